@@ -1,0 +1,123 @@
+"""The generated head of an ode45 module: the right-hand side in the user's own order of operations, split by what changes when.
+
+Parameter-only parts are worked out once a trajectory (``prepare``), time-only parts once a stage time (``drive``): the same operations on
+the same numbers, so not a digit changes, but the cosine of two stages at one time is computed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from saltus.codegen.scalar import ScalarCode
+from saltus.codegen.taylor_head import bits_of, evaluation_order, indented, parameter_leaf
+from saltus.system import expression as ex
+from saltus.system.derivatives import differentiate
+from saltus.system.expression import Expr
+from saltus.system.system import System
+
+
+class _Slots:
+    """Values that a later stage reads from an array: each gets an index."""
+
+    def __init__(self, array: str) -> None:
+        self.array = array
+        self.nodes: dict[Expr, int] = {}
+
+    def code(self, node: Expr) -> str:
+        return f"{self.array}[{self.nodes.setdefault(node, len(self.nodes))}]"
+
+
+def _level(node: Expr) -> int:
+    """0: parameters only, 1: time too, 2: state or mode."""
+    if ex.depends_on(node, ("state", "select")):
+        return 2
+    return 1 if ex.depends_on(node, ("time",)) else 0
+
+
+class _Stages:
+    """Leaves for the state-dependent code: whatever doesn't depend on the state is read from ``c`` or ``q``."""
+
+    def __init__(self, system: System) -> None:
+        self.constants, self.drives = _Slots("c"), _Slots("q")
+        self._system = system
+
+    def state_leaf(self, node: Expr) -> str | None:
+        if node.op == "state":
+            return f"y[{self._system.states.index(node.payload)}]"
+        level = _level(node)
+        if level == 2 or node.op == "const":
+            return None
+        return "t" if node.op == "time" else (self.constants if level == 0 else self.drives).code(node)
+
+    def drive_leaf(self, node: Expr) -> str | None:
+        if node.op == "time":
+            return "t"
+        return self.constants.code(node) if _level(node) == 0 and node.op != "const" else None
+
+
+def _with_sides(system: System, stages: _Stages, roots: Iterable[Expr]) -> ScalarCode:
+    """Code that first takes from the state the sides that the roots ask about."""
+    roots = list(roots)
+    asked = {g for root in roots for node in ex.walk(root) if node.op == "select" for g in bits_of(node.payload)}
+    code = ScalarCode(stages.state_leaf, side=lambda i: f"b{i}")
+    for i in evaluation_order(system):
+        if i in asked or any(i in _asked_by(system, g) for g in asked):
+            value = code.value(system.guards[i].gap)
+            code.lines.append(f"b{i} = {value} > 0.0")
+    return code
+
+
+def _asked_by(system: System, guard: int) -> set[int]:
+    """Guards whose sides the gap of a guard depends on."""
+    return {g for node in ex.walk(system.guards[guard].gap) if node.op == "select" for g in bits_of(node.payload)}
+
+
+def _outputs(code: ScalarCode, roots: Iterable[Expr]) -> str:
+    values = code.values(roots)
+    code.lines += [f"out[{i}] = {value}" for i, value in enumerate(values)]
+    return indented(code.lines)
+
+
+def _gap_rates(system: System, stages: _Stages) -> str:
+    """d gap/dt = gradient . dy/dt + partial derivative by time."""
+    gaps = [guard.gap for guard in system.guards]
+    rows = [[differentiate(gap, ex.state(s)) for s in system.states] + [differentiate(gap, ex.TIME)] for gap in gaps]
+    code = _with_sides(system, stages, [entry for row in rows for entry in row])
+    for i, row in enumerate(rows):
+        terms = []
+        for j, entry in enumerate(row):
+            if entry.op == "const" and entry.payload == 0:
+                continue
+            value = code.value(entry)
+            terms.append(f"{value} * dy[{j}]" if j < len(system.states) else value)
+        code.lines.append(f"out[{i}] = {' + '.join(terms) or '0.0'}")
+    return indented(code.lines)
+
+
+def ode45_head(system: System) -> str:
+    """Everything that kernels/ode45.py expects to stand above it."""
+    stages = _Stages(system)
+    gaps = [guard.gap for guard in system.guards]
+    field = _outputs(_with_sides(system, stages, system.field), system.field)
+    gap_values = _outputs(_with_sides(system, stages, gaps), gaps)
+    gap_rates = _gap_rates(system, stages)
+    drive = ScalarCode(stages.drive_leaf)
+    for node, i in stages.drives.nodes.items():
+        value = drive.value(node)
+        drive.lines.append(f"q[{i}] = {value}")
+    prepare = ScalarCode(parameter_leaf(system))
+    for node, i in stages.constants.nodes.items():
+        value = prepare.value(node)
+        prepare.lines.append(f"c[{i}] = {value}")
+    sizes = dict(NSTATES=len(system.states), NGUARDS=len(gaps), NCONST=len(stages.constants.nodes), NDRIVE=len(stages.drives.nodes))
+    return "\n".join(
+        [
+            *(f"{name} = {value!r}" for name, value in sizes.items()),
+            "",
+            f"@kernel\ndef prepare(p, c):\n{indented(prepare.lines)}\n",
+            f"@kernel\ndef drive(t, c, q):\n{indented(drive.lines)}\n",
+            f"@kernel\ndef field(t, y, c, q, out):\n{field}\n",
+            f"@kernel\ndef gaps(t, y, c, q, out):\n{gap_values}\n",
+            f"@kernel\ndef gap_rates(t, y, dy, c, q, out):\n{gap_rates}\n",
+        ]
+    )

@@ -1,0 +1,192 @@
+"""Equations as linear combinations of series: the form in which Taylor recurrences are cheapest.
+
+A field such as ``(drive - contact)/mass - 2*zeta*wn*v - wn**2*x - cubic/mass*x**3`` is flattened to
+``sum(coefficient * series)``: the coefficients depend on parameters and mode only and are worked out once per step at most, the series
+(states, products, elementary functions) carry the Taylor coefficients. Piecewise laws whose pieces are finite everywhere dissolve into
+mode-dependent coefficients; pieces that may be undefined on the other side (roots, logarithms, quotients) stay a selection of series.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from saltus.system import expression as ex
+from saltus.system.expression import Expr
+
+#: Series kinds whose value is finite wherever their operands are.
+_TOTAL = ("state", "time", "product", "sin", "cos", "atan", "tanh", "linear")
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One series.
+
+    Attributes
+    ----------
+    kind : str
+        ``state``, ``time``, ``linear``, ``product``, ``quotient``, ``power``, ``select``, or an elementary function.
+    operands : tuple of Series
+        Its arguments.
+    payload : object
+        Name of a state, exponent (Expr) of a power, condition of a select, :class:`Linear` of a linear series.
+    """
+
+    kind: str
+    operands: tuple[Series, ...] = ()
+    payload: object = None
+
+    @property
+    def total(self) -> bool:
+        """Whether the series is finite wherever the states are."""
+        return self.kind in _TOTAL and all(s.total for s in self.operands)
+
+
+@dataclass
+class Linear:
+    """``offset + sum(terms[s] * s)``; coefficients are expressions of parameters and mode bits only."""
+
+    offset: Expr
+    terms: dict[Series, Expr] = field(default_factory=dict)
+
+
+def is_constant(coefficient: Expr, value: float) -> bool:
+    """Whether a coefficient is the literal ``value``."""
+    return coefficient.op == "const" and coefficient.payload == value
+
+
+def _scale(factor: Expr, c: Expr, by_division: bool = False) -> Expr:
+    """``c * factor`` (or ``c / factor``), pushed into the branches of a mode selection so that nothing is divided at run time."""
+    if c.op == "select":
+        return ex.select(c.payload, _scale(factor, c.args[0], by_division), _scale(factor, c.args[1], by_division))
+    if c.op == "neg":
+        return ex.neg(_scale(factor, c.args[0], by_division))
+    if factor.op == "select" and not by_division:
+        return ex.select(factor.payload, _scale(factor.args[0], c), _scale(factor.args[1], c))
+    return ex.div(c, factor) if by_division else ex.mul(c, factor)
+
+
+class SeriesBuilder:
+    """Turns expressions into :class:`Linear` forms over shared series."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple, Series] = {}
+        self._forms: dict[Expr, Linear] = {}
+
+    def form(self, node: Expr) -> Linear:
+        """The linear form of an expression."""
+        for step in ex.walk(node):
+            if step not in self._forms:
+                self._forms[step] = self._flatten(step)
+        return self._forms[node]
+
+    def series(self, node: Expr) -> Series:
+        """The expression as one series."""
+        return self._as_series(self.form(node))
+
+    # -- one node -----------------------------------------------------------------------------------------------------------------
+    def _flatten(self, node: Expr) -> Linear:
+        if not ex.depends_on(node, ("state", "time")):
+            return Linear(node)
+        forms = [self._forms[a] for a in node.args]
+        match node.op:
+            case "state" | "time":
+                return self._unit(self._make(node.op, (), node.payload))
+            case "add":
+                return self._combine(forms[0], forms[1], ex.add)
+            case "sub":
+                return self._combine(forms[0], forms[1], ex.sub)
+            case "neg":
+                return self._scaled(ex.constant(-1.0), forms[0])
+            case "mul":
+                return self._product(*forms)
+            case "div":
+                return self._quotient(*forms)
+            case "pow":
+                return self._power(forms[0], node.args[1])
+            case "select":
+                return self._selection(node.payload, *forms)
+        return self._unit(self._make(node.op, (self._as_series(forms[0]),)))
+
+    def _make(self, kind: str, operands: tuple[Series, ...], payload: object = None) -> Series:
+        key = (kind, payload, tuple(map(id, operands)))
+        return self._known.setdefault(key, Series(kind, operands, payload))
+
+    @staticmethod
+    def _unit(series: Series) -> Linear:
+        return Linear(ex.constant(0.0), {series: ex.constant(1.0)})
+
+    def _as_series(self, form: Linear) -> Series:
+        if len(form.terms) == 1 and is_constant(form.offset, 0.0):
+            ((series, coefficient),) = form.terms.items()
+            if is_constant(coefficient, 1.0):
+                return series
+        key = ("linear", form.offset, tuple((id(s), c) for s, c in form.terms.items()))
+        return self._known.setdefault(key, Series("linear", tuple(form.terms), form))
+
+    @staticmethod
+    def _combine(a: Linear, b: Linear, op) -> Linear:
+        zero = ex.constant(0.0)
+        terms = dict(a.terms)
+        for series, coefficient in b.terms.items():
+            terms[series] = op(terms.get(series, zero), coefficient)
+        return Linear(op(a.offset, b.offset), {s: c for s, c in terms.items() if not is_constant(c, 0.0)})
+
+    @staticmethod
+    def _scaled(factor: Expr, form: Linear, by_division: bool = False) -> Linear:
+        if is_constant(factor, -1.0):
+            return Linear(ex.neg(form.offset), {s: ex.neg(c) for s, c in form.terms.items()})
+        return Linear(_scale(factor, form.offset, by_division), {s: _scale(factor, c, by_division) for s, c in form.terms.items()})
+
+    def _split_factor(self, form: Linear) -> tuple[Expr, Series]:
+        """A form as coefficient times series, the coefficient pulled out where there is only one term."""
+        if len(form.terms) == 1 and is_constant(form.offset, 0.0):
+            ((series, coefficient),) = form.terms.items()
+            return coefficient, series
+        return ex.constant(1.0), self._as_series(form)
+
+    def _product(self, a: Linear, b: Linear) -> Linear:
+        if not a.terms:
+            return self._scaled(a.offset, b)
+        if not b.terms:
+            return self._scaled(b.offset, a)
+        (ca, sa), (cb, sb) = self._split_factor(a), self._split_factor(b)
+        return self._scaled(_scale(ca, cb), self._unit(self._make("product", (sa, sb))))
+
+    def _quotient(self, a: Linear, b: Linear) -> Linear:
+        if not b.terms:
+            return self._scaled(b.offset, a, by_division=True)
+        cb, sb = self._split_factor(b)
+        if a.terms:
+            ca, sa = self._split_factor(a)
+            quotient = self._unit(self._make("quotient", (sa, sb)))
+        else:
+            ca, quotient = a.offset, self._unit(self._make("power", (sb,), ex.constant(-1.0)))
+        return self._scaled(cb, self._scaled(ca, quotient), by_division=True)
+
+    def _power(self, base: Linear, exponent: Expr) -> Linear:
+        coefficient, series = self._split_factor(base)
+        if exponent.op == "const" and exponent.payload == int(exponent.payload) and 0 < exponent.payload <= 64:
+            return self._scaled(self._whole_power(coefficient, exponent.payload), self._unit(self._multiply_out(series, int(exponent.payload))))
+        if not is_constant(coefficient, 1.0):
+            series = self._as_series(base)
+        if is_constant(exponent, 0.5):
+            return self._unit(self._make("sqrt", (series,)))
+        return self._unit(self._make("power", (series,), exponent))
+
+    @staticmethod
+    def _whole_power(coefficient: Expr, exponent: float) -> Expr:
+        return coefficient if is_constant(coefficient, 1.0) else ex.power(coefficient, exponent)
+
+    def _multiply_out(self, series: Series, exponent: int) -> Series:
+        if exponent == 1:
+            return series
+        half = self._multiply_out(series, exponent // 2)
+        square = self._make("product", (half, half))
+        return self._make("product", (series, square)) if exponent % 2 else square
+
+    def _selection(self, condition: ex.Condition, a: Linear, b: Linear) -> Linear:
+        if all(s.total for s in (*a.terms, *b.terms)):
+            zero = ex.constant(0.0)
+            terms = {s: ex.select(condition, a.terms.get(s, zero), b.terms.get(s, zero)) for s in {**a.terms, **b.terms}}
+            return Linear(ex.select(condition, a.offset, b.offset), terms)
+        return self._unit(self._make("select", (self._as_series(a), self._as_series(b)), condition))

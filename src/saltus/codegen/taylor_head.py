@@ -1,0 +1,169 @@
+"""The generated head of a Taylor module: sizes, constants, jets and gaps of one system."""
+
+from __future__ import annotations
+
+from saltus.codegen.jets import Constants, JetCode
+from saltus.codegen.scalar import ScalarCode
+from saltus.codegen.series import Linear, SeriesBuilder, is_constant
+from saltus.system import expression as ex
+from saltus.system.expression import Expr
+from saltus.system.system import System
+
+#: Rows of the clock before the phases of harmonics (kernels/taylor.py: TAU, BASE).
+FIRST_TURN = 2
+
+
+def indented(lines: list[str]) -> str:
+    """Lines as a function body."""
+    return "\n".join("    " + line for line in lines) if lines else "    pass"
+
+
+def parameter_leaf(system: System, states: str | None = None):
+    """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions."""
+    names, state_names = tuple(system.values), system.states
+
+    def leaf(node: Expr) -> str | None:
+        if node.op == "param":
+            return f"p[{names.index(node.payload)}]"
+        if states and node.op == "state":
+            return f"{states}[{state_names.index(node.payload)}]"
+        return "t" if states and node.op == "time" else None
+
+    return leaf
+
+
+def gaps_function(system: System) -> str:
+    """``gaps(t, y, p, out)``: value of every guard, sides taken from the state."""
+    code = ScalarCode(parameter_leaf(system, "y"), side=lambda i: f"(out[{i}] > 0.0)")
+    for i in evaluation_order(system):
+        value = code.value(system.guards[i].gap)
+        code.lines.append(f"out[{i}] = {value}")
+    return f"@kernel\ndef gaps(t, y, p, out):\n{indented(code.lines)}\n"
+
+
+def evaluation_order(system: System) -> list[int]:
+    """Guards ordered so that a gap comes after the guards on whose sides it depends."""
+    order: list[int] = []
+
+    def visit(i: int) -> None:
+        if i in order:
+            return
+        for node in ex.walk(system.guards[i].gap):
+            if node.op == "select":
+                for guard in bits_of(node.payload):
+                    visit(guard)
+        order.append(i)
+
+    for i in range(len(system.guards)):
+        visit(i)
+    return order
+
+
+def bits_of(condition: ex.Condition) -> set[int]:
+    """Guards that a condition asks about."""
+    match condition:
+        case ex.Bit(guard):
+            return {guard}
+        case ex.And(left, right) | ex.Or(left, right):
+            return bits_of(left) | bits_of(right)
+        case ex.Not(inner):
+            return bits_of(inner)
+    raise TypeError(condition)
+
+
+class _Guards:
+    """Rows and snap data of the guards, filled while the jets are written."""
+
+    def __init__(self) -> None:
+        self.row: list[int] = []
+        self.sign: list[float] = []
+        self.snap_state: list[int] = []
+        self.snap_const: list[int] = []
+
+
+def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
+    """(state, sign, boundary) if the gap is ``sign * (state - boundary)`` with a boundary of parameters only."""
+    if len(form.terms) != 1 or ex.depends_on(form.offset, ("select",)):
+        return None
+    ((series, coefficient),) = form.terms.items()
+    if series.kind != "state" or not (is_constant(coefficient, 1.0) or is_constant(coefficient, -1.0)):
+        return None
+    sign = coefficient.payload
+    return str(series.payload), sign, ex.neg(form.offset) if sign > 0 else form.offset
+
+
+def taylor_head(system: System, order: int, lanes: int) -> str:
+    """Everything that kernels/taylor.py expects to stand above it."""
+    builder, constants = SeriesBuilder(), Constants()
+    fields = tuple(builder.form(f) for f in system.field)
+    code = JetCode(system.states, fields, builder, constants, order)
+    for i in range(len(system.states)):
+        for k in range(order + 1):
+            code.write(i * (order + 1) + k, code.state(i, k))
+    guards, rows = _write_guards(system, code, builder, constants, order)
+    gap_row, scale_row = rows, rows + len(system.guards)
+    constant_code = ScalarCode(parameter_leaf(system))
+    for node, i in constants.rows.items():
+        value = constant_code.value(node)
+        constant_code.lines.append(f"c[{i}, lane] = {value}")
+    series = sorted(set(guards.row))
+    sizes = dict(
+        LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order, NCONST=len(constants.rows),
+        NTURNS=len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, ROWS=scale_row + len(system.guards),
+        NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSERIES=len(series), SERIES_ROW=tuple(series) or (0,),
+        GUARD_ROW=tuple(guards.row) or (0,), GUARD_SERIES=tuple(series.index(row) for row in guards.row) or (0,),
+        GUARD_SIGN=tuple(guards.sign) or (1.0,),
+        SNAP_STATE=tuple(guards.snap_state) or (-1,), SNAP_CONST=tuple(guards.snap_const) or (-1,),
+    )  # fmt: skip
+    return "\n".join(
+        [
+            *(f"{name} = {value!r}" for name, value in sizes.items()),
+            "",
+            f"@kernel\ndef constants(p, c, lane):\n{indented(constant_code.lines)}\n",
+            gaps_function(system),
+            _turns_function(system, code),
+            f"@inner\ndef jets(y, side, c, clock, work):\n{indented(code.lines)}\n",
+        ]
+    )
+
+
+def _write_guards(system: System, code: JetCode, builder: SeriesBuilder, constants: Constants, order: int) -> tuple[_Guards, int]:
+    """Write every gap to the work rows; guards of one state share that state's rows."""
+    guards, rows = _Guards(), len(system.states) * (order + 1)
+    forms = [builder.form(guard.gap) for guard in system.guards]
+    boundaries = [_state_boundary(form) for form in forms]
+    own_rows = rows
+    for form, boundary in zip(forms, boundaries, strict=True):
+        if boundary:
+            state, sign, place = boundary
+            index = system.states.index(state)
+            guards.row.append(index * (order + 1))
+            guards.sign.append(sign)
+            guards.snap_state.append(index)
+            guards.snap_const.append(constants.index(place))
+            continue
+        guards.row.append(own_rows)
+        guards.sign.append(1.0)
+        guards.snap_state.append(-1)
+        guards.snap_const.append(-1)
+        for k in range(order + 1):
+            code.write(own_rows + k, code.linear(form, k))
+        own_rows += order + 1
+    for i, (form, boundary) in enumerate(zip(forms, boundaries, strict=True)):
+        if boundary:
+            x, c = code.state(guards.snap_state[i], 0), f"load(c, {guards.snap_const[i]}, LANES)"
+            value = f"{x} - {c}" if boundary[1] > 0 else f"{c} - {x}"
+        else:
+            value = code.linear(form, 0)
+        code.write(own_rows + i, value)
+        code.write(own_rows + len(forms) + i, code.size(form))
+    return guards, own_rows
+
+
+def _turns_function(system: System, code: JetCode) -> str:
+    """``turns(p, period, count, lane, clock)``: phase of every harmonic at the start of a period."""
+    scalar = ScalarCode(parameter_leaf(system))
+    for (rate, offset), i in code.harmonics.items():
+        w, b = scalar.value(rate), scalar.value(offset)
+        scalar.lines.append(f"clock[{FIRST_TURN + i}, lane] = {b} + turned({w}, period, count) + {w} * origin")
+    return f"@kernel\ndef turns(p, origin, period, count, lane, clock):\n{indented(scalar.lines)}\n"

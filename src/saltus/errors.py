@@ -1,0 +1,37 @@
+"""Exceptions. Every message says what happened, where, and what to do next."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class SaltusError(Exception):
+    """Base of everything that saltus raises on purpose."""
+
+
+class TraceError(SaltusError):
+    """An equation can't be traced."""
+
+
+class UnitError(SaltusError, ValueError):
+    """A value has the wrong unit or none that can be read."""
+
+
+class ParameterError(SaltusError, ValueError):
+    """A parameter, start or option is unknown or out of range."""
+
+
+class StudyError(SaltusError, ValueError):
+    """A study file is wrong."""
+
+
+class CacheError(SaltusError, OSError):
+    """The folder of generated kernels can't be used."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A sentence that offers the nearest known name, or lists all of them."""
+    known = list(known)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return f"Did you mean {close[0]!r}?" if close else f"Known: {', '.join(sorted(known))}."

@@ -1,0 +1,1 @@
+"""Numba templates and their pure helpers: numbers in, numbers out, nothing allocated in a loop, nothing raised."""

@@ -1,0 +1,130 @@
+"""Template: MATLAB's odezero, the root finder behind ode45's events. codegen puts it, with ode45.py, behind a generated head.
+
+A step from t to t_new has the values of all gaps at both ends. While a gap differs in sign between the ends of the bracket [t_left,
+t_right], regula falsi proposes a place for each such gap, the leftmost proposal is tried, and the half in which the first change of sign
+lies is kept; an end that has stayed twice in a row has its values halved (the Illinois rule, Dowell & Jarratt 1971). The rules are those
+of Shampine & Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997), as ode45 applies them to terminal events in either direction.
+
+Symbols
+-------
+t_left, t_right the bracket; t_try the last place tried, after a move: the end that was given up; rows LEFT, RIGHT, TRY of `gap` hold the
+gaps at these three. Only the signs and ratios of gaps matter, so halved values do no harm.
+"""
+
+# Rows of `gap`: at the two ends of the step, then the three of the root finder, rates at a contact and rates of a state at rest.
+AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST = range(7)
+GAP_ROWS = 7
+# Ends of the bracket that moved last.
+NEITHER, MOVED_LEFT, MOVED_RIGHT = range(3)
+SMALLEST_NORMAL = 2.2250738585072014e-308
+
+
+@inner
+def ulp(x):
+    """Distance from |x| to the next larger double (MATLAB's eps(x))."""
+    return np.spacing(abs(x))
+
+
+@inner
+def sign(x):
+    """-1, 0 or 1."""
+    return int(x > 0.0) - int(x < 0.0)
+
+
+@inner
+def changes_sign(gap, row, other, g):
+    """Whether gap g has another sign in `other` than in `row`; zero is a sign of its own."""
+    return sign(gap[row, g]) != sign(gap[other, g])
+
+
+@inner
+def any_sign_change(gap, row, other):
+    """Whether any gap has another sign in `other` than in `row`."""
+    for g in range(NGUARDS):
+        if changes_sign(gap, row, other, g):
+            return True
+    return False
+
+
+@kernel
+def odezero(t, t_new, t_leg, h, work, gap, c, q):
+    """The end of the step up to which no contact happens: (time of the first contact, whether it ends the leg), times in s.
+
+    Needs the gaps at t and t_new in rows AT_NODE and AT_NEXT. Afterwards rows LEFT and RIGHT bracket the contact: the gaps that differ
+    in sign there are those that close. A contact at the very start of a leg (t_leg) doesn't end it: it is the one that began it.
+    """
+    tol = min(128.0 * max(ulp(t), ulp(t_new)), abs(t_new - t))
+    t_left, t_right, t_try = t, t_new, t_new
+    for g in range(NGUARDS):
+        gap[LEFT, g], gap[RIGHT, g], gap[TRY, g] = gap[AT_NODE, g], gap[AT_NEXT, g], gap[AT_NEXT, g]
+    moved = NEITHER
+    while t_right - t_left > tol:
+        place = propose(t, t_left, t_right, t_try, tol, gap)
+        gaps_at(place, t, h, work, gap, c, q)
+        if any_sign_change(gap, LEFT, TRY):
+            t_right, t_try = place, t_right
+            give_up(gap, RIGHT)
+            if moved == MOVED_RIGHT:
+                halve(gap, LEFT)
+            moved = MOVED_RIGHT
+        else:
+            t_left, t_try = place, t_left
+            give_up(gap, LEFT)
+            if moved == MOVED_LEFT:
+                halve(gap, RIGHT)
+            moved = MOVED_LEFT
+    return t_right, t_left != t_leg
+
+
+@inner
+def propose(t, t_left, t_right, t_try, tol, gap):
+    """The next place to try, at least tol/2 inside the bracket."""
+    width = t_right - t_left
+    change = 1.0
+    for g in range(NGUARDS):
+        if changes_sign(gap, LEFT, RIGHT, g):
+            if gap[LEFT, g] == 0.0 and t_left == t:
+                return t_left + 0.5 * tol
+            change = min(change, proposal(t_left, t_right, t_try, width, gap[LEFT, g], gap[RIGHT, g], gap[TRY, g]))
+    change = max(0.5 * tol, min(change * width, width - 0.5 * tol))
+    return t_left + change
+
+
+@inner
+def proposal(t_left, t_right, t_try, width, left, right, tried):
+    """Where one gap wants to be tried, as a fraction of the bracket; a gap that is zero at an end is extrapolated from the end given up."""
+    if left == 0.0:
+        if not (t_try > t_right and tried != right):
+            return 0.5
+        maybe = 1.0 - right * (t_try - t_right) / ((tried - right) * width)
+    elif right == 0.0:
+        if not (t_try < t_left and tried != left):
+            return 0.5
+        maybe = left * (t_left - t_try) / ((tried - left) * width)
+    else:
+        return -left / (right - left)
+    return maybe if 0.0 <= maybe <= 1.0 else 0.5
+
+
+@inner
+def give_up(gap, row):
+    """The place tried becomes an end of the bracket; the end it replaces is remembered as tried."""
+    for g in range(NGUARDS):
+        gap[row, g], gap[TRY, g] = gap[TRY, g], gap[row, g]
+
+
+@inner
+def halve(gap, row):
+    """The Illinois rule, where it doesn't lose the sign."""
+    for g in range(NGUARDS):
+        if abs(0.5 * gap[row, g]) >= SMALLEST_NORMAL:
+            gap[row, g] *= 0.5
+
+
+@inner
+def gaps_at(time, t, h, work, gap, c, q):
+    """Gaps at a time inside the step, in row TRY."""
+    dense(time, t, h, work)
+    if GAPS_IN_TIME:
+        drive(time, c, q)
+    gaps(time, work[POINT], c, q, gap[TRY])

@@ -1,0 +1,55 @@
+"""Status codes of a trajectory and kinds of contact: numbers in kernels, words in results, a sentence each for people."""
+
+from __future__ import annotations
+
+# Status of a trajectory. 0 is not used: a fill value must never read as success.
+RUNNING = 1
+OK = 2
+GRAZE_UNRESOLVED = 3
+RESTING = 4
+SLIDING = 5
+BUDGET_STEPS = 6
+BUDGET_EVENTS = 7
+NONFINITE = 8
+INVALID = 9
+NOT_COMPUTED = 10
+
+#: Name and meaning of every status code.
+STATUS = {
+    RUNNING: ("running", "not finished yet"),
+    OK: ("ok", "reached the end"),
+    GRAZE_UNRESOLVED: ("graze_unresolved", "reached the end, but a graze on the way was shallower than the local error: either outcome is possible"),
+    RESTING: ("resting", "the gap and its first three derivatives are zero: resting on a boundary, which this version doesn't follow"),
+    SLIDING: ("sliding", "both sides push onto a boundary: the solution slides along it, which this version doesn't follow"),
+    BUDGET_STEPS: ("budget_steps", "the step budget was used up"),
+    BUDGET_EVENTS: ("budget_events", "the event budget was used up: contacts accumulate"),
+    NONFINITE: ("nonfinite", "the state or its derivatives overflowed or became NaN"),
+    INVALID: ("invalid", "the start or a parameter isn't a finite number"),
+    NOT_COMPUTED: ("not_computed", "stopped before this trajectory was begun"),
+}
+
+# Kinds of contact record.
+CROSSING = 0
+GRAZE = 1
+GRAZE_SHALLOW = 2
+
+#: Name of every kind of contact record.
+CONTACT_KIND = {CROSSING: "crossing", GRAZE: "graze", GRAZE_SHALLOW: "graze_unresolved"}
+
+# Columns of the integer counters kept for each trajectory.
+STEPS, REJECTED, EVENTS, GRAZES, UNRESOLVED, VIOLATIONS = range(6)
+#: Names of the integer counters, by column.
+COUNTERS = ("steps", "rejected_steps", "events", "grazes", "grazes_unresolved", "mode_violations")
+
+# Columns of the running minima kept for each trajectory.
+CONTACT_SPEED, GAP_MARGIN = range(2)
+#: Names of the running minima, by column.
+MINIMA = ("smallest_contact_speed", "smallest_gap_margin")
+
+# Columns of a contact record: integers, then floats (the state follows the floats).
+REC_TRAJECTORY, REC_PERIOD, REC_GUARD, REC_DIRECTION, REC_KIND, REC_MODE_BEFORE, REC_MODE_AFTER = range(7)
+REC_PHASE, REC_VELOCITY, REC_TIME_ERROR = range(3)
+RECORD_INTEGERS, RECORD_FLOATS = 7, 3
+
+# What a call of a kernel returns.
+FINISHED, PAUSED = 0, 1

@@ -1,0 +1,422 @@
+"""Expressions: what a traced equation is made of.
+
+An :class:`Expr` is one node of a directed acyclic graph. Nodes are interned: the same operation on the same operands is the same
+object, so common subexpressions are shared from the start, and the order of operations is the order in which the user wrote them (a
+computer algebra system would sort the terms; MATLAB's digits depend on that order, see docs/decisions/0002).
+
+Conditions (:class:`Relation`, :class:`And`, :class:`Or`, :class:`Not`) never become Python booleans: asking for their truth raises a
+:class:`~saltus.errors.TraceError` that says what to write instead.
+"""
+
+from __future__ import annotations
+
+import math
+import weakref
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Union
+
+from saltus.errors import TraceError
+
+#: Elementary functions that a traced equation may call, in addition to arithmetic.
+ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
+
+_MATH = {name: getattr(math, name) for name in ELEMENTARY}
+_INTERNED: weakref.WeakValueDictionary[tuple, Expr] = weakref.WeakValueDictionary()
+Number = int | float
+Operand = Union["Expr", int, float]
+
+
+class Expr:
+    """One node of an expression graph.
+
+    Attributes
+    ----------
+    op : str
+        ``const``, ``param``, ``state``, ``time``, ``add``, ``sub``, ``mul``, ``div``, ``neg``, ``pow``, ``select`` or one of
+        :data:`ELEMENTARY`.
+    args : tuple of Expr
+        Operands in the order written. ``pow`` holds base and exponent, ``select`` the value where its condition holds and the other.
+    payload : object
+        The number of a ``const``, the name of a ``param`` or ``state``, the condition of a ``select``; else None.
+    """
+
+    __slots__ = ("__weakref__", "args", "op", "payload")
+    __array_ufunc__ = None  # a NumPy scalar on the left defers to our reflected operators
+
+    op: str
+    args: tuple[Expr, ...]
+    payload: Any
+
+    def __new__(cls, op: str, args: tuple[Expr, ...] = (), payload: Any = None) -> Expr:
+        tag = payload.hex() if isinstance(payload, float) else payload
+        key = (op, tag, tuple(map(id, args)))
+        node = _INTERNED.get(key)
+        if node is None:
+            node = object.__new__(cls)
+            node.op, node.args, node.payload = op, args, payload
+            _INTERNED[key] = node
+        return node
+
+    # -- arithmetic ----------------------------------------------------------------------------------------------------------
+    def __add__(self, other: Operand) -> Expr:
+        return add(self, other)
+
+    def __radd__(self, other: Operand) -> Expr:
+        return add(other, self)
+
+    def __sub__(self, other: Operand) -> Expr:
+        return sub(self, other)
+
+    def __rsub__(self, other: Operand) -> Expr:
+        return sub(other, self)
+
+    def __mul__(self, other: Operand) -> Expr:
+        return mul(self, other)
+
+    def __rmul__(self, other: Operand) -> Expr:
+        return mul(other, self)
+
+    def __truediv__(self, other: Operand) -> Expr:
+        return div(self, other)
+
+    def __rtruediv__(self, other: Operand) -> Expr:
+        return div(other, self)
+
+    def __pow__(self, other: Operand) -> Expr:
+        return power(self, other)
+
+    def __rpow__(self, other: Operand) -> Expr:
+        return power(other, self)
+
+    def __neg__(self) -> Expr:
+        return neg(self)
+
+    def __pos__(self) -> Expr:
+        return self
+
+    def __abs__(self) -> Expr:
+        return absolute(self)
+
+    # -- comparisons make guards -----------------------------------------------------------------------------------------------
+    def __lt__(self, other: Operand) -> Relation:
+        return Relation(sub(other, self))
+
+    def __le__(self, other: Operand) -> Relation:
+        return Relation(sub(other, self))
+
+    def __gt__(self, other: Operand) -> Relation:
+        return Relation(sub(self, other))
+
+    def __ge__(self, other: Operand) -> Relation:
+        return Relation(sub(self, other))
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        raise TraceError(
+            "an equation compared a traced value with ==, which holds only on a set of measure zero. "
+            "Write the two sides of the boundary with < or > inside sl.piecewise(...)."
+        )
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    # -- everything that would need a number ---------------------------------------------------------------------------------
+    def __bool__(self) -> bool:
+        raise TraceError(
+            "an equation asked whether a traced value is true. It is a symbol here, not a number: "
+            "write sl.piecewise((value, condition), otherwise=...) in place of `if`, `and`, `or`."
+        )
+
+    def __float__(self) -> float:
+        raise TraceError(
+            "an equation passed a traced value to a function that needs a plain number (math.cos, float, numpy on arrays, ...). "
+            "Use saltus's own: sl.cos, sl.sin, sl.exp, sl.sqrt, sl.log, sl.tan, sl.atan, sl.tanh, sl.min, sl.max, abs."
+        )
+
+    __int__ = __float__
+    __index__ = None  # type: ignore[assignment]
+
+    def __iter__(self) -> Iterator[Expr]:
+        raise TraceError("an equation iterated over a traced value, which is a single number. List every state in states=.")
+
+    def __repr__(self) -> str:
+        from saltus.system.text import to_text  # text.py builds on this module
+
+        return to_text(self)
+
+    def __copy__(self) -> Expr:
+        return self
+
+    def __deepcopy__(self, memo: dict) -> Expr:
+        return self
+
+
+# -- conditions -------------------------------------------------------------------------------------------------------------------
+class Condition:
+    """A truth value that depends on the state: sides of guards, joined by ``&``, ``|`` and ``~``."""
+
+    def __and__(self, other: Condition) -> Condition:
+        return And(self, _condition(other))
+
+    def __or__(self, other: Condition) -> Condition:
+        return Or(self, _condition(other))
+
+    def __invert__(self) -> Condition:
+        return Not(self)
+
+    def __bool__(self) -> bool:
+        raise TraceError(
+            "an equation used a comparison of traced values as a Python truth value (`if x > gap:`, `a < x < b`, `and`, `or`, "
+            "`not`, min(), max()). Write the branches as sl.piecewise((value, x > gap), ..., otherwise=...); join conditions with "
+            "& | ~; use sl.min and sl.max."
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Relation(Condition):
+    """``gap > 0``: one side of a guard. Only while tracing: a system's conditions hold bits."""
+
+    gap: Expr
+
+
+@dataclass(frozen=True)
+class Bit(Condition):
+    """Side of guard number ``guard`` in a system's list: true where that guard is positive."""
+
+    guard: int
+
+
+@dataclass(frozen=True)
+class And(Condition):
+    """Both conditions hold."""
+
+    left: Condition
+    right: Condition
+
+
+@dataclass(frozen=True)
+class Or(Condition):
+    """At least one condition holds."""
+
+    left: Condition
+    right: Condition
+
+
+@dataclass(frozen=True)
+class Not(Condition):
+    """The condition does not hold."""
+
+    inner: Condition
+
+
+def _condition(value: object) -> Condition:
+    if not isinstance(value, Condition):
+        raise TraceError(f"a condition must be a comparison such as x > gap, not {value!r}.")
+    return value
+
+
+# -- leaves -----------------------------------------------------------------------------------------------------------------------
+def constant(value: Number) -> Expr:
+    """A literal number; it must be finite. Zero has no sign."""
+    value = float(value) + 0.0
+    if not math.isfinite(value):
+        raise TraceError(f"an equation holds the constant {value}; every number in it must be finite.")
+    return Expr("const", (), value)
+
+
+def parameter(name: str) -> Expr:
+    """A named parameter of the system."""
+    return Expr("param", (), name)
+
+
+def state(name: str) -> Expr:
+    """A named state variable."""
+    return Expr("state", (), name)
+
+
+#: The independent variable t [s].
+TIME = Expr("time")
+
+
+def as_expr(value: Operand) -> Expr:
+    """``value`` as an expression; numbers become constants. Raises TraceError for anything else."""
+    if isinstance(value, Expr):
+        return value
+    if isinstance(value, Condition):
+        raise TraceError("a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0).")
+    if isinstance(value, str):
+        raise TraceError(f"an equation holds the text {value!r}. Text with units is for parameter values; inside an equation write SI numbers.")
+    if getattr(value, "shape", ()) != ():
+        raise TraceError("an equation holds an array. A traced value is a single number: write out the components.")
+    try:
+        return constant(value)
+    except (TypeError, ValueError, OverflowError):
+        raise TraceError(f"an equation holds {value!r}, which is neither a number nor a traced value.") from None
+
+
+# -- operations: constants are folded, nothing else is rearranged --------------------------------------------------------------------
+def add(a: Operand, b: Operand) -> Expr:
+    """``a + b``"""
+    a, b = as_expr(a), as_expr(b)
+    if a.op == "const" and b.op == "const":
+        return constant(a.payload + b.payload)
+    if a.op == "const" and a.payload == 0:
+        return b
+    if b.op == "const" and b.payload == 0:
+        return a
+    return Expr("add", (a, b))
+
+
+def sub(a: Operand, b: Operand) -> Expr:
+    """``a - b``"""
+    a, b = as_expr(a), as_expr(b)
+    if a.op == "const" and b.op == "const":
+        return constant(a.payload - b.payload)
+    if a is b:
+        return constant(0.0)
+    if a.op == "const" and a.payload == 0:
+        return neg(b)
+    if b.op == "const" and b.payload == 0:
+        return a
+    return Expr("sub", (a, b))
+
+
+def mul(a: Operand, b: Operand) -> Expr:
+    """``a * b``"""
+    a, b = as_expr(a), as_expr(b)
+    if a.op == "const" and b.op == "const":
+        return constant(a.payload * b.payload)
+    for one, other in ((a, b), (b, a)):
+        if one.op == "const" and one.payload == 0:
+            return constant(0.0)
+        if one.op == "const" and one.payload == 1:
+            return other
+    return Expr("mul", (a, b))
+
+
+def div(a: Operand, b: Operand) -> Expr:
+    """``a / b``"""
+    a, b = as_expr(a), as_expr(b)
+    if b.op == "const" and b.payload == 0:
+        raise TraceError("an equation divides by the constant zero.")
+    if a.op == "const" and b.op == "const":
+        return constant(a.payload / b.payload)
+    if a.op == "const" and a.payload == 0:
+        return constant(0.0)
+    if b.op == "const" and b.payload == 1:
+        return a
+    return Expr("div", (a, b))
+
+
+def neg(a: Operand) -> Expr:
+    """``-a``"""
+    a = as_expr(a)
+    if a.op == "const":
+        return constant(-a.payload)
+    if a.op == "neg":
+        return a.args[0]
+    return Expr("neg", (a,))
+
+
+def power(base: Operand, exponent: Operand) -> Expr:
+    """``base ** exponent``; the exponent must not depend on time or state."""
+    base, exponent = as_expr(base), as_expr(exponent)
+    if varies(exponent):
+        return elementary("exp", mul(exponent, elementary("log", base)))
+    if base.op == "const" and exponent.op == "const":
+        try:
+            value = base.payload**exponent.payload
+        except (ZeroDivisionError, OverflowError):
+            value = math.inf
+        if isinstance(value, complex):
+            raise TraceError(f"an equation holds {base.payload} ** {exponent.payload}, which is not real.")
+        return constant(value)
+    if exponent.op == "const" and exponent.payload == 0:
+        return constant(1.0)
+    if exponent.op == "const" and exponent.payload == 1:
+        return base
+    return Expr("pow", (base, exponent))
+
+
+def elementary(name: str, a: Operand) -> Expr:
+    """One of the functions in :data:`ELEMENTARY` of ``a``."""
+    a = as_expr(a)
+    if a.op == "const":
+        try:
+            return constant(_MATH[name](a.payload))
+        except (ValueError, OverflowError):
+            raise TraceError(f"an equation holds {name}({a.payload}), which is not a finite real number.") from None
+    return Expr(name, (a,))
+
+
+def select(condition: Condition, where: Operand, otherwise: Operand) -> Expr:
+    """``where`` if the condition holds, else ``otherwise``."""
+    condition, a, b = _condition(condition), as_expr(where), as_expr(otherwise)
+    return a if a is b else Expr("select", (a, b), condition)
+
+
+def absolute(a: Operand) -> Expr:
+    """``|a|``: a guard at ``a = 0`` and its two sides."""
+    a = as_expr(a)
+    if a.op == "const":
+        return constant(abs(a.payload))
+    return select(Relation(a), a, neg(a)) if varies(a) else elementary("sqrt", mul(a, a))
+
+
+# -- walking ------------------------------------------------------------------------------------------------------------------------
+def relations_in(condition: Condition) -> Iterator[Relation]:
+    """Every relation in a condition, left to right."""
+    if isinstance(condition, Relation):
+        yield condition
+    elif isinstance(condition, And | Or):
+        yield from relations_in(condition.left)
+        yield from relations_in(condition.right)
+    elif isinstance(condition, Not):
+        yield from relations_in(condition.inner)
+
+
+def operands(node: Expr) -> tuple[Expr, ...]:
+    """The operands of a node, the gaps of a select's condition first."""
+    if node.op == "select":
+        return tuple(relation.gap for relation in relations_in(node.payload)) + node.args
+    return node.args
+
+
+def walk(*roots: Expr) -> Iterator[Expr]:
+    """Every node below the roots once, operands before the nodes that use them (iterative: deep sums don't overflow the stack)."""
+    seen: set[Expr] = set()
+    stack = [(root, False) for root in reversed(roots)]
+    while stack:
+        node, ready = stack.pop()
+        if ready:
+            yield node
+        elif node not in seen:
+            seen.add(node)
+            stack.append((node, True))
+            stack.extend((child, False) for child in reversed(operands(node)) if child not in seen)
+
+
+def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
+    """The same operation on other operands, constants folded; the node itself if nothing differs."""
+    if payload is node.payload and all(new is old for new, old in zip(args, node.args, strict=True)):
+        return node
+    if node.op == "select":
+        return select(payload, *args)
+    if node.op in ELEMENTARY:
+        return elementary(node.op, *args)
+    return _OPERATIONS[node.op](*args)
+
+
+def depends_on(node: Expr, ops: tuple[str, ...]) -> bool:
+    """Whether a leaf of one of the kinds ``ops`` stands below ``node``."""
+    return any(leaf.op in ops for leaf in walk(node))
+
+
+def varies(node: Expr) -> bool:
+    """Whether the value changes along a trajectory (depends on time, state or mode)."""
+    return depends_on(node, ("time", "state", "select"))
+
+
+_OPERATIONS: dict[str, Callable[..., Expr]] = {"add": add, "sub": sub, "mul": mul, "div": div, "neg": neg, "pow": power}
