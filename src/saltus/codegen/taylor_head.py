@@ -165,5 +165,5 @@ def _turns_function(system: System, code: JetCode) -> str:
     scalar = ScalarCode(parameter_leaf(system))
     for (rate, offset), i in code.harmonics.items():
         w, b = scalar.value(rate), scalar.value(offset)
-        scalar.lines.append(f"clock[{FIRST_TURN + i}, lane] = {b} + turned({w}, period, count) + {w} * origin")
+        scalar.lines.append(f"clock[{FIRST_TURN + i}, lane] = {b} + turned({w}, period, count) + turned({w}, origin, 1)")
     return f"@kernel\ndef turns(p, origin, period, count, lane, clock):\n{indented(scalar.lines)}\n"

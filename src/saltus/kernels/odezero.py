@@ -7,13 +7,10 @@ of Shampine & Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997), as
 
 Symbols
 -------
-t_left, t_right the bracket; t_try the last place tried, after a move: the end that was given up; rows LEFT, RIGHT, TRY of `gap` hold the
-gaps at these three. Only the signs and ratios of gaps matter, so halved values do no harm.
+t_left, t_right the bracket; t_try the last place tried, after a move: the end that was given up; LEFT, RIGHT, TRY in `work` (laid out in
+ode45.py): the gaps at these three. Only the signs and ratios of gaps matter, so halved values do no harm.
 """
 
-# Rows of `gap`: at the two ends of the step, then the three of the root finder, rates at a contact and rates of a state at rest.
-AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST = range(7)
-GAP_ROWS = 7
 # Ends of the bracket that moved last.
 NEITHER, MOVED_LEFT, MOVED_RIGHT = range(3)
 SMALLEST_NORMAL = 2.2250738585072014e-308
@@ -32,60 +29,60 @@ def sign(x):
 
 
 @inner
-def changes_sign(gap, row, other, g):
-    """Whether gap g has another sign in `other` than in `row`; zero is a sign of its own."""
-    return sign(gap[row, g]) != sign(gap[other, g])
+def changes_sign(work, one, other, g):
+    """Whether gap g has another sign at `other` than at `one`; zero is a sign of its own."""
+    return sign(work[one + g]) != sign(work[other + g])
 
 
 @inner
-def any_sign_change(gap, row, other):
-    """Whether any gap has another sign in `other` than in `row`."""
+def any_sign_change(work, one, other):
+    """Whether any gap has another sign at `other` than at `one`."""
     for g in range(NGUARDS):
-        if changes_sign(gap, row, other, g):
+        if changes_sign(work, one, other, g):
             return True
     return False
 
 
 @kernel
-def odezero(t, t_new, t_leg, h, work, gap, c, q):
+def odezero(t, t_new, t_leg, h, work):
     """The end of the step up to which no contact happens: (time of the first contact, whether it ends the leg), times in s.
 
-    Needs the gaps at t and t_new in rows AT_NODE and AT_NEXT. Afterwards rows LEFT and RIGHT bracket the contact: the gaps that differ
+    Needs the gaps at t and t_new at AT_NODE and AT_NEXT. Afterwards LEFT and RIGHT bracket the contact: the gaps that differ
     in sign there are those that close. A contact at the very start of a leg (t_leg) doesn't end it: it is the one that began it.
     """
     tol = min(128.0 * max(ulp(t), ulp(t_new)), abs(t_new - t))
     t_left, t_right, t_try = t, t_new, t_new
     for g in range(NGUARDS):
-        gap[LEFT, g], gap[RIGHT, g], gap[TRY, g] = gap[AT_NODE, g], gap[AT_NEXT, g], gap[AT_NEXT, g]
+        work[LEFT + g], work[RIGHT + g], work[TRY + g] = work[AT_NODE + g], work[AT_NEXT + g], work[AT_NEXT + g]
     moved = NEITHER
     while t_right - t_left > tol:
-        place = propose(t, t_left, t_right, t_try, tol, gap)
-        gaps_at(place, t, h, work, gap, c, q)
-        if any_sign_change(gap, LEFT, TRY):
+        place = propose(t, t_left, t_right, t_try, tol, work)
+        try_place(place, t, h, work)
+        if any_sign_change(work, LEFT, TRY):
             t_right, t_try = place, t_right
-            give_up(gap, RIGHT)
+            give_up(work, RIGHT)
             if moved == MOVED_RIGHT:
-                halve(gap, LEFT)
+                halve(work, LEFT)
             moved = MOVED_RIGHT
         else:
             t_left, t_try = place, t_left
-            give_up(gap, LEFT)
+            give_up(work, LEFT)
             if moved == MOVED_LEFT:
-                halve(gap, RIGHT)
+                halve(work, RIGHT)
             moved = MOVED_LEFT
     return t_right, t_left != t_leg
 
 
 @inner
-def propose(t, t_left, t_right, t_try, tol, gap):
+def propose(t, t_left, t_right, t_try, tol, work):
     """The next place to try, at least tol/2 inside the bracket."""
     width = t_right - t_left
     change = 1.0
     for g in range(NGUARDS):
-        if changes_sign(gap, LEFT, RIGHT, g):
-            if gap[LEFT, g] == 0.0 and t_left == t:
+        if changes_sign(work, LEFT, RIGHT, g):
+            if work[LEFT + g] == 0.0 and t_left == t:
                 return t_left + 0.5 * tol
-            change = min(change, proposal(t_left, t_right, t_try, width, gap[LEFT, g], gap[RIGHT, g], gap[TRY, g]))
+            change = min(change, proposal(t_left, t_right, t_try, width, work[LEFT + g], work[RIGHT + g], work[TRY + g]))
     change = max(0.5 * tol, min(change * width, width - 0.5 * tol))
     return t_left + change
 
@@ -107,24 +104,24 @@ def proposal(t_left, t_right, t_try, width, left, right, tried):
 
 
 @inner
-def give_up(gap, row):
+def give_up(work, row):
     """The place tried becomes an end of the bracket; the end it replaces is remembered as tried."""
     for g in range(NGUARDS):
-        gap[row, g], gap[TRY, g] = gap[TRY, g], gap[row, g]
+        work[row + g], work[TRY + g] = work[TRY + g], work[row + g]
 
 
 @inner
-def halve(gap, row):
+def halve(work, row):
     """The Illinois rule, where it doesn't lose the sign."""
     for g in range(NGUARDS):
-        if abs(0.5 * gap[row, g]) >= SMALLEST_NORMAL:
-            gap[row, g] *= 0.5
+        if abs(0.5 * work[row + g]) >= SMALLEST_NORMAL:
+            work[row + g] *= 0.5
 
 
 @inner
-def gaps_at(time, t, h, work, gap, c, q):
-    """Gaps at a time inside the step, in row TRY."""
-    dense(time, t, h, work)
+def try_place(place, t, h, work):
+    """Gaps at a place inside the step, to TRY."""
+    dense(place, t, h, work)
     if GAPS_IN_TIME:
-        drive(time, c, q)
-    gaps(time, work[POINT], c, q, gap[TRY])
+        drive_at(place, Q, work)
+    gaps_at(place, POINT, Q, TRY, work)

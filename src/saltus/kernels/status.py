@@ -46,10 +46,11 @@ CONTACT_SPEED, GAP_MARGIN = range(2)
 #: Names of the running minima, by column.
 MINIMA = ("smallest_contact_speed", "smallest_gap_margin")
 
-# Columns of a contact record: integers, then floats (the state follows the floats).
-REC_TRAJECTORY, REC_PERIOD, REC_GUARD, REC_DIRECTION, REC_KIND, REC_MODE_BEFORE, REC_MODE_AFTER = range(7)
+# Columns of a contact record: integers, then floats (the state, then the absolute time, follow the floats). REC_STEPS counts the accepted
+# steps from the start of the trajectory to the contact.
+REC_TRAJECTORY, REC_PERIOD, REC_GUARD, REC_DIRECTION, REC_KIND, REC_MODE_BEFORE, REC_MODE_AFTER, REC_STEPS = range(8)
 REC_PHASE, REC_VELOCITY, REC_TIME_ERROR = range(3)
-RECORD_INTEGERS, RECORD_FLOATS = 7, 3
+RECORD_INTEGERS, RECORD_FLOATS = 8, 3
 
 # What a call of a kernel returns.
 FINISHED, PAUSED = 0, 1

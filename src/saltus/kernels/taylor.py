@@ -64,6 +64,7 @@ from saltus.kernels.status import (
     REC_MODE_BEFORE,
     REC_PERIOD,
     REC_PHASE,
+    REC_STEPS,
     REC_TIME_ERROR,
     REC_TRAJECTORY,
     REC_VELOCITY,
@@ -416,8 +417,10 @@ def record(lanes, lane, batch, tau, g, direction, velocity, kind, before, after,
     batch.rec_f[j, REC_PHASE] = tau
     batch.rec_f[j, REC_VELOCITY] = velocity
     batch.rec_f[j, REC_TIME_ERROR] = error
+    batch.rec_i[j, REC_STEPS] = int(lanes.run[TAKEN, lane])
     for i in range(NSTATES):
         batch.rec_f[j, RECORD_FLOATS + i] = state[i]
+    batch.rec_f[j, RECORD_FLOATS + NSTATES] = lanes.clock[BASE, lane] + tau
 
 
 @inner

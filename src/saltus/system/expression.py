@@ -49,6 +49,7 @@ class Expr:
     payload: Any
 
     def __new__(cls, op: str, args: tuple[Expr, ...] = (), payload: Any = None) -> Expr:
+        """The one node of this operation on these operands."""
         tag = payload.hex() if isinstance(payload, float) else payload
         key = (op, tag, tuple(map(id, args)))
         node = _INTERNED.get(key)
@@ -136,7 +137,7 @@ class Expr:
         )
 
     __int__ = __float__
-    __index__ = None  # type: ignore[assignment]
+    __index__ = None
 
     def __iter__(self) -> Iterator[Expr]:
         raise TraceError("an equation iterated over a traced value, which is a single number. List every state in states=.")
@@ -247,7 +248,9 @@ def as_expr(value: Operand) -> Expr:
     if isinstance(value, Condition):
         raise TraceError("a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0).")
     if isinstance(value, str):
-        raise TraceError(f"an equation holds the text {value!r}. Text with units is for parameter values; inside an equation write SI numbers.")
+        raise TraceError(
+            f"an equation holds the text {value!r}. Text with units is for parameter values; inside an equation write SI numbers."
+        )
     if getattr(value, "shape", ()) != ():
         raise TraceError("an equation holds an array. A traced value is a single number: write out the components.")
     try:

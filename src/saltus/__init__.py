@@ -1,0 +1,57 @@
+"""saltus: the toolkit for vibration with contacts - freeplay, backlash, stops, impacts, friction.
+
+>>> import saltus as sl
+>>> rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+>>> run = sl.simulate(rig, start=(0.0, 0.0), periods=2)
+>>> run.sizes["contact"] > 0
+True
+
+Names are imported when they are first used, so that `import saltus` and `saltus --help` are quick.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from saltus import models, plot
+    from saltus.analysis import settled, simulate, stroboscope
+    from saltus.flow import ODE45, Interrupted, Taylor
+    from saltus.results import describe, load, save, to_csv, to_mat
+    from saltus.system import System, abs, atan, cos, exp, freeplay, log, max, min, pi, piecewise, sin, sqrt, system, tan, tanh
+
+#: Public name: module that holds it.
+_HOMES = {
+    **dict.fromkeys(("settled", "simulate", "stroboscope"), "saltus.analysis"),
+    **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
+    **dict.fromkeys(("describe", "load", "save", "to_csv", "to_mat"), "saltus.results"),
+    **dict.fromkeys(
+        ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan", "tanh"),
+        "saltus.system",
+    ),
+}
+_MODULES = ("models", "plot")
+
+__all__ = [
+    "ODE45", "Interrupted", "System", "Taylor", "abs", "atan", "cos", "describe", "exp", "freeplay", "load", "log", "max", "min", "models",
+    "pi", "piecewise", "plot", "save", "settled", "simulate", "sin", "sqrt", "stroboscope", "system", "tan", "tanh", "to_csv", "to_mat",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(f"saltus.{name}")
+    if name not in _HOMES:
+        from saltus.errors import nearest
+
+        raise AttributeError(f"saltus has no {name!r}. {nearest(name, __all__)}")
+    value = getattr(importlib.import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

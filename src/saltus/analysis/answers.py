@@ -1,0 +1,111 @@
+"""From what a flow computed to the parts of a Dataset that all analyses share: guards, counters, provenance, contacts and their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.starts import Ensemble
+from saltus.flow.engine import Outcome
+from saltus.flow.methods import Method
+from saltus.kernels import status as st
+from saltus.results import Contacts, Guards, attributes
+from saltus.system.evaluate import evaluate
+from saltus.system.system import System
+
+#: An error estimate is this many times the largest difference to the companion run so far.
+SAFETY = 2.0
+
+
+def shared_values(system: System, group: Ensemble) -> dict[str, float]:
+    """Parameter values of the first trajectory."""
+    return dict(zip(system.values, (float(v) for v in group.parameters[0]), strict=True))
+
+
+def guards(system: System, group: Ensemble) -> Guards:
+    """The guards with their boundaries, one for each trajectory where a varied parameter moves them."""
+    values: Mapping[str, Any] = {**shared_values(system, group), **group.varied}
+    places = []
+    for guard in system.guards:
+        place = np.nan if guard.boundary is None else evaluate([guard.boundary], values=values)[0]
+        places.append(np.broadcast_to(place, group.size if np.ndim(place) else ()))
+    if any(np.ndim(place) for place in places):
+        places = [np.broadcast_to(place, group.size) for place in places]
+    return Guards([g.name for g in system.guards], [g.state for g in system.guards], np.array(places, float))
+
+
+def common(system: System, method: Method, group: Ensemble, outcome: Outcome) -> dict[str, Any]:
+    """The arguments that every Dataset of trajectories takes."""
+    return dict(
+        states=system.states,
+        units=system.units,
+        guards=guards(system, group),
+        status=[st.STATUS[int(code)][0] for code in outcome.status],
+        counters={name: outcome.counters[:, i] for i, name in enumerate(st.COUNTERS)},
+        minima={name: outcome.minima[:, i] for i, name in enumerate(st.MINIMA)},
+        varied=group.varied,
+        batch=group.batch,
+        attrs=attributes(
+            system=system.name, equations=system.equations(), parameters=shared_values(system, group), units=system.units, method=method.name,
+            method_options=method.options(), fingerprint=system.fingerprint(), source=system.source, varied=group.varied,
+        ),
+    )  # fmt: skip
+
+
+def contacts(outcome: Outcome, states: int, time_error: np.ndarray) -> Contacts:
+    """The table of contacts."""
+    integers, floats = outcome.record_integers, outcome.record_floats
+    kinds = np.array([st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))])
+    return Contacts(
+        trajectory=integers[:, st.REC_TRAJECTORY],
+        time=contact_times(outcome),
+        time_error=time_error,
+        guard=integers[:, st.REC_GUARD],
+        direction=integers[:, st.REC_DIRECTION],
+        velocity=floats[:, st.REC_VELOCITY],
+        kind=kinds[integers[:, st.REC_KIND]],
+        states=floats[:, st.RECORD_FLOATS : st.RECORD_FLOATS + states],
+        mode_before=integers[:, st.REC_MODE_BEFORE],
+        mode_after=integers[:, st.REC_MODE_AFTER],
+        steps=integers[:, st.REC_STEPS],
+    )
+
+
+def contact_times(outcome: Outcome) -> np.ndarray:
+    """Absolute times of the contacts [s]."""
+    return outcome.record_floats[:, -1]
+
+
+def local_time_errors(outcome: Outcome) -> np.ndarray:
+    """What one step's own error means for the time of its contact [s]."""
+    return outcome.record_floats[:, st.REC_TIME_ERROR]
+
+
+def measured_time_errors(outcome: Outcome, companion: Outcome) -> np.ndarray:
+    """Error of every contact's time [s], measured against a more exact run of the same trajectories.
+
+    The k-th contact of a trajectory is compared with the k-th of its companion; errors grow along a trajectory, so the estimate is
+    twice the largest difference so far, and never less than the local error. From the first contact on at which the two runs meet
+    different guards (or one of them meets none) nothing is known: infinite.
+    """
+    ours, theirs = outcome.record_integers, companion.record_integers
+    error = np.full(len(ours), np.inf)
+    bounds_ours, bounds_theirs = _bounds(ours, outcome), _bounds(theirs, companion)
+    for i in range(len(outcome.status)):
+        a, b = slice(*bounds_ours[i : i + 2]), slice(*bounds_theirs[i : i + 2])
+        shared = min(a.stop - a.start, b.stop - b.start)
+        a, b = slice(a.start, a.start + shared), slice(b.start, b.start + shared)
+        columns = [st.REC_GUARD, st.REC_DIRECTION]
+        differ = (ours[a][:, columns] != theirs[b][:, columns]).any(axis=1)
+        same = int(np.argmax(differ)) if differ.any() else shared
+        here = slice(a.start, a.start + same)
+        difference = np.abs(outcome.record_floats[here, -1] - companion.record_floats[b.start : b.start + same, -1])
+        error[here] = SAFETY * np.maximum.accumulate(difference)
+    return np.maximum(error, local_time_errors(outcome))
+
+
+def _bounds(table: np.ndarray, outcome: Outcome) -> np.ndarray:
+    """Where each trajectory's contacts begin in a sorted table, and where the last ends."""
+    return np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(len(outcome.status) + 1))

@@ -1,0 +1,170 @@
+"""`simulate`: trajectories with every contact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis import answers
+from saltus.analysis.starts import Ensemble, Span, ensemble, span
+from saltus.errors import ParameterError
+from saltus.flow import engine
+from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
+from saltus.flow.methods import Method, Taylor
+from saltus.results import trajectory_dataset
+from saltus.system.system import System
+
+#: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
+PER_PERIOD = 200
+#: Samples over the whole span of an unforced system.
+PER_SPAN = 2000
+#: Samples beyond which a call is refused: 16 GB of states.
+MOST_SAMPLES = 1_000_000_000
+
+
+def simulate(
+    system: System,
+    start: Any = None,
+    periods: int | None = None,
+    t_end: float | str | None = None,
+    *,
+    t_start: float | str = 0.0,
+    method: Method | None = None,
+    samples: int | None = None,
+    keep: int | None = None,
+    values: Mapping[str, Any] | None = None,
+    time_errors: str = "measured",
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Run one trajectory, or many, and keep samples and every contact.
+
+    Parameters
+    ----------
+    system : System
+        Equations, contacts and parameter values.
+    start : sequence, mapping or array
+        State at the start: ``(0.0, 0.0)``, ``("1 mm", 0)``, ``{"x": [...], "v": [...]}`` or an array (trajectory, state). Numbers are
+        SI. Default: all zero.
+    periods : int
+        Whole forcing periods to run; or
+    t_end : float or str
+        the time at the end [s].
+    t_start : float or str
+        Time at the start [s]; the phase of the forcing is that of this time.
+    method : Method
+        Default :class:`saltus.Taylor`; :class:`saltus.ODE45` for MATLAB's.
+    samples : int
+        Samples per forcing period (default 200), or over the whole span if the system isn't forced (default 2000).
+    keep : int
+        Keep samples and contacts of the last so many periods only (default all).
+    values : mapping
+        Parameter values of this call: one each, or an array with one for each trajectory (the forcing frequency included).
+    time_errors : str
+        ``"measured"``: every trajectory is run a second time by a more exact method, and ``contact_time_error`` is measured. ``"local"``:
+        the error of the step that holds the contact only, at half the cost.
+    threads : int
+        Default all processors. Results don't depend on it.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds. A callable gets the share done.
+
+    Returns
+    -------
+    Dataset
+        Dims ``time``, ``contact``, ``guard``, and ``trajectory`` for many starts or values. Variables: each state, ``mode``,
+        ``contact_time``, ``contact_time_error``, ``contact_guard``, ``contact_direction``, ``contact_velocity``, ``contact_kind``, ...,
+        ``status``, counters. If the trajectories have forcing periods of their own, samples lie along ``period``.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset so far.
+    """
+    method = method or Taylor()
+    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    length = span(system, group, periods, t_end, t_start)
+    plan = _plan(system, group, length, samples, keep)
+    if time_errors not in ("measured", "local"):
+        raise ParameterError(f'time_errors must be "measured" or "local", not {time_errors!r}.')
+    show, close = engine.reporter(progress)
+    try:
+        outcome = engine.run(system, method, plan.request(group, length), threads, show)
+        if time_errors == "measured" and system.guards:
+            check = engine.run(system, method.companion(), plan.contacts_only(group, length), threads, show)
+            errors = answers.measured_time_errors(outcome, check)
+        else:
+            errors = answers.local_time_errors(outcome)
+    except Interrupted as stop:
+        if isinstance(stop.partial, Outcome):
+            stop.partial = _dataset(system, method, group, length, plan, stop.partial, answers.local_time_errors(stop.partial))
+        raise
+    finally:
+        close()
+    return _dataset(system, method, group, length, plan, outcome, errors)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Which samples and contacts are kept."""
+
+    schedule: Schedule
+    first: int
+
+    def request(self, group: Ensemble, length: Span) -> Request:
+        return Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, self.schedule, self.first)
+
+    def contacts_only(self, group: Ensemble, length: Span) -> Request:
+        return replace(self.request(group, length), schedule=Schedule.none())
+
+
+def _plan(system: System, group: Ensemble, length: Span, samples: int | None, keep: int | None) -> _Plan:
+    per = _whole(samples, "samples", PER_SPAN if system.forced_at is None else PER_PERIOD)
+    last = int(np.max(length.count + length.phase / length.period))
+    kept = _whole(keep, "keep", max(last, 1))
+    if keep is not None and system.forced_at is None:
+        raise ParameterError(f"{system.name} has no forcing period, so keep= has no meaning. Start later, or take fewer samples=.")
+    first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
+    longest = np.max((length.count + length.phase / length.period) * per)
+    index = np.arange(first * per, int(longest + 1e-9) + 1)
+    if len(index) * group.size * len(system.states) > MOST_SAMPLES:
+        raise ParameterError(
+            f"{group.size} trajectories with {len(index)} samples each don't fit in memory. Give keep= (last periods) or fewer samples=, "
+            "or use sl.stroboscope."
+        )
+    return _Plan(Schedule(index // per, (index % per) / per), first)
+
+
+def _whole(value: int | None, name: str, default: int) -> int:
+    if value is None:
+        return default
+    if isinstance(value, bool) or value != int(value) or value < 1:
+        raise ParameterError(f"{name} must be a whole number of at least 1, not {value!r}.")
+    return int(value)
+
+
+def _dataset(
+    system: System, method: Method, group: Ensemble, length: Span, plan: _Plan, outcome: Outcome, errors: np.ndarray
+) -> xr.Dataset:
+    """Everything under its name."""
+    at = plan.schedule.count + plan.schedule.fraction
+    forced = system.forced_at is not None
+    own_periods = forced and bool(np.ptp(length.period) > 0)
+    scale = length.period[:, None] if own_periods else length.period[0]
+    time = length.t_start + (plan.schedule.count * scale + plan.schedule.fraction * scale)
+    return trajectory_dataset(
+        time=time,
+        values={name: outcome.samples[:, :, i] for i, name in enumerate(system.states)},
+        mode=outcome.sample_mode,
+        contacts=answers.contacts(outcome, len(system.states), errors),
+        end_time=outcome.time,
+        end={name: outcome.state[:, i] for i, name in enumerate(system.states)},
+        period=at if forced else None,
+        forcing_period=(length.period if own_periods else float(length.period[0])) if forced else None,
+        **answers.common(system, method, group, outcome),
+    )

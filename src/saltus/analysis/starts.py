@@ -1,0 +1,168 @@
+"""What users write for starts, values and spans, turned into the arrays of a request."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, nearest
+from saltus.system.system import System
+from saltus.units import to_si
+
+#: Trajectories that a single call may hold before their starts alone fill memory.
+MOST_TRAJECTORIES = 100_000_000
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Trajectories to run.
+
+    Attributes
+    ----------
+    start : float64[n, D]
+        States [SI].
+    parameters : float64[1 or n, P]
+        Values in the order of the system's.
+    varied : mapping of str to float64[n]
+        The parameters that differ between trajectories.
+    batch : bool
+        Whether the user gave many (or an array of one).
+    """
+
+    start: np.ndarray
+    parameters: np.ndarray
+    varied: Mapping[str, np.ndarray]
+    batch: bool
+
+    @property
+    def size(self) -> int:
+        """Number of trajectories."""
+        return len(self.start)
+
+
+def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> Ensemble:
+    """Starts and values of all trajectories, broadcast against each other.
+
+    Parameters
+    ----------
+    start : sequence, mapping or array
+        One number (or text with a unit) per state; a mapping of state names to numbers or arrays; or an array (n, states).
+    values : mapping, optional
+        Parameter values that replace the system's own: one each, or an array of n.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If a name is unknown, a number isn't finite, or lengths don't match.
+    """
+    columns = _columns(system, start)
+    given = {name: system.resolve(name, value) for name, value in (values or {}).items()}
+    sizes = {name: np.size(array) for name, array in {**columns, **given}.items() if np.ndim(array)}
+    count = max(sizes.values(), default=1)
+    wrong = [f"{name} has {size}" for name, size in sizes.items() if size not in (1, count)]
+    if wrong:
+        raise ParameterError(f"starts and values must have one length: {', '.join(wrong)}, the longest has {count}.")
+    if count > MOST_TRAJECTORIES:
+        raise ParameterError(f"{count} trajectories in one call are too many for memory. Split them into calls of {MOST_TRAJECTORIES} at most.")
+    states = np.stack([np.broadcast_to(np.ravel(columns[name]), count) for name in system.states], axis=1).astype(float)
+    varied = {name: np.broadcast_to(np.ravel(value), count).astype(float) for name, value in given.items() if np.ndim(value)}
+    shared = system.with_values(**{name: value for name, value in given.items() if not np.ndim(value)}).values
+    if varied:
+        rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
+        return Ensemble(states, np.stack(rows, axis=1), varied, True)
+    return Ensemble(states, np.array([list(shared.values())]), {}, bool(sizes))
+
+
+def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
+    """Each state's start [SI], a scalar or an array."""
+    if isinstance(start, Mapping):
+        unknown = [name for name in start if name not in system.states]
+        if unknown:
+            raise ParameterError(f"{system.name} has no state {unknown[0]!r}. {nearest(unknown[0], system.states)}")
+        missing = [name for name in system.states if name not in start]
+        if missing:
+            raise ParameterError(f"the start gives no {missing[0]!r}. Write start={{{', '.join(f'{s!r}: 0.0' for s in system.states)}}}.")
+        return {name: _numbers(system, name, start[name]) for name in system.states}
+    rows = start if isinstance(start, np.ndarray) else _as_array(start)
+    if rows.shape == () or rows.shape[-1] != len(system.states) or rows.ndim > 2:
+        raise ParameterError(
+            f"a start of {system.name} is {len(system.states)} numbers ({', '.join(system.states)}), or an array of such rows; "
+            f"this one has shape {rows.shape}."
+        )
+    return {name: _numbers(system, name, rows[..., i]) for i, name in enumerate(system.states)}
+
+
+def _as_array(start: Any) -> np.ndarray:
+    try:
+        return np.asarray(start)
+    except ValueError:
+        raise ParameterError("a start must be a row of numbers, or rows of one length.") from None
+
+
+def _numbers(system: System, name: str, value: Any) -> np.ndarray:
+    array = np.asarray(value)
+    if array.dtype.kind in "OUS":
+        array = np.array([to_si(item, system.units[name], name) for item in np.ravel(array).tolist()]).reshape(array.shape)
+    if array.dtype.kind not in "fiu" or array.ndim > 1:
+        raise ParameterError(f"the start of {name} must be a number or a one-dimensional array of numbers.")
+    if not np.isfinite(array).all():
+        where = "" if array.ndim == 0 else f" (first at index {int(np.argmin(np.isfinite(array)))})"
+        raise ParameterError(f"the start of {name} isn't finite{where}. Every start must be a number.")
+    return array.astype(float)
+
+
+@dataclass(frozen=True)
+class Span:
+    """How long to run: a period for each trajectory, whole periods and the time after them, all since t_start.
+
+    For an unforced system the whole span is one period.
+    """
+
+    t_start: float
+    period: np.ndarray
+    count: np.ndarray
+    phase: np.ndarray
+
+
+def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any) -> Span:
+    """The span of all trajectories.
+
+    Raises
+    ------
+    ParameterError
+        If neither or both of ``periods`` and ``t_end`` are given, or the end isn't after the start.
+    """
+    begin = _time(t_start, "t_start")
+    n = group.size
+    if (periods is None) == (t_end is None):
+        raise ParameterError("give periods= (whole forcing periods) or t_end= (seconds), and only one of them.")
+    if periods is not None:
+        if system.forced_at is None:
+            raise ParameterError(f"{system.name} has no forcing period. Give t_end= in place of periods=.")
+        if isinstance(periods, bool) or not isinstance(periods, int | float | np.integer) or periods != int(periods) or periods < 1:
+            raise ParameterError(f"periods must be a whole number of at least 1, not {periods!r}. For a part of a period give t_end=.")
+        return Span(begin, _periods(system, group), np.full(n, int(periods), np.int64), np.zeros(n))
+    length = _time(t_end, "t_end") - begin
+    if not length > 0:
+        raise ParameterError(f"t_end = {t_end!r} must be after t_start = {t_start!r}.")
+    if system.forced_at is None:
+        return Span(begin, np.full(n, length), np.ones(n, np.int64), np.zeros(n))
+    period = _periods(system, group)
+    count = np.floor(length / period).astype(np.int64)
+    return Span(begin, period, count, np.maximum(length - count * period, 0.0))
+
+
+def _time(value: Any, name: str) -> float:
+    seconds = to_si(value, "s", name)
+    if not math.isfinite(seconds):
+        raise ParameterError(f"{name} must be a finite time, not {value!r}.")
+    return seconds
+
+
+def _periods(system: System, group: Ensemble) -> np.ndarray:
+    values = dict(zip(system.values, group.parameters[0], strict=True))
+    return np.broadcast_to(system.period({**values, **group.varied}), group.size).astype(float)

@@ -1,0 +1,89 @@
+"""`stroboscope`: states at whole forcing periods."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis import answers
+from saltus.analysis.starts import ensemble, span
+from saltus.errors import ParameterError
+from saltus.flow import engine
+from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
+from saltus.flow.methods import Method, Taylor
+from saltus.results import stroboscope_dataset
+from saltus.system.system import System
+
+#: Values beyond which a call is refused: 8 GB.
+MOST_VALUES = 1_000_000_000
+
+
+def stroboscope(
+    system: System,
+    start: Any = None,
+    periods: int = 1,
+    keep: int | None = None,
+    *,
+    t_start: float | str = 0.0,
+    method: Method | None = None,
+    values: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """States at whole forcing periods after the start (the stroboscopic map, iterated). The phase stays exact over millions of periods.
+
+    Parameters
+    ----------
+    system, start, t_start, method, values, threads, progress
+        As for :func:`saltus.simulate`.
+    periods : int
+        Whole forcing periods to run.
+    keep : int
+        How many of the last whole periods to keep (default all, the start included). A run of 1e6 starts that keeps one takes well under
+        1 GB.
+
+    Returns
+    -------
+    Dataset
+        Dims ``trajectory``, ``period`` (whole periods since the start), ``guard``; a variable per state, ``status``, counters.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used, or the system isn't forced.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset so far.
+    """
+    method = method or Taylor()
+    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    length = span(system, group, periods, None, t_start)
+    if keep is not None and (isinstance(keep, bool) or keep != int(keep) or keep < 1):
+        raise ParameterError(f"keep must be a whole number of at least 1, not {keep!r}.")
+    first = 0 if keep is None else max(int(periods) + 1 - int(keep), 0)
+    kept = np.arange(first, int(periods) + 1, dtype=np.int64)
+    if len(kept) * group.size * len(system.states) > MOST_VALUES:
+        raise ParameterError(f"{group.size} trajectories with {len(kept)} periods each don't fit in memory. Give keep= (last periods).")
+    schedule = Schedule(kept, np.zeros(len(kept)))
+    request = Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, schedule, None)
+
+    def dataset(outcome: Outcome) -> xr.Dataset:
+        own_periods = bool(np.ptp(length.period) > 0)
+        return stroboscope_dataset(
+            period=kept,
+            values={name: outcome.samples[:, :, i] for i, name in enumerate(system.states)},
+            forcing_period=length.period if own_periods else float(length.period[0]),
+            **{**answers.common(system, method, group, outcome), "batch": True},
+        )
+
+    show, close = engine.reporter(progress)
+    try:
+        return dataset(engine.run(system, method, request, threads, show))
+    except Interrupted as stop:
+        if isinstance(stop.partial, Outcome):
+            stop.partial = dataset(stop.partial)
+        raise
+    finally:
+        close()

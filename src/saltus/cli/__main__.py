@@ -1,0 +1,5 @@
+"""``python -m saltus.cli``."""
+
+from saltus.cli import main
+
+main()

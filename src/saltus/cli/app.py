@@ -1,0 +1,58 @@
+"""The application: its commands by name, and how errors end it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from saltus.errors import SaltusError
+
+#: Exit codes: what was asked for can't be done as asked; stopped by the user (128 + SIGINT, as shells expect).
+REFUSED, INTERRUPTED = 2, 130
+
+
+class Commands(TyperGroup):
+    """Runs a command; ends errors of ours, and Ctrl-C, with a message instead of a traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command that was typed."""
+        from saltus.cli import screen
+
+        try:
+            return super().invoke(ctx)
+        except SaltusError as error:
+            screen.fail(str(error))
+            raise typer.Exit(REFUSED) from None
+        except BrokenPipeError:  # `saltus models | head`
+            raise
+        except OSError as error:
+            screen.fail(f"{error.filename or 'a file'}: {error.strerror or error}. Choose another folder, or free some space.")
+            raise typer.Exit(REFUSED) from None
+        except KeyboardInterrupt:
+            screen.fail("stopped. Files are written in full or not at all; what was said to be written is there.")
+            raise typer.Exit(INTERRUPTED) from None
+
+
+app = typer.Typer(
+    cls=Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="markdown",
+    pretty_exceptions_show_locals=False,
+    help="Vibration with contacts, to machine precision: freeplay, backlash, stops.\n\nStart with `saltus demo`.",
+)
+
+
+@app.callback(invoke_without_command=True)
+def version(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
+    """Print the version if it is asked for."""
+    if version:
+        from importlib import metadata
+
+        typer.echo(f"saltus {metadata.version('saltus')}")
+        raise typer.Exit
+
+
+from saltus.cli import commands as commands  # noqa: E402  (registers the commands on `app`)

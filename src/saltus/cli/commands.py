@@ -1,0 +1,192 @@
+"""The commands. Each help teaches with an example; each imports what it needs when it runs."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from saltus.cli.app import app
+
+
+class Case(StrEnum):
+    """Gaps of the rig (lower, upper)."""
+
+    a = "a"
+    b = "b"
+    c = "c"
+
+
+class Kind(StrEnum):
+    """Pictures of a run."""
+
+    history = "history"
+    phase = "phase"
+
+
+@app.command()
+def demo(
+    frequency: Annotated[str, typer.Option(help="Forcing frequency, with its unit.")] = "15 Hz",
+    force: Annotated[str, typer.Option(help="Forcing amplitude, with its unit.")] = "4 N",
+    case: Annotated[Case, typer.Option(help="Gaps: a = 0.4, 0.4 mm; b = 0, 0.4 mm; c = 0, 0.8 mm.")] = Case.b,
+    periods: Annotated[int, typer.Option(min=3, help="Forcing periods to run.")] = 2000,
+    out: Annotated[Path, typer.Option(help="Folder for the picture and the data.")] = Path("saltus-demo"),
+    plot: Annotated[bool, typer.Option(help="Draw the picture.")] = True,
+) -> None:
+    """One rig, five starts: what does each settle to?
+
+    A block between two springs with gaps, shaken sideways. Where it starts decides how it vibrates for ever after. Prints a table, draws
+    each motion, keeps the data.
+
+    Example: `saltus demo --case c --frequency "5 Hz"`
+    """
+    from saltus.cli import screen
+    from saltus.results import save
+    from saltus.study import demo as study
+
+    with screen.working() as progress:
+        result = study.demo(frequency, case.value, force, periods, progress)
+    screen.show(result.table)
+    out.mkdir(parents=True, exist_ok=True)
+    written = [save(result.run, out / "demo.nc"), result.table.write_csv(out / "demo.csv")]
+    if plot:
+        written.append(study.draw(result, out / "demo.png"))
+    screen.files(written)
+
+
+@app.command()
+def run(
+    study: Annotated[Path, typer.Argument(help="The study file (TOML).")],
+    system: Annotated[str, typer.Option(help="A system of your own: FILE.py:NAME. Runs that file.")] = "",
+    out: Annotated[Path | None, typer.Option(help="Folder for results; default saltus-runs/STUDY.")] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads; by default one for each usable core.")] = None,
+) -> None:
+    """Run a study file: print its table, keep its data.
+
+    A study names a model of saltus and its values; it never runs code. A system of your own is given here, by you.
+
+    Example: `saltus run replications/saunders2021/table2.toml`
+
+    Example: `saltus run my_study.toml --system my_rig.py:rig`
+    """
+    from saltus.cli import screen
+    from saltus.study.own_system import own_system
+    from saltus.study.read import read
+    from saltus.study.run import run_study
+
+    spec, text = read(study)
+    own = own_system(system) if system else None
+    with screen.working() as progress:
+        outcome = run_study(spec, text, study.parent, own, threads, progress)
+    screen.show(outcome.table)
+    screen.files(outcome.write(out or Path("saltus-runs") / study.stem))
+
+
+@app.command()
+def plot(
+    result: Annotated[Path, typer.Argument(help="A result (.nc) that saltus wrote.")],
+    kind: Annotated[Kind, typer.Option(help="history: state against time. phase: velocity against displacement.")] = Kind.history,
+    trajectory: Annotated[int | None, typer.Option(min=0, help="Which trajectory of a batch; by default all, at most 8.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture (.png, .pdf, .svg); default RESULT-KIND.png.")] = None,
+) -> None:
+    """Draw a result.
+
+    Example: `saltus plot saltus-demo/demo.nc --trajectory 2 --kind phase -o phase.pdf`
+    """
+    from saltus.cli import screen
+    from saltus.study.draw import draw
+
+    screen.files([draw(result, kind.value, trajectory, out or result.with_name(f"{result.stem}-{kind.value}.png"))])
+
+
+@app.command()
+def models(
+    name: Annotated[str, typer.Argument(help="A model, to see its equations and values.")] = "",
+) -> None:
+    """List the published systems that come with saltus, or show one.
+
+    Example: `saltus models delangre`
+    """
+    from saltus import models as published
+    from saltus.cli import screen
+    from saltus.study.table import TextTable
+
+    if name:
+        screen.say(repr(published.find(name)()))
+    else:
+        screen.show(TextTable("Models; `saltus models NAME` shows one", ("name", "what it is"), tuple(published.describe().items())))
+
+
+@app.command()
+def doctor() -> None:
+    """Show what saltus runs on here, and check its answers against closed forms. Exit code 1 if one is wrong.
+
+    Example: `saltus doctor`
+    """
+    from saltus.cli import screen
+    from saltus.study import doctor as study
+
+    screen.show(study.machine())
+    with screen.working():
+        found = study.checks()
+    screen.show(study.check_table(found))
+    if not all(check.passed for check in found):
+        screen.fail("a self-check failed: results on this machine can't be trusted. Try `saltus cache clear`, then report this output.")
+        raise typer.Exit(1)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of study files, for editors that check TOML.
+
+    Example: `saltus schema > study.schema.json`
+    """
+    import json
+
+    from saltus.study.spec import Study
+
+    typer.echo(json.dumps(Study.model_json_schema(), indent=2, ensure_ascii=False))
+
+
+cache = typer.Typer()
+app.add_typer(cache, name="cache")
+
+
+@cache.callback(invoke_without_command=True)
+def cache_by_default(context: typer.Context) -> None:
+    """Show or clear the kernels compiled so far.
+
+    Example: `saltus cache`
+
+    Example: `saltus cache clear`
+    """
+    if context.invoked_subcommand is None:
+        cache_show()
+
+
+@cache.command("show")
+def cache_show() -> None:
+    """List the compiled kernels, and where they are.
+
+    Example: `saltus cache show`
+    """
+    from saltus.cli import screen
+    from saltus.codegen import cache as kernels
+    from saltus.study.table import TextTable
+
+    rows = tuple((entry.name[:12], entry.system, f"{entry.size_bytes / 1e6:.2f}") for entry in kernels.entries())
+    screen.show(TextTable(f"Kernels in {kernels.folder()}", ("entry", "system", "MB"), rows))
+
+
+@cache.command("clear")
+def cache_clear() -> None:
+    """Delete the compiled kernels. They are built again when they are needed.
+
+    Example: `saltus cache clear`
+    """
+    from saltus.cli import screen
+    from saltus.codegen import cache as kernels
+
+    screen.say(f"deleted {kernels.clear()} entries from {kernels.folder()}")

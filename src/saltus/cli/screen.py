@@ -1,0 +1,71 @@
+"""What the commands print: tables, notes, files, messages."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from saltus.study.table import TextTable
+
+#: Columns assumed where the output isn't a terminal: a table in a log file isn't cut.
+LOG_WIDTH = 220
+
+
+def console(stderr: bool = False) -> Console:
+    """A console on the current standard output (or error)."""
+    stream = sys.stderr if stderr else sys.stdout
+    return Console(stderr=stderr, highlight=False, width=None if stream.isatty() else LOG_WIDTH, soft_wrap=False)
+
+
+def show(table: TextTable) -> None:
+    """Print a table and its notes."""
+    screen = console()
+    headings = any(table.columns)
+    screen.print(escape(table.title), style="bold")
+    grid = Table(show_header=headings, header_style="dim", box=None, pad_edge=False, padding=(0, 3, 0, 0))
+    for number, column in enumerate(table.columns):
+        numeric = all(_is_number(row[number]) for row in table.rows if row[number])
+        grid.add_column(escape(column), justify="right" if numeric else "left", overflow="fold")
+    for row in table.rows:
+        grid.add_row(*map(escape, row))
+    screen.print(grid, no_wrap=not screen.is_terminal)
+    for note in table.notes:
+        screen.print(escape(note), style="dim")
+
+
+def say(text: str) -> None:
+    """Print a line as it is."""
+    console().print(escape(text))
+
+
+def files(paths: Iterable[Path]) -> None:
+    """Print where files were written."""
+    for path in paths:
+        say(f"wrote {path}")
+
+
+def fail(text: str) -> None:
+    """Print a message of what went wrong to standard error."""
+    console(stderr=True).print(f"[bold red]saltus:[/] {escape(text)}")
+
+
+@contextmanager
+def working() -> Iterator[Callable[[float], None]]:
+    """Show that something is being computed, and afterwards how long it took; yields what to call with the share done."""
+    begin = time.perf_counter()
+    with console(stderr=True).status("compiling the equations, if they are new here (about 20 s) ...") as status:
+        yield lambda share: status.update(f"integrating, {share:.0%} ...")
+    say(f"computed in {time.perf_counter() - begin:.1f} s")
+
+
+def _is_number(text: str) -> bool:
+    return text == "-" or text.lstrip("+-")[:1].isdigit()

@@ -1,0 +1,336 @@
+"""The engine: trajectories in chunks, chunks on threads, kernels in slices short enough for Ctrl-C; records and samples come back.
+
+Every trajectory is independent of all others, so chunks may be cut and threads may run as they like: the result is the same to the bit.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from types import ModuleType
+
+import numpy as np
+
+from saltus.flow.methods import Method
+from saltus.kernels import status as st
+from saltus.system.system import System
+
+#: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show progress.
+CHUNK = 1024
+#: Steps of the lanes between two looks at the keyboard: some ten milliseconds.
+SLICE = 50_000
+#: Contacts that a chunk's table holds before it is emptied.
+RECORDS = 8192
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a computation. ``partial`` holds what was finished; the rest has status ``not_computed``."""
+
+    partial: object = None
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """When states are wanted: at ``(count + fraction)`` periods after the start, ascending.
+
+    Attributes
+    ----------
+    count : int64[M]
+    fraction : float64[M], in [0, 1)
+    """
+
+    count: np.ndarray
+    fraction: np.ndarray
+
+    @classmethod
+    def none(cls) -> Schedule:
+        """No samples."""
+        return cls(np.zeros(0, np.int64), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to compute. n trajectories, D states, P parameters.
+
+    Attributes
+    ----------
+    start : float64[n, D]
+        States at the start.
+    parameters : float64[n or 1, P]
+        Values in the order of ``system.values``; one row for all, or one each.
+    period : float64[n]
+        Forcing period [s]; for an unforced system the span.
+    origin : float
+        Time at the start [s].
+    end_count : int
+        Whole periods to run,
+    end_phase : float64[n]
+        and the time after them [s].
+    schedule : Schedule
+        When samples are taken.
+    record_from : int or None
+        First period since the start whose contacts are kept; None keeps none.
+    """
+
+    start: np.ndarray
+    parameters: np.ndarray
+    period: np.ndarray
+    origin: float
+    end_count: np.ndarray
+    end_phase: np.ndarray
+    schedule: Schedule
+    record_from: int | None
+
+
+@dataclass
+class Outcome:
+    """What came out; arrays have the trajectory first. Contacts are sorted by trajectory, then time."""
+
+    state: np.ndarray
+    time: np.ndarray
+    status: np.ndarray
+    mode: np.ndarray
+    counters: np.ndarray
+    minima: np.ndarray
+    samples: np.ndarray
+    sample_mode: np.ndarray
+    record_integers: np.ndarray
+    record_floats: np.ndarray
+    complete: bool = True
+
+
+@dataclass
+class _Chunk:
+    """A run of trajectories and the arrays of its kernel call (views of the outcome's arrays where possible)."""
+
+    first: int
+    arrays: dict[str, np.ndarray]
+    keeps_contacts: bool
+    integers: list[np.ndarray] = field(default_factory=list)
+    floats: list[np.ndarray] = field(default_factory=list)
+
+
+def run(
+    system: System, method: Method, request: Request, threads: int | None = None, progress: Callable[[float], None] | None = None
+) -> Outcome:
+    """Compute a request.
+
+    Parameters
+    ----------
+    system : System
+        The equations; its own parameter values aren't used.
+    method : Method
+        How to integrate.
+    request : Request
+        What to compute.
+    threads : int, optional
+        Threads to use; default all processors this process may run on. The result doesn't depend on it.
+    progress : callable, optional
+        Called with the share done, from this thread.
+
+    Raises
+    ------
+    Interrupted
+        On Ctrl-C, with the partial Outcome.
+    """
+    module = method.kernels(system)
+    outcome, whole = _allocate(request, len(system.states), module)
+    periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
+    options = method.numbers(periods)
+    chunks = [_cut(request, whole, first, module, options) for first in range(0, len(request.start), CHUNK)]
+    workers = min(threads or usable_processors(), max(len(chunks), 1))
+    stop = threading.Event()
+    try:
+        if workers == 1:
+            _run_here(chunks, module, stop, progress)
+        else:
+            _run_on_threads(chunks, module, stop, progress, workers)
+    except KeyboardInterrupt:
+        outcome.complete = False
+        interrupted = Interrupted()
+        interrupted.partial = _finish(outcome, whole, chunks, request)
+        raise interrupted from None
+    return _finish(outcome, whole, chunks, request)
+
+
+def usable_processors() -> int:
+    """Processors that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+# -- arrays ------------------------------------------------------------------------------------------------------------------------------
+def _allocate(request: Request, states: int, module: ModuleType) -> tuple[Outcome, dict[str, np.ndarray]]:
+    n, m = len(request.start), len(request.schedule.count)
+    finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
+    whole = {
+        "period": request.period,
+        "origin": np.full(n, float(request.origin)),
+        "state": np.array(request.start, float, order="C"),
+        "count": np.zeros(n, np.int64),
+        "phase": np.zeros(n),
+        "mode": np.full(n, -1, np.int64),
+        "fresh": np.zeros(n, np.int64),
+        "carry": np.zeros((n, module.CARRY)),
+        "status": np.where(finite, st.RUNNING, st.INVALID).astype(np.int64),
+        "end_count": request.end_count,
+        "end_phase": request.end_phase,
+        "counters": np.zeros((n, len(st.COUNTERS)), np.int64),
+        "minima": np.full((n, len(st.MINIMA)), np.inf),
+        "cursor": np.zeros(n, np.int64),
+        "samples": np.full((n, m, states), np.nan),
+        "sample_mode": np.full((n, m), -1, np.int64),
+    }
+    outcome = Outcome(
+        whole["state"], whole["phase"], whole["status"], whole["mode"], whole["counters"], whole["minima"], whole["samples"],
+        whole["sample_mode"], np.zeros((0, st.RECORD_INTEGERS), np.int64), np.zeros((0, st.RECORD_FLOATS + states + 1)),
+    )  # fmt: skip
+    return outcome, whole
+
+
+#: Order of the arguments of every `propagate`.
+_ARGUMENTS = (
+    "period", "origin", "param", "stride", "state", "count", "phase", "mode", "fresh", "carry", "status", "end_count", "end_phase", "counters",
+    "minima", "sample_count", "sample_fraction", "cursor", "samples", "sample_mode", "rec_first", "rec_i", "rec_f", "rec_used", "options",
+)  # fmt: skip
+
+
+def _cut(request: Request, whole: dict[str, np.ndarray], first: int, module: ModuleType, options: np.ndarray) -> _Chunk:
+    """The arrays of one chunk: views of the whole, and tables of its own."""
+    last = min(first + CHUNK, len(request.start))
+    arrays = {name: array[first:last] for name, array in whole.items()}
+    shared = len(request.parameters) == 1
+    arrays["param"] = np.ascontiguousarray(request.parameters if shared else request.parameters[first:last], float)
+    arrays["stride"] = np.int64(0 if shared else 1)  # type: ignore[assignment]
+    arrays["sample_count"], arrays["sample_fraction"] = request.schedule.count, request.schedule.fraction
+    arrays["rec_first"] = np.full(last - first, 0 if request.record_from is None else request.record_from, np.int64)
+    arrays["rec_used"] = np.zeros(1, np.int64)
+    arrays["options"] = options
+    return _Chunk(first, arrays, request.record_from is not None)
+
+
+def _open_tables(chunk: _Chunk) -> None:
+    """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no memory."""
+    size = RECORDS if chunk.keeps_contacts else 0
+    chunk.arrays["rec_i"] = np.zeros((size, st.RECORD_INTEGERS), np.int64)
+    chunk.arrays["rec_f"] = np.zeros((size, st.RECORD_FLOATS + chunk.arrays["state"].shape[1] + 1))
+
+
+def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], request: Request) -> Outcome:
+    """Times at the end, and the contacts of all chunks in one sorted table."""
+    outcome.time = whole["origin"] + whole["count"] * whole["period"] + whole["phase"]
+    whole["status"][whole["status"] == st.RUNNING] = st.NOT_COMPUTED
+    integers = [part for chunk in chunks for part in chunk.integers]
+    floats = [part for chunk in chunks for part in chunk.floats]
+    if integers:
+        table, numbers = np.concatenate(integers), np.concatenate(floats)
+        order = np.lexsort((np.arange(len(table)), table[:, st.REC_TRAJECTORY]))
+        outcome.record_integers, outcome.record_floats = table[order], numbers[order]
+    return outcome
+
+
+# -- work ----------------------------------------------------------------------------------------------------------------------------------
+def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: threading.Event, shown: Callable[[], None] | None) -> None:
+    """Move a chunk to its end in slices; empties its table of contacts after each."""
+    arrays = chunk.arrays
+    while not stop.is_set():
+        outcome = module.propagate(*(arrays[name] for name in _ARGUMENTS), SLICE, *workspace)
+        used = int(arrays["rec_used"][0])
+        if used:
+            integers = arrays["rec_i"][:used].copy()
+            integers[:, st.REC_TRAJECTORY] += chunk.first
+            chunk.integers.append(integers)
+            chunk.floats.append(arrays["rec_f"][:used].copy())
+            arrays["rec_used"][0] = 0
+        if shown:
+            shown()
+        if outcome == st.FINISHED:
+            return
+
+
+def _share_done(chunks: list[_Chunk]) -> float:
+    """Share of all periods that lie behind the trajectories."""
+    done = sum(_behind(chunk.arrays) for chunk in chunks)
+    return done / max(sum(len(chunk.arrays["status"]) for chunk in chunks), 1)
+
+
+def _behind(arrays: dict[str, np.ndarray]) -> float:
+    span = arrays["end_count"] + arrays["end_phase"] / arrays["period"]
+    at = (arrays["count"] + arrays["phase"] / arrays["period"]) / np.where(span > 0, span, 1.0)
+    return float(np.sum(np.where(arrays["status"] == st.RUNNING, at, 1.0)))
+
+
+def _run_here(chunks: list[_Chunk], module: ModuleType, stop: threading.Event, progress: Callable[[float], None] | None) -> None:
+    workspace = module.workspace()
+    for chunk in chunks:
+        _open_tables(chunk)
+        _advance(chunk, module, workspace, stop, (lambda: progress(_share_done(chunks))) if progress else None)
+
+
+def _run_on_threads(
+    chunks: list[_Chunk], module: ModuleType, stop: threading.Event, progress: Callable[[float], None] | None, workers: int
+) -> None:
+    local = threading.local()
+
+    def work(chunk: _Chunk) -> None:
+        if not hasattr(local, "workspace"):
+            local.workspace = module.workspace()
+        _open_tables(chunk)
+        _advance(chunk, module, local.workspace, stop, None)
+
+    with ThreadPoolExecutor(workers) as pool:
+        waiting: set[Future] = {pool.submit(work, chunk) for chunk in chunks}
+        try:
+            while waiting:
+                done, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
+                for future in done:
+                    future.result()
+                if progress:
+                    progress(_share_done(chunks))
+        except BaseException:
+            stop.set()
+            for future in waiting:
+                future.cancel()
+            raise
+
+
+def reporter(progress: bool | Callable[[float], None] | None) -> tuple[Callable[[float], None] | None, Callable[[], None]]:
+    """A progress callable and what to call at the end: the user's own, a bar after two seconds on a terminal, or nothing."""
+    if callable(progress):
+        return progress, lambda: None
+    if progress is False or (progress is None and not os.isatty(2)):
+        return None, lambda: None
+    return _Bar().pair()
+
+
+class _Bar:
+    """A rich progress bar that appears only if the work lasts."""
+
+    PATIENCE = 2.0
+
+    def __init__(self) -> None:
+        self._begun = time.monotonic()
+        self._bar = None
+
+    def pair(self) -> tuple[Callable[[float], None], Callable[[], None]]:
+        return self.show, self.close
+
+    def show(self, share: float) -> None:
+        if self._bar is None:
+            if time.monotonic() - self._begun < self.PATIENCE:
+                return
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+            columns = (TextColumn("integrating"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn(), TimeRemainingColumn())
+            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._bar.add_task("", total=1.0)
+            self._bar.start()
+        self._bar.update(self._bar.task_ids[0], completed=share)
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.stop()

@@ -1,0 +1,154 @@
+"""Methods: small option objects that name a compiled flow and hand it its numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from saltus.codegen.module import lane_width, ode45_module, taylor_module
+from saltus.errors import ParameterError
+from saltus.system.system import System
+
+#: Steps that a trajectory may take for each of its periods; a healthy one takes ten to a hundred.
+STEPS_PER_PERIOD = 10_000
+#: Steps that any trajectory may take.
+STEPS_AT_LEAST = 1_000_000
+
+
+def _step_budget(given: int | None, periods: float) -> float:
+    return float(given) if given is not None else STEPS_AT_LEAST + STEPS_PER_PERIOD * math.ceil(periods)
+
+
+def _check_count(name: str, value: Any, low: int, high: float = math.inf) -> None:
+    if value is not None and (isinstance(value, bool) or int(value) != value or not low <= value <= high):
+        upper = f" and at most {high}" if high < math.inf else ""
+        raise ParameterError(f"{name} must be a whole number of at least {low}{upper}, not {value!r}.")
+
+
+def _check_positive(name: str, value: Any) -> None:
+    if not (isinstance(value, int | float | np.number) and 0 < float(value) < math.inf):
+        raise ParameterError(f"{name} must be a positive number, not {value!r}.")
+
+
+class Method:
+    """What every method offers to the engine."""
+
+    @property
+    def name(self) -> str:
+        """Name as users write it."""
+        return type(self).__name__
+
+    def options(self) -> dict[str, Any]:
+        """The options, for provenance."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
+
+    def kernels(self, system: System) -> ModuleType:
+        """The compiled module of this method for a system."""
+        raise NotImplementedError
+
+    def numbers(self, periods: float) -> np.ndarray:
+        """The options as the kernel reads them, for a run of so many periods."""
+        raise NotImplementedError
+
+    def companion(self) -> Method:
+        """A more exact method: how far its contact times lie from this one's is the error estimate of this one's."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Taylor(Method):
+    """Taylor series, contacts located on the gap's own polynomial: machine precision, no contact missed. The default.
+
+    Parameters
+    ----------
+    order : int
+        Order of the series, 6 to 40. 20 is where the rig's cost is flattest (benchmarks/flow.py): higher orders take fewer steps, but
+        every contact ends a step anyway.
+    tolerance : float
+        Size of the last two terms of a step relative to the leading ones [-]. The default, 2**-46, leaves 3e-15 m of error on the rig
+        after five periods; 2**-52 leaves rounding only and costs a fifth more.
+    lanes : int, optional
+        Trajectories moved at once: 2, 4 or 8. Default: what the processor does in one instruction. Results don't depend on it.
+    max_steps, max_events : int, optional
+        Budgets of one trajectory; beyond them it stops with status ``budget_steps`` or ``budget_events``. Default: 10 000 steps per period
+        and a million more; 10 million contacts.
+
+    References
+    ----------
+    Jorba & Zou, Experimental Mathematics 14 (2005) 99-117.
+    """
+
+    order: int = 20
+    tolerance: float = 2.0**-46
+    lanes: int | None = None
+    max_steps: int | None = None
+    max_events: int = 10_000_000
+
+    def __post_init__(self) -> None:
+        _check_count("order", self.order, 6, 40)
+        _check_positive("tolerance", self.tolerance)
+        if self.lanes not in (None, 2, 4, 8):
+            raise ParameterError(f"lanes must be 2, 4 or 8, not {self.lanes!r}.")
+        _check_count("max_steps", self.max_steps, 1)
+        _check_count("max_events", self.max_events, 1)
+
+    def kernels(self, system: System) -> ModuleType:
+        return taylor_module(system, self.order, self.lanes or lane_width())
+
+    def numbers(self, periods: float) -> np.ndarray:
+        return np.array([math.log2(self.tolerance), _step_budget(self.max_steps, periods), float(self.max_events)])
+
+    def companion(self) -> Taylor:
+        """The same series with steps a fifth shorter: other truncation, other rounding, the same compiled kernel."""
+        return Taylor(self.order, self.tolerance * 2.0**-6, self.lanes, self.max_steps, self.max_events)
+
+
+@dataclass(frozen=True)
+class ODE45(Method):
+    """MATLAB's ode45 with odezero, digit for digit, for comparison with published results.
+
+    Parameters
+    ----------
+    rtol, atol : float
+        RelTol [-] and AbsTol [unit of each state]; the defaults are MATLAB's.
+    events : str
+        ``"locate"``: integration stops at each contact and starts afresh, as with MATLAB's Events option. ``"ignore"``: contacts are
+        stepped over and the right-hand side picks its side from the state, as without it.
+    max_steps, max_events : int, optional
+        Budgets, as for :class:`Taylor`.
+
+    References
+    ----------
+    Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19-26; Shampine & Reichelt, SIAM J. Sci. Comput. 18 (1997) 1-22.
+    """
+
+    rtol: float = 1e-3
+    atol: float = 1e-6
+    events: str = "locate"
+    max_steps: int | None = None
+    max_events: int = 10_000_000
+
+    def __post_init__(self) -> None:
+        _check_positive("rtol", self.rtol)
+        _check_positive("atol", self.atol)
+        if self.rtol < 100 * np.finfo(float).eps:
+            raise ParameterError(f"rtol must be at least {100 * np.finfo(float).eps:.3g}, as in MATLAB, not {self.rtol}.")
+        if self.events not in ("locate", "ignore"):
+            raise ParameterError(f'events must be "locate" or "ignore", not {self.events!r}.')
+        _check_count("max_steps", self.max_steps, 1)
+        _check_count("max_events", self.max_events, 1)
+
+    def kernels(self, system: System) -> ModuleType:
+        return ode45_module(system)
+
+    def numbers(self, periods: float) -> np.ndarray:
+        locate = 1.0 if self.events == "locate" else 0.0
+        return np.array([self.rtol, self.atol, locate, _step_budget(self.max_steps, periods), float(self.max_events)])
+
+    def companion(self) -> Taylor:
+        """The Taylor flow: exact, beside ode45."""
+        return Taylor()

@@ -1,0 +1,45 @@
+"""Published systems, ready to run. One file each: equations, parameter table, source, known results.
+
+Every entry of :data:`MODELS` is a function that takes parameter values by name and returns a
+:class:`~saltus.system.System`. Nothing is traced before a model is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from saltus.errors import ParameterError, nearest
+from saltus.models.aeroelastic import aeroelastic
+from saltus.models.chain import chain
+from saltus.models.delangre import delangre
+from saltus.models.gear_pair import gear_pair
+from saltus.system import System
+
+#: Every model by name.
+MODELS: dict[str, Callable[..., System]] = {
+    "delangre": delangre,
+    "chain": chain,
+    "gear_pair": gear_pair,
+    "aeroelastic": aeroelastic,
+}
+
+
+def find(name: str) -> Callable[..., System]:
+    """The model called ``name``.
+
+    Raises
+    ------
+    ParameterError
+        If there is none; the message offers the nearest name.
+    """
+    if name not in MODELS:
+        raise ParameterError(f"no model is called {name!r}. {nearest(name, MODELS)}")
+    return MODELS[name]
+
+
+def describe() -> dict[str, str]:
+    """One line about every model, by name."""
+    return {name: (model.__doc__ or "").strip().splitlines()[0] for name, model in MODELS.items()}
+
+
+__all__ = ["MODELS", "aeroelastic", "chain", "delangre", "describe", "find", "gear_pair"]

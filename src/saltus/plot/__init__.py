@@ -1,0 +1,7 @@
+"""Pictures: a Dataset in, Axes out. Nothing is computed here, and nothing is shown: that is left to the caller."""
+
+from saltus.plot.history import history
+from saltus.plot.phase import phase
+from saltus.plot.style import OKABE_ITO, style
+
+__all__ = ["OKABE_ITO", "history", "phase", "style"]

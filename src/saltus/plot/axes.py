@@ -1,0 +1,132 @@
+"""What every picture of a run draws: coloured pieces of curve, gap lines, contact regions, limits, notes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Literal
+
+import matplotlib.pyplot as plt
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
+from saltus.errors import ParameterError
+from saltus.plot.regions import Regions
+from saltus.plot.style import QUIET, RASTERISE_ABOVE, Scale, style
+
+Direction = Literal["x", "y"]
+#: A gap is drawn into the limits if the axis grows by no more than this: an orbit far inside its gap must stay visible.
+_WIDEN = 2.0
+
+
+@contextmanager
+def panels(ax: Any, count: int, size: tuple[float, float], caller: str) -> Iterator[list[Axes]]:
+    """The Axes to draw into: those that the user handed over, or a new figure of panels, one above the other, in saltus's style."""
+    if ax is not None:
+        yield _given(ax, count, caller)
+        return
+    with style():
+        _, grid = plt.subplots(count, 1, figsize=(size[0], size[1] * count), squeeze=False)
+        yield list(grid[:, 0])
+
+
+def _given(ax: Any, count: int, caller: str) -> list[Axes]:
+    """The Axes that the user handed over, one for each panel."""
+    axes = [ax] if isinstance(ax, Axes) else list(np.ravel(np.asarray(ax, dtype=object)))
+    if not all(isinstance(one, Axes) for one in axes):
+        raise ParameterError(f"{caller}: ax={type(ax).__name__}. Give matplotlib Axes, such as plt.subplots() makes.")
+    if len(axes) != count:
+        raise ParameterError(f"{caller}: {count} trajectories need {count} Axes, not {len(axes)}. Choose one with trajectory=.")
+    return axes
+
+
+def draw_pieces(ax: Axes, x: np.ndarray, y: np.ndarray, region: np.ndarray, regions: Regions, width: float) -> None:
+    """One line for each region that occurs; pieces of the same region are separated by NaN, neighbours share the point between them."""
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(region)) + 1])
+    stops = np.concatenate([starts[1:] + 1, [region.size]])
+    for k in np.unique(region):
+        mine = [np.arange(a, b) for a, b in zip(starts, stops, strict=True) if region[a] == k]
+        xs, ys = (_join([values[piece] for piece in mine]) for values in (x, y))
+        ax.plot(xs, ys, color=regions.regions[k].color, label=regions.regions[k].label or None, lw=width, zorder=2, solid_capstyle="butt")
+
+
+def _join(pieces: Sequence[np.ndarray]) -> np.ndarray:
+    """Pieces one after the other, NaN between them."""
+    return np.concatenate([part for piece in pieces for part in (piece, [np.nan])][:-1])
+
+
+def draw_points(ax: Axes, x: np.ndarray, y: np.ndarray, **look: Any) -> None:
+    """Markers; many of them become pixels in vector files."""
+    ax.plot(x, y, ls="none", rasterized=x.size > RASTERISE_ABOVE, **look)
+
+
+def set_limits(ax: Axes, direction: Direction, values: np.ndarray, marks: Sequence[float] = (), margin: float = 0.06) -> None:
+    """Limits around the finite values, and around the marks where the axis doesn't grow too much for that.
+
+    An Axes that was drawn into before keeps what it showed.
+    """
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return
+    low, high = float(finite.min()), float(finite.max())
+    drawn = ax.dataLim.intervalx if direction == "x" else ax.dataLim.intervaly
+    if np.isfinite(drawn).all():
+        low, high = min(low, float(drawn[0])), max(high, float(drawn[1]))
+    span = high - low or abs(high) or 1.0
+    for mark in marks:
+        if max(high, mark) - min(low, mark) <= _WIDEN * span:
+            low, high = min(low, mark), max(high, mark)
+    pad = margin * (high - low or span)
+    (ax.set_xlim if direction == "x" else ax.set_ylim)(low - pad, high + pad)
+
+
+def draw_gaps(ax: Axes, direction: Direction, regions: Regions, scale: Scale, label: bool = True) -> None:
+    """Gap lines dashed and named, contact regions lightly shaded; once for an Axes, after its limits are set."""
+    tag = f"saltus-gaps-{direction}"
+    if any(artist.get_gid() == tag for artist in ax.get_children()):
+        return
+    low, high = ax.get_xlim() if direction == "x" else ax.get_ylim()
+    far = 1e3 * (high - low)  # so that a later change of the limits finds the region shaded too
+    transform = ax.get_xaxis_transform() if direction == "x" else ax.get_yaxis_transform()
+    for region in regions.regions:
+        if region.contact:
+            a, b = (np.clip(edge * scale.factor, low - far, high + far) for edge in (region.below, region.above))
+            corner, size = ((a, 0), (b - a, 1)) if direction == "x" else ((0, a), (1, b - a))
+            ax.add_artist(Rectangle(corner, *size, transform=transform, fc=region.color, alpha=0.07, ec="none", zorder=0, gid=tag))
+    line = ax.axvline if direction == "x" else ax.axhline
+    for i, boundary in enumerate(regions.boundaries):
+        place = boundary.value * scale.factor
+        line(place, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid=tag)
+        if label and low <= place <= high:
+            lower = i == 0 and len(regions.boundaries) > 1 and place - low > 0.12 * (high - low)  # else it meets the ticks
+            _name_gap(ax, direction, place, f"{boundary.label}\n{scale.text(boundary.value)}", lower)
+
+
+def _name_gap(ax: Axes, direction: Direction, place: float, text: str, lower: bool) -> None:
+    """Name a gap line outside the axes; the lowest one keeps away from the others."""
+    look: dict[str, Any] = {"color": QUIET, "fontsize": 7, "linespacing": 1.1}
+    if direction == "y":
+        ax.text(1.01, place, text, transform=ax.get_yaxis_transform(), va="top" if lower else "bottom", ha="left", **look)
+    else:
+        ax.text(place, 1.01, text, transform=ax.get_xaxis_transform(), va="bottom", ha="right" if lower else "left", **look)
+
+
+def legend(ax: Axes, regions: Regions, **place: Any) -> None:
+    """Name the colours and markers: regions from the top of the picture to its bottom, then the rest."""
+    handles, labels = ax.get_legend_handles_labels()
+    first = dict(zip(labels[::-1], handles[::-1], strict=True))  # a picture of several trajectories names each thing once
+    order = [region.label for region in regions.regions[::-1] if region.label in first]
+    order += [label for label in dict.fromkeys(labels) if label not in order]
+    if order:
+        ax.legend([first[label] for label in order], order, **place)
+
+
+def note_status(ax: Axes, ds: xr.Dataset) -> None:
+    """Say in the picture when a trajectory stopped early, or rests on a graze that isn't decided."""
+    status = str(ds["status"].values)
+    if status != "ok":
+        stopped = status != "graze_unresolved" and "end_time" in ds
+        where = f", stopped at {float(ds['end_time']):.6g} s" if stopped else ""
+        ax.text(0.99, 0.02, f"status: {status}{where}", transform=ax.transAxes, ha="right", va="bottom", fontsize=7, color="#A00000")

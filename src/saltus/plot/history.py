@@ -1,0 +1,142 @@
+"""Time history: a state against time, coloured by region, contacts marked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import ScaledTranslation
+
+from saltus.errors import ParameterError
+from saltus.plot import axes as draw
+from saltus.plot import regions, selection
+from saltus.plot.style import OKABE_ITO, Scale, display_scale
+from saltus.results.schema import TRAJECTORY, check, contact_name, forcing_period, states_of
+
+_CALLER = "plot.history"
+#: Marker, face and name of each kind of contact. Hollow means undecided.
+_MARKERS: dict[str, dict[str, Any]] = {
+    "crossing": {"marker": "o", "mfc": OKABE_ITO["black"], "label": "contact"},
+    "graze": {"marker": "D", "mfc": OKABE_ITO["orange"], "label": "graze"},
+    "graze_unresolved": {"marker": "o", "mfc": "white", "label": "graze, unresolved"},
+}
+
+
+def history(
+    run: xr.Dataset,
+    trajectory: int | Sequence[int] | None = None,
+    state: str | None = None,
+    periods: selection.Periods = None,
+    ax: Any = None,
+    *,
+    time: Literal["s", "T", "both"] = "both",
+    units: Mapping[str, str] | None = None,
+    legend: bool = True,
+) -> Any:
+    """Time history of one state, coloured by region, every contact marked.
+
+    Gap lines are dashed, contact regions lightly shaded. Colours change exactly at the contacts. A trajectory that did not reach its end
+    says so in the picture.
+
+    Parameters
+    ----------
+    run : Dataset
+        What ``simulate`` returned.
+    trajectory : int or list of int, optional
+        Which of a batch; each gets a panel. Without it all are shown, at most 8.
+    state : str, optional
+        Name of the state; the first one by default.
+    periods : int, float or pair, optional
+        The last so many forcing periods, or from one to another; the whole run by default.
+    ax : Axes or array of Axes, optional
+        Where to draw, one for each trajectory; a new figure by default.
+    time : {"both", "s", "T"}
+        Axis of time: seconds with forcing periods at the top, or one of the two.
+    units : mapping of str to str, optional
+        Display units, such as ``{"x": "mm"}``; by the size of the numbers by default.
+    legend : bool
+        Whether to name the colours and markers.
+
+    Returns
+    -------
+    Axes, or array of Axes, shape (trajectory,)
+        The array for several trajectories.
+
+    Raises
+    ------
+    ParameterError
+        If ``run`` is not from ``simulate``, or an argument doesn't fit it.
+    """
+    check(run, caller=_CALLER, kinds=[TRAJECTORY])
+    if time not in ("s", "T", "both"):
+        raise ParameterError(f"{_CALLER}: time={time!r}. Known: 'both', 's', 'T'.")
+    state = states_of(run)[0] if state is None else selection.state_named(run, state, _CALLER)
+    wanted = selection.units_of_states(run, units, _CALLER).get(state)
+    labels = selection.chosen(run, trajectory, _CALLER)
+    singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
+    windows = [selection.window(one, periods, _CALLER) for one in singles]
+    with draw.panels(ax, len(singles), (6.3, 2.5), _CALLER) as panels:
+        for i, (panel, one, shown) in enumerate(zip(panels, singles, windows, strict=True)):
+            _panel(panel, one, state, shown, time, wanted)
+            if len(labels) > 1:
+                panel.set_ylabel(f"trajectory {labels[i]}\n{panel.get_ylabel()}")
+            if legend and i == 0:
+                ticks = 0.25 if time == "both" and "period" in one else 0.05  # inches
+                above = panel.transAxes + ScaledTranslation(0, ticks, panel.figure.dpi_scale_trans)
+                draw.legend(panel, regions.find(one, [state]), loc="lower right", bbox_to_anchor=(1, 1), bbox_transform=above, ncols=8)
+    return panels[0] if len(singles) == 1 else np.array(panels, dtype=object)
+
+
+def _panel(ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], time: str, unit: str | None) -> None:
+    """One trajectory in one Axes."""
+    curve = selection.path(ds, (state,), *shown)
+    values = curve.values[:, 0]
+    finite = np.abs(values[np.isfinite(values)])
+    y = display_scale(ds[state].attrs.get("units", ""), float(finite.max(initial=0.0)), unit)
+    period = forcing_period(ds)
+    in_periods = time == "T" and "period" in ds
+    x = Scale(1 / period, "T") if in_periods else display_scale("s", float(np.abs(curve.time).max()))
+    coloured = regions.find(ds, [state])
+    own = regions.along(ds, state)
+
+    width = 1.1 if shown[1] - shown[0] <= 40 or "period" not in ds else 0.7
+    draw.draw_pieces(ax, curve.time * x.factor, values * y.factor, coloured.of(curve.mode), coloured, width)
+    _mark_contacts(ax, selection.contacts_in(ds, *shown), state, x, y)
+    draw.set_limits(ax, "x", curve.time * x.factor, margin=0.0)
+    draw.set_limits(ax, "y", values * y.factor, [boundary.value * y.factor for boundary in own.boundaries])
+    draw.draw_gaps(ax, "y", own, y)
+    draw.note_status(ax, ds)
+    ax.set_xlabel(x.label("time"))
+    ax.set_ylabel(y.label(state))
+    if time == "both" and "period" in ds:
+        _period_axis(ax, period * x.factor)
+
+
+def _period_axis(ax: Axes, period: float) -> None:
+    """A second axis at the top that counts forcing periods; ``period`` in units of the axis below."""
+
+    def count(time: Any) -> Any:
+        return np.asarray(time, dtype=float) / period
+
+    def place(periods: Any) -> Any:
+        return np.asarray(periods, dtype=float) * period
+
+    top = ax.secondary_xaxis("top", functions=(count, place))
+    top.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10], integer=True))
+    top.xaxis.set_major_formatter("{x:g} T")
+
+
+def _mark_contacts(ax: Axes, table: xr.Dataset, state: str, x: Scale, y: Scale) -> None:
+    """A marker for each contact, by its kind; smaller where they are many."""
+    kinds = table["contact_kind"].values.astype(str)
+    size = 3.4 if kinds.size <= 40 else 2.4 if kinds.size <= 150 else 1.5
+    for kind, look in _MARKERS.items():
+        rows = np.flatnonzero(kinds == kind)
+        if rows.size:
+            grow = 1.0 if kind == "crossing" else 1.5
+            at = table["contact_time"].values[rows] * x.factor, table[contact_name(state)].values[rows] * y.factor
+            draw.draw_points(ax, *at, ms=size * grow, mec=OKABE_ITO["black"], mew=0.5, zorder=3, **look)

@@ -1,0 +1,158 @@
+"""Phase portrait: one state against another, coloured by region, with the stroboscopic points."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from saltus.errors import ParameterError
+from saltus.plot import axes as draw
+from saltus.plot import regions, selection
+from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
+from saltus.results.schema import STROBOSCOPE, check, kind_of, states_of
+from saltus.units import from_si
+
+_CALLER = "plot.phase"
+#: Without `periods` the last part of the run is shown: transients of lightly damped systems have mostly gone by then (of the rig with
+#: 3 % damping after 40 periods, at 15 Hz), and subharmonic orbits still show several of their periods.
+SETTLED_SHARE = 0.3
+
+
+def phase(
+    run: xr.Dataset,
+    trajectory: int | Sequence[int] | None = None,
+    states: tuple[str, str] | None = None,
+    periods: selection.Periods = None,
+    ax: Any = None,
+    *,
+    poincare: bool = True,
+    units: Mapping[str, str] | None = None,
+    legend: bool = True,
+) -> Axes:
+    """Phase portrait of one trajectory, coloured by region; or of several in one picture, a colour each.
+
+    Gap lines are dashed, contact regions lightly shaded, the states at whole forcing periods (Poincare points) are dots. What
+    ``stroboscope`` returned shows as dots alone.
+
+    Parameters
+    ----------
+    run : Dataset
+        What ``simulate`` or ``stroboscope`` returned.
+    trajectory : int or list of int, optional
+        Which of a batch; without it all are laid over one another, at most 8.
+    states : pair of str, optional
+        On the horizontal and the vertical axis; the first two by default.
+    periods : int, float or pair, optional
+        The last so many forcing periods, or from one to another. The last 30 % of the run by default.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+    poincare : bool
+        Whether to draw the Poincare points.
+    units : mapping of str to str, optional
+        Display units, such as ``{"x": "mm", "v": "mm/s"}``; by the size of the numbers by default.
+    legend : bool
+        Whether to name the colours.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``run`` is not a result of saltus, or an argument doesn't fit it.
+    """
+    check(run, caller=_CALLER)
+    pair = _pair(run, states)
+    labels = selection.chosen(run, trajectory, _CALLER)
+    singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
+    windows = [selection.window(one, periods, _CALLER, SETTLED_SHARE) for one in singles]
+    curves = [_values(one, pair, shown) for one, shown in zip(singles, windows, strict=True)]
+    scales = _scales(run, pair, np.concatenate(curves), selection.units_of_states(run, units, _CALLER))
+    with draw.panels(ax, 1, (4.6, 3.1), _CALLER) as (panel,):
+        for i, (one, shown) in enumerate(zip(singles, windows, strict=True)):
+            name = _name(one, run, labels[i]) if len(labels) > 1 else None
+            color = CYCLE[i % len(CYCLE)] if name else None
+            if kind_of(run) != STROBOSCOPE:
+                _curve(panel, one, pair, shown, scales, color, name)
+            if poincare or kind_of(run) == STROBOSCOPE:
+                _dots(panel, selection.stroboscope_points(one, pair, *shown), scales, color, name)
+            draw.note_status(panel, one)
+        _frame(panel, singles[0], pair, np.concatenate(curves), scales)
+        if legend:
+            draw.legend(panel, regions.find(singles[0], pair), loc="upper left", bbox_to_anchor=(1.02, 1))
+    return panel
+
+
+def _pair(run: xr.Dataset, states: Any) -> tuple[str, str]:
+    """The two states to show."""
+    known = states_of(run)
+    if states is None:
+        if len(known) < 2:
+            raise ParameterError(f"{_CALLER}: a phase portrait needs two states, this system has only {known[0]!r}. See plot.history.")
+        return known[0], known[1]
+    if isinstance(states, str) or len(states) != 2:
+        raise ParameterError(f"{_CALLER}: states={states!r}. Give two names, such as states={known[:2]!r}.")
+    first, second = (selection.state_named(run, name, _CALLER) for name in states)
+    return first, second
+
+
+def _values(ds: xr.Dataset, pair: tuple[str, str], shown: tuple[float, float]) -> np.ndarray:
+    """All points of one trajectory that will be drawn, shape (point, 2)."""
+    if kind_of(ds) == STROBOSCOPE:
+        return selection.stroboscope_points(ds, pair, *shown)
+    return selection.path(ds, pair, *shown).values
+
+
+def _scales(run: xr.Dataset, pair: tuple[str, str], values: np.ndarray, units: Mapping[str, str]) -> tuple[Scale, Scale]:
+    """Display units of the two axes."""
+    largest = np.abs(np.where(np.isfinite(values), values, 0.0)).max(axis=0, initial=0.0)
+    first, second = (display_scale(run[name].attrs.get("units", ""), float(largest[i]), units.get(name)) for i, name in enumerate(pair))
+    return first, second
+
+
+def _curve(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], shown: tuple[float, float], scales: tuple[Scale, Scale],
+           color: str | None, name: str | None) -> None:  # fmt: skip
+    """The orbit: a colour for each region, or one colour of its own among several."""
+    curve = selection.path(ds, pair, *shown)
+    x, y = (curve.values[:, i] * scales[i].factor for i in (0, 1))
+    width = 1.0 if shown[1] - shown[0] <= 40 or "period" not in ds else 0.6
+    if color:
+        ax.plot(x, y, color=color, lw=width, label=name, zorder=2)
+    else:
+        coloured = regions.find(ds, pair)
+        draw.draw_pieces(ax, x, y, coloured.of(curve.mode), coloured, width)
+
+
+def _dots(ax: Axes, points: np.ndarray, scales: tuple[Scale, Scale], color: str | None, name: str | None) -> None:
+    """The Poincare points; smaller where they are many."""
+    size = 4.5 if len(points) <= 60 else 2.5 if len(points) <= 500 else 1.2
+    label = "whole periods" if color is None else name if name not in ax.get_legend_handles_labels()[1] else None
+    look = {"marker": "o", "ms": size, "mfc": color or OKABE_ITO["black"], "mec": "white", "mew": 0.4 if size > 2 else 0.0}
+    if len(points):
+        draw.draw_points(ax, points[:, 0] * scales[0].factor, points[:, 1] * scales[1].factor, zorder=4, label=label, **look)
+
+
+def _frame(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], values: np.ndarray, scales: tuple[Scale, Scale]) -> None:
+    """Limits, gap lines and names of the axes."""
+    directions: tuple[draw.Direction, draw.Direction] = ("x", "y")
+    own = [regions.along(ds, name) for name in pair]
+    for i, direction in enumerate(directions):
+        marks = [boundary.value * scales[i].factor for boundary in own[i].boundaries]
+        draw.set_limits(ax, direction, values[:, i] * scales[i].factor, marks)
+    for i, direction in enumerate(directions):
+        draw.draw_gaps(ax, direction, own[i], scales[i])
+    ax.set_xlabel(scales[0].label(pair[0]))
+    ax.set_ylabel(scales[1].label(pair[1]))
+
+
+def _name(one: xr.Dataset, run: xr.Dataset, label: int) -> str:
+    """A trajectory by what sets it apart: the parameters that vary, else its number."""
+    varied = json.loads(run.attrs.get("varied_parameters", "[]"))
+    texts = [f"{name} = {from_si(float(one[name]), one[name].attrs.get('units', ''), 4)}" for name in varied if name in one]
+    return ", ".join(text.replace("_", " ") for text in texts) or f"trajectory {label}"

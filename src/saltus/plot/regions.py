@@ -1,0 +1,171 @@
+"""Which side of which contact a sample lies on, and the colour and name of that side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from saltus.plot.style import CYCLE, OKABE_ITO
+
+#: Outwards from the free region; a contact with more stages repeats the last colour.
+_ABOVE = (OKABE_ITO["vermillion"], OKABE_ITO["orange"])
+_BELOW = (OKABE_ITO["blue"], OKABE_ITO["sky blue"])
+_FREE = OKABE_ITO["green"]
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A value of a state at which a contact begins.
+
+    Attributes
+    ----------
+    name : str
+        Name of the guard.
+    value : float
+        Where it lies [unit of the state].
+    """
+
+    name: str
+    value: float
+
+    @property
+    def label(self) -> str:
+        """The name as text."""
+        return self.name.replace("_", " ")
+
+
+@dataclass(frozen=True)
+class Region:
+    """One side: its colour, its name in a legend, whether it is a contact and the interval of the state that it covers."""
+
+    color: str
+    label: str
+    contact: bool
+    below: float = -np.inf
+    above: float = np.inf
+
+
+@dataclass(frozen=True)
+class Regions:
+    """All sides that a picture tells apart.
+
+    Attributes
+    ----------
+    regions : tuple of Region
+        In the order of the state, where there is one.
+    boundaries : tuple of Boundary
+        Between the regions; empty where the guards don't bound one state.
+    state : str or None
+        The state that is bounded.
+    codes : array of int, shape (region,)
+        The bits of each region.
+    bits : tuple of int
+        The guards that count.
+    """
+
+    regions: tuple[Region, ...]
+    boundaries: tuple[Boundary, ...]
+    state: str | None
+    bits: tuple[int, ...]
+    codes: np.ndarray
+
+    def of(self, mode: np.ndarray) -> np.ndarray:
+        """Index of the region of each mode."""
+        if self.state is not None:
+            return _positive(mode, self.bits)
+        return np.searchsorted(self.codes, mode & _mask(self.bits))
+
+
+def _mask(bits: Sequence[int]) -> int:
+    return sum(1 << bit for bit in bits)
+
+
+def _positive(mode: np.ndarray, bits: Sequence[int]) -> np.ndarray:
+    """How many of the guards are positive: along one state that is the place among its boundaries."""
+    return sum(((np.asarray(mode) >> bit) & 1 for bit in bits), start=np.zeros(np.shape(mode), dtype=np.int64))
+
+
+def find(ds: xr.Dataset, shown: Sequence[str]) -> Regions:
+    """The regions of a single trajectory in a picture of some states.
+
+    Parameters
+    ----------
+    ds : Dataset
+        One trajectory.
+    shown : sequence of str
+        States on the axes, the most important first. Their own guards decide; if they have none, those of the only state that has any;
+        else every guard does, a colour for each combination of sides that occurs.
+    """
+    owners = ds["guard_state"].values.tolist()
+    bounded = [state for state in shown if state in owners] or (owners[:1] if len(set(owners)) == 1 and owners[0] else [])
+    if not owners or not bounded:
+        return _by_mode(ds)
+    return along(ds, bounded[0])
+
+
+def along(ds: xr.Dataset, state: str) -> Regions:
+    """The regions between the boundaries of one state; a single free one if it has none."""
+    values = ds["guard_boundary"].values
+    mine = [i for i, owner in enumerate(ds["guard_state"].values.tolist()) if owner == state and np.isfinite(values[i])]
+    bits = tuple(sorted(mine, key=lambda i: values[i]))
+    boundaries = tuple(Boundary(str(ds["guard"].values[i]), float(values[i])) for i in bits)
+    free = _free_region(boundaries)
+    edges = [-np.inf, *(boundary.value for boundary in boundaries), np.inf]
+    regions = []
+    for i in range(len(bits) + 1):
+        color, label = _FREE, "free"
+        if i > free:
+            color, label = _ABOVE[min(i - free, len(_ABOVE)) - 1], _contact_label(boundaries[i - 1])
+        elif i < free:
+            color, label = _BELOW[min(free - i, len(_BELOW)) - 1], _contact_label(boundaries[i])
+        regions.append(Region(color, label, i != free, edges[i], edges[i + 1]))
+    return Regions(tuple(regions), boundaries, state, bits, np.arange(len(regions)))
+
+
+def _free_region(boundaries: Sequence[Boundary]) -> int:
+    """Which region is free of contact: above the guards called lower and below those called upper, else the one that holds zero.
+
+    Where zero is itself a boundary it is the middle one, and below a single boundary.
+    """
+    lower = ["lower" in boundary.name for boundary in boundaries]
+    if boundaries and all(low or "upper" in boundary.name for low, boundary in zip(lower, boundaries, strict=True)):
+        return sum(lower)
+    if any(boundary.value == 0 for boundary in boundaries):
+        return len(boundaries) // 2
+    return sum(boundary.value < 0 for boundary in boundaries)
+
+
+def _contact_label(boundary: Boundary) -> str:
+    """``upper_gap`` bounds the ``upper contact``."""
+    stem = boundary.name.removesuffix("_gap")
+    return f"{stem.replace('_', ' ')} contact" if stem != boundary.name and stem else f"beyond {boundary.label}"
+
+
+def _by_mode(ds: xr.Dataset) -> Regions:
+    """A colour for every combination of sides that occurs, named after the guards that are positive in it."""
+    names = ds["guard"].values.tolist()
+    modes = np.concatenate([np.ravel(ds["mode"].values), ds["contact_mode_after"].values]) if "mode" in ds else np.zeros(1, dtype=np.int64)
+    codes = np.unique(modes)
+    regions = []
+    for code, color in zip(codes.tolist(), _mode_colors(codes.tolist()), strict=True):
+        positive = [name for bit, name in enumerate(names) if code >> bit & 1]
+        regions.append(Region(color, ", ".join(f"{name} > 0" for name in positive) or "no gap > 0", contact=False))
+    if not names:
+        regions = [Region(CYCLE[0], "", contact=False)]
+        codes = np.zeros(1, dtype=np.int64)
+    return Regions(tuple(regions), (), None, tuple(range(len(names))), codes)
+
+
+def _mode_colors(codes: Sequence[int]) -> list[str]:
+    """The colours of a freeplay where the modes look like one, so that green is free there too; else a colour each.
+
+    Two gaps of a freeplay give the modes none, one, both positive if they point the same way, and none, one, the other if they don't.
+    """
+    if len(codes) == 3 and codes[0] & codes[1] == codes[0] and codes[1] & codes[2] == codes[1]:
+        return [_BELOW[0], _FREE, _ABOVE[0]]
+    if len(codes) <= 3 and codes[0] == 0 and all(code.bit_count() == 1 for code in codes[1:]):
+        return [_FREE, _ABOVE[0], _BELOW[0]][: len(codes)]
+    return [CYCLE[i % len(CYCLE)] for i in range(len(codes))]

@@ -1,0 +1,172 @@
+"""What part of a run a picture shows: one trajectory, a window of time, the samples and contacts in it."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.errors import ParameterError, nearest
+from saltus.results.schema import contact_name, forcing_period, sample_dim, states_of
+
+Periods = int | float | tuple[float, float] | None
+#: The most trajectories that one picture can tell apart: the colours of the palette.
+MOST = 8
+
+
+# -- trajectory ---------------------------------------------------------------------------------------------------------------------------
+def chosen(run: xr.Dataset, trajectory: Any, caller: str) -> list[int]:
+    """Labels of the trajectories to show; an empty list for a run of a single one.
+
+    Raises
+    ------
+    ParameterError
+        If a label is unknown, or there are more than :data:`MOST` and none was chosen.
+    """
+    if "trajectory" not in run.dims:
+        if trajectory not in (None, 0):
+            raise ParameterError(f"{caller}: trajectory={trajectory!r}, but this run holds a single trajectory. Leave trajectory out.")
+        return []
+    known = run["trajectory"].values.tolist()
+    if trajectory is None:
+        labels = known
+    else:
+        labels = [int(one) if isinstance(one, numbers.Integral) else one for one in np.atleast_1d(trajectory).tolist()]
+    strange = [label for label in labels if label not in known]
+    if strange:
+        raise ParameterError(f"{caller}: there is no trajectory {strange[0]!r}; this run has {_span(known)}.")
+    if not 0 < len(labels) <= MOST:
+        raise ParameterError(f"{caller} shows 1 to {MOST} trajectories, not {len(labels)}. Choose, such as trajectory=[{known[0]}].")
+    return labels
+
+
+def _span(known: list[int]) -> str:
+    return f"{known[0]} to {known[-1]}" if len(known) > 1 else f"only {known[0]}"
+
+
+def single(run: xr.Dataset, label: int | None) -> xr.Dataset:
+    """One trajectory of a run, with its own contacts only."""
+    ds = run if label is None else run.sel(trajectory=label)
+    if "contact_trajectory" in ds and "trajectory" in ds.coords:
+        ds = ds.isel(contact=np.flatnonzero(ds["contact_trajectory"].values == int(ds["trajectory"])))
+    return ds
+
+
+def state_named(run: xr.Dataset, name: str, caller: str) -> str:
+    """The name, if it is that of a state; else a ParameterError with the nearest one."""
+    if name not in states_of(run):
+        raise ParameterError(f"{caller}: this run has no state {name!r}. {nearest(str(name), states_of(run))}")
+    return name
+
+
+def units_of_states(run: xr.Dataset, units: Mapping[str, str] | None, caller: str) -> dict[str, str]:
+    """Display units that the user chose, every name checked."""
+    return {state_named(run, name, caller): unit for name, unit in (units or {}).items()}
+
+
+# -- window -------------------------------------------------------------------------------------------------------------------------------
+def window(ds: xr.Dataset, periods: Periods, caller: str, default_share: float = 1.0) -> tuple[float, float]:
+    """Begin and end of what is shown, in the run's own coordinate: periods if it is forced, else seconds.
+
+    Parameters
+    ----------
+    ds : Dataset
+        One trajectory.
+    periods : int, float or pair of float, optional
+        The last so many periods, or from one to another.
+    caller : str
+        Used in messages.
+    default_share : float
+        The last share of the run that is shown without ``periods``; of a forced run a whole number of periods, at least one.
+
+    Raises
+    ------
+    ParameterError
+        If the run is not forced, or the window lies outside it.
+    """
+    axis = sample_axis(ds)
+    if not axis.size:
+        raise ParameterError(f"{caller}: this run holds no samples.")
+    first, last = float(axis[0]), float(axis[-1])
+    if periods is None:
+        length = default_share * (last - first)
+        if "period" in ds and default_share < 1:
+            length = max(1.0, math.ceil(length - 1e-9))
+        return max(first, last - length), last
+    if "period" not in ds:
+        raise ParameterError(f"{caller}: periods={periods!r}, but this system isn't forced. Select by time: run.sel(time=slice(1, 2)).")
+    begin, end = _interval(periods, last, caller)
+    if begin >= last or end <= first:
+        raise ParameterError(f"{caller}: periods={periods!r} is outside this run, which holds periods {first:g} to {last:g}.")
+    return max(begin, first), min(end, last)
+
+
+def _interval(periods: Any, last: float, caller: str) -> tuple[float, float]:
+    """``periods`` as begin and end."""
+    if isinstance(periods, numbers.Real) and not isinstance(periods, bool):
+        if float(periods) > 0:
+            return last - float(periods), last
+    elif isinstance(periods, tuple | list) and len(periods) == 2 and float(periods[0]) < float(periods[1]):
+        return float(periods[0]), float(periods[1])
+    raise ParameterError(f"{caller}: periods={periods!r}. Give the number of last periods, such as 5, or begin and end, such as (10, 15).")
+
+
+def sample_axis(ds: xr.Dataset) -> np.ndarray:
+    """Periods of the samples of one trajectory if it is forced, else their times [s]."""
+    return np.asarray(ds["period" if "period" in ds else "time"].values, dtype=float)
+
+
+# -- points -------------------------------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Path:
+    """Samples and contacts in the window, in the order of time. A piece of curve has the mode of the point at which it begins.
+
+    Attributes
+    ----------
+    time : array, shape (point,)
+        [s]
+    values : array, shape (point, state)
+        The states that were asked for [their units].
+    mode : array of int, shape (point,)
+        Sides of the guards just after the point.
+    """
+
+    time: np.ndarray
+    values: np.ndarray
+    mode: np.ndarray
+
+
+def contacts_in(ds: xr.Dataset, begin: float, end: float) -> xr.Dataset:
+    """The rows of the table of contacts in the window."""
+    time = ds["contact_time"].values
+    where = time / forcing_period(ds) if "period" in ds else time
+    return ds.isel(contact=np.flatnonzero((where >= begin) & (where <= end)))
+
+
+def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> Path:
+    """The curve of one trajectory in the window, with the contacts put in, so that colours change exactly there."""
+    axis = sample_axis(ds)
+    slack = 1e-9 * max(1.0, abs(end))
+    inside = ds.isel({sample_dim(ds): np.flatnonzero((axis >= begin - slack) & (axis <= end + slack))})
+    table = contacts_in(ds, begin, end)
+    time = np.concatenate([inside["time"].values, table["contact_time"].values])
+    values = np.stack([np.concatenate([inside[name].values, table[contact_name(name)].values]) for name in states], axis=-1)
+    mode = np.concatenate([inside["mode"].values, table["contact_mode_after"].values])
+    is_contact = np.arange(time.size) >= inside["time"].size
+    order = np.lexsort((is_contact, time))  # at equal times the contact comes last: the curve goes on in its mode
+    return Path(time[order], values[order], mode[order])
+
+
+def stroboscope_points(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> np.ndarray:
+    """The states at whole forcing periods in the window, shape (point, state); none if the system isn't forced."""
+    if "period" not in ds:
+        return np.empty((0, len(states)))
+    axis = sample_axis(ds)
+    whole = np.abs(axis - np.round(axis)) < 1e-6  # a millionth of a period is far less than the distance of two samples
+    index = np.flatnonzero(whole & (axis >= begin - 1e-6) & (axis <= end + 1e-6))
+    return np.stack([ds[name].values[index] for name in states], axis=-1)

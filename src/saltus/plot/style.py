@@ -1,0 +1,104 @@
+"""The look of saltus's pictures: a style file, a palette, and units that suit the numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+
+from saltus.errors import ParameterError
+
+#: Eight colours that colour-blind readers tell apart: M. Okabe and K. Ito, Color universal design (2008).
+OKABE_ITO = {
+    "black": "#000000",
+    "orange": "#E69F00",
+    "sky blue": "#56B4E9",
+    "green": "#009E73",
+    "yellow": "#F0E442",
+    "blue": "#0072B2",
+    "vermillion": "#D55E00",
+    "purple": "#CC79A7",
+}
+#: Colours for things that have no order of their own, such as trajectories.
+CYCLE = tuple(OKABE_ITO[name] for name in ("blue", "vermillion", "green", "purple", "orange", "sky blue", "black", "yellow"))
+#: Lines and texts that stay behind the data.
+QUIET = "#555555"
+#: Above this many points a marker layer is stored as pixels in vector files: they would otherwise grow to megabytes.
+RASTERISE_ABOVE = 500
+
+_STYLE_FILE = Path(__file__).with_name("saltus.mplstyle")
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Context in which figures get saltus's look: ``with sl.plot.style(): fig, axes = plt.subplots(2, 2)``.
+
+    The functions of this package use it themselves when they make the figure.
+    """
+    with plt.style.context(_STYLE_FILE):
+        yield
+
+
+# -- display units ------------------------------------------------------------------------------------------------------------------------
+_PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
+_SCALABLE = re.compile(r"(m|s|Hz|N|Pa|J|W|V|A|rad)(?=$|[*/])")
+#: The prefix is the largest with which the largest value is at least this: 0.43 m/s stays, 0.03 m/s becomes 30 mm/s.
+_AT_LEAST = 0.1
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How a quantity is shown: multiply by ``factor``, write ``unit``."""
+
+    factor: float
+    unit: str
+
+    def label(self, name: str) -> str:
+        """Text of an axis, such as ``x [mm]``."""
+        return f"{name} [{self.unit}]" if self.unit not in ("", "1") else name
+
+    def text(self, value: float) -> str:
+        """A value in SI as people write it, such as ``0.4 mm``."""
+        number = f"{value * self.factor + 0.0:.4g}".replace("-", "\N{MINUS SIGN}")  # + 0.0: never minus zero
+        return f"{number} {self.unit}" if self.unit not in ("", "1") else number
+
+
+def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale:
+    """The prefix under which numbers of this size are best read.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit of the numbers, ``""`` if unknown.
+    largest : float
+        Largest absolute value to show [unit]. Lengths below 1 m are shown in mm, as is the custom of this field.
+    wanted : str, optional
+        Unit to use instead, such as ``"mm"``.
+
+    Returns
+    -------
+    Scale
+
+    Raises
+    ------
+    ParameterError
+        If ``wanted`` is not the unit with a prefix.
+    """
+    known = _PREFIXES if _SCALABLE.match(unit) else {"": 1.0}
+    if wanted is not None:
+        for prefix, size in known.items():
+            if prefix + unit == wanted:
+                return Scale(1 / size, wanted)
+        choice = ", ".join(prefix + unit for prefix in known)
+        raise ParameterError(f"values in {unit or 'an unknown unit'} can't be shown in {wanted!r}. Known: {choice}.")
+    for prefix, size in known.items():
+        limit = 1.0 if prefix + unit == "m" else _AT_LEAST
+        if unit in ("m", "s") and size > 1:
+            continue  # nobody reads kilometres or kiloseconds here
+        if largest / size >= (limit if size <= 1 else 1.0):
+            return Scale(1 / size, prefix + unit)
+    return Scale(1.0, unit)

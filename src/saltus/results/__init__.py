@@ -1,0 +1,23 @@
+"""Results: the schema of every Dataset, where it comes from, and files."""
+
+from saltus.results.assemble import Contacts, Guards, stroboscope_dataset, trajectory_dataset
+from saltus.results.export import save, to_csv, to_mat, to_netcdf
+from saltus.results.files import ResultFileError
+from saltus.results.load import load
+from saltus.results.provenance import attributes, content_hash, describe
+
+__all__ = [
+    "Contacts",
+    "Guards",
+    "ResultFileError",
+    "attributes",
+    "content_hash",
+    "describe",
+    "load",
+    "save",
+    "stroboscope_dataset",
+    "to_csv",
+    "to_mat",
+    "to_netcdf",
+    "trajectory_dataset",
+]

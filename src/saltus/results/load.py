@@ -1,0 +1,76 @@
+"""Files back to results."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import xarray as xr
+
+from saltus.results.files import ResultFileError
+from saltus.results.provenance import file_hash
+from saltus.results.schema import kind_of, restore
+
+#: First bytes of a file and the xarray engine that reads it.
+_ENGINES = {b"CDF\x01": "scipy", b"CDF\x02": "scipy", b"\x89HDF": "h5netcdf"}
+
+
+def load(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a result that :func:`saltus.results.save` (or ``to_netcdf``) wrote; it is identical to the one that was written.
+
+    Parameters
+    ----------
+    path : str or path
+        A ``.nc`` file.
+
+    Returns
+    -------
+    Dataset
+        In memory; the file is closed.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is missing, damaged, changed since, or not a result of saltus.
+    """
+    path = Path(path)
+    ds = _read(path)
+    expected = ds.attrs.pop("file_hash", None)
+    if expected is not None and expected != file_hash(ds):
+        raise ResultFileError(
+            f"{path}: what is in the file doesn't match the checksum saved with it. The file is damaged, or was changed by other means "
+            f"than saltus.save. Compute it again, or read it as it is with xarray.open_dataset({str(path)!r})."
+        )
+    return ds
+
+
+def _read(path: Path) -> xr.Dataset:
+    """The result that the file holds, with its checksum."""
+    if path.suffix in (".csv", ".mat"):
+        raise ResultFileError(f"{path}: only .nc files hold everything that a result is made of. Save it as {path.stem}.nc too.")
+    try:
+        with path.open("rb") as file:
+            engine = _ENGINES.get(file.read(4))
+        if engine is None:
+            raise ResultFileError(f"{path} is not a netCDF file, or its beginning is damaged. saltus.save makes the files that load reads.")
+        if engine == "h5netcdf":
+            _probe(path)
+        ds = xr.load_dataset(path, engine=engine)
+        if not kind_of(ds):
+            raise ResultFileError(f"{path} is a netCDF file, but not a result of saltus. Read it with xarray.open_dataset({str(path)!r}).")
+        return restore(ds)
+    except ResultFileError:
+        raise
+    except FileNotFoundError:
+        raise ResultFileError(f"there is no file {path} (looked in {path.parent.resolve()}).") from None
+    except ImportError as error:
+        raise ResultFileError(f'{path} is a netCDF-4 file. Install "saltus[io]" to read it ({error}).') from error
+    except Exception as error:  # a damaged file makes the readers raise almost anything, struct.error and KeyError among it
+        raise ResultFileError(f"{path} is damaged: {type(error).__name__}: {error}. Restore it from a copy or compute it again.") from error
+
+
+def _probe(path: Path) -> None:
+    """Raise what h5py raises on a file that it can't open; h5netcdf would print a second error while it cleans up."""
+    import h5py  # type: ignore[import-untyped]
+
+    h5py.File(path, "r").close()

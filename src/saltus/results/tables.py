@@ -1,0 +1,68 @@
+"""A result as plain tables: columns with headers, for formats that know no dims."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+
+import numpy as np
+import xarray as xr
+
+from saltus.results.schema import sample_dim, states_of
+
+Table = dict[str, np.ndarray]
+
+
+def samples(ds: xr.Dataset) -> Table:
+    """One row a sample: trajectory (of a batch), time, period, states, mode. Headers carry the units: ``x [m]``."""
+    names = [name for name in ("trajectory", "time", "period", *states_of(ds), "mode") if name in ds]
+    dims = [dim for dim in ("trajectory", sample_dim(ds)) if dim in ds.dims]
+    shape = xr.Variable(dims, np.empty([ds.sizes[dim] for dim in dims]))
+    return {_header(ds, name): _spread(ds[name].variable, shape) for name in names}
+
+
+def contacts(ds: xr.Dataset) -> Table:
+    """One row a contact. The prefix ``contact_`` is dropped; empty for a result without contacts."""
+    names = [str(name) for name in ds.data_vars if ds[name].dims == ("contact",)]
+    names.sort(key=lambda name: name != "contact_trajectory")
+    return {_header(ds, name).removeprefix("contact_"): ds[name].values for name in names}
+
+
+def trajectories(ds: xr.Dataset) -> Table:
+    """One row a trajectory of a batch: its parameters, status, counters and end."""
+    names = [str(name) for name in ds.variables if ds[name].dims == ("trajectory",)]
+    names.sort(key=lambda name: name != "trajectory")
+    return {_header(ds, name): ds[name].values for name in names}
+
+
+def scalars(ds: xr.Dataset) -> dict[str, object]:
+    """What has no dims: the status, counters and end of a single trajectory."""
+    return {_header(ds, str(name)): ds[name].item() for name in ds.variables if ds[name].dims == ()}
+
+
+def guards(ds: xr.Dataset) -> list[str]:
+    """A line for each guard, such as ``upper_gap: x = 0.0004 m``."""
+    lines = []
+    for i, name in enumerate(ds["guard"].values.tolist() if "guard" in ds else []):
+        guard = ds.isel(guard=i)
+        state, unit = guard["guard_state"].item(), guard["guard_units"].item()
+        place = " ".join(map(str, np.atleast_1d(guard["guard_boundary"].values).tolist()))
+        lines.append(f"{name}: {state} = {place} {unit}".rstrip() if state else name)
+    return lines
+
+
+def _header(ds: xr.Dataset, name: str) -> str:
+    unit = ds[name].attrs.get("units", "")
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
+def _spread(variable: xr.Variable, shape: xr.Variable) -> np.ndarray:
+    """A variable as a column that has a row for every element of ``shape``."""
+    return np.ravel(variable.set_dims(dict(shape.sizes)).transpose(*shape.dims).values)
+
+
+def notes(ds: xr.Dataset) -> Iterable[str]:
+    """Provenance, guards and scalars as lines ``name: value``; no line holds a line break."""
+    for name, value in {**ds.attrs, **scalars(ds)}.items():
+        yield f"{name}: {json.dumps(value, ensure_ascii=False) if isinstance(value, str) and chr(10) in value else value}"
+    yield from (f"guard {line}" for line in guards(ds))

@@ -1,0 +1,115 @@
+"""Contact times beside those that a paper printed, beside exact ones, and beside a second method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.errors import StudyError
+from saltus.study.printed import cell, rows
+from saltus.study.spec import Compare
+from saltus.study.table import TextTable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def contact_table(title: str, run: xr.Dataset, compare: Compare, folder: Path, reference: xr.Dataset | None) -> TextTable:
+    """A row for each contact that was printed.
+
+    Parameters
+    ----------
+    title : str
+        Goes above the table.
+    run : Dataset
+        What ``simulate`` returned for one start.
+    compare : Compare
+        [compare] of the study.
+    folder : Path
+        Where the CSV files stand.
+    reference : Dataset or None
+        The same run by the second method.
+
+    Returns
+    -------
+    TextTable
+        Marker, number of the contact, our time [s], the printed time [s], difference [s], residual |x - boundary| [m], printed residual
+        [m], exact time [s], difference of the second method [s], steps of the legs since the row before.
+
+    Raises
+    ------
+    StudyError
+        If a file can't be read, or names a contact that the run doesn't have.
+    """
+    path = folder / compare.printed
+    printed = rows(path, ("event_number", "time_s"))
+    exact = exact_times(folder / compare.exact) if compare.exact else {}
+    residual, steps = _residuals(run), _steps(run)
+    table, before = [], 0
+    for row in printed:
+        number = int(cell(row, "event_number", path))
+        ours, theirs = _time(run, number, path), cell(row, "time_s", path)
+        line = [row.get("marker") or "", str(number), _seconds(ours), _seconds(theirs), _small(ours - theirs), _small(residual[number - 1])]
+        line.append(_small(abs(cell(row, "position_minus_boundary_m", path))) if row.get("position_minus_boundary_m") else "")
+        line.append(_seconds(exact[number]) if number in exact else "")
+        line.append(_small(_time(reference, number, path) - exact[number]) if reference is not None and number in exact else "")
+        line.append(" ".join(map(str, steps[before:number])))
+        table.append(tuple(line))
+        before = number
+    method = run.attrs["method"]
+    second = reference.attrs["method"] if reference is not None else "second method"
+    columns = ("", "contact", f"{method} [s]", "printed [s]", "difference [s]", "|x - boundary| [m]", "printed [m]", "exact [s]",
+               f"{second} - exact [s]", "steps of each leg")  # fmt: skip
+    return TextTable(title, columns, tuple(table), _notes(run, exact, reference))
+
+
+def exact_times(path: Path) -> dict[int, float]:
+    """Exact contact times [s] by number of the contact, from a CSV file with the columns event_number and time_s."""
+    return {int(cell(row, "event_number", path)): cell(row, "time_s", path) for row in rows(path, ("event_number", "time_s"))}
+
+
+def largest_difference(run: xr.Dataset, exact: dict[int, float]) -> tuple[float, int]:
+    """Largest difference [s] of contact times from exact ones, and how many contacts both have."""
+    times = run["contact_time"].values
+    differences = [abs(times[number - 1] - time) for number, time in exact.items() if number <= times.size]
+    return max(differences, default=np.nan), len(differences)
+
+
+def _notes(run: xr.Dataset, exact: dict[int, float], reference: xr.Dataset | None) -> tuple[str, ...]:
+    notes = []
+    for one in (run, reference):
+        if one is not None and exact:
+            worst, count = largest_difference(one, exact)
+            notes.append(f"{one.attrs['method']}: {count} of {len(exact)} exact contact times compared; largest difference {worst:.2e} s.")
+    return tuple(notes)
+
+
+def _time(run: xr.Dataset, number: int, path: Path) -> float:
+    if not 1 <= number <= run.sizes["contact"]:
+        raise StudyError(f"[compare] {path} names contact {number}, but {run.attrs['method']} had {run.sizes['contact']}. Run longer.")
+    return float(run["contact_time"][number - 1])
+
+
+def _residuals(run: xr.Dataset) -> np.ndarray:
+    """|state - boundary| at every contact whose guard is on one state; NaN elsewhere."""
+    residual = np.full(run.sizes["contact"], np.nan)
+    for guard, state, boundary in zip(run["guard"].values, run["guard_state"].values, run["guard_boundary"].values, strict=True):
+        here = run["contact_guard"].values == guard
+        if state:
+            residual[here] = np.abs(run[f"contact_{state}"].values[here] - boundary)
+    return residual
+
+
+def _steps(run: xr.Dataset) -> list[int]:
+    """Accepted steps of the leg before each contact."""
+    return [int(count) for count in np.diff(run["contact_steps"].values, prepend=0)]
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.16f}"
+
+
+def _small(value: float) -> str:
+    return f"{value:.1e}" if abs(value) < 1e-18 or abs(value) > 1e-15 else f"{value:.2e}"

@@ -1,0 +1,118 @@
+"""The demo: one rig, five starts, and what each settles to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.analysis.settled import LAST, settled
+from saltus.study.report import response_texts
+from saltus.study.table import TextTable
+from saltus.units import from_si
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+#: What is called with the share done, if anything.
+Progress = Callable[[float], None] | None
+#: Starts (x [m], v [m/s]): the four that Saunders et al. (2021), Fig. 5, name, and a high one that reaches the T-periodic response.
+STARTS = ((1.0e-3, 0.0), (0.2e-3, 0.0), (0.4e-3, 0.0), (2.0e-3, 0.0), (4.0e-3, 0.3))
+#: Long enough for the slowest of them, 24T from x = 0.4 mm, to repeat to ten digits.
+PERIODS = 2000
+#: Forcing periods drawn in a time history, and in the phase portrait of a response that doesn't repeat.
+SHOWN, SHOWN_IF_APERIODIC = 12, 24
+
+
+@dataclass(frozen=True)
+class Demo:
+    """What the demo computed: the runs, what they settled to, and the table that tells it."""
+
+    run: xr.Dataset
+    settled: xr.Dataset
+    table: TextTable
+
+
+def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods: int = PERIODS, progress: Progress = None) -> Demo:
+    """Move the rig from five starts until it settles.
+
+    Parameters
+    ----------
+    frequency, force : str
+        Of the drive, with units.
+    case : str
+        ``"a"``, ``"b"`` or ``"c"``.
+    periods : int
+        Forcing periods to run; the last 96 (or all, if fewer) are kept.
+    progress : callable, optional
+        Called with the share done.
+
+    Raises
+    ------
+    UnitError, ParameterError
+        If a value can't be used.
+    """
+    from saltus import models
+    from saltus.analysis import simulate
+
+    rig = models.delangre(case, force=force, frequency=frequency)
+    x, v = np.array(STARTS).T
+    run = simulate(rig, start={"x": x, "v": v}, periods=periods, keep=min(LAST, periods), progress=progress or False)
+    found = settled(run)
+    return Demo(run, found, _table(run, found, f"deLangre rig, case {case}, {force} at {frequency}, {periods} forcing periods"))
+
+
+def draw(result: Demo, file: Path) -> Path:
+    """A row for each start, the time history and the phase portrait of what it settles to; returns the file."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    from saltus import plot
+
+    with plot.style():
+        figure, axes = plt.subplots(len(STARTS), 2, figsize=(9.0, 1.75 * len(STARTS)), width_ratios=(2.6, 1), layout="constrained")
+        for i, (row, text) in enumerate(zip(axes, response_texts(result.run), strict=True)):
+            n = int(result.settled["response_period"][i]) or SHOWN_IF_APERIODIC
+            plot.history(result.run, trajectory=i, periods=SHOWN, ax=row[0], time="T", legend=False)
+            plot.phase(result.run, trajectory=i, periods=n, ax=row[1], legend=False)
+            if i < len(STARTS) - 1:
+                row[0].set_xlabel("")
+            row[0].set_title(f"from {_start(i)}: {text}", loc="left")
+        named = {label: handle for handle, label in _handles(axes[:, 0])}
+        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
+        figure.savefig(file)
+        plt.close(figure)
+    return file
+
+
+def _handles(axes: Iterable[Axes]) -> Iterator[tuple[Any, str]]:
+    """What stands in the legends of all axes."""
+    for one in axes:
+        yield from zip(*one.get_legend_handles_labels(), strict=True)
+
+
+def _table(run: xr.Dataset, found: xr.Dataset, title: str) -> TextTable:
+    rows = []
+    for i, text in enumerate(response_texts(run)):
+        one, row = run.isel(trajectory=i), found.isel(trajectory=i)
+        n = int(row["response_period"])
+        contacts = f"{float(row['contacts_per_response']):g} in {text}" if n else "-"
+        peak, rms = (from_si(float(row[name]), "m", 5) for name in ("x_peak", "x_rms"))
+        rows.append((_start(i), str(one["status"].item()), text, contacts, peak, rms, f"{int(one['steps'])}"))
+    found_one = found["response_period"] > 0
+    notes = (
+        f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. Stability isn't examined."
+        + (f" States repeat to {float(found['mismatch'].where(found_one).max()):.0e} of their range." if found_one.any() else ""),
+    )
+    return TextTable(title, ("start", "status", "settles to", "contacts", "peak |x|", "rms x", "steps"), tuple(rows), notes)
+
+
+def _start(number: int) -> str:
+    x, v = STARTS[number]
+    return f"x = {from_si(x, 'm')}, v = {from_si(v, 'm/s')}"

@@ -1,0 +1,54 @@
+"""Draw a result that stands in a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from saltus.errors import ParameterError
+
+
+def draw(result: Path, kind: str, trajectory: int | None, file: Path) -> Path:
+    """Draw a result to a picture file.
+
+    Parameters
+    ----------
+    result : Path
+        A ``.nc`` file that saltus wrote.
+    kind : {"history", "phase"}
+        Which picture.
+    trajectory : int, optional
+        Which of a batch; all of them, at most 8, by default.
+    file : Path
+        The picture; its suffix says the format.
+
+    Returns
+    -------
+    Path
+        The picture.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such trajectory, or the format is unknown.
+    ResultFileError
+        If the result can't be read.
+    OSError
+        If the picture can't be written.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    from saltus import plot
+    from saltus.results import load
+
+    formats = FigureCanvasBase.get_supported_filetypes()
+    if file.suffix.removeprefix(".") not in formats:
+        raise ParameterError(f"a picture can't be written as {file.name!r}. Known: {', '.join('.' + name for name in sorted(formats))}.")
+    axes = getattr(plot, kind)(load(result), trajectory=trajectory)
+    first = axes.flat[0] if hasattr(axes, "flat") else axes
+    first.figure.savefig(file)
+    plt.close("all")
+    return file

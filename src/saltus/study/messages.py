@@ -1,0 +1,107 @@
+"""What is wrong with a study file, said so that it can be mended: place, fault, what to write."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from tomllib import TOMLDecodeError
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from saltus.errors import nearest
+from saltus.study.spec import METHODS, Compare, Header, Simulate, Study, SystemTable
+
+TABLES: dict[str, type[BaseModel]] = {"study": Header, "system": SystemTable, "simulate": Simulate, "compare": Compare}
+_BRANCHES = re.compile(r"float|str|list\[.*\]")
+_BARE_QUANTITY = re.compile(r"\s*([\w.-]+)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[A-Za-zµ][^#\"']*?)\s*(?:#.*)?")
+_EXPECTED = {
+    "int_type": "a whole number",
+    "float_type": "a number",
+    "string_type": "text in quotes",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "finite_number": "a finite number",
+}
+
+
+def toml(value: Any) -> str:
+    """A value as TOML would write it on one line."""
+    match value:
+        case dict():
+            return "{ " + ", ".join(f"{key} = {toml(item)}" for key, item in value.items()) + " }"
+        case list():
+            return "[" + ", ".join(map(toml, value)) + "]"
+        case bool() | str():
+            return json.dumps(value, ensure_ascii=False)
+        case _:
+            return str(value)
+
+
+def syntax_fault(error: TOMLDecodeError, text: str) -> str:
+    """A sentence on text that isn't TOML: the line, and what to write if the fault is a common one."""
+    place = re.search(r"line (\d+)", str(error))
+    number = int(place[1]) if place else text.rstrip().count("\n") + 1
+    line = text.splitlines()[number - 1].strip() if text.strip() else ""
+    if re.match(r"Cannot (overwrite|declare|mutate)|Duplicate", str(error)):
+        return f"line {number}: {line!r} gives again what stands in the file already. Keep one of the two."
+    quantity = _BARE_QUANTITY.fullmatch(line)
+    if quantity:
+        return f'line {number}: {line!r} needs quotes. Write {quantity[1]} = "{quantity[2]}".'
+    return f"line {number}: {line!r} isn't TOML: {str(error).split(' (at')[0]}."
+
+
+def content_faults(error: ValidationError) -> list[str]:
+    """A sentence for each fault of a study that is TOML, but not a study."""
+    faults: dict[tuple, list[dict]] = {}
+    for detail in error.errors():
+        place = tuple(part for part in detail["loc"] if not (isinstance(part, str) and _BRANCHES.fullmatch(part)))
+        faults.setdefault(place, []).append(dict(detail))
+    return [_fault(place, details) for place, details in faults.items()]
+
+
+def _fault(place: tuple, details: list[dict]) -> str:
+    first, kind = details[0], details[0]["type"]
+    path = [str(part) for part in place if part not in METHODS]
+    *tables, key = path or [""]
+    where = f"[{'.'.join(tables)}] " if tables else ""
+    if kind == "extra_forbidden":
+        return f"{where or 'the file '}has no {'key' if tables else 'table'} {key!r}. {nearest(key, _known(place[:-1]))}"
+    if kind == "missing":
+        return f"{where}needs {key!r}." + _example(place) if tables else f"a table [{key}] is missing."
+    if kind == "union_tag_invalid":
+        given = str(first["ctx"]["tag"])
+        alike = [name for name in METHODS if name.lower() == given.lower()]
+        return f"[{'.'.join(path)}] name = {toml(given)} is no method. {nearest(alike[0] if alike else given, METHODS)}"
+    if kind == "union_tag_not_found":
+        return f'[{".".join(path)}] needs \'name\'. Write name = "Taylor" or name = "ODE45".'
+    if kind == "value_error":
+        return f"[{'.'.join(path)}] {first['ctx']['error']}."
+    if len(details) > 1:
+        finite = any(detail["type"] == "finite_number" for detail in details)
+        expected = "a finite number" if finite else 'a plain number, or text with a unit, such as "0.4 mm"'
+    else:
+        expected = _EXPECTED.get(kind, first["msg"].removeprefix("Input should be "))
+    return f"{where}{key} = {toml(first['input'])} must be {expected}." + _example(place)
+
+
+def _table(place: tuple) -> type[BaseModel] | None:
+    """The class of the table at a place in a study."""
+    table: type[BaseModel] | None = Study
+    for part in place:
+        table = METHODS.get(part) or TABLES.get(part) or (table if part in ("method", "reference") else None)
+    return table
+
+
+def _known(place: tuple) -> Iterator[str]:
+    table = _table(place)
+    yield from table.model_fields if table else ()
+
+
+def _example(place: tuple) -> str:
+    table = _table(place[:-1])
+    field = table.model_fields.get(str(place[-1])) if table else None
+    return f" For example: {place[-1]} = {toml(field.examples[0])}" if field is not None and field.examples else ""

@@ -1,0 +1,76 @@
+"""Quantities of a study, from text with units to SI: what has a dimension must show its unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from saltus.errors import StudyError, nearest
+from saltus.study.spec import Quantity, Simulate, Start
+from saltus.units import to_si
+
+if TYPE_CHECKING:
+    from saltus.system import System
+
+
+def number(value: Quantity, unit: str, place: str, key: str) -> float:
+    """One quantity in SI.
+
+    Parameters
+    ----------
+    value : float or str
+        As written in the study.
+    unit : str
+        Coherent SI unit of what it is for; ``"1"`` for a plain number, ``""`` if not known.
+    place, key : str
+        Table and key, for the message.
+
+    Raises
+    ------
+    StudyError
+        If a quantity with a dimension is a bare number.
+    UnitError
+        If its unit is the wrong one.
+    """
+    if not isinstance(value, str) and unit not in ("", "1"):
+        raise StudyError(f'[{place}] {key} = {value:g} has no unit. Write it with one, for example {key} = "{value:g} {unit}".')
+    return to_si(value, unit, f"[{place}] {key}")
+
+
+def parameters(system: System, values: Mapping[str, Quantity]) -> dict[str, float]:
+    """[system] values in SI. Raises StudyError for a name that the system doesn't have, or for a missing unit."""
+    return {name: number(value, _unit(system, name, system.values, "system"), "system", name) for name, value in values.items()}
+
+
+def start(system: System, table: Mapping[str, Start]) -> dict[str, float | list[float]]:
+    """[simulate] start in SI: a number a state, or a list for a batch. Raises StudyError if a state is missing or unknown."""
+    missing = [state for state in system.states if state not in table]
+    if missing:
+        raise StudyError(f"[simulate] start lacks {', '.join(missing)}. {system.name} has the states {', '.join(system.states)}.")
+    return {state: _numbers(system, state, value, system.states, "simulate.start") for state, value in table.items()}
+
+
+def varied(system: System, table: Mapping[str, list[Quantity]]) -> dict[str, list[float]]:
+    """[simulate] values in SI: a list a parameter, one value for each trajectory."""
+    place = "simulate.values"
+    return {name: [number(value, _unit(system, name, system.values, place), place, name) for value in row] for name, row in table.items()}
+
+
+def is_batch(table: Simulate) -> bool:
+    """Whether [simulate] moves a batch. Raises StudyError if two of its lists differ in length, or one is empty."""
+    lengths = {name: len(value) for part in (table.start, table.values) for name, value in part.items() if isinstance(value, list)}
+    if len(set(lengths.values())) > 1 or 0 in lengths.values():
+        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise StudyError(f"[simulate] lists must have the same length, at least 1: {told}.")
+    return bool(lengths)
+
+
+def _numbers(system: System, state: str, value: Start, known: tuple[str, ...], place: str) -> float | list[float]:
+    unit = _unit(system, state, known, place)
+    return [number(one, unit, place, state) for one in value] if isinstance(value, list) else number(value, unit, place, state)
+
+
+def _unit(system: System, name: str, known: Mapping[str, float] | tuple[str, ...], place: str) -> str:
+    if name not in known:
+        raise StudyError(f"[{place}] {name!r} is unknown to {system.name}. {nearest(name, known)}")
+    return system.units.get(name, "")

@@ -1,0 +1,67 @@
+"""What a run has to say, as a table: a row for each trajectory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.analysis.settled import settled
+from saltus.errors import ParameterError
+from saltus.kernels.status import STATUS
+from saltus.results.schema import end_name, states_of
+from saltus.study.table import TextTable
+from saltus.units import from_si
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Rows printed at most; the files hold them all.
+ROWS = 24
+
+
+def run_table(title: str, run: xr.Dataset) -> TextTable:
+    """A row for each trajectory: status, contacts, grazes, steps, state at the end and, for a forced system, what it settled to.
+
+    Parameters
+    ----------
+    title : str
+        Goes above the table.
+    run : Dataset
+        What ``simulate`` returned.
+    """
+    batch = run if "trajectory" in run.dims else run.expand_dims("trajectory")
+    counts = [
+        name for name in ("events", "grazes", "grazes_unresolved", "steps") if name == "events" or name == "steps" or batch[name].any()
+    ]
+    responses = response_texts(run)
+    rows = []
+    for i in range(min(batch.sizes["trajectory"], ROWS)):
+        one = batch.isel(trajectory=i)
+        ends = [from_si(float(one[end_name(name)]), one[name].attrs.get("units", ""), 5) for name in states_of(run)]
+        rows.append((str(i), str(one["status"].item()), *(str(int(one[name])) for name in counts), *ends, *responses[i : i + 1]))
+    columns = ("", "status", *({"events": "contacts"}.get(name, name.replace("_", " ")) for name in counts),
+               *(f"{name} at the end" for name in states_of(run)), *(("response",) if responses else ()))  # fmt: skip
+    return TextTable(title, columns, tuple(rows), _notes(batch, len(rows)))
+
+
+def response_texts(run: xr.Dataset) -> list[str]:
+    """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty if the system isn't forced or too little was kept."""
+    try:
+        found = settled(run)
+    except ParameterError:
+        return []
+    longest = found.attrs["longest_period"]
+    words = {0: f"not periodic within {longest}T", 1: "T"}
+    return [words.get(n, f"{n}T") for n in np.atleast_1d(found["response_period"].values).tolist()]
+
+
+def _notes(batch: xr.Dataset, shown: int) -> tuple[str, ...]:
+    notes = []
+    total = batch.sizes["trajectory"]
+    if shown < total:
+        notes.append(f"{total - shown} more trajectories are in the file.")
+    status, counts = np.unique(batch["status"].values.astype(str), return_counts=True)
+    sentences = dict(STATUS.values())
+    notes += [f"{count} of {total} {word}: {sentences.get(word, '')}." for word, count in zip(status, counts, strict=True) if word != "ok"]
+    return tuple(notes)

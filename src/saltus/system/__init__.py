@@ -1,0 +1,20 @@
+"""The System layer: equations of motion with contacts, traced from a Python function.
+
+>>> from saltus.system import cos, freeplay, pi, system
+>>> @system(states="x v", forced_at="frequency")
+... def rig(t, x, v, *, stiffness=1.4e4, gap=4e-4, force=4.0, frequency=15.0):
+...     return v, force * cos(2 * pi * frequency * t) - freeplay(x, stiffness=stiffness, gap=gap)
+>>> [guard.name for guard in rig.guards]
+['x = -gap', 'x = gap']
+"""
+
+from saltus.system.functions import abs, atan, cos, exp, log, max, min, pi, piecewise, sin, sqrt, tan, tanh
+from saltus.system.guards import Guard
+from saltus.system.laws import freeplay
+from saltus.system.system import System
+from saltus.system.trace import system
+
+__all__ = [
+    "Guard", "System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan",
+    "tanh",
+]  # fmt: skip

@@ -1,0 +1,145 @@
+"""Numbers from expressions, by NumPy: for tests, checks and pictures. Trajectories are computed by generated code, not here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation, walk
+
+if TYPE_CHECKING:
+    from saltus.system.system import System
+
+_OPERATIONS: dict[str, Any] = {
+    "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative, "pow": np.power,
+    "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan, "atan": np.arctan, "tanh": np.tanh,
+}  # fmt: skip
+
+
+def evaluate(
+    expressions: Iterable[Expr],
+    *,
+    t: Any = 0.0,
+    states: Mapping[str, Any] | None = None,
+    values: Mapping[str, Any] | None = None,
+    bits: Sequence[Any] = (),
+) -> list[Any]:
+    """Values of expressions.
+
+    Parameters
+    ----------
+    expressions : iterable of Expr
+        What to evaluate; parts that they share are computed once.
+    t : float or array
+        Time [s].
+    states, values : mapping of str to float or array
+        States and parameters [SI]. All arrays must broadcast.
+    bits : sequence of bool or array of bool
+        Side of each guard: True where its gap is positive. May be shorter than the list of guards if the rest isn't used.
+
+    Returns
+    -------
+    list of float64 scalars or arrays
+        One for each expression. Where an operation isn't defined the value is nan or inf, without a warning.
+    """
+    expressions = list(expressions)
+    known: dict[Expr, Any] = {}
+    leaves = {"state": states or {}, "param": values or {}}
+
+    def truth(condition: Condition) -> Any:
+        match condition:
+            case Bit(guard):
+                return bits[guard]
+            case Relation(gap):
+                return known[gap] > 0
+            case Not(inner):
+                return np.logical_not(truth(inner))
+            case And(left, right):
+                return np.logical_and(truth(left), truth(right))
+            case Or(left, right):
+                return np.logical_or(truth(left), truth(right))
+        raise TypeError(condition)
+
+    with np.errstate(all="ignore"):
+        for node in walk(*expressions):
+            args = [known[child] for child in node.args]
+            if node.op == "const":
+                known[node] = np.float64(node.payload)
+            elif node.op == "time":
+                known[node] = np.asarray(t, dtype=np.float64)[()]
+            elif node.op in leaves:
+                known[node] = np.asarray(leaves[node.op][node.payload], dtype=np.float64)[()]
+            elif node.op == "select":
+                known[node] = np.where(truth(node.payload), *args)[()]
+            else:
+                known[node] = _OPERATIONS[node.op](*args)
+    return [known[expression] for expression in expressions]
+
+
+def sides(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = None) -> list[Any]:
+    """Side of each guard where the state is: True if the gap is positive.
+
+    On a boundary itself (gap exactly 0) this says False; which side the motion enters is decided by derivatives, in the flow.
+
+    Parameters
+    ----------
+    system : System
+        Its guards, equations and values.
+    t : float or array
+        Time [s].
+    y : sequence of float or array
+        One entry per state [SI].
+    values : mapping, optional
+        Values that replace the system's own [SI].
+
+    Returns
+    -------
+    list of bool or array of bool
+        One for each guard.
+    """
+    states, values = _arguments(system, y, values)
+    bits: list[Any] = []
+    for guard in system.guards:
+        (gap,) = evaluate([guard.gap], t=t, states=states, values=values, bits=bits)
+        bits.append(gap > 0)
+    return bits
+
+
+def mode_number(bits: Sequence[Any]) -> Any:
+    """Bits as one integer: bit i is guard i."""
+    return sum((np.asarray(bit, dtype=np.int64) << i for i, bit in enumerate(bits)), start=np.int64(0))
+
+
+def field(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = None, bits: Sequence[Any] | None = None) -> np.ndarray:
+    """Time derivatives of the states.
+
+    Parameters
+    ----------
+    system : System
+        Its guards, equations and values.
+    t : float or array
+        Time [s].
+    y : sequence of float or array
+        One entry per state [SI].
+    values : mapping, optional
+        Values that replace the system's own [SI].
+    bits : sequence of bool, optional
+        The mode; taken from the state if not given (:func:`sides`).
+
+    Returns
+    -------
+    ndarray, shape (states, ...)
+        [SI per second].
+    """
+    if bits is None:
+        bits = sides(system, t, y, values)
+    states, values = _arguments(system, y, values)
+    derivatives = evaluate(system.field, t=t, states=states, values=values, bits=bits)
+    return np.array(np.broadcast_arrays(*derivatives))
+
+
+def _arguments(system: System, y: Any, values: Mapping[str, Any] | None) -> tuple[dict[str, Any], dict[str, Any]]:
+    """States by name and all parameter values."""
+    return dict(zip(system.states, y, strict=True)), {**system.values, **(values or {})}

@@ -1,0 +1,288 @@
+"""Guards: the boundaries found in a system's equations.
+
+Every comparison in a condition is a boundary ``gap = 0``. Comparisons that mean the same boundary - equal up to a non-zero number, however
+they are written - become one guard; conditions then hold bits (:class:`~saltus.system.expression.Bit`), and equations are smooth where
+the bits don't change.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from saltus.errors import TraceError
+from saltus.system import expression as ex
+from saltus.system.canonical import ONE, Canonical, Polynomial, proportion
+from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
+from saltus.system.text import Writer
+
+
+@dataclass(frozen=True, eq=False)
+class Guard:
+    """A boundary; side 1 is where ``gap > 0``.
+
+    Attributes
+    ----------
+    name : str
+        The parameter that sets the boundary, if there is just one; else the equation of the boundary.
+    gap : Expr
+        Distance from the boundary, signed. It may hold bits of guards earlier in the list (``abs(x) - gap``).
+    state : str or None
+        The state that the boundary is a level of: ``gap = state - boundary``. None for any other boundary.
+    boundary : Expr or None
+        That level, an expression of parameters.
+    """
+
+    name: str
+    gap: Expr
+    state: str | None = None
+    boundary: Expr | None = None
+
+
+def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
+    """The guards of a traced field, and the field with bits in place of comparisons.
+
+    Guards are listed in the order in which the equations name them first, a boundary inside a gap before that gap. A boundary on which
+    nothing depends (equal values on both sides) is left out.
+
+    Raises
+    ------
+    TraceError
+        If a comparison doesn't depend on a state, or compares equal things.
+    """
+    field = tuple(field)
+    finder = _Finder()
+    for relation in relations(field):
+        finder.add(relation)
+    return _used_only(tuple(finder.rewrite(root) for root in field), finder.guards)
+
+
+def relations(roots: Sequence[Expr]) -> Iterator[Relation]:
+    """Every relation below the roots in the order of reading, those inside a gap before it; a relation may come more than once."""
+    seen: set[Expr] = set()
+    stack: list[Expr | Relation] = list(reversed(roots))
+    while stack:
+        item = stack.pop()
+        if isinstance(item, Relation):
+            yield item
+        elif item not in seen:
+            seen.add(item)
+            stack.extend(reversed(item.args))
+            if item.op == "select":
+                for relation in reversed(list(ex.relations_in(item.payload))):
+                    stack.extend((relation, relation.gap))
+
+
+class _Finder:
+    """Collects guards and knows what became of every relation."""
+
+    def __init__(self) -> None:
+        self.guards: list[Guard] = []
+        self._polynomials: list[Polynomial] = []
+        self._canonical = Canonical()
+        self._outcome: dict[Relation, Condition | bool] = {}
+        self._rewritten: dict[Expr, Expr] = {}
+
+    def add(self, relation: Relation) -> None:
+        """Find the guard of a relation, or make one."""
+        if relation in self._outcome:
+            return
+        gap = self.rewrite(relation.gap)
+        polynomial = self._canonical.polynomial(gap)
+        if polynomial.keys() <= {ONE}:
+            if not polynomial:
+                raise TraceError(f"an equation compares equal things: {gap!r} is always zero. Remove the comparison.")
+            self._outcome[relation] = polynomial[ONE] > 0
+            return
+        for number, known in enumerate(self._polynomials):
+            sign = proportion(polynomial, known)
+            if sign:
+                self._outcome[relation] = Bit(number) if sign > 0 else Not(Bit(number))
+                return
+        _check_moves(gap, self._canonical.kinds(polynomial))
+        guard, positive = _guard(gap, self._canonical)
+        self._outcome[relation] = Bit(len(self.guards)) if positive else Not(Bit(len(self.guards)))
+        self._polynomials.append(self._canonical.polynomial(guard.gap))
+        self.guards.append(guard)
+
+    def rewrite(self, root: Expr) -> Expr:
+        """The expression with bits in place of relations, all of which must be known."""
+        memo = self._rewritten
+        for node in ex.walk(root):
+            if node not in memo:
+                args = tuple(memo[child] for child in node.args)
+                if node.op != "select":
+                    memo[node] = ex.rebuild(node, args, node.payload)
+                else:
+                    condition = self._condition(node.payload)
+                    memo[node] = args[not condition] if isinstance(condition, bool) else ex.rebuild(node, args, condition)
+        return memo[root]
+
+    def _condition(self, condition: Condition) -> Condition | bool:
+        """A condition on bits, or its value where that is certain."""
+        match condition:
+            case Relation():
+                return self._outcome[condition]
+            case Not(inner):
+                value = self._condition(inner)
+                return not value if isinstance(value, bool) else _opposite(value)
+            case And(left, right) | Or(left, right):
+                joint = type(condition)
+                a, b = self._condition(left), self._condition(right)
+                neutral = joint is And
+                if isinstance(a, bool):
+                    return b if a is neutral else a
+                if isinstance(b, bool):
+                    return a if b is neutral else b
+                return a if a == b else joint(a, b)
+        return condition
+
+
+def _opposite(condition: Condition) -> Condition:
+    return condition.inner if isinstance(condition, Not) else Not(condition)
+
+
+def _check_moves(gap: Expr, kinds: frozenset[str]) -> None:
+    """Raise unless the gap changes with a state inside a mode."""
+    if "state" in kinds:
+        return
+    what = f"the boundary {gap!r} = 0"
+    if "time" in kinds:
+        raise TraceError(
+            f"{what} depends on time only, not on a state. Contacts are boundaries that a state crosses; a drive that switches at given "
+            f"times isn't one. Write the drive as a smooth function of t."
+        )
+    if "select" in kinds:
+        raise TraceError(
+            f"{what} depends on a state only through another condition: it jumps and is never crossed. Join the conditions with & or |, "
+            f"or write one piecewise inside the other."
+        )
+    raise TraceError(
+        f"{what} depends on parameters only, not on a state, so it is no contact. Make the choice before: pass its result as a parameter, "
+        f"or trace two systems."
+    )
+
+
+# -- the form of a guard ----------------------------------------------------------------------------------------------------------------
+def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
+    """The guard of a gap, and whether both have the same sign. Guards get their names later."""
+    gap, positive = _without_factor(gap)
+    if gap.op == "sub" and not ex.varies(gap.args[0]):
+        gap, positive = ex.sub(gap.args[1], gap.args[0]), not positive
+    name, factor = canonical.level_of(gap)
+    if name is None:
+        return Guard("", gap), positive
+    state, at_zero = ex.state(name), _substituted(gap, ex.state(name), ex.constant(0.0))
+    boundary = ex.div(_negated(at_zero) if factor > 0 else at_zero, abs(factor))
+    if ex.varies(boundary):
+        return Guard("", gap), positive
+    return Guard("", ex.sub(state, boundary), name, boundary), positive == (factor > 0)
+
+
+def _without_factor(gap: Expr) -> tuple[Expr, bool]:
+    """The gap without a numeric factor around it, and whether that factor is positive."""
+    positive = True
+    while True:
+        match gap.op, gap.args:
+            case "neg", (inner,):
+                gap, positive = inner, not positive
+            case "mul" | "div", (inner, Expr(op="const", payload=number)) if number:
+                gap, positive = inner, positive == (number > 0)
+            case "mul", (Expr(op="const", payload=number), inner) if number:
+                gap, positive = inner, positive == (number > 0)
+            case _:
+                return gap, positive
+
+
+def _substituted(root: Expr, old: Expr, new: Expr) -> Expr:
+    memo: dict[Expr, Expr] = {}
+    for node in ex.walk(root):
+        memo[node] = new if node is old else ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
+    return memo[root]
+
+
+def _negated(a: Expr) -> Expr:
+    """``-a``, the sign taken inside sums; equal to ``-a`` in every bit."""
+    match a.op, a.args:
+        case "sub", (left, right):
+            return ex.add(left.args[0], right) if left.op == "neg" else ex.sub(right, left)
+        case "add", (left, right) if left.op == "neg":
+            return ex.sub(left.args[0], right)
+    return ex.neg(a)
+
+
+# -- numbering and names ------------------------------------------------------------------------------------------------------------------
+def _used_only(field: tuple[Expr, ...], guards: Sequence[Guard]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
+    """Leave out guards on which nothing depends, renumber and name the rest."""
+    used = bits_in(field)
+    for number in reversed(range(len(guards))):
+        if number in used:
+            used |= bits_in([guards[number].gap])
+    new = {old: number for number, old in enumerate(sorted(used))}
+    field = tuple(_renumbered(root, new) for root in field)
+    kept = [replace(guards[old], gap=_renumbered(guards[old].gap, new)) for old in new]
+    return field, tuple(_with_names(kept))
+
+
+def bits_in(roots: Sequence[Expr]) -> set[int]:
+    """Numbers of the guards whose bits stand in conditions below the roots."""
+    return {bit for node in ex.walk(*roots) if node.op == "select" for bit in _bits(node.payload)}
+
+
+def _bits(condition: Condition) -> Iterator[int]:
+    match condition:
+        case Bit(guard):
+            yield guard
+        case Not(inner):
+            yield from _bits(inner)
+        case And(left, right) | Or(left, right):
+            yield from _bits(left)
+            yield from _bits(right)
+
+
+def _renumbered(root: Expr, new: Mapping[int, int]) -> Expr:
+    """The expression with other numbers for its bits."""
+
+    def condition(old: Condition) -> Condition:
+        match old:
+            case Bit(guard):
+                return Bit(new[guard])
+            case Not(inner):
+                return Not(condition(inner))
+            case And(left, right) | Or(left, right):
+                return type(old)(condition(left), condition(right))
+        raise TypeError(old)
+
+    if all(old == number for old, number in new.items()):
+        return root
+    memo: dict[Expr, Expr] = {}
+    for node in ex.walk(root):
+        payload = condition(node.payload) if node.op == "select" else node.payload
+        memo[node] = ex.rebuild(node, tuple(memo[child] for child in node.args), payload)
+    return memo[root]
+
+
+def equation_of(number: int, guards: Sequence[Guard]) -> str:
+    """The equation of a boundary, such as ``x = -lower_gap``."""
+    return Writer(guards[: number + 1], limit=100).side(number).replace(" > ", " = ", 1)
+
+
+def _with_names(guards: Sequence[Guard]) -> list[Guard]:
+    """Guards named after their only parameter; after the boundary's equation if that isn't unique."""
+    single = []
+    for guard in guards:
+        where = guard.gap if guard.boundary is None else guard.boundary
+        names = {node.payload for node in ex.walk(where) if node.op == "param"}
+        single.append(names.pop() if len(names) == 1 else None)
+    count = Counter(single)
+    taken: set[str] = set()
+    named = []
+    for number, (guard, name) in enumerate(zip(guards, single, strict=True)):
+        if name is None or count[name] > 1:
+            name = equation_of(number, guards)
+        while name in taken:
+            name += "'"
+        taken.add(name)
+        named.append(replace(guard, name=name))
+    return named

@@ -1,0 +1,158 @@
+"""Systems as plain data, and their fingerprint. Data, not code: reading it runs nothing."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from saltus.errors import SaltusError
+from saltus.system.expression import ELEMENTARY, And, Bit, Condition, Expr, Not, Or, constant, walk
+from saltus.system.guards import Guard, bits_in
+
+if TYPE_CHECKING:
+    from saltus.system.system import System
+
+#: Changes whenever the meaning of the data does.
+FORMAT = "saltus-system/1"
+
+_OPERANDS = {"const": 0, "param": 0, "state": 0, "time": 0, "add": 2, "sub": 2, "mul": 2, "div": 2, "neg": 1, "pow": 2, "select": 2}
+_OPERANDS |= dict.fromkeys(ELEMENTARY, 1)
+
+
+def to_dict(system: System) -> dict[str, Any]:
+    """A system as JSON-able data; floats are kept to the last bit."""
+    return {
+        "format": FORMAT,
+        "name": system.name,
+        "description": system.description,
+        "source": system.source,
+        "values": dict(system.values),
+        "units": dict(system.units),
+        **_equations(system),
+    }
+
+
+def _equations(system: System) -> dict[str, Any]:
+    """The part that the generated code depends on."""
+    roots = [*system.field]
+    for guard in system.guards:
+        roots += [guard.gap] if guard.boundary is None else [guard.gap, guard.boundary]
+    index: dict[Expr, int] = {}
+    nodes = []
+    for node in walk(*roots):
+        index[node] = len(index)
+        payload = _condition_data(node.payload) if node.op == "select" else node.payload
+        nodes.append([node.op, [index[child] for child in node.args], payload])
+    return {
+        "states": list(system.states),
+        "parameters": list(system.values),
+        "forced_at": system.forced_at,
+        "nodes": nodes,
+        "field": [index[root] for root in system.field],
+        "guards": [
+            [guard.name, index[guard.gap], guard.state, None if guard.boundary is None else index[guard.boundary]]
+            for guard in system.guards
+        ],
+    }
+
+
+def fingerprint(system: System) -> str:
+    """SHA-256 of the equations: field, guards, names of states and parameters, and what sets the period. Not of values, name or source."""
+    data = {"format": FORMAT, **_equations(system)}
+    data["forced_at_unit"] = system.units[system.forced_at] if system.forced_at else None
+    data["nodes"] = [[op, args, payload.hex() if isinstance(payload, float) else payload] for op, args, payload in data["nodes"]]
+    return hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def _condition_data(condition: Condition) -> list[Any]:
+    match condition:
+        case Bit(guard):
+            return ["bit", guard]
+        case Not(inner):
+            return ["not", _condition_data(inner)]
+        case And(left, right):
+            return ["and", _condition_data(left), _condition_data(right)]
+        case Or(left, right):
+            return ["or", _condition_data(left), _condition_data(right)]
+    raise TypeError(condition)
+
+
+# -- reading --------------------------------------------------------------------------------------------------------------------------
+def arguments(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of System from :func:`to_dict`'s data.
+
+    Raises
+    ------
+    SaltusError
+        If the data isn't a system of this format: every node, name and number is checked, because code is generated from it.
+    """
+    if not isinstance(data, Mapping) or data.get("format") != FORMAT:
+        found = data.get("format") if isinstance(data, Mapping) else type(data).__name__
+        raise SaltusError(f"this isn't a system written by this version of saltus (format {found!r}, expected {FORMAT!r}). Trace it again.")
+    try:
+        return _read(data)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        raise SaltusError(f"the data of a system is damaged ({type(error).__name__}: {error}). Trace the system again.") from error
+
+
+def _read(data: Mapping[str, Any]) -> dict[str, Any]:
+    states, parameters = tuple(data["states"]), list(data["parameters"])
+    for name in (*states, *parameters):
+        _require(isinstance(name, str) and name.isidentifier(), f"{name!r} is no name")
+    _require(len({*states, *parameters}) == len(states) + len(parameters), "a name stands twice")
+    names = {"state": set(states), "param": set(parameters)}
+    nodes: list[Expr] = []
+    for op, args, payload in data["nodes"]:
+        _require(len(args) == _OPERANDS[op] and all(0 <= i < len(nodes) for i in args), f"wrong operands of {op!r}")
+        nodes.append(_node(op, tuple(nodes[i] for i in args), payload, names))
+    guards = tuple(
+        Guard(str(name), nodes[gap], state, None if boundary is None else nodes[boundary]) for name, gap, state, boundary in data["guards"]
+    )
+    field = tuple(nodes[i] for i in data["field"])
+    _require(len(field) == len(states), "the number of derivatives and of states differ")
+    _require(all(guard.state is None or guard.state in states for guard in guards), "a guard names an unknown state")
+    for number, guard in enumerate(guards):
+        _require(bits_in([guard.gap]) <= set(range(number)), "a gap depends on a later guard")
+    _require(bits_in(field) <= set(range(len(guards))), "a condition names an unknown guard")
+    _require(data["forced_at"] is None or data["forced_at"] in parameters, "forced_at is no parameter")
+    return {
+        "name": str(data["name"]),
+        "description": str(data["description"]),
+        "source": str(data["source"]),
+        "states": states,
+        "values": {name: float(data["values"][name]) for name in parameters},
+        "units": {name: str(data["units"][name]) for name in (*states, *parameters)},
+        "forced_at": data["forced_at"],
+        "field": field,
+        "guards": guards,
+    }
+
+
+def _node(op: str, args: tuple[Expr, ...], payload: Any, names: Mapping[str, set[str]]) -> Expr:
+    if op == "const":
+        return constant(payload)
+    if op in names:
+        _require(payload in names[op], f"unknown {op} {payload!r}")
+        return Expr(op, args, str(payload))
+    if op == "select":
+        return Expr(op, args, _condition(payload))
+    return Expr(op, args)
+
+
+def _condition(data: Sequence[Any]) -> Condition:
+    kind, *parts = data
+    if kind == "bit" and len(parts) == 1 and isinstance(parts[0], int) and parts[0] >= 0:
+        return Bit(parts[0])
+    inner = [_condition(part) for part in parts] if kind in ("not", "and", "or") else []
+    if kind == "not" and len(inner) == 1:
+        return Not(inner[0])
+    if kind in ("and", "or") and len(inner) == 2:
+        return (And if kind == "and" else Or)(*inner)
+    raise ValueError(f"unknown condition {kind!r}")
+
+
+def _require(holds: bool, what: str) -> None:
+    if not holds:
+        raise ValueError(what)

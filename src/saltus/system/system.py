@@ -1,0 +1,176 @@
+"""The System: equations with contacts, and values for their parameters."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+from saltus.errors import ParameterError, nearest
+from saltus.system import checks, serial
+from saltus.system.derivatives import gradient
+from saltus.system.expression import Expr
+from saltus.system.guards import Guard
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class System:
+    """Equations of motion with contacts. Made by :func:`saltus.system`, not by hand; never changed, only copied.
+
+    Attributes
+    ----------
+    name, description, source : str
+        What it is called, what it is, where it was published.
+    states : tuple of str
+        Names of the states.
+    field : tuple of Expr
+        Time derivative of each state [SI per second]. Conditions hold bits: see ``guards``.
+    guards : tuple of Guard
+        The boundaries at which the equations change.
+    values : mapping of str to float
+        Parameter values [SI]; read-only.
+    units : mapping of str to str
+        Coherent SI unit of each state and parameter; ``""`` if not declared, ``"1"`` for a plain number; read-only.
+    forced_at : str or None
+        The parameter that holds the forcing frequency, in Hz or rad/s as its unit says. None for a system without a period.
+    """
+
+    name: str
+    states: tuple[str, ...]
+    field: tuple[Expr, ...]
+    guards: tuple[Guard, ...]
+    values: Mapping[str, float]
+    units: Mapping[str, str]
+    forced_at: str | None = None
+    source: str = ""
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
+        object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+        for name, value in self.values.items():
+            checks.check_range(name, value, self.forced_at)
+        checks.check_periodic(self)
+
+    # -- values --------------------------------------------------------------------------------------------------------------
+    def with_values(self, **values: Any) -> System:
+        """The same equations with other parameter values. Nothing is traced or compiled again.
+
+        Parameters
+        ----------
+        **values : float or str
+            By parameter name: a number in SI, or text with a unit, such as ``contact_stiffness="70 kN/m"``.
+
+        Raises
+        ------
+        ParameterError
+            If a name is unknown, or a value isn't a finite number in the parameter's range.
+        UnitError
+            If a text value has the wrong unit.
+        """
+        new = {name: checks.resolve_one(self._known(name), value, self.units[name], self.forced_at) for name, value in values.items()}
+        return replace(self, values={**self.values, **new})
+
+    def resolve(self, name: str, value: Any) -> Any:
+        """A value for a parameter, in SI and checked; the system itself stays as it is.
+
+        Parameters
+        ----------
+        name : str
+            A parameter.
+        value : float or str, or a list or array of them
+            Numbers in SI, or text with a unit.
+
+        Returns
+        -------
+        float, or ndarray of float64 of the shape of the array
+
+        Raises
+        ------
+        ParameterError, UnitError
+            As :meth:`with_values`.
+        """
+        return checks.resolve(self._known(name), value, self.units[name], self.forced_at)
+
+    def _known(self, name: str) -> str:
+        """The name of a parameter, checked."""
+        if name not in self.values:
+            raise ParameterError(f"{self.name} has no parameter {name!r}. {nearest(name, self.values)}")
+        return name
+
+    def period(self, values: Mapping[str, Any] | None = None) -> Any:
+        """Forcing period T [s]; None for a system that isn't forced.
+
+        Parameters
+        ----------
+        values : mapping of str to float or array, optional
+            Values [SI] that replace the system's own; with an array of frequencies the result is an array.
+        """
+        if self.forced_at is None:
+            return None
+        frequency = (values or {}).get(self.forced_at, self.values[self.forced_at])
+        return (2 * math.pi if self.units[self.forced_at] == "rad/s" else 1.0) / frequency
+
+    # -- equations -----------------------------------------------------------------------------------------------------------
+    @functools.cached_property
+    def jacobian(self) -> tuple[tuple[Expr, ...], ...]:
+        """Derivative of each entry of the field (row) with respect to each state (column), in a frozen mode."""
+        return tuple(gradient(entry, self.states) for entry in self.field)
+
+    @functools.cached_property
+    def guard_gradients(self) -> tuple[tuple[Expr, ...], ...]:
+        """Derivative of each gap (row) with respect to each state (column), in a frozen mode."""
+        return tuple(gradient(guard.gap, self.states) for guard in self.guards)
+
+    def equations(self) -> list[str]:
+        """The equations as text, one line each; long parts that are used twice come first, named."""
+        from saltus.system.display import equation_lines
+
+        return equation_lines(self)
+
+    def fingerprint(self) -> str:
+        """Hash of the equations (64 hexadecimal digits): the same for other values, another name and in another process."""
+        return self._fingerprint
+
+    @functools.cached_property
+    def _fingerprint(self) -> str:
+        return serial.fingerprint(self)
+
+    # -- units and looks -----------------------------------------------------------------------------------------------------
+    def state_unit(self, name: str) -> str:
+        """Unit of a state; ``""`` if not declared. Raises ParameterError for an unknown state."""
+        if name not in self.states:
+            raise ParameterError(f"{self.name} has no state {name!r}. {nearest(name, self.states)}")
+        return self.units[name]
+
+    def parameter_text(self, name: str) -> str:
+        """A parameter's value as people write it, such as ``0.4 mm``. Raises ParameterError for an unknown parameter."""
+        from saltus.units import from_si
+
+        return from_si(self.values[self._known(name)], self.units[name])
+
+    def __repr__(self) -> str:
+        from saltus.system.display import system_text
+
+        return system_text(self)
+
+    def _repr_html_(self) -> str:
+        from saltus.system.display import system_html
+
+        return system_html(self)
+
+    # -- data ----------------------------------------------------------------------------------------------------------------
+    def to_dict(self) -> dict[str, Any]:
+        """The system as JSON-able data, which :meth:`from_dict` reads back to the last bit."""
+        return serial.to_dict(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> System:
+        """A system from :meth:`to_dict`'s data. No code is run. Raises SaltusError if the data is damaged or of another version."""
+        return cls(**serial.arguments(data))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return System.from_dict, (self.to_dict(),)

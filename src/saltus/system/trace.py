@@ -1,0 +1,221 @@
+"""Tracing: the user's function is called once, with symbols, and what it computes is recorded.
+
+Whatever goes wrong inside the function becomes a TraceError that names its file and line and says what to write instead.
+"""
+
+from __future__ import annotations
+
+import inspect
+import sysconfig
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from saltus.errors import ParameterError, TraceError, UnitError, nearest
+from saltus.system import checks
+from saltus.system.expression import TIME, Expr, as_expr, parameter, state
+from saltus.system.guards import find_guards
+from saltus.system.system import System
+from saltus.units import check_declared, coherent_unit
+
+_HERE = str(Path(__file__).parent.parent)
+_LIBRARIES = tuple({sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None})
+_HOW_TO = (
+    "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and saltus's own functions: sl.sqrt, sl.exp, sl.log, "
+    "sl.sin, sl.cos, sl.tan, sl.atan, sl.tanh, sl.min, sl.max, sl.abs. Functions of numpy, math, scipy and sympy can't be traced."
+)
+
+
+def system(
+    *,
+    states: str | Sequence[str],
+    forced_at: str | None = None,
+    units: Mapping[str, str] | None = None,
+    name: str | None = None,
+    source: str = "",
+) -> Callable[[Callable[..., Any]], System]:
+    """Decorator that turns an equation of motion into a :class:`System`.
+
+    The function takes the time, the states, and after a ``*`` the parameters with their default values; it returns the time derivative of
+    each state. It is called once, with symbols. Comparisons inside :func:`piecewise` become the contacts.
+
+    Parameters
+    ----------
+    states : str or sequence of str
+        Names of the states: ``"x v"``.
+    forced_at : str, optional
+        The parameter that holds the forcing frequency. It is in Hz (T = 1/f) unless ``units`` says ``"rad/s"``. The equations must
+        repeat after T. Leave out for a system without a period.
+    units : mapping of str to str, optional
+        Coherent SI unit of states and parameters: ``{"x": "m", "mass": "kg", "damping_ratio": "1"}``. The unit of a parameter whose
+        default is text (``mass="3 kg"``) is known already.
+    name : str, optional
+        What to call the system; the function's name if not given.
+    source : str, optional
+        Where the equations were published.
+
+    Returns
+    -------
+    decorator
+        Gives a System in place of the function. The function's docstring becomes its description.
+
+    Raises
+    ------
+    TraceError
+        If the function can't be traced; the message names file and line.
+    ParameterError, UnitError
+        If a default value is out of range or a unit is wrong.
+
+    Examples
+    --------
+    >>> from saltus.system import cos, pi, piecewise
+    >>> @system(states="x v", forced_at="frequency", units={"x": "m", "v": "m/s"})
+    ... def rig(t, x, v, *, mass="3 kg", stiffness="14 kN/m", gap="0.4 mm", force="4 N", frequency="15 Hz"):
+    ...     contact = piecewise((stiffness * (x - gap), x > gap), otherwise=0)
+    ...     return v, (force * cos(2 * pi * frequency * t) - contact) / mass
+    >>> rig.guards[0].name, rig.values["gap"], rig.units["stiffness"]
+    ('gap', 0.0004, 'N/m')
+    """
+    if callable(states):
+        raise TraceError('write @sl.system(states="x v"), with the names of the states, not bare @sl.system.')
+    names = tuple(states.replace(",", " ").split()) if isinstance(states, str) else tuple(states)
+
+    def decorate(function: Callable[..., Any]) -> System:
+        title = name or function.__name__
+        defaults = _parameters(function, names, title)
+        known_units = _units(names, defaults, forced_at, dict(units or {}), title)
+        if forced_at is not None and known_units[forced_at] not in ("Hz", "rad/s"):
+            raise UnitError(
+                f"{title}: forced_at={forced_at!r} is in {known_units[forced_at]!r}, but a forcing frequency is in 'Hz' or 'rad/s'."
+            )
+        values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
+        field, guards = _traced(function, names, tuple(defaults), title)
+        return System(
+            name=title,
+            states=names,
+            field=field,
+            guards=guards,
+            values=values,
+            units=known_units,
+            forced_at=forced_at,
+            source=source,
+            description=inspect.getdoc(function) or "",
+        )
+
+    return decorate
+
+
+# -- the signature --------------------------------------------------------------------------------------------------------------------
+def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: str) -> dict[str, Any]:
+    """Names and defaults of the parameters; checks the signature."""
+    _check_states(states, title)
+    wanted = f"def {title}(t, {', '.join(states)}, *, ...)"
+    positional, parameters = [], {}
+    for argument in inspect.signature(function).parameters.values():
+        if argument.kind in (argument.VAR_POSITIONAL, argument.VAR_KEYWORD):
+            raise TraceError(f"{title}: name every parameter; *{argument.name} can't be traced. Write {wanted}.")
+        if argument.kind != argument.KEYWORD_ONLY:
+            positional.append(argument)
+        elif argument.default is argument.empty:
+            raise TraceError(
+                f"{title}: parameter {argument.name!r} has no default. Give it a value: {argument.name}=1.0, or text with a unit."
+            )
+        else:
+            parameters[argument.name] = argument.default
+    names = [argument.name for argument in positional]
+    if names[1:] == list(states):
+        return parameters
+    if names[: len(states)] == list(states):
+        raise TraceError(f"{title}: the time is the first argument, before the states. Write {wanted}.")
+    if names[1 : len(states) + 1] == list(states):
+        raise TraceError(f"{title}: put a * between the states and the parameters, so that parameters are given by name. Write {wanted}.")
+    raise TraceError(f"{title}: states={' '.join(states)!r}, but the function takes ({', '.join(names)}). Write {wanted}.")
+
+
+def _check_states(states: tuple[str, ...], title: str) -> None:
+    if not states:
+        raise TraceError(f'{title}: states="" names no state. Write states="x v".')
+    for name in states:
+        if not (isinstance(name, str) and name.isidentifier()):
+            raise TraceError(f"{title}: {name!r} can't be the name of a state. Use letters, digits and _.")
+    if len(set(states)) < len(states):
+        raise TraceError(f"{title}: states={' '.join(states)!r} names a state twice.")
+
+
+def _units(
+    states: tuple[str, ...], defaults: Mapping[str, Any], forced_at: str | None, declared: dict[str, str], title: str
+) -> dict[str, str]:
+    """Unit of every state and parameter."""
+    for name in declared:
+        if name not in states and name not in defaults:
+            raise ParameterError(
+                f"{title}: units= names {name!r}, which is neither a state nor a parameter. {nearest(name, (*states, *defaults))}"
+            )
+    if forced_at is not None and forced_at not in defaults:
+        raise ParameterError(f"{title}: forced_at={forced_at!r} is no parameter. {nearest(forced_at, defaults)}")
+    units = {}
+    for name in (*states, *defaults):
+        if name in declared:
+            units[name] = check_declared(declared[name], name)
+        elif name == forced_at:
+            units[name] = "Hz"
+        else:
+            default = defaults.get(name)
+            units[name] = coherent_unit(default, name) if isinstance(default, str) else ""
+    return units
+
+
+# -- the call -------------------------------------------------------------------------------------------------------------------------
+def _traced(function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...], title: str) -> tuple[Any, Any]:
+    """Field and guards."""
+    try:
+        returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
+        derivatives = _as_derivatives(returned, states)
+    except Exception as error:
+        raise TraceError(_explained(error, function, title)) from error
+    try:
+        return find_guards(derivatives)
+    except TraceError as error:
+        raise TraceError(f"{title} ({_place(function)}): {error}") from error
+
+
+def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
+    """What the function returned, as one expression per state."""
+    if returned is None:
+        raise TraceError("it returns nothing. End it with: return " + ", ".join(f"d{name}/dt" for name in states))
+    if isinstance(returned, Expr | int | float):
+        returned = (returned,)
+    try:
+        derivatives = [as_expr(value) for value in returned]
+    except TypeError:
+        raise TraceError(f"it returns {returned!r} in place of the time derivatives of {', '.join(states)}.") from None
+    if len(derivatives) != len(states):
+        raise TraceError(
+            f"it returns {len(derivatives)} value{'s' * (len(derivatives) != 1)}, but there are {len(states)} states "
+            f"({', '.join(states)}): one time derivative for each, in this order."
+        )
+    return derivatives
+
+
+def _explained(error: Exception, function: Callable[..., Any], title: str) -> str:
+    """The message for an error inside the user's function: where, what, and what to write instead."""
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    own_file = code.co_filename if code else ""
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename == own_file or not frame.filename.startswith((_HERE, *_LIBRARIES))
+    ]
+    where = _place(function)
+    if frames:
+        where = f"{frames[-1].filename}, line {frames[-1].lineno}"
+        where += f": {frames[-1].line}" if frames[-1].line else ""
+    if isinstance(error, TraceError):
+        return f"{title} ({where}): {error}"
+    return f"{title} ({where}) can't be traced: {type(error).__name__}: {error}. {_HOW_TO}"
+
+
+def _place(function: Callable[..., Any]) -> str:
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    return f"{code.co_filename}, line {code.co_firstlineno}" if code else "unknown place"

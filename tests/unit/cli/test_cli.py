@@ -1,0 +1,122 @@
+"""The command line: quick to help, teaches by example, ends every fault with a message and the right exit code."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+from saltus.cli import app, commands
+
+COMMANDS = ["demo", "run", "plot", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
+
+
+def saltus(*arguments: str):
+    """The result of a command; faults that should have been caught surface as exceptions."""
+    return CliRunner().invoke(app, arguments, catch_exceptions=False)
+
+
+def test_help_imports_nothing_heavy():
+    """What makes `saltus --help` take less than 0.5 s; measured by the modules, since a clock would depend on the load."""
+    code = (
+        "import sys; from saltus.cli import main\n"
+        "sys.argv = ['saltus', '--help']\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print('HEAVY', sorted({'numpy', 'numba', 'xarray', 'pandas', 'scipy', 'matplotlib', 'pint', 'pydantic'} & set(sys.modules)))"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert "demo" in out
+    assert out.splitlines()[-1] == "HEAVY []"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_teaches_with_an_example(command):
+    result = saltus(*command.split(), "--help")
+    assert result.exit_code == 0
+    assert f"saltus {command}" in result.output.split("Example", 1)[1]
+
+
+def test_no_arguments_shows_the_commands():
+    assert all(command.split()[0] in saltus().output for command in COMMANDS)
+
+
+def test_unknown_command():
+    result = saltus("dmo")
+    assert result.exit_code == 2
+    assert "dmo" in result.output
+
+
+def test_a_fault_has_no_traceback(tmp_path):
+    result = saltus("run", str(tmp_path / "none.toml"))
+    assert result.exit_code == 2
+    assert result.output.startswith("saltus: the study")
+    assert "Traceback" not in result.output
+
+
+def test_brackets_in_messages_stay(tmp_path):
+    """rich reads [simulate] as markup unless told not to."""
+    (tmp_path / "a.toml").write_text('[study]\nname = "a"\n[simulate]\nstart = { x = "0 mm" }\nperiods = true\n')
+    assert "[simulate] periods = true" in saltus("run", str(tmp_path / "a.toml")).output
+
+
+def test_ctrl_c_ends_with_a_message(monkeypatch, tmp_path):
+    def stopped(path):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("saltus.study.read.read", stopped)
+    result = saltus("run", str(tmp_path / "a.toml"))
+    assert result.exit_code == 130
+    assert "stopped" in result.output
+    assert "Traceback" not in result.output
+
+
+def test_a_file_that_cannot_be_written(monkeypatch, tmp_path):
+    def refused(path):
+        raise PermissionError(13, "Permission denied", "/out/demo.csv")
+
+    monkeypatch.setattr("saltus.study.read.read", refused)
+    result = saltus("run", str(tmp_path / "a.toml"))
+    assert result.exit_code == 2
+    assert result.output.startswith("saltus: /out/demo.csv: Permission denied.")
+
+
+def test_schema_is_json():
+    assert json.loads(saltus("schema").output)["title"] == "Study"
+
+
+def test_models():
+    assert "delangre" in saltus("models").output
+    assert "contact_stiffness" in saltus("models", "delangre").output
+    result = saltus("models", "delange")
+    assert result.exit_code == 2
+    assert "Did you mean 'delangre'?" in result.output
+
+
+def test_cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("SALTUS_CACHE", str(tmp_path))
+    entry = tmp_path / "0123456789abcdef"
+    entry.mkdir()
+    (entry / "manifest.json").write_text('{"title": "rig, ode45", "files": {}}')
+    assert "rig, ode45" in saltus("cache", "show").output
+    assert saltus("cache").output == saltus("cache", "show").output
+    assert "deleted 1 entries" in saltus("cache", "clear").output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_doctor_fails_if_a_check_fails(monkeypatch):
+    from saltus.study import doctor
+
+    monkeypatch.setattr(doctor, "checks", lambda: [doctor.Check("a case", float("nan"), 1e-14)])
+    result = saltus("doctor")
+    assert result.exit_code == 1
+    assert "FAILED" in result.output
+
+
+def test_cases_of_the_demo_are_those_of_the_rig():
+    from saltus.models.delangre import CASES
+
+    assert [case.value for case in commands.Case] == list(CASES)

@@ -1,0 +1,212 @@
+"""A time history shows every contact of its window, changes colour exactly there, and names its units."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+from saltus.errors import ParameterError
+from saltus.plot import OKABE_ITO, history, style
+
+from .conftest import GAPS, PERIOD, rig_run
+
+COLORS = {"upper contact": "vermillion", "free": "green", "lower contact": "blue"}
+
+
+def line(ax, label):
+    return next(one for one in ax.lines if one.get_label() == label)
+
+
+def contacts(run, begin, end):
+    t = run["contact_time"].values / PERIOD
+    return run.isel(contact=np.flatnonzero((t >= begin) & (t <= end)))
+
+
+def ends(ax, label):
+    """Both ends of every piece of one colour, shape (end, 2)."""
+    xy = np.array(line(ax, label).get_data()).T
+    gaps = np.flatnonzero(np.isnan(xy[:, 0]))
+    first, last = np.concatenate([[0], gaps + 1]), np.concatenate([gaps - 1, [len(xy) - 1]])
+    return np.concatenate([xy[first], xy[last]])
+
+
+@pytest.mark.parametrize(("periods", "begin", "end"), [(None, 0, 40), (5, 35, 40), (2.5, 37.5, 40), ((10, 12.25), 10, 12.25)])
+def test_every_contact_of_the_window_is_marked(run, periods, begin, end):
+    ax = history(run, periods=periods)
+    inside = contacts(run, begin, end)
+    t, x = line(ax, "contact").get_data()
+    assert inside.sizes["contact"] >= 5
+    assert np.array_equal(t, inside["contact_time"].values)
+    assert np.array_equal(x, inside["contact_x"].values * 1e3)
+    assert np.allclose(ax.get_xlim(), np.array([begin, end]) * PERIOD, rtol=1e-12)
+
+
+def test_colours_change_exactly_at_the_boundaries(run):
+    ax = history(run, periods=5)
+    for label, allowed in {"upper contact": [0.4], "free": [0.0, 0.4], "lower contact": [0.0]}.items():
+        inner = [x for t, x in ends(ax, label) if ax.get_xlim()[0] < t < ax.get_xlim()[1]]
+        assert len(inner) > 4
+        assert set(inner) <= set(allowed), label
+    assert np.nanmin(line(ax, "upper contact").get_ydata()) == 0.4
+    assert np.nanmax(line(ax, "lower contact").get_ydata()) == 0.0
+    assert (np.nanmin(line(ax, "free").get_ydata()), np.nanmax(line(ax, "free").get_ydata())) == (0.0, 0.4)
+
+
+def test_pieces_join_without_a_hole(run):
+    """Each contact in the window is the end of one piece and the beginning of the next."""
+    ax = history(run, periods=5)
+    times = np.sort(np.concatenate([ends(ax, label)[:, 0] for label in COLORS]))[1:-1]
+    assert np.array_equal(times, np.repeat(contacts(run, 35, 40)["contact_time"].values, 2))
+
+
+def test_no_sample_is_lost(run):
+    ax = history(run, periods=5)
+    drawn = np.unique(np.concatenate([line(ax, label).get_ydata() for label in COLORS]))
+    assert np.isin(run["x"].values[3500:] * 1e3, drawn).all()
+
+
+def test_colours_are_those_of_the_palette(run):
+    ax = history(run)
+    assert {label: to_hex(line(ax, label).get_color()) for label in COLORS} == {k: OKABE_ITO[v].lower() for k, v in COLORS.items()}
+
+
+def test_axes_have_units_and_gap_lines(run):
+    ax = history(run, periods=3)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("time [s]", "x [mm]")
+    dashed = [one.get_ydata()[0] for one in ax.lines if one.get_linestyle() == "--" or one.is_dashed()]
+    assert dashed == [gap * 1e3 for gap in GAPS]
+    assert [text.get_text() for text in ax.texts] == ["lower gap\n0 mm", "upper gap\n0.4 mm"]
+
+
+def test_periods_stand_at_the_top(run):
+    ax = history(run, periods=4)
+    ax.figure.canvas.draw()
+    (top,) = ax.child_axes
+    assert np.allclose(top.get_xlim(), (36, 40))
+    assert [label.get_text() for label in top.get_xticklabels()] == ["36 T", "37 T", "38 T", "39 T", "40 T"]
+    assert not history(run, time="s").child_axes
+
+
+def test_time_in_periods(run):
+    ax = history(run, periods=4, time="T")
+    assert ax.get_xlabel() == "time [T]"
+    assert np.allclose(ax.get_xlim(), (36, 40))
+    assert np.allclose(line(ax, "contact").get_xdata(), contacts(run, 36, 40)["contact_time"].values / PERIOD)
+
+
+def test_another_state_keeps_the_colours_of_the_guarded_one(run):
+    ax = history(run, state="v", periods=5)
+    assert ax.get_ylabel() == "v [mm/s]"
+    inside = contacts(run, 35, 40)
+    assert np.array_equal(line(ax, "contact").get_ydata(), inside["contact_v"].values * 1e3)
+    inner = {round(v, 9) for t, v in ends(ax, "free") if ax.get_xlim()[0] < t < ax.get_xlim()[1]}
+    assert inner <= {round(v, 9) for v in inside["contact_v"].values * 1e3}
+    assert not ax.texts
+
+
+def test_units_can_be_chosen(run):
+    ax = history(run, units={"x": "µm"})
+    assert ax.get_ylabel() == "x [µm]"
+    assert np.nanmin(line(ax, "upper contact").get_ydata()) == pytest.approx(400)
+    with pytest.raises(ParameterError, match=r"can't be shown in 'inch'.*mm"):
+        history(run, units={"x": "inch"})
+
+
+def test_grazes_have_markers_of_their_own():
+    run = rig_run(periods=3, kinds=["graze", "graze_unresolved", "graze"], status="graze_unresolved")
+    ax = history(run)
+    graze, open_ = line(ax, "graze"), line(ax, "graze, unresolved")
+    assert (len(graze.get_xdata()), len(open_.get_xdata())) == (2, 1)
+    assert len(line(ax, "contact").get_xdata()) == run.sizes["contact"] - 3
+    assert graze.get_marker() != line(ax, "contact").get_marker()
+    assert open_.get_markerfacecolor() == "white"
+    assert any("graze_unresolved" in text.get_text() for text in ax.texts)
+
+
+def test_an_early_stop_is_told():
+    ax = history(rig_run(periods=2, status="budget_events"))
+    assert any("budget_events, stopped at 0.133333 s" in text.get_text() for text in ax.texts)
+
+
+def test_a_batch_becomes_a_stack_of_panels(batch):
+    axes = history(batch, periods=3)
+    assert axes.shape == (4,)
+    for k, ax in enumerate(axes):
+        one = batch.isel(contact=np.flatnonzero(batch["contact_trajectory"].values == k))
+        assert len(line(ax, "contact").get_xdata()) == contacts(one, 17, 20).sizes["contact"]
+    assert sum(ax.get_legend() is not None for ax in axes) == 1
+
+
+def test_one_of_a_batch_into_given_axes(batch):
+    _, grid = plt.subplots(2, 2)
+    assert history(batch, 2, ax=grid[0, 0]) is grid[0, 0]
+    alone = rig_run((0.4e-3,), periods=20)
+    assert np.array_equal(line(grid[0, 0], "contact").get_xdata(), alone["contact_time"].values)
+    assert len(history(batch, [0, 3], ax=grid[1])) == 2
+    selected = batch.sel(trajectory=2)
+    assert np.array_equal(line(history(selected), "contact").get_xdata(), alone["contact_time"].values)
+
+
+def test_a_run_without_forcing(run):
+    free = run.drop_vars("period").sel(time=slice(0.5, 0.54))
+    ax = history(free)
+    assert not ax.child_axes
+    t = run["contact_time"].values
+    inside = (t >= free["time"].values[0]) & (t <= free["time"].values[-1])
+    assert len(line(ax, "contact").get_xdata()) == inside.sum() > 0
+    with pytest.raises(ParameterError, match=r"isn't forced.*sel\(time="):
+        history(free, periods=3)
+
+
+def test_missing_samples_leave_a_hole(run):
+    broken = run.copy(deep=True)
+    broken["x"][{"time": slice(3600, None)}] = np.nan
+    ax = history(broken, periods=5)
+    assert np.isfinite(ax.get_ylim()).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"trajectory": 7}, "there is no trajectory 7; this run has 0 to 3"),
+        ({"state": "z"}, "no state 'z'"),
+        ({"periods": 0}, "number of last periods"),
+        ({"periods": (5, 3)}, "begin and end"),
+        ({"periods": (30, 40)}, "outside this run, which holds periods 0 to 20"),
+        ({"periods": "all"}, "number of last periods"),
+        ({"units": {"X": "mm"}}, "no state 'X'. Known: v, x"),
+        ({"time": "ms"}, "Known: 'both', 's', 'T'"),
+        ({"ax": "here"}, "Give matplotlib Axes"),
+        ({"trajectory": []}, "1 to 8 trajectories"),
+    ],
+)
+def test_errors_teach(batch, arguments, message):
+    with pytest.raises(ParameterError, match=message):
+        history(batch, **arguments)
+
+
+def test_axes_must_fit_the_trajectories(batch):
+    _, ax = plt.subplots()
+    with pytest.raises(ParameterError, match="4 trajectories need 4 Axes, not 1"):
+        history(batch, ax=ax)
+
+
+@pytest.mark.parametrize("thing", [None, {"x": [1.0]}, np.zeros(3)])
+def test_only_runs_are_drawn(thing):
+    with pytest.raises(ParameterError, match="takes the Dataset that simulate returns"):
+        history(thing)
+
+
+def test_stroboscopic_points_have_no_history(points):
+    with pytest.raises(ParameterError, match="from stroboscope"):
+        history(points)
+
+
+def test_figures_of_its_own_have_the_style_and_leave_no_trace(run):
+    before = plt.rcParams.copy()
+    ax = history(run, periods=2)
+    assert not ax.spines["right"].get_visible()
+    assert not ax.get_legend().get_frame_on()
+    assert plt.rcParams == before
+    with style():
+        assert plt.rcParams["axes.spines.right"] is False

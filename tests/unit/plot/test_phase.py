@@ -1,0 +1,115 @@
+"""A phase portrait: settled part, colours by region, Poincare points at whole periods."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from saltus.errors import ParameterError
+from saltus.plot import phase
+
+from .conftest import GAPS, rig_run
+from .test_history import COLORS, ends, line
+
+
+def test_poincare_points_are_the_states_at_whole_periods(run):
+    ax = phase(run, periods=7)
+    x, v = line(ax, "whole periods").get_data()
+    whole = run.isel(time=slice(3300, None, 100))
+    assert np.array_equal(x, whole["x"].values * 1e3)
+    assert np.array_equal(v, whole["v"].values * 1e3)
+    assert "whole periods" not in [one.get_label() for one in phase(run, poincare=False).lines]
+
+
+def test_the_last_30_percent_are_shown(run):
+    assert len(line(phase(run), "whole periods").get_xdata()) == 12 + 1
+    short = rig_run(periods=2)
+    assert len(line(phase(short), "whole periods").get_xdata()) == 1 + 1
+
+
+def test_colours_change_exactly_at_the_boundaries(run):
+    ax = phase(run, periods=5)
+    begin, end = run.isel(time=3500), run.isel(time=-1)
+    loose = {float(one["x"]) * 1e3 for one in (begin, end)}
+    for label, allowed in {"upper contact": {0.4}, "free": {0.0, 0.4}, "lower contact": {0.0}}.items():
+        assert set(ends(ax, label)[:, 0]) <= allowed | loose
+
+
+def test_axes_have_units_and_gap_lines(run):
+    ax = phase(run)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [mm]", "v [mm/s]")
+    assert [one.get_xdata()[0] for one in ax.lines if one.is_dashed()] == [gap * 1e3 for gap in GAPS]
+    assert {text.get_text() for text in ax.get_legend().get_texts()} == {*COLORS, "whole periods"}
+
+
+def test_states_can_be_turned(run):
+    ax = phase(run, states=("v", "x"))
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("v [mm/s]", "x [mm]")
+    assert [one.get_ydata()[0] for one in ax.lines if one.is_dashed()] == [gap * 1e3 for gap in GAPS]
+
+
+def test_a_batch_is_laid_over_one_another(batch):
+    ax = phase(batch, periods=5)
+    orbits = [one for one in ax.lines if one.get_label().startswith("trajectory ")]
+    assert [one.get_label() for one in orbits] == [f"trajectory {k}" for k in range(4)]
+    assert len({one.get_color() for one in orbits}) == 4
+    dots = [one for one in ax.lines if one.get_marker() == "o"]
+    assert [len(one.get_xdata()) for one in dots] == [6] * 4
+    assert len([one for one in ax.lines if one.is_dashed()]) == 2
+
+
+def test_one_of_a_batch_is_coloured_by_region(batch):
+    _, ax = plt.subplots()
+    assert phase(batch, 1, ax=ax) is ax
+    assert {one.get_label() for one in ax.lines} >= set(COLORS)
+
+
+def test_stroboscopic_points_alone(points):
+    ax = phase(points, 1, periods=(10, 20))
+    assert [len(one.get_xdata()) for one in ax.lines if one.get_marker() == "o"] == [11]
+    assert np.array_equal(line(ax, "whole periods").get_xdata(), points["x"].values[1, 10:] * 1e3)
+    assert len([one for one in phase(points).lines if one.get_marker() == "o"]) == 4
+
+
+def test_many_points_become_pixels(points):
+    many = rig_run(periods=2)
+    assert not line(phase(many), "whole periods").get_rasterized()
+    cloud = points.isel(period=np.zeros(600, dtype=int), trajectory=[0]).assign_coords(period=np.arange(600))
+    assert line(phase(cloud, 0, periods=(0, 600)), "whole periods").get_rasterized()
+
+
+def test_colours_of_guards_that_bound_no_state(run):
+    """A gap between two masses: the modes decide, named by the signs of the gaps."""
+    relative = run.copy(deep=True)
+    relative["guard_state"] = ("guard", np.array(["", ""]))
+    relative["guard_boundary"] = ("guard", np.full(2, np.nan))
+    ax = phase(relative, periods=5)
+    both = line(ax, "lower_gap > 0, upper_gap > 0")
+    assert np.nanmin(both.get_xdata()) == 0.4
+    assert np.nanmax(line(ax, "no gap > 0").get_xdata()) == 0.0
+    assert not [one for one in ax.lines if one.is_dashed()]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"states": "x"}, "Give two names"),
+        ({"states": ("x", "w")}, "no state 'w'"),
+        ({"units": {"V": "m/s"}}, "no state 'V'"),
+        ({"trajectory": 9}, "no trajectory 9"),
+        ({"ax": [1, 2]}, "Give matplotlib Axes"),
+    ],
+)
+def test_errors_teach(batch, arguments, message):
+    with pytest.raises(ParameterError, match=message):
+        phase(batch, **arguments)
+
+
+def test_too_many_to_tell_apart(batch):
+    many = batch.isel(trajectory=np.zeros(9, dtype=int)).assign_coords(trajectory=np.arange(9))
+    with pytest.raises(ParameterError, match=r"1 to 8 trajectories, not 9.*trajectory=\[0\]"):
+        phase(many)
+
+
+def test_only_results_are_drawn():
+    with pytest.raises(ParameterError, match="simulate or stroboscope"):
+        phase([1, 2])

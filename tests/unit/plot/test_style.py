@@ -1,0 +1,88 @@
+"""Display units, regions and the palette."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from saltus.plot import regions
+from saltus.plot.style import OKABE_ITO, display_scale
+
+
+@pytest.mark.parametrize(
+    ("unit", "largest", "shown", "factor"),
+    [
+        ("m", 4.7e-3, "mm", 1e3),
+        ("m", 0.3, "mm", 1e3),
+        ("m", 2.0, "m", 1.0),
+        ("m", 2e-5, "µm", 1e6),
+        ("m/s", 0.43, "m/s", 1.0),
+        ("m/s", 0.03, "mm/s", 1e3),
+        ("s", 4.0, "s", 1.0),
+        ("s", 4000.0, "s", 1.0),
+        ("s", 0.03, "ms", 1e3),
+        ("N", 1.4e4, "kN", 1e-3),
+        ("rad", 0.01, "mrad", 1e3),
+        ("kg", 1e-3, "kg", 1.0),
+        ("", 1e-3, "", 1.0),
+        ("1", 1e-9, "1", 1.0),
+        ("m", 0.0, "m", 1.0),
+    ],
+)
+def test_units_suit_the_numbers(unit, largest, shown, factor):
+    scale = display_scale(unit, largest)
+    assert scale.unit == shown
+    assert math.isclose(scale.factor, factor)
+
+
+def test_texts():
+    scale = display_scale("m", 1e-3)
+    assert scale.label("x") == "x [mm]"
+    assert display_scale("", 1.0).label("x") == "x"
+    assert scale.text(-0.4e-3) == "\N{MINUS SIGN}0.4 mm"
+    assert scale.text(-0.0) == "0 mm"
+
+
+def dataset(names, values):
+    n = len(names)
+    return xr.Dataset(
+        {"guard_state": ("guard", np.array(["x"] * n, dtype=np.str_)), "guard_boundary": ("guard", np.array(values, dtype=float))},
+        {"guard": np.array(names, dtype=np.str_)},
+    )
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "labels"),
+    [
+        (["lower_gap", "upper_gap"], [-1, 1], ["lower contact", "free", "upper contact"]),
+        (["upper_gap", "lower_gap"], [1, -1], ["lower contact", "free", "upper contact"]),
+        (["lower_gap", "upper_gap"], [0, 0], ["lower contact", "free", "upper contact"]),
+        (["lower_gap", "upper_gap"], [0.2, 0.8], ["lower contact", "free", "upper contact"]),
+        (["first_gap", "second_gap"], [0.4, 1.0], ["free", "first contact", "second contact"]),
+        (["stop"], [0.3], ["free", "beyond stop"]),
+        (["stop"], [-0.3], ["beyond stop", "free"]),
+        (["stop"], [0.0], ["free", "beyond stop"]),
+        (["lower_gap"], [0.0], ["lower contact", "free"]),
+    ],
+)
+def test_which_region_is_free(names, values, labels):
+    found = regions.along(dataset(names, values), "x")
+    assert [region.label for region in found.regions] == labels
+    assert [region.contact for region in found.regions] == [label != "free" for label in labels]
+    assert [region.color == OKABE_ITO["green"] for region in found.regions] == [label == "free" for label in labels]
+
+
+def test_bits_lead_to_regions_in_any_order():
+    found = regions.along(dataset(["upper_gap", "lower_gap"], [1, -1]), "x")
+    assert found.of(np.array([0b00, 0b10, 0b11])).tolist() == [0, 1, 2]
+
+
+def test_opposite_gaps_keep_free_green():
+    """Between two bodies the gaps of a freeplay may point away from each other: none positive is free."""
+    ds = dataset(["a", "b"], [np.nan, np.nan]).assign(
+        guard_state=("guard", np.array(["", ""])), mode=("time", [0, 1, 0, 2]), contact_mode_after=("contact", [1, 0])
+    )
+    found = regions.find(ds, ["y"])
+    assert [region.label for region in found.regions] == ["no gap > 0", "a > 0", "b > 0"]
+    assert found.regions[0].color == OKABE_ITO["green"]

@@ -1,0 +1,107 @@
+"""The comparison with printed and exact contact times, on a run made up for it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from saltus.errors import StudyError
+from saltus.study.compare import contact_table, exact_times
+from saltus.study.spec import ODE45, Compare
+
+
+def made_up_run(method: str, times: list[float]) -> xr.Dataset:
+    """Three contacts with the guards at 0 and 0.4 mm; the second lands 1e-17 m beside its boundary."""
+    return xr.Dataset(
+        {
+            "contact_time": ("contact", times),
+            "contact_guard": ("contact", ["upper", "lower", "upper"]),
+            "contact_x": ("contact", [4e-4, 1e-17, 4e-4]),
+            "contact_steps": ("contact", [6, 5, 3]),
+            "guard_state": ("guard", ["x", "x"]),
+            "guard_boundary": ("guard", [0.0, 4e-4]),
+        },
+        {"guard": ["lower", "upper"]},
+        {"method": method},
+    )
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "printed.csv").write_text(
+        "# a comment\nmarker,event_number,time_s,position_minus_boundary_m\nA,2,0.25,-4e-17\nB,3,0.5,1e-16\n"
+    )
+    (tmp_path / "exact.csv").write_text("event_number,time_s\n1,0.125\n2,0.2500001\n3,0.5\n")
+    return tmp_path
+
+
+def table(folder, exact="exact.csv", reference="Taylor"):
+    spec = Compare(printed="printed.csv", exact=exact, reference=ODE45(name="ODE45") if reference else None)
+    second = made_up_run("Taylor", [0.125, 0.2500001, 0.5 + 1e-13]) if reference else None
+    return contact_table("title", made_up_run("ODE45", [0.125, 0.25 + 2**-50, 0.5]), spec, folder, second)
+
+
+def test_rows(folder):
+    rows = table(folder).rows
+    assert rows[0] == ("A", "2", "0.2500000000000009", "0.2500000000000000", "8.88e-16", "1.00e-17", "4.00e-17", "0.2500001000000000",
+                       "0.0e+00", "6 5")  # fmt: skip
+    assert rows[1][:2] == ("B", "3")
+    assert math.isclose(float(rows[1][8]), 1e-13, rel_tol=1e-2)
+    assert rows[1][9] == "3", "only the legs since the row before"
+
+
+def test_notes_tell_the_largest_difference_of_all_contacts(folder):
+    assert table(folder).notes == (
+        "ODE45: 3 of 3 exact contact times compared; largest difference 1.00e-07 s.",
+        "Taylor: 3 of 3 exact contact times compared; largest difference 1.00e-13 s.",
+    )
+
+
+def test_without_exact_times_and_second_method(folder):
+    found = table(folder, exact=None, reference=None)
+    assert found.notes == ()
+    assert found.rows[0][7:9] == ("", "")
+
+
+def test_a_residual_off_the_states_is_unknown(folder):
+    run = made_up_run("ODE45", [0.125, 0.25, 0.5])
+    run["guard_state"] = ("guard", ["", "x"])
+    found = contact_table("title", run, Compare(printed="printed.csv"), folder, None)
+    assert np.isnan(float(found.rows[0][5]))
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "part"),
+    [
+        ("printed.csv", None, "can't be read: No such file"),
+        ("printed.csv", "marker,time_s\nA,0.25\n", "lacks the column 'event_number'"),
+        ("printed.csv", "event_number,time_s\n2,soon\n", "holds 'soon' in column 'time_s', which is no number"),
+        ("printed.csv", "event_number,time_s\n4,0.7\n", "names contact 4, but ODE45 had 3. Run longer."),
+        ("exact.csv", "event_number\n1\n", "lacks the column 'time_s'"),
+    ],
+)
+def test_refusals(folder, file, text, part):
+    (folder / file).unlink()
+    if text is not None:
+        (folder / file).write_text(text)
+    with pytest.raises(StudyError) as caught:
+        table(folder)
+    assert part in str(caught.value)
+
+
+def test_csv_keeps_what_was_printed(folder):
+    lines = table(folder).write_csv(folder / "table.csv").read_text().splitlines()
+    assert lines[0] == "# title"
+    assert lines[3].startswith(",contact,ODE45 [s],printed [s]")
+    assert lines[4].startswith("A,2,0.2500000000000009,")
+
+
+def test_exact_times_of_the_replication():
+    from pathlib import Path
+
+    times = exact_times(Path(__file__).parents[3] / "replications" / "saunders2021" / "exact_events.csv")
+    assert len(times) == 63
+    assert times[1] == 0.027283034515573257

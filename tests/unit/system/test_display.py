@@ -1,0 +1,101 @@
+"""How a System looks."""
+
+import re
+
+import pytest
+
+from saltus.models import MODELS, delangre
+from saltus.system import abs, system
+from saltus.system.display import latex_lines, latex_name
+
+TEXT = """\
+System delangre: 2 states, 2 guards, forced at frequency = 15 Hz (T = 66.6667 ms)
+states      x [m], v [m/s]
+equations   dx/dt = v
+            dv/dt = (force*(1 - 18/(2*pi*frequency)**2)*cos(2*pi*frequency*t) - piecewise((contact_stiffness*(x + lower_gap), \
+x < -lower_gap), (contact_stiffness*(x - upper_gap), x > upper_gap), otherwise=0))/mass - 2*damping_ratio*(2*pi*natural_frequency)*v \
+- (2*pi*natural_frequency)**2*x - cubic/mass*x**3
+guards      lower_gap  x = -lower_gap  (0 m)
+            upper_gap  x = upper_gap  (0.4 mm)
+parameters  mass               3 kg
+            damping_ratio      0.03
+            natural_frequency  5 Hz
+            cubic              700 MN/m^3
+            contact_stiffness  14 kN/m
+            lower_gap          0 m
+            upper_gap          0.4 mm
+            force              4 N
+            frequency          15 Hz
+"""
+
+
+def test_repr_of_the_rig():
+    assert repr(delangre()).startswith(TEXT)
+
+
+def test_equations_are_the_lines_of_repr():
+    assert delangre().equations()[0] == "dx/dt = v"
+    assert delangre().equations()[1] in TEXT
+
+
+def test_a_system_without_anything():
+    @system(states="x")
+    def decay(t, x):
+        return -x
+
+    assert repr(decay) == "System decay: 1 state, 0 guards, not forced\nstates      x\nequations   dx/dt = -x"
+    assert "table" not in decay._repr_html_()
+
+
+def test_shared_parts_are_named_and_names_do_not_clash():
+    @system(states="x s1")
+    def clash(t, x, s1, *, a_long_parameter_name=1.0, another_long_parameter_name=2.0):
+        shared = a_long_parameter_name * x**2 + another_long_parameter_name * s1**2 + abs(x) * a_long_parameter_name
+        return s1 * shared, -x * shared
+
+    lines = clash.equations()
+    assert lines[0].startswith("s2 = ")
+    assert lines[1:] == ["dx/dt = s1*s2", "ds1/dt = -x*s2"]
+
+
+@pytest.mark.parametrize(
+    ("name", "latex"),
+    [
+        ("x", "x"), ("x1", "x_{1}"), ("omega", r"\omega"), ("x_max", r"x_{\mathrm{max}}"), ("k_1", "k_{1}"), ("k_c", "k_{c}"),
+        ("upper_gap", r"\mathrm{upper\_gap}"), ("zeta_n", r"\zeta_{n}"), ("m2_b", r"m_{\mathrm{2 b}}"), ("a_b_c", r"\mathrm{a\_b\_c}"),
+        ("größe", r"\mathrm{gr\text{ö}\text{ß}e}"),
+    ],
+)  # fmt: skip
+def test_names_in_formulas(name, latex):
+    assert latex_name(name) == latex
+
+
+def test_formulas_of_the_rig():
+    first, second = latex_lines(delangre())
+    assert first == r"\dot{x} &= v"
+    assert second.startswith(
+        r"\dot{v} &= \frac{\mathrm{force} \, \left(1 - \frac{18}{{\left(2 \pi \, \mathrm{frequency}\right)}^{2}}\right) \, \cos\left("
+    )
+    assert r"\mathrm{contact\_stiffness} \, \left(x + \mathrm{lower\_gap}\right) & \text{if } x \lt -\mathrm{lower\_gap} \\" in second
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_formulas_are_balanced(model):
+    for line in latex_lines(model()):
+        assert line.count("{") == line.count("}")
+        assert line.count(r"\left(") == line.count(r"\right)")
+        assert line.count(r"\begin") == line.count(r"\end")
+        assert "**" not in line
+
+
+def test_html_is_escaped():
+    @system(states="x", name="<script>alert(1)</script>", source="<b>")
+    def rig(t, x, *, gap=1.0):
+        """<i>x</i> & y"""
+        return abs(x) - gap
+
+    view = rig._repr_html_()
+    assert "<script>" not in view
+    assert "<i>" not in view
+    assert "&lt;i&gt;x&lt;/i&gt; &amp; y" in view
+    assert not re.search(r"&(?!amp;|lt;|gt;|quot;|#x27;)", view)

@@ -1,0 +1,125 @@
+"""Systems as data: nothing is lost, nothing is run, and the fingerprint knows equations only."""
+
+import copy
+import json
+import os
+import pickle
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from saltus.errors import SaltusError
+from saltus.models import MODELS, delangre
+from saltus.system import System, abs, cos, max, pi, piecewise, system
+from saltus.system import expression as ex
+from saltus.system.guards import find_guards
+
+
+def nested():
+    @system(states="x v", forced_at="frequency", units={"x": "m"})
+    def rig(t, x, v, *, gap=0.1, frequency=2.0):
+        law = piecewise((abs(x) - gap, (abs(x) > gap) & ~(v > 0)), (max(x, v), x > 2 * v), otherwise=0.1)
+        return v, -law + cos(2 * pi * frequency * t)
+
+    return rig
+
+
+def same(a, b):
+    guards = [[(g.name, g.gap, g.state, g.boundary) for g in made.guards] for made in (a, b)]
+    plain = [(m.name, m.description, m.source, m.states, dict(m.values), dict(m.units), m.forced_at, m.fingerprint()) for m in (a, b)]
+    return a.field == b.field and guards[0] == guards[1] and plain[0] == plain[1]  # interned: equal expressions are one object
+
+
+@pytest.mark.parametrize("made", [model() for model in MODELS.values()] + [nested()], ids=lambda made: made.name)
+def test_round_trips(made):
+    assert same(System.from_dict(json.loads(json.dumps(made.to_dict()))), made)
+    assert same(pickle.loads(pickle.dumps(made)), made)
+    assert same(copy.deepcopy(made), made)
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_random_equations_round_trip(expressions, data):
+    entry = data.draw(expressions)
+    gap = data.draw(expressions) + 2 * ex.state("x")
+    field, guards = find_guards([ex.state("v"), piecewise((entry, gap > 0), otherwise=-entry)])
+    made = System("random", ("x", "v"), field, guards, {"p": 0.1, "q": 1e300}, dict.fromkeys("xvpq", ""))
+    assert same(System.from_dict(json.loads(json.dumps(made.to_dict()))), made)
+
+
+def test_pickles_hold_no_code():
+    @system(states="x")
+    def local(t, x, *, rate=1.0):  # a local function can't be pickled; the system can
+        return -rate * x
+
+    assert pickle.loads(pickle.dumps(local)).field is not None
+
+
+def variant(stiffness=2.0, states="x v", unit="Hz", name="k", guard=True, forced_at="f", factor=3.0):
+    def rig(t, x, v, *, k=stiffness, f=1.0):
+        force = piecewise((k * x * factor, x > 1 if guard else x > 2), otherwise=0)
+        return v, force + (cos(2 * pi * f * t) if unit == "Hz" else cos(f * t) * cos(2 * pi * f * t / (2 * pi)))
+
+    return system(states=states, forced_at=forced_at, units={"f": unit}, name=name)(rig)
+
+
+def test_the_fingerprint_knows_equations_only():
+    reference = variant().fingerprint()
+    assert len(reference) == 64
+    assert variant(stiffness=5.0).fingerprint() == reference
+    assert variant(name="other").fingerprint() == reference
+    assert variant().with_values(k=7.0).fingerprint() == reference
+    others = [variant(guard=False), variant(forced_at=None), variant(factor=3.0000000000000004), variant(unit="rad/s")]
+    assert len({reference, *(other.fingerprint() for other in others)}) == 5
+
+
+def test_the_fingerprint_is_that_of_another_process():
+    code = "from saltus.models import delangre; print(delangre('c').fingerprint())"
+    for seed in ("1", "2"):
+        run = subprocess.run(
+            [sys.executable, "-c", code], check=True, capture_output=True, text=True, env={**os.environ, "PYTHONHASHSEED": seed}
+        )
+        assert run.stdout.strip() == delangre("b").fingerprint()
+
+
+def damaged(change):
+    data = json.loads(json.dumps(nested().to_dict()))
+    change(data)
+    return data
+
+
+@pytest.mark.parametrize(
+    ("data", "teaches"),
+    [
+        ([], "isn't a system"),
+        ({}, "isn't a system"),
+        (damaged(lambda d: d.update(format="saltus-system/0")), "saltus-system/0"),
+        (damaged(lambda d: d.pop("nodes")), "damaged"),
+        (damaged(lambda d: d["nodes"].insert(0, ["eval", [], None])), "damaged"),
+        (damaged(lambda d: d["nodes"].insert(0, ["param", [], "unknown"])), "damaged"),
+        (damaged(lambda d: d["nodes"].insert(0, ["add", [1, 2], None])), "wrong operands"),
+        (damaged(lambda d: d["nodes"].insert(0, ["add", [0], None])), "wrong operands"),
+        (damaged(lambda d: d["nodes"].insert(0, ["add", [-1, -1], None])), "wrong operands"),
+        (damaged(lambda d: d["nodes"].append(["select", [0, 1], ["bit", 99]])), None),
+        (damaged(lambda d: d["nodes"].append(["select", [0, 1], ["xor", 1]])), "unknown condition"),
+        (damaged(lambda d: d["nodes"].append(["select", [0, 1], ["not", ["bit", 0], ["bit", 0]]])), "unknown condition"),
+        (damaged(lambda d: d["guards"].clear()), "unknown guard"),
+        (damaged(lambda d: d["guards"].insert(0, d["guards"].pop(1))), "later guard"),
+        (damaged(lambda d: d["guards"][0].__setitem__(2, "zzz")), "unknown state"),
+        (damaged(lambda d: d["field"].pop()), "derivatives"),
+        (damaged(lambda d: d.update(forced_at="zzz")), "forced_at"),
+        (damaged(lambda d: d["parameters"].__setitem__(0, "import os")), "no name"),
+        (damaged(lambda d: d["parameters"].append("x")), "twice"),
+        (damaged(lambda d: d["values"].update(gap="a")), "damaged"),
+        (damaged(lambda d: d["values"].update(gap=-1.0)), "negative"),
+    ],
+)
+def test_damaged_data_is_refused(data, teaches):
+    if teaches is None:  # a node that nothing uses does no harm
+        assert same(System.from_dict(data), nested())
+        return
+    with pytest.raises(SaltusError, match=teaches):
+        System.from_dict(data)

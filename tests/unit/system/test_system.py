@@ -1,0 +1,127 @@
+"""The System: values, checks, period, derived equations."""
+
+import dataclasses
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from saltus.errors import ParameterError, UnitError
+from saltus.models import aeroelastic, chain, delangre, gear_pair
+from saltus.system.evaluate import evaluate
+
+RIG = delangre()
+
+
+def test_with_values_gives_a_copy_and_traces_nothing():
+    stiff = RIG.with_values(contact_stiffness="70 kN/m", upper_gap=0.8e-3)
+    assert (stiff.values["contact_stiffness"], stiff.values["upper_gap"]) == (70e3, 0.8e-3)
+    assert RIG.values["contact_stiffness"] == 14e3
+    assert stiff.field is RIG.field
+    assert stiff.guards is RIG.guards
+    assert stiff.fingerprint() == RIG.fingerprint()
+
+
+some_values = st.dictionaries(st.sampled_from(sorted(RIG.values)), st.floats(1e-6, 1e6))
+
+
+@given(values=some_values, later=some_values)
+def test_later_values_win_and_order_does_not_matter(values, later):
+    changed = RIG.with_values(**values).with_values(**later)
+    assert dict(changed.values) == {**RIG.values, **values, **later}
+    assert list(changed.values) == list(RIG.values)
+
+
+def test_nothing_can_be_changed_in_place():
+    with pytest.raises(TypeError):
+        RIG.values["mass"] = 2.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        RIG.name = "other"
+
+
+@pytest.mark.parametrize(
+    ("values", "error", "teaches"),
+    [
+        ({"contact_stifness": 1.0}, ParameterError, "no parameter 'contact_stifness'. Did you mean 'contact_stiffness'"),
+        ({"zzz": 1.0}, ParameterError, "Known: contact_stiffness, cubic"),
+        ({"mass": 0.0}, ParameterError, "mass = 0 must be positive"),
+        ({"mass": "-3 kg"}, ParameterError, "mass = -3 must be positive"),
+        ({"upper_gap": "-0.1 mm"}, ParameterError, "upper_gap = -0.0001 is negative"),
+        ({"frequency": 0.0}, ParameterError, "it is the forcing frequency"),
+        ({"frequency": "-1 Hz"}, ParameterError, "it is the forcing frequency"),
+        ({"force": math.nan}, ParameterError, "force = nan is not a finite number"),
+        ({"force": math.inf}, ParameterError, "not a finite number"),
+        ({"force": "4 N/m"}, UnitError, "measured in N"),
+        ({"force": "4"}, UnitError, "no unit"),
+        ({"force": [1.0, 2.0]}, ParameterError, "a system holds one"),
+    ],
+)
+def test_errors_teach(values, error, teaches):
+    with pytest.raises(error, match=teaches):
+        RIG.with_values(**values)
+
+
+def test_resolve_takes_one_or_many():
+    assert RIG.resolve("frequency", "900 rpm") == 15.0
+    assert type(RIG.resolve("frequency", 3)) is float
+    many = RIG.resolve("frequency", ["900 rpm", 16, "94.2 rad/s"])
+    assert many.dtype == np.float64
+    assert many == pytest.approx([15, 16, 94.2 / (2 * math.pi)], rel=1e-15)
+    grid = np.linspace(1, 30, 7)
+    resolved = RIG.resolve("frequency", grid)
+    assert np.array_equal(resolved, grid)
+    assert resolved is not grid
+    with pytest.raises(ParameterError, match=r"upper_gap = -1 \(entry 1 of 3\) is negative"):
+        RIG.resolve("upper_gap", np.array([0.0, -1.0, -2.0]))
+    with pytest.raises(ParameterError, match=r"entry 0 of 1\) is not a finite"):
+        RIG.resolve("force", np.array([math.nan]))
+
+
+def test_period():
+    assert RIG.period() == 1 / 15
+    assert RIG.period({"frequency": 20.0}) == 0.05
+    assert np.array_equal(RIG.period({"frequency": np.array([1.0, 2.0])}), [1.0, 0.5])
+    assert RIG.period({"force": 1.0}) == 1 / 15
+    assert aeroelastic().period() is None
+
+
+def test_units_and_texts():
+    assert RIG.state_unit("v") == "m/s"
+    assert RIG.parameter_text("contact_stiffness") == "14 kN/m"
+    with pytest.raises(ParameterError, match="no state 'y'"):
+        RIG.state_unit("y")
+    with pytest.raises(ParameterError, match="no parameter"):
+        RIG.parameter_text("y")
+
+
+@pytest.mark.parametrize("made", [delangre("c"), chain(), gear_pair(), aeroelastic()], ids=lambda made: made.name)
+def test_jacobian_and_gradients_against_differences(made):
+    random = np.random.default_rng(3)
+    y = random.uniform(-3e-3, 3e-3, len(made.states))
+    bits = list(random.random(len(made.guards)) < 0.5)
+    expressions = [*made.field, *(guard.gap for guard in made.guards)]
+    derived = np.array([evaluate(row, t=0.01, states=dict(zip(made.states, y, strict=True)), values=made.values, bits=bits)
+                        for row in (*made.jacobian, *made.guard_gradients)])  # fmt: skip
+    for column in range(len(y)):
+        ends = []
+        for sign in (-1, 1):
+            moved = y.copy()
+            moved[column] += sign * 1e-6
+            states = dict(zip(made.states, moved, strict=True))
+            ends.append(np.array(evaluate(expressions, t=0.01, states=states, values=made.values, bits=bits)))
+        scale = np.abs(derived).max()
+        assert (ends[1] - ends[0]) / 2e-6 == pytest.approx(derived[:, column], rel=1e-5, abs=1e-8 * scale)
+
+
+def test_derived_equations_are_computed_once():
+    assert RIG.jacobian is RIG.jacobian
+    assert RIG.guard_gradients is RIG.guard_gradients
+
+
+def test_importing_the_layer_is_light():
+    code = "import sys, saltus.system, saltus.models; print([m for m in ('sympy', 'pint', 'numba', 'scipy', 'xarray') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.strip() == "[]"

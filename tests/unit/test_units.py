@@ -1,0 +1,184 @@
+"""Text with units to SI and back. Truth: definitions of the units."""
+
+import math
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from saltus.errors import ParameterError, UnitError
+from saltus.units import check_declared, coherent_unit, from_si, to_si
+
+UNITS = ["m", "N/m", "Hz", "rad/s", "kg", "N/m^3", "s", "m/s", "N*s/m", "rad", "kg*m^2", "N*m/rad", "1", "1/s"]
+finite = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e300, max_value=1e300)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("0.4 mm", "m", 0.4e-3),
+        ("0.3mm", "m", 0.3e-3),
+        (" -5 mm ", "m", -5e-3),
+        ("\N{MINUS SIGN}5 mm", "m", -5e-3),
+        ("+.5 m", "m", 0.5),
+        ("20 µm", "m", 20e-6),
+        ("20 um", "m", 20e-6),
+        ("1 inch", "m", 0.0254),
+        ("14 kN/m", "N/m", 14e3),
+        ("14 N/mm", "N/m", 14e3),
+        ("1.4e4 N/m", "N/m", 14e3),
+        ("7e8 N/m^3", "N/m^3", 7e8),
+        ("7e8 N/m**3", "N/m^3", 7e8),
+        ("3000 g", "kg", 3.0),
+        ("15 Hz", "Hz", 15.0),
+        ("0.015 kHz", "Hz", 15.0),
+        ("900 rpm", "Hz", 15.0),
+        ("15 cycle/s", "Hz", 15.0),
+        ("94.2 rad/s", "Hz", 94.2 / (2 * math.pi)),
+        ("15 Hz", "rad/s", 30 * math.pi),
+        ("900 rpm", "rad/s", 30 * math.pi),
+        ("180 deg/s", "Hz", 0.5),
+        ("60 rpm/s", "Hz/s", 1.0),
+        ("1 Hz/s", "rad/s^2", 2 * math.pi),
+        ("180 deg", "rad", math.pi),
+        ("1 N*m/deg", "N*m/rad", 180 / math.pi),
+        ("5 N*m/rad", "N*m", 5.0),
+        ("0.03", "1", 0.03),
+        ("3 %", "1", 0.03),
+        ("0.03", "", 0.03),
+        ("3 g", "", 0.003),
+        ("14 kN/m", "", 14e3),
+        ("2 1/s", "1/s", 2.0),
+    ],
+)
+def test_text_becomes_the_nearest_double(text, unit, expected):
+    tolerance = math.ulp(expected) if "rad" in text + unit or "deg" in text else 0.0  # a factor of pi is rounded before and after
+    assert abs(to_si(text, unit, "p") - expected) <= tolerance
+
+
+@pytest.mark.parametrize("number", [0.1, 0.3, 0.4, 0.7, 0.8, 1.1, 123.456])
+def test_a_decimal_in_mm_is_the_same_double_as_in_m(number):
+    assert to_si(f"{number} mm", "m", "gap") == float(f"{number}e-3")
+
+
+@pytest.mark.parametrize("value", [3, 3.0, -2.5])
+def test_numbers_pass(value):
+    assert to_si(value, "m", "p") == value
+    assert type(to_si(value, "m", "p")) is float
+
+
+def test_numpy_numbers_and_quantities_pass():
+    np = pytest.importorskip("numpy")
+    pint = pytest.importorskip("pint")
+    assert to_si(np.float32(0.5), "m", "p") == 0.5
+    assert to_si(np.array(0.5), "m", "p") == 0.5
+    assert to_si(pint.UnitRegistry().Quantity(0.4, "mm"), "m", "p") == 0.4e-3
+    assert to_si(pint.UnitRegistry().Quantity(15.0, "Hz"), "rad/s", "p") == pytest.approx(30 * math.pi, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "error", "teaches"),
+    [
+        ("0.4", "m", UnitError, "'0.4 m'"),
+        ("3 kg", "m", UnitError, "measured in m.*'0.4 mm'"),
+        ("3 m", "1", UnitError, "plain number"),
+        ("5 deg", "1", UnitError, "can't be told apart"),
+        ("15 1/s", "Hz", UnitError, "Say Hz, rpm, rad/s"),
+        ("15 1/s", "rad/s", UnitError, "Say Hz, rpm, rad/s"),
+        ("15 Hz", "1/s", UnitError, "Say Hz, rpm, rad/s"),
+        ("15 Hz", "", UnitError, r"units=\{'p': 'Hz'\}"),
+        ("94 rad/s", "", UnitError, r"units=\{'p': 'Hz'\}"),
+        ("5 furlongz", "m", UnitError, "'furlongz' can't be read"),
+        ("0,4 mm", "m", UnitError, "decimal point"),
+        ("mm", "m", UnitError, "a number and a unit"),
+        ("", "m", UnitError, "a number and a unit"),
+        ("nan mm", "m", UnitError, "a number and a unit"),
+        ("5 mm 3", "m", UnitError, "can't be read|wrong unit"),
+        ("9**9**9 m", "m", UnitError, "can't be read|number and a unit"),
+        ("1e999 mm", "m", ParameterError, "not a finite number"),
+        (float("nan"), "m", ParameterError, "not a finite number"),
+        (float("inf"), "m", ParameterError, "not a finite number"),
+        (10**400, "m", ParameterError, "not a finite number"),
+        (True, "m", ParameterError, "not a number"),
+        (None, "m", ParameterError, "not a number"),
+        (1j, "m", ParameterError, "not a number"),
+        ([1.0], "m", ParameterError, "not a number"),
+    ],
+)
+def test_errors_teach(value, unit, error, teaches):
+    with pytest.raises(error, match=teaches):
+        to_si(value, unit, "p")
+
+
+@pytest.mark.parametrize("unit", UNITS)
+@given(value=finite)
+def test_text_without_loss_comes_back_bit_for_bit(unit, value):
+    assert to_si(from_si(value, unit, digits=None), unit, "p") == value
+
+
+@given(value=st.floats(1e-6, 1e6))
+def test_hertz_and_rad_per_second_differ_by_two_pi(value):
+    assert to_si(f"{value!r} Hz", "rad/s", "w") == pytest.approx(2 * math.pi * value, rel=3e-16)
+    assert to_si(f"{value!r} rad/s", "Hz", "f") == pytest.approx(value / (2 * math.pi), rel=3e-16)
+    assert to_si(f"{value!r} rpm", "Hz", "f") == pytest.approx(value / 60, rel=3e-16)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.4e-3, "m", "0.4 mm"),
+        (20e-6, "m", "0.02 mm"),
+        (2e-6, "m", "2 µm"),
+        (1.5, "m", "1.5 m"),
+        (14e3, "N/m", "14 kN/m"),
+        (7e8, "N/m^3", "700 MN/m^3"),
+        (15.0, "Hz", "15 Hz"),
+        (3.0, "kg", "3 kg"),
+        (0.036, "N*m*s/rad", "36 mN*m*s/rad"),
+        (0.065, "kg*m^2", "0.065 kg*m^2"),
+        (1.225, "kg/m^3", "1.225 kg/m^3"),
+        (0.0, "m", "0 m"),
+        (0.03, "1", "0.03"),
+        (7e8, "", "7e8"),
+        (1 / 15, "s", "66.6667 ms"),
+        (999.9999999, "N", "1 kN"),
+        (math.nan, "m", "nan m"),
+    ],
+)
+def test_numbers_are_written_as_people_write_them(value, unit, text):
+    assert from_si(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("0.4 mm", "m"), ("14 kN/m", "N/m"), ("7e8 N/m^3", "N/m^3"), ("3000 g", "kg"), ("900 rpm", "rad/s"), ("15 kHz", "Hz"),
+        ("2 N*s/m", "N*s/m"), ("0.03", "1"), ("3 %", "1"), ("5 deg", "rad"), ("1 inch", "m"), ("2 ms", "s"), ("1 lbf/inch", "kg/s^2"),
+    ],
+)  # fmt: skip
+def test_the_unit_of_a_text_value_is_kept_coherent(text, unit):
+    assert coherent_unit(text, "p") == unit
+    assert check_declared(coherent_unit(text, "p"), "p") == unit
+
+
+@pytest.mark.parametrize(("unit", "kept"), [("N/m", "N/m"), (" N / m ", "N/m"), ("dimensionless", "1"), ("", ""), ("kg m", "kg m")])
+def test_declared_units_pass(unit, kept):
+    assert check_declared(unit, "p") == kept
+
+
+@pytest.mark.parametrize(
+    ("unit", "teaches"), [("mm", "'mm' isn't a coherent SI unit.*declare"), ("rpm", "coherent"), ("N//m", "can't be read"), (3, "as text")]
+)
+def test_declared_units_are_coherent(unit, teaches):
+    with pytest.raises(UnitError, match=teaches):
+        check_declared(unit, "p")
+
+
+def test_pint_waits_for_the_first_text():
+    code = (
+        "import sys; from saltus.units import to_si, from_si; to_si(1.0, 'm', 'p'); from_si(1.0, 'm'); assert 'pint' not in sys.modules;"
+        "to_si('1 mm', 'm', 'p'); assert 'pint' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
