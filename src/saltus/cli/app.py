@@ -40,7 +40,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode="markdown",
-    pretty_exceptions_show_locals=False,
+    pretty_exceptions_enable=False,
     help="Vibration with contacts, to machine precision: freeplay, backlash, stops.\n\nStart with `saltus demo`.",
 )
 

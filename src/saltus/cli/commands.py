@@ -35,7 +35,7 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for the picture and the data.")] = Path("saltus-demo"),
     plot: Annotated[bool, typer.Option(help="Draw the picture.")] = True,
 ) -> None:
-    """One rig, five starts: what does each settle to?
+    """One rig, six starts: what does each settle to?
 
     A block between two springs with gaps, shaken sideways. Where it starts decides how it vibrates for ever after. Prints a table, draws
     each motion, keeps the data.

@@ -25,7 +25,7 @@ BATCH = (
     _I1, _F1, _I1, _F3, _I2, _I1, _I2, _F2, _I1, _F1, "int64",
 )  # fmt: skip
 
-#: Types of the arrays that kernels/taylor.py:workspace returns.
+#: Types of the arrays that kernels/taylor_lanes.py:workspace returns.
 TAYLOR_WORKSPACE = (_F2,) * 10 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F1)
 #: Types of the arrays that kernels/ode45.py:workspace returns.
 ODE45_WORKSPACE = (_F2, _F2, _F1, _F1)
@@ -58,7 +58,7 @@ def lane_width() -> int:
 def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
     """The compiled Taylor flow of a system. Parameters are arguments: new values never recompile."""
     title = f"{system.name}, Taylor order {order}, {lanes} lanes"
-    return _module(title, taylor_head(system, order, lanes), ("taylor.py",), BATCH + TAYLOR_WORKSPACE)
+    return _module(title, taylor_head(system, order, lanes), ("taylor_layout.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"), BATCH + TAYLOR_WORKSPACE)
 
 
 def ode45_module(system: System) -> ModuleType:
@@ -87,7 +87,7 @@ def _environment() -> str:
     import llvmlite
     import numpy
 
-    inlined = "".join(_template(name) for name in ("lanes.py", "trigonometry.py", "isolation.py", "status.py"))
+    inlined = "".join(_template(name) for name in ("lanes.py", "trigonometry.py", "isolation.py", "status.py", "batch.py"))
     features = llvm.get_host_cpu_features().flatten()
     versions = (sys.version, numba.__version__, llvmlite.__version__, numpy.__version__)
     return "\n".join([inlined, *versions, platform.machine(), llvm.get_host_cpu_name(), features])

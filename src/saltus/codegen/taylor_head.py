@@ -9,7 +9,7 @@ from saltus.system import expression as ex
 from saltus.system.expression import Expr
 from saltus.system.system import System
 
-#: Rows of the clock before the phases of harmonics (kernels/taylor.py: TAU, BASE).
+#: Rows of the clock before the phases of harmonics (kernels/taylor_layout.py: TAU, BASE).
 FIRST_TURN = 2
 
 
@@ -93,7 +93,7 @@ def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
 
 
 def taylor_head(system: System, order: int, lanes: int) -> str:
-    """Everything that kernels/taylor.py expects to stand above it."""
+    """Everything that kernels/taylor_*.py expect to stand above it."""
     builder, constants = SeriesBuilder(), Constants()
     fields = tuple(builder.form(f) for f in system.field)
     code = JetCode(system.states, fields, builder, constants, order)

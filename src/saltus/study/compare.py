@@ -46,7 +46,7 @@ def contact_table(title: str, run: xr.Dataset, compare: Compare, folder: Path, r
     path = folder / compare.printed
     printed = rows(path, ("event_number", "time_s"))
     exact = exact_times(folder / compare.exact) if compare.exact else {}
-    residual, steps = _residuals(run), _steps(run)
+    residual, legs = _residuals(run), _legs(run)
     table, before = [], 0
     for row in printed:
         number = int(cell(row, "event_number", path))
@@ -55,7 +55,7 @@ def contact_table(title: str, run: xr.Dataset, compare: Compare, folder: Path, r
         line.append(_small(abs(cell(row, "position_minus_boundary_m", path))) if row.get("position_minus_boundary_m") else "")
         line.append(_seconds(exact[number]) if number in exact else "")
         line.append(_small(_time(reference, number, path) - exact[number]) if reference is not None and number in exact else "")
-        line.append(" ".join(map(str, steps[before:number])))
+        line.append(" ".join(map(str, legs[before:number])))
         table.append(tuple(line))
         before = number
     method = run.attrs["method"]
@@ -102,9 +102,9 @@ def _residuals(run: xr.Dataset) -> np.ndarray:
     return residual
 
 
-def _steps(run: xr.Dataset) -> list[int]:
+def _legs(run: xr.Dataset) -> np.ndarray:
     """Accepted steps of the leg before each contact."""
-    return [int(count) for count in np.diff(run["contact_steps"].values, prepend=0)]
+    return np.diff(run["contact_steps"].values, prepend=0)
 
 
 def _seconds(value: float) -> str:

@@ -1,4 +1,4 @@
-"""The demo: one rig, five starts, and what each settles to."""
+"""The demo: one rig, six starts, what each settles to, and whether a start one nanometre away settles to the same."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.analysis.settled import LAST, settled
-from saltus.study.report import response_texts
+from saltus.study.report import period_text, response_texts
 from saltus.study.table import TextTable
 from saltus.units import from_si
 
@@ -20,8 +20,11 @@ if TYPE_CHECKING:
 
 #: What is called with the share done, if anything.
 Progress = Callable[[float], None] | None
-#: Starts (x [m], v [m/s]): the four that Saunders et al. (2021), Fig. 5, name, and a high one that reaches the T-periodic response.
-STARTS = ((1.0e-3, 0.0), (0.2e-3, 0.0), (0.4e-3, 0.0), (2.0e-3, 0.0), (4.0e-3, 0.3))
+#: Starts (x [m], v [m/s]): the four that Saunders et al. (2021), Fig. 5, name; then 1.9 mm, which reaches the 4T that they report from 2 mm
+#: (there the outcome changes from one nanometre to the next); and a high one, which reaches the T-periodic response.
+STARTS = ((1.0e-3, 0.0), (0.2e-3, 0.0), (0.4e-3, 0.0), (2.0e-3, 0.0), (1.9e-3, 0.0), (4.0e-3, 0.3))
+#: Distance [m] of the neighbours that are started on either side: less than any experiment can set.
+NEIGHBOUR = 1e-9
 #: Long enough for the slowest of them, 24T from x = 0.4 mm, to repeat to ten digits.
 PERIODS = 2000
 #: Forcing periods drawn in a time history, and in the phase portrait of a response that doesn't repeat.
@@ -30,15 +33,28 @@ SHOWN, SHOWN_IF_APERIODIC = 12, 24
 
 @dataclass(frozen=True)
 class Demo:
-    """What the demo computed: the runs, what they settled to, and the table that tells it."""
+    """What the demo computed.
+
+    Attributes
+    ----------
+    run : Dataset
+        The motions, a trajectory for each start.
+    settled : Dataset
+        What they settled to.
+    neighbours : array of int, shape (2, trajectory)
+        Periods of the responses from one nanometre to either side, 0 if none was found.
+    table : TextTable
+        What to print.
+    """
 
     run: xr.Dataset
     settled: xr.Dataset
+    neighbours: np.ndarray
     table: TextTable
 
 
 def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods: int = PERIODS, progress: Progress = None) -> Demo:
-    """Move the rig from five starts until it settles.
+    """Move the rig from six starts, and from their neighbours, until it settles.
 
     Parameters
     ----------
@@ -57,13 +73,18 @@ def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods:
         If a value can't be used.
     """
     from saltus import models
-    from saltus.analysis import simulate
+    from saltus.analysis import simulate, stroboscope
 
     rig = models.delangre(case, force=force, frequency=frequency)
     x, v = np.array(STARTS).T
-    run = simulate(rig, start={"x": x, "v": v}, periods=periods, keep=min(LAST, periods), progress=progress or False)
+    kept = min(LAST, periods)
+    run = simulate(rig, start={"x": x, "v": v}, periods=periods, keep=kept, progress=progress or False)
+    twins = {"x": np.concatenate([x - NEIGHBOUR, x + NEIGHBOUR]), "v": np.tile(v, 2)}
+    beside = stroboscope(rig, start=twins, periods=periods, keep=kept + 1)
+    neighbours = settled(beside)["response_period"].values.reshape(2, len(STARTS))
     found = settled(run)
-    return Demo(run, found, _table(run, found, f"deLangre rig, case {case}, {force} at {frequency}, {periods} forcing periods"))
+    title = f"deLangre rig, case {case}, {force} at {frequency}, {periods} forcing periods"
+    return Demo(run, found, neighbours, _table(run, found, neighbours, title))
 
 
 def draw(result: Demo, file: Path) -> Path:
@@ -97,20 +118,24 @@ def _handles(axes: Iterable[Axes]) -> Iterator[tuple[Any, str]]:
         yield from zip(*one.get_legend_handles_labels(), strict=True)
 
 
-def _table(run: xr.Dataset, found: xr.Dataset, title: str) -> TextTable:
+def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: str) -> TextTable:
     rows = []
     for i, text in enumerate(response_texts(run)):
         one, row = run.isel(trajectory=i), found.isel(trajectory=i)
         n = int(row["response_period"])
         contacts = f"{float(row['contacts_per_response']):g} in {text}" if n else "-"
+        beside = "same" if set(neighbours[:, i].tolist()) == {n} else ", ".join(period_text(int(other)) for other in neighbours[:, i])
         peak, rms = (from_si(float(row[name]), "m", 5) for name in ("x_peak", "x_rms"))
-        rows.append((_start(i), str(one["status"].item()), text, contacts, peak, rms, f"{int(one['steps'])}"))
-    found_one = found["response_period"] > 0
-    notes = (
+        rows.append((_start(i), str(one["status"].item()), text, beside, contacts, peak, rms, str(int(one["steps"]))))
+    periodic = found["response_period"] > 0
+    notes = [
         f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. Stability isn't examined."
-        + (f" States repeat to {float(found['mismatch'].where(found_one).max()):.0e} of their range." if found_one.any() else ""),
-    )
-    return TextTable(title, ("start", "status", "settles to", "contacts", "peak |x|", "rms x", "steps"), tuple(rows), notes)
+        + (f" States repeat to {float(found['mismatch'].where(periodic).max()):.0e} of their range." if periodic.any() else "")
+    ]
+    if any(row[3] != "same" for row in rows):
+        notes.append("Where a start 1 nm away settles to something else, no experiment and no other program need agree.")
+    columns = ("start", "status", "settles to", "1 nm beside", "contacts", "peak |x|", "rms x", "steps")
+    return TextTable(title, columns, tuple(rows), tuple(notes))
 
 
 def _start(number: int) -> str:

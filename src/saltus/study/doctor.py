@@ -44,7 +44,7 @@ def machine() -> TextTable:
     entries = cache.entries()
     rows = [
         *versions().items(),
-        ("processor", f"{_processor()}, {os.cpu_count()} threads, {_usable()} usable"),
+        ("processor", f"{processor()}, {os.cpu_count()} threads, {_usable()} usable"),
         ("lanes", f"{lane_width()} trajectories in one instruction"),
         ("cache", f"{cache.folder()}: {len(entries)} entries, {sum(entry.size_bytes for entry in entries) / 1e6:.1f} MB"),
     ]
@@ -98,7 +98,7 @@ def _probe(**values: float) -> System:
     return probe.with_values(**values)
 
 
-def _processor() -> str:
+def processor() -> str:
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]

@@ -51,9 +51,13 @@ def response_texts(run: xr.Dataset) -> list[str]:
         found = settled(run)
     except ParameterError:
         return []
-    longest = found.attrs["longest_period"]
-    words = {0: f"not periodic within {longest}T", 1: "T"}
-    return [words.get(n, f"{n}T") for n in np.atleast_1d(found["response_period"].values).tolist()]
+    none = f"not periodic within {found.attrs['longest_period']}T"
+    return [period_text(int(n), none) for n in np.atleast_1d(found["response_period"].values)]
+
+
+def period_text(n: int, none: str = "not periodic") -> str:
+    """``T``, ``3T``; ``none`` for 0."""
+    return {0: none, 1: "T"}.get(n, f"{n}T")
 
 
 def _notes(batch: xr.Dataset, shown: int) -> tuple[str, ...]:

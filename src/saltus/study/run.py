@@ -85,6 +85,8 @@ def run_study(
     system = system_of(study.system, own)
     if quantities.is_batch(study.simulate) and study.compare is not None:
         raise StudyError("[compare] is for one start: let [simulate] start hold single values.")
+    if study.compare is not None and study.simulate.keep is not None:
+        raise StudyError("[compare] counts contacts from the start of the run: leave keep out of [simulate].")
     computing = {"threads": threads, "progress": progress or False}
     run = _simulate(system, study, study.method, text, computing)
     if study.compare is None:

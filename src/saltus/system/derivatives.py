@@ -94,7 +94,8 @@ def _outer(op: str, value: Expr, u: Expr) -> Expr:
 
 def gradient(expression: Expr, states: Sequence[str]) -> tuple[Expr, ...]:
     """Derivatives with respect to each state, in a frozen mode."""
-    return tuple(differentiate(expression, state(name)) for name in states)
+    present = {node.payload for node in walk(expression) if node.op == "state"}
+    return tuple(differentiate(expression, state(name)) if name in present else _ZERO for name in states)
 
 
 def time_derivative(expression: Expr) -> Expr:

@@ -11,6 +11,7 @@ Conditions (:class:`Relation`, :class:`And`, :class:`Or`, :class:`Not`) never be
 from __future__ import annotations
 
 import math
+import threading
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
 
 _MATH = {name: getattr(math, name) for name in ELEMENTARY}
 _INTERNED: weakref.WeakValueDictionary[tuple, Expr] = weakref.WeakValueDictionary()
+_LOCK = threading.RLock()  # two nodes for one state would make a derivative silently zero
 Number = int | float
 Operand = Union["Expr", int, float]
 
@@ -52,11 +54,12 @@ class Expr:
         """The one node of this operation on these operands."""
         tag = payload.hex() if isinstance(payload, float) else payload
         key = (op, tag, tuple(map(id, args)))
-        node = _INTERNED.get(key)
-        if node is None:
-            node = object.__new__(cls)
-            node.op, node.args, node.payload = op, args, payload
-            _INTERNED[key] = node
+        with _LOCK:
+            node = _INTERNED.get(key)
+            if node is None:
+                node = object.__new__(cls)
+                node.op, node.args, node.payload = op, args, payload
+                _INTERNED[key] = node
         return node
 
     # -- arithmetic ----------------------------------------------------------------------------------------------------------

@@ -136,7 +136,7 @@ class _Finder:
                 if isinstance(b, bool):
                     return a if b is neutral else b
                 return a if a == b else joint(a, b)
-        return condition
+        raise TypeError(condition)
 
 
 def _opposite(condition: Condition) -> Condition:

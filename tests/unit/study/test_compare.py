@@ -20,7 +20,7 @@ def made_up_run(method: str, times: list[float]) -> xr.Dataset:
             "contact_time": ("contact", times),
             "contact_guard": ("contact", ["upper", "lower", "upper"]),
             "contact_x": ("contact", [4e-4, 1e-17, 4e-4]),
-            "contact_steps": ("contact", [6, 5, 3]),
+            "contact_steps": ("contact", [6, 11, 14]),
             "guard_state": ("guard", ["x", "x"]),
             "guard_boundary": ("guard", [0.0, 4e-4]),
         },

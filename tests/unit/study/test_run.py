@@ -106,6 +106,7 @@ def test_own_system_with_values(tmp_path):
         ('"delangre"\ncase', '"chain"\ncase', "chain has no cases"),
         ("periods = 12", "periods = 12\nkeep = 13", "keep"),
         ("periods = 12", 'periods = 12\n[compare]\nprinted = "a.csv"', "for one start"),
+        ('["0.2 mm", "1 mm"], v = "0 m/s" }', '"1 mm", v = "0 m/s" }\nkeep = 3\n[compare]\nprinted = "a.csv"\n#', "leave keep out"),
     ],
 )
 def test_refusals(old, new, part):
@@ -124,16 +125,21 @@ def rig():
 
 
 def test_demo_finds_the_periods(rig):
-    """Case b4 at 15 Hz from x0 = 1, 0.2, 0.4, 2 mm and high up: the paper's "12T" is 24T (the 12T orbit is unstable)."""
-    assert rig.settled["response_period"].values.tolist() == [3, 5, 24, 4, 1]
+    """Case b4 at 15 Hz: the paper's "12T" from 0.4 mm is 24T (the 12T orbit is unstable); its 4T is reached from 1.9 mm."""
+    assert rig.settled["response_period"].values.tolist() == [3, 5, 24, 24, 4, 1]
     assert (rig.run["status"] == "ok").all()
+
+
+def test_demo_says_where_a_nanometre_decides(rig):
+    """The paper reports 4T from 2.0 mm. That start lies where the outcome changes from one nanometre to the next."""
+    assert [row[3] == "same" for row in rig.table.rows] == [True, True, True, False, True, True]
 
 
 def test_demo_agrees_with_the_known_orbits(rig):
     """rms, largest |x| and contacts of the periodic orbits of tests/reference/orbits.csv; the peak is that of 200 samples a period."""
     with (REFERENCE / "orbits.csv").open() as file:
         orbits = {row["name"]: row for row in csv.DictReader(file)}
-    for trajectory, name in ((0, "B4_15_P3"), (3, "B4_15_P4"), (4, "B4_15_high")):
+    for trajectory, name in ((0, "B4_15_P3"), (4, "B4_15_P4"), (5, "B4_15_high")):
         row, orbit = rig.settled.isel(trajectory=trajectory), orbits[name]
         assert float(row["contacts_per_response"]) == float(orbit["contact_events_per_period"])
         assert float(row["x_rms"]) == pytest.approx(float(orbit["rms_m"]), rel=1e-6)
@@ -141,7 +147,7 @@ def test_demo_agrees_with_the_known_orbits(rig):
 
 
 def test_demo_table_and_picture(rig, tmp_path):
-    assert [row[2] for row in rig.table.rows] == ["3T", "5T", "24T", "4T", "T"]
+    assert [row[2] for row in rig.table.rows] == ["3T", "5T", "24T", "24T", "4T", "T"]
     assert draw(rig, tmp_path / "demo.png").stat().st_size > 50_000
 
 

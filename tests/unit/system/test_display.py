@@ -5,7 +5,7 @@ import re
 import pytest
 
 from saltus.models import MODELS, delangre
-from saltus.system import abs, system
+from saltus.system import abs, atan, piecewise, sqrt, system
 from saltus.system.display import latex_lines, latex_name
 
 TEXT = """\
@@ -77,6 +77,18 @@ def test_formulas_of_the_rig():
         r"\dot{v} &= \frac{\mathrm{force} \, \left(1 - \frac{18}{{\left(2 \pi \, \mathrm{frequency}\right)}^{2}}\right) \, \cos\left("
     )
     assert r"\mathrm{contact\_stiffness} \, \left(x + \mathrm{lower\_gap}\right) & \text{if } x \lt -\mathrm{lower\_gap} \\" in second
+
+
+def test_conditions_in_formulas():
+    @system(states="x v")
+    def rig(t, x, v):
+        return v, piecewise((sqrt(1 + x**2) * 7e8, (x > 1) & ~(v < 0) | (v > 3)), otherwise=atan(x))
+
+    formula = latex_lines(rig)[1]
+    assert r"\left(x \gt 1\right) \;\text{and}\; \left(v \gt 0\right)" in formula
+    assert r"\;\text{or}\; \left(v \gt 3\right)" in formula
+    assert r"\sqrt{1 + x^{2}} \, 7 \cdot 10^{8}" in formula
+    assert r"\arctan\left(x\right)" in formula
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)

@@ -2,6 +2,7 @@
 
 import copy
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -67,6 +68,15 @@ def test_a_power_that_varies_is_an_exponential():
 def test_errors_teach(what, teaches):
     with pytest.raises(TraceError, match=teaches):
         what()
+
+
+def test_threads_share_their_nodes():
+    def trace(_):
+        return [ex.state(f"shared{i}") * ex.parameter("p") + i for i in range(200)]
+
+    with ThreadPoolExecutor(8) as pool:
+        results = list(pool.map(trace, range(8)))
+    assert all(a is b for result in results for a, b in zip(result, results[0], strict=True))
 
 
 def test_deep_sums_do_not_overflow_the_stack():

@@ -36,6 +36,7 @@ def described(guard):
         (X + P > 0, "x - (-p)", "-p", Bit(0)),
         (X - P - Q > 0, "x - (p + q)", "p + q", Bit(0)),
         (P - X > Q, "x - (p - q)", "p - q", Not(Bit(0))),
+        (-P + Q + X > 0, "x - (p - q)", "p - q", Bit(0)),
         (2 * X > P, "x - p/2", "p/2", Bit(0)),
         (-2 * X > P, "x - (-p/2)", "-p/2", Not(Bit(0))),
         (3 * (X - P) > 0, "x - p", "p", Bit(0)),
@@ -126,6 +127,24 @@ def test_names_are_unique():
     assert [guard.name for guard in guards_of(piecewise((1, X - V > P), otherwise=0))] == ["p"]
 
 
+def test_long_names_are_cut_and_stay_unique():
+    def deep(start):
+        for number in range(40):
+            start = start * V**2 + number
+        return start
+
+    first, second = guards_of(piecewise((1, deep(X**2) > P * Q), (2, deep(X**3) > P * Q), otherwise=0))
+    assert second.name == first.name + "'"
+    assert len(first.name) < 200
+
+
+def test_comparisons_inside_functions_and_products_are_found():
+    (field,), guards = find_guards([cos(piecewise((X, X > P), otherwise=0)) * V / (-Q + piecewise((1, P - X < 0), otherwise=2))])
+    assert [guard.name for guard in guards] == ["p"]
+    on = ex.select(Bit(0), X, 0)
+    assert field is ex.elementary("cos", on) * V / (-Q + ex.select(Bit(0), 1, 2))
+
+
 def test_a_boundary_inside_a_gap_comes_before_it():
     (field,), guards = find_guards([piecewise((abs(X) - P, abs(X) > P), otherwise=0)])
     assert [described(guard) for guard in guards] == [
@@ -158,6 +177,7 @@ def test_conditions_that_are_certain_are_folded():
             piecewise((X, always), otherwise=V),
             piecewise((X, never), otherwise=V),
             piecewise((X, always & (V > 0)), otherwise=0),
+            piecewise((X, (V > 0) & always), otherwise=0),
             piecewise((X, never | (V > 0)), otherwise=0),
             piecewise((X, never & (V > 0)), otherwise=0),
             piecewise((X, ~never), otherwise=0),
@@ -165,7 +185,7 @@ def test_conditions_that_are_certain_are_folded():
         ]
     )
     on = ex.select(Bit(0), X, 0)
-    assert field == (X, V, on, on, ex.constant(0), X, on)
+    assert field == (X, V, on, on, on, ex.constant(0), X, on)
     assert len(guards) == 1
 
 

@@ -21,7 +21,7 @@ from saltus.system.guards import find_guards
 def nested():
     @system(states="x v", forced_at="frequency", units={"x": "m"})
     def rig(t, x, v, *, gap=0.1, frequency=2.0):
-        law = piecewise((abs(x) - gap, (abs(x) > gap) & ~(v > 0)), (max(x, v), x > 2 * v), otherwise=0.1)
+        law = piecewise((abs(x) - gap, (abs(x) > gap) & ~(v > 0) | (v > 3)), (max(x, v), x > 2 * v), otherwise=0.1)
         return v, -law + cos(2 * pi * frequency * t)
 
     return rig

@@ -183,6 +183,10 @@ def text(t, x, v):
     return "v", "x"
 
 
+def an_object(t, x, v):
+    return object()
+
+
 def a_dict(t, x, v):
     return {"x": v, "v": object()}
 
@@ -211,6 +215,7 @@ def of_parameters(t, x, v, *, a=1.0, b=2.0):
         (chained, "return v, piecewise", "a < x < b"),
         (too_few, "", "returns 1 value, but there are 2 states"),
         (nothing, "", "returns nothing. End it with: return dx/dt, dv/dt"),
+        (an_object, "", "in place of the time derivatives of x, v"),
         (text, "", "the text 'v'"),
         (a_dict, "", "the text 'x'"),
         (of_time, "", "depends on time only"),

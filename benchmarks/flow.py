@@ -1,0 +1,123 @@
+"""What one forcing period of one trajectory costs, and how exact it is: saltus beside its rivals, same work, same run.
+
+Case b4 of the deLangre rig at 15 Hz, starts x in [-5, 5] mm, v in [-1, 1] m/s, contacts located. CPU time of one pinned core, the smallest
+of three repeats, over 100 periods from at least 512 starts (SciPy: a few starts, its cost per trajectory is the same). Errors are of |x|
+after 5 periods from the 64 grid starts of tests/reference/rig_b4_15hz_5periods.csv, known to 30 digits.
+
+    python benchmarks/flow.py                 the table of the README
+    python benchmarks/flow.py --orders        cost and error by order and tolerance of the series
+    python benchmarks/flow.py --memory        memory of a stroboscope run from 1e6 starts
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import resource
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+import saltus as sl
+from saltus.codegen.module import lane_width
+from saltus.study.doctor import processor
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+
+from benchmarks.rivals import rig  # noqa: E402
+
+PERIODS = 100
+
+
+def reference() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Grid starts (x, v) [m, m/s] and x [m] after 5 periods, exact."""
+    with open(HERE.parent / "tests/reference/rig_b4_15hz_5periods.csv") as file:
+        rows = [row for row in csv.DictReader(file) if row["start"] == "grid"]
+    return tuple(np.array([float(row[name]) for row in rows]) for name in ("x0_m", "v0_m_per_s", "x_end_m"))  # type: ignore[return-value]
+
+
+def ours(method: sl.Taylor | sl.ODE45, x: np.ndarray, v: np.ndarray) -> tuple[float, np.ndarray, float]:
+    """Microseconds per period and trajectory, errors [m] after 5 periods, contacts per period."""
+    system = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+
+    def job() -> object:
+        return sl.stroboscope(system, {"x": x, "v": v}, PERIODS, keep=1, method=method, threads=1, progress=False)
+
+    events = float(job().events.sum()) / (len(x) * PERIODS)  # type: ignore[attr-defined]
+    seconds = rig.cpu_seconds(job)
+    x0, v0, exact = reference()
+    end = sl.stroboscope(system, {"x": x0, "v": v0}, 5, keep=1, method=method, threads=1).x.values[:, -1]
+    return seconds / (len(x) * PERIODS) * 1e6, np.abs(end - exact), events
+
+
+def line(name: str, us: float, errors: np.ndarray, contacts: float, fastest: float) -> str:
+    """One row of the table."""
+    return f"| {name:<42} | {np.median(errors):9.1e} | {errors.max():9.1e} | {us:10.3f} | {us / fastest:9.1f} | {contacts:8.3f} |"
+
+
+def rows(count: int) -> Iterator[tuple[str, float, np.ndarray, float]]:
+    """(name, microseconds per period, errors, contacts per period) of everyone."""
+    x, v = rig.starts(count)
+    for method in (sl.Taylor(), sl.Taylor(tolerance=2.0**-52), sl.ODE45(1e-4, 1e-7), sl.ODE45(1e-4, 1e-7, events="ignore")):
+        title = f"saltus {method.name} " + (f"2^{np.log2(method.tolerance):.0f}" if isinstance(method, sl.Taylor) else f"(1e-4, 1e-7) {method.events}")
+        yield (title, *ours(method, x, v))
+    x0, v0, exact = reference()
+    try:
+        from benchmarks.rivals import heyoka_flow
+    except ImportError:
+        print("heyoka isn't installed (pip install 'saltus[reference]'); left out", file=sys.stderr)
+    else:
+        timed = heyoka_flow.measure(x, v, periods=PERIODS, tolerance=1e-12)
+        exactness = heyoka_flow.measure(x0, v0, periods=5, tolerance=1e-12)
+        yield "heyoka batch of 8, 1e-12", timed.us_per_period, np.abs(exactness.end[:, 0] - exact), timed.contacts_per_period
+    from benchmarks.rivals import scipy_flow
+
+    few = scipy_flow.measure(x0[:4], v0[:4], periods=5, rtol=1e-12, atol=1e-12, repeats=1)
+    yield "scipy DOP853, 1e-12 (4 starts, 5 periods)", few.us_per_period, np.abs(few.end[:, 0] - exact[:4]), few.contacts_per_period
+
+
+def table(count: int) -> None:
+    """Print everyone's row."""
+    print(f"{processor()}, one core; {count} starts, {PERIODS} periods; {lane_width()} lanes")
+    print(f"| {'':<42} | median m  | largest m | us/period  | times     | contacts |")
+    print(f"|{'-' * 44}|----------:|----------:|-----------:|----------:|---------:|")
+    fastest = None
+    for name, us, errors, contacts in rows(count):
+        fastest = fastest or us
+        print(line(name, us, errors, contacts, fastest), flush=True)
+
+
+def orders(count: int) -> None:
+    """Print cost and error by order and tolerance."""
+    x, v = rig.starts(count)
+    for order in (14, 16, 18, 20, 22, 24):
+        for exponent in (-44, -46, -48, -52):
+            us, errors, _ = ours(sl.Taylor(order, tolerance=2.0**exponent), x, v)
+            print(f"order {order:2d}  2^{exponent}  {us:6.3f} us  median {np.median(errors):.1e} m  largest {errors.max():.1e} m", flush=True)
+
+
+def memory() -> None:
+    """Print what a stroboscope run from a million starts takes."""
+    x, v = rig.starts(1_000_000)
+    system = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    sl.stroboscope(system, (0.0, 0.0), 1)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    sl.stroboscope(system, {"x": x, "v": v}, 10, keep=1)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(f"1e6 starts, 10 periods: {peak / 2**20:.2f} GB at the peak, of which {before / 2**20:.2f} GB Python and libraries")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--starts", type=int, default=512, help="number of starts (a multiple of 8)")
+    parser.add_argument("--orders", action="store_true", help="cost and error by order and tolerance")
+    parser.add_argument("--memory", action="store_true", help="memory of a run from 1e6 starts")
+    chosen = parser.parse_args()
+    if chosen.memory:
+        memory()
+    else:
+        rig.pin()
+        (orders if chosen.orders else table)(chosen.starts)

@@ -1,0 +1,255 @@
+"""Template, 4 of 4 of the Taylor flow: the life of a lane - filled, attended to at contacts, samples and ends of periods, emptied."""
+
+import math
+
+import numpy as np
+
+from saltus.kernels.batch import Batch
+from saltus.kernels.isolation import DEEPEST
+from saltus.kernels.status import (
+    BUDGET_STEPS,
+    FINISHED,
+    GAP_MARGIN,
+    GRAZE_UNRESOLVED,
+    NONFINITE,
+    OK,
+    PAUSED,
+    RESTING,
+    RUNNING,
+    STEPS,
+    UNRESOLVED,
+)
+
+
+# -- samples and periods ------------------------------------------------------------------------------------------------------------
+@kernel
+def write_samples(lanes, lane, batch, start, slow):
+    """Write every sample that this step has passed, from its polynomial; at a node, the node's own state."""
+    who, count = lanes.memo[lane, WHO], lanes.memo[lane, COUNT]
+    tau, period = lanes.clock[TAU, lane], batch.period[who]
+    m = batch.cursor[who]
+    while m < batch.sample_count.shape[0]:
+        due = (batch.sample_count[m] - count) * period + batch.sample_fraction[m] * period
+        if due > tau or batch.sample_count[m] > count:
+            break
+        if due == tau:
+            for i in range(NSTATES):
+                batch.samples[who, m, i] = lanes.y[i, lane]
+        else:
+            state_at(lanes, lane, due - start, batch.samples[who, m])
+        batch.sample_mode[who, m] = mode_of(lanes, lane)
+        m += 1
+    batch.cursor[who] = m
+    set_due(lanes, lane, batch)
+
+
+@inner
+def set_due(lanes, lane, batch):
+    """Phase of the next sample in this period, infinite if there is none."""
+    who, m = lanes.memo[lane, WHO], batch.cursor[lanes.memo[lane, WHO]]
+    lanes.run[DUE, lane] = math.inf
+    if m < batch.sample_count.shape[0] and batch.sample_count[m] <= lanes.memo[lane, COUNT]:
+        lanes.run[DUE, lane] = (batch.sample_count[m] - lanes.memo[lane, COUNT]) * batch.period[who] + batch.sample_fraction[m] * batch.period[who]
+
+
+@inner
+def set_period(lanes, lane, batch):
+    """Everything of a lane that depends on its period count: time base, phases of harmonics, end of the stretch, next sample."""
+    who, count = lanes.memo[lane, WHO], lanes.memo[lane, COUNT]
+    lanes.clock[BASE, lane] = batch.origin[who] + count * batch.period[who]
+    turns(batch.param[who * batch.stride], batch.origin[who], batch.period[who], count, lane, lanes.clock)
+    lanes.run[END, lane] = batch.period[who] if count < batch.end_count[who] else batch.end_phase[who]
+    set_due(lanes, lane, batch)
+
+
+@kernel
+def final_contacts(lanes, lane, batch, slow):
+    """A gap that is exactly zero, or past zero by rounding, at the very end is an event there, reported once."""
+    for i in range(NSTATES):
+        slow.state[i] = lanes.y[i, lane]
+    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, batch.param[lanes.memo[lane, WHO] * batch.stride], slow.gaps)
+    for g in range(NGUARDS):
+        if lanes.fresh[g, lane] < 0.5 and slow.gaps[g] * lanes.side[g, lane] <= 0.0:
+            land(lanes, lane, batch, g, gap_rate(lanes, lane, g, lanes.found[DELTA, lane]), slow)
+
+
+@inner
+def end_stretch(lanes, lane, batch, slow):
+    """The end of a period, or of the run. Returns the status."""
+    who = lanes.memo[lane, WHO]
+    if lanes.memo[lane, COUNT] < batch.end_count[who]:
+        lanes.memo[lane, COUNT] += 1
+        lanes.clock[TAU, lane] = 0.0
+        set_period(lanes, lane, batch)
+        if lanes.run[DUE, lane] <= 0.0:
+            write_samples(lanes, lane, batch, 0.0, slow)
+    if lanes.memo[lane, COUNT] < batch.end_count[who] or lanes.clock[TAU, lane] < batch.end_phase[who]:
+        return RUNNING
+    final_contacts(lanes, lane, batch, slow)
+    if lanes.memo[lane, RESTS] != 0:
+        return RESTING
+    return GRAZE_UNRESOLVED if batch.counters[who, UNRESOLVED] > 0 else OK
+
+
+@inner
+def overflowed(lanes, lane):
+    """Whether the step left the range of numbers; the lane then keeps the state at the start of the step."""
+    bad = False
+    for i in range(NSTATES):
+        bad = bad or not abs(lanes.y[i, lane]) < HUGE
+    if bad:
+        for i in range(NSTATES):
+            lanes.y[i, lane] = lanes.work[i * (ORDER + 1), lane]
+    return bad
+
+
+@inner
+def crossing_guards(lanes, lane):
+    """Bits of the guards that cross at the end of this step."""
+    if lanes.memo[lane, DECIDED] == 1:
+        return lanes.memo[lane, HITS]
+    which = int(lanes.found[WHICH, lane])
+    return 1 << which if which >= 0 else 0
+
+
+@inner
+def attend(lanes, lane, batch, slow):
+    """Everything that happened to one lane in this step. Returns its status."""
+    start = lanes.run[START, lane]
+    if overflowed(lanes, lane):
+        return NONFINITE
+    hits = crossing_guards(lanes, lane)
+    if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
+        write_samples(lanes, lane, batch, start, slow)
+    status = land_all(lanes, lane, batch, hits, slow) if hits != 0 else RUNNING
+    for g in range(NGUARDS):
+        if (lanes.memo[lane, RESTS] >> g) & 1:
+            lanes.fresh[g, lane] = 1.0
+    if status == RUNNING and lanes.clock[TAU, lane] >= lanes.run[END, lane]:
+        status = end_stretch(lanes, lane, batch, slow)
+    if status == RUNNING and lanes.run[TAKEN, lane] > batch.options[1]:
+        status = BUDGET_STEPS
+    lanes.memo[lane, DECIDED] = 0
+    return status
+
+
+# -- filling and emptying lanes -------------------------------------------------------------------------------------------------------------
+@kernel
+def start_sides(lanes, lane, batch, slow):
+    """Sides of all guards from the state; on a boundary the guard is fresh and its side is settled by the first step."""
+    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, batch.param[lanes.memo[lane, WHO] * batch.stride], slow.gaps)
+    for g in range(NGUARDS):
+        lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
+        lanes.fresh[g, lane] = 1.0 if slow.gaps[g] == 0.0 else 0.0
+    lanes.memo[lane, STARTING] = 1
+    lanes.run[LANDED, lane] = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
+
+
+@kernel
+def fill(lanes, lane, who, batch, slow):
+    """Load a trajectory into a lane."""
+    lanes.memo[lane, :] = 0
+    lanes.memo[lane, WHO], lanes.memo[lane, COUNT] = who, batch.count[who]
+    constants(batch.param[who * batch.stride], lanes.c, lane)
+    lanes.clock[TAU, lane] = batch.phase[who]
+    set_period(lanes, lane, batch)
+    lanes.run[TAKEN, lane] = batch.counters[who, STEPS]
+    lanes.run[LEAST, lane] = batch.minima[who, GAP_MARGIN]
+    lanes.run[ACTIVE, lane] = 1.0
+    for i in range(NSTATES):
+        lanes.y[i, lane] = batch.state[who, i]
+        slow.state[i] = batch.state[who, i]
+    if batch.mode[who] < 0:
+        start_sides(lanes, lane, batch, slow)
+        if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
+            write_samples(lanes, lane, batch, lanes.clock[TAU, lane], slow)
+        return
+    for g in range(NGUARDS):
+        lanes.side[g, lane] = 1.0 if (batch.mode[who] >> g) & 1 else -1.0
+        lanes.fresh[g, lane] = 1.0 if (batch.fresh[who] >> g) & 1 else 0.0
+    lanes.run[LANDED, lane] = batch.carry[who, 0]
+    lanes.memo[lane, BOUNCES], lanes.memo[lane, STARTING] = int(batch.carry[who, 1]), int(batch.carry[who, 2])
+
+
+@kernel
+def empty(lanes, lane, batch, status):
+    """Write a lane back to its trajectory and leave the lane idle."""
+    who = lanes.memo[lane, WHO]
+    fresh = 0
+    for g in range(NGUARDS):
+        if lanes.fresh[g, lane] > 0.5:
+            fresh |= 1 << g
+    for i in range(NSTATES):
+        batch.state[who, i] = lanes.y[i, lane]
+        lanes.y[i, lane] = 0.0
+    batch.count[who], batch.phase[who] = lanes.memo[lane, COUNT], lanes.clock[TAU, lane]
+    batch.mode[who], batch.fresh[who], batch.status[who] = mode_of(lanes, lane), fresh, status
+    batch.carry[who, 0] = lanes.run[LANDED, lane]
+    batch.carry[who, 1], batch.carry[who, 2] = lanes.memo[lane, BOUNCES], lanes.memo[lane, STARTING]
+    batch.counters[who, STEPS] = int(lanes.run[TAKEN, lane])
+    batch.minima[who, GAP_MARGIN] = lanes.run[LEAST, lane]
+    lanes.run[ACTIVE, lane] = 0.0
+    lanes.memo[lane, WHO] = -1
+
+
+@kernel
+def refill(lanes, lane, cursor, batch, slow):
+    """Give an idle lane the next trajectory that wants to run; returns where to look for the one after it."""
+    while cursor < batch.status.shape[0]:
+        if batch.status[cursor] == RUNNING:
+            if batch.count[cursor] < batch.end_count[cursor] or batch.phase[cursor] < batch.end_phase[cursor]:
+                fill(lanes, lane, cursor, batch, slow)
+                return cursor + 1
+            batch.status[cursor] = OK
+        cursor += 1
+    return cursor
+
+
+# -- the whole batch -------------------------------------------------------------------------------------------------------------------
+def workspace():
+    """The memory that one call of `propagate` works in; one set for each thread."""
+    guards = max(NGUARDS, 1)
+    lanes = Lanes(
+        y=np.zeros((NSTATES, LANES)), side=np.ones((guards, LANES)), fresh=np.zeros((guards, LANES)), clock=np.zeros((TURN + NTURNS, LANES)),
+        c=np.zeros((NCONST, LANES)), work=np.zeros((ROWS, LANES)), bounds=np.zeros((BOUNDS * max(NSERIES, 1), LANES)), poly=np.zeros((ORDER + 1, LANES)), run=np.zeros((RUN_ROWS, LANES)),
+        found=np.zeros((3, LANES)), memo=np.zeros((LANES, MEMO), np.int64),
+    )  # fmt: skip
+    slow = Slow(
+        q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)), bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
+        out=np.zeros(3), gaps=np.zeros(guards), state=np.zeros(NSTATES), touch=np.zeros(1),
+    )  # fmt: skip
+    return (*lanes, *slow)
+
+
+@entry
+def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
+              sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, budget,
+              lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_poly, lane_run, lane_found, lane_memo,
+              slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touch):  # fmt: skip
+    """Move every trajectory whose status is RUNNING to its end, `budget` steps of the lanes at most. See flow/engine.py for the arrays."""
+    batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
+                  sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options)  # fmt: skip
+    lanes = Lanes(lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_poly, lane_run, lane_found, lane_memo)
+    slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touch)
+    roomy = rec_i.shape[0] - 2 * LANES * (NGUARDS + 1)
+    following = 0
+    busy = 0
+    for lane in range(LANES):
+        lanes.run[END, lane], lanes.run[ACTIVE, lane], lanes.memo[lane, WHO] = 1.0, 0.0, -1
+    for lane in range(LANES):
+        following = refill(lanes, lane, following, batch, slow)
+        busy += lanes.run[ACTIVE, lane] > 0.5
+    while busy > 0 and budget > 0 and (roomy <= 0 or rec_used[0] <= roomy):
+        budget -= 1
+        attention = step_all(lanes, batch, slow)
+        for lane in range(LANES):
+            if (attention >> lane) & 1:
+                outcome = attend(lanes, lane, batch, slow)
+                if outcome != RUNNING:
+                    empty(lanes, lane, batch, outcome)
+                    following = refill(lanes, lane, following, batch, slow)
+                    busy -= lanes.run[ACTIVE, lane] < 0.5
+    for lane in range(LANES):
+        if lanes.run[ACTIVE, lane] > 0.5:
+            empty(lanes, lane, batch, RUNNING)
+    return FINISHED if busy == 0 else PAUSED

@@ -1,0 +1,46 @@
+"""Template, 1 of 4 of the Taylor flow: what its work arrays hold. codegen puts a generated head before the four.
+
+One step of all lanes reads: jets -> step length -> locate contacts -> advance (taylor_step.py), then attend to the lanes where something
+happened: a contact (taylor_contacts.py), the end of a period, a sample, the end (taylor_lanes.py). Steps are arithmetic on lanes without
+branches on their contents, or with branches that only skip work; so a trajectory's digits don't depend on its neighbours.
+
+Symbols
+-------
+N = ORDER; y_k Taylor coefficient k of state y; g gap; s = +1/-1 the side of a guard that the mode says; P(d) = s*g along the step, d the
+time since its start; h step length; T forcing period; tau phase in [0, T); c parameter-only constants of each lane.
+A guard is *fresh* while its lane stands exactly on the boundary: P(0) = 0, and that known root is divided out.
+
+The head supplies the sizes LANES, NSTATES, NGUARDS, ORDER, NCONST, NTURNS, ROWS, NSERIES, the rows SERIES_ROW, GUARD_ROW, GUARD_SERIES,
+GUARD_SIGN, GAP_ROW, SCALE_ROW, SNAP_STATE, SNAP_CONST, the degrees NEWTON_DEGREE_1 and _2, and the functions constants(p, c, lane),
+gaps(t, y, p, out), turns(p, origin, period, count, lane, clock) and jets(y, side, c, clock, work).
+"""
+
+from collections import namedtuple
+
+# Rows of `clock`: phase, time at phase zero, then one phase offset for each harmonic of the forcing.
+TAU, BASE, TURN = 0, 1, 2
+# Rows of `run`: the phase at which the current stretch ends, the next sample's phase, steps taken, smallest gap margin, active (0/1), the
+# step length, the phase at its start, time of the last landing.
+END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED = range(8)
+RUN_ROWS = 8
+# Rows of `bounds`, for each series that a gap reads (see bound_series).
+LINEAR, QUADRATIC, CUBIC, CHANGE, REST, BOUNDS = range(6)
+# Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none).
+DELTA, RATE, WHICH = range(3)
+# Columns of `memo`: trajectory, periods, contacts in a row without time passing, whether its mode at the start is still being settled,
+# whether the slow path has decided this step, guards that it found to cross (bits), guards on which the state rests (bits), and the
+# tangency that it saw (guard + 1, kind).
+WHO, COUNT, BOUNCES, STARTING, DECIDED, HITS, RESTS, TOUCHED, TOUCH_KIND = range(9)
+MEMO = 9
+# Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING.
+CARRY = 3
+#: Times within this many ulp are one event (EVENTS.md, rule 6).
+COINCIDENT = 10.0 * 2.220446049250313e-16
+#: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
+MOST_BOUNCES = 100
+#: Rounding error of a gap, in units of its terms.
+NOISE = 4.0 * 2.220446049250313e-16
+HUGE = 1.0e300
+
+Lanes = namedtuple("Lanes", "y side fresh clock c work bounds poly run found memo")
+Slow = namedtuple("Slow", "q b bounds rates out gaps state touch")
