@@ -42,9 +42,10 @@ from saltus.kernels.status import (
     VIOLATIONS,
 )
 
-# Columns of `carry`, what a paused trajectory needs besides its state: time, start of the leg, next step length.
-TIME, LEG, LENGTH = range(3)
-CARRY = 3
+# Columns of `carry`, what a paused trajectory needs besides its state: time, start of the leg, next step length,
+# and the error estimates of all steps so far, added up for each state.
+TIME, LEG, LENGTH, ERRORS = range(4)
+CARRY = ERRORS + NSTATES
 # Columns of `options`.
 RTOL, ATOL, LOCATE, MAX_STEPS, MAX_EVENTS = range(5)
 
@@ -188,14 +189,27 @@ def land(i, t, t_hit, t_new, h, batch, work):
     drive_at(t_hit, Q, work)
     rate_at(t_hit, NEXT, Q, K1, work)
     gap_rates_at(t_hit, NEXT, K1, Q, RATE, work)
-    gap_rates_at(t_hit, NEXT, REST, Q, RATE_AT_REST, work)
-    gap_rates_at(t_hit, NEXT, ERROR, Q, TRY, work)
-    record_contacts(i, t_hit, h, batch, work)
+    gap_errors(i, t_hit, batch, work)
+    record_contacts(i, t_hit, batch, work)
     gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
 
 
+@kernel
+def gap_errors(i, t_hit, batch, work):
+    """How far the errors of all steps so far have moved each gap at most, to TRY; how errors grow from step to step is left out."""
+    gap_rates_at(t_hit, NEXT, REST, Q, RATE_AT_REST, work)
+    for g in range(NGUARDS):
+        work[TRY + g] = 0.0
+    for j in range(NSTATES):
+        work[REST + j] = batch.carry[i, ERRORS + j]
+        gap_rates_at(t_hit, NEXT, REST, Q, AT_NEXT, work)
+        work[REST + j] = 0.0
+        for g in range(NGUARDS):
+            work[TRY + g] += abs(work[AT_NEXT + g] - work[RATE_AT_REST + g])
+
+
 @inner
-def record_contacts(i, t_hit, h, batch, work):
+def record_contacts(i, t_hit, batch, work):
     """Count and record every gap that closes at t_hit; sets the mode."""
     before, after = batch.mode[i], batch.mode[i]
     for g in range(NGUARDS):
@@ -207,12 +221,12 @@ def record_contacts(i, t_hit, h, batch, work):
         if changes_sign(work, LEFT, RIGHT, g):
             batch.counters[i, EVENTS] += 1
             batch.minima[i, CONTACT_SPEED] = min(batch.minima[i, CONTACT_SPEED], abs(work[RATE + g]))
-            record(i, g, t_hit, h, before, after, batch, work)
+            record(i, g, t_hit, before, after, batch, work)
     batch.mode[i] = after
 
 
 @kernel
-def record(i, g, t_hit, h, before, after, batch, work):
+def record(i, g, t_hit, before, after, batch, work):
     """Write one contact, if there is a table and it lies in a period that is kept."""
     period, elapsed = batch.period[i], t_hit - batch.origin[i]
     count = int(math.floor(elapsed / period))
@@ -225,7 +239,7 @@ def record(i, g, t_hit, h, before, after, batch, work):
     row[REC_DIRECTION] = 1 if work[RIGHT + g] > work[LEFT + g] else -1
     row[REC_MODE_BEFORE], row[REC_MODE_AFTER], row[REC_STEPS] = before, after, batch.counters[i, STEPS]
     values[REC_PHASE], values[REC_VELOCITY] = elapsed - count * period, work[RATE + g]
-    values[REC_TIME_ERROR] = abs(h * (work[TRY + g] - work[RATE_AT_REST + g]) / work[RATE + g]) if work[RATE + g] != 0.0 else math.inf
+    values[REC_TIME_ERROR] = work[TRY + g] / abs(work[RATE + g]) if work[RATE + g] != 0.0 else math.inf
     for j in range(NSTATES):
         values[RECORD_FLOATS + j] = work[NEXT + j]
     values[RECORD_FLOATS + NSTATES] = t_hit
@@ -325,6 +339,8 @@ def advance(i, budget, batch, work):
             status = NONFINITE
             break
         batch.counters[i, STEPS] += 1
+        for j in range(NSTATES):
+            batch.carry[i, ERRORS + j] += abs(h * work[ERROR + j])
         t_hit, lands = find_contact(t, t_new, t_leg, h, work) if locate else (t_new, False)
         if lands:
             land(i, t, t_hit, t_new, h, batch, work)

@@ -99,6 +99,7 @@ def _probe(**values: float) -> System:
 
 
 def processor() -> str:
+    """Name of the processor."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]

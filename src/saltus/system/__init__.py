@@ -8,6 +8,9 @@
 ['x = -gap', 'x = gap']
 """
 
+import sys
+from types import ModuleType
+
 from saltus.system.functions import abs, atan, cos, exp, log, max, min, pi, piecewise, sin, sqrt, tan, tanh
 from saltus.system.guards import Guard
 from saltus.system.laws import freeplay
@@ -18,3 +21,12 @@ __all__ = [
     "Guard", "System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan",
     "tanh",
 ]  # fmt: skip
+
+
+class _CallableModule(ModuleType):
+    """Lets ``saltus.system`` be the decorator, although importing this folder binds that name to the module."""
+
+    __call__ = staticmethod(system)
+
+
+sys.modules[__name__].__class__ = _CallableModule

@@ -104,9 +104,7 @@ def test_own_system_with_values(tmp_path):
         ('case = "b"', 'case = "d"', "no case 'd'"),
         ('case = "b"', "force = 4", 'force = "4 N"'),
         ('"delangre"\ncase', '"chain"\ncase', "chain has no cases"),
-        ("periods = 12", "periods = 12\nkeep = 13", "keep"),
         ("periods = 12", 'periods = 12\n[compare]\nprinted = "a.csv"', "for one start"),
-        ('["0.2 mm", "1 mm"], v = "0 m/s" }', '"1 mm", v = "0 m/s" }\nkeep = 3\n[compare]\nprinted = "a.csv"\n#', "leave keep out"),
     ],
 )
 def test_refusals(old, new, part):
@@ -116,6 +114,12 @@ def test_refusals(old, new, part):
     with pytest.raises(SaltusError) as caught:
         run_text(BATCH.replace(old, new))
     assert part in str(caught.value)
+
+
+def test_comparing_needs_the_contacts_from_the_start():
+    text = BATCH.replace('["0.2 mm", "1 mm"]', '"1 mm"') + 'keep = 3\n[compare]\nprinted = "a.csv"\n'
+    with pytest.raises(StudyError, match="leave keep out"):
+        run_text(text)
 
 
 # -- demo and doctor ----------------------------------------------------------------------------------------------------------------------

@@ -79,6 +79,23 @@ def test_every_elementary_function(name):
     assert value == pytest.approx(3 * exact[name], rel=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("expression", "exact"),
+    [
+        (X * V + X, lambda x, v: v + 1),
+        (V - X * X, lambda x, v: -2 * x),
+        (V / X, lambda x, v: -v / x**2),
+        (X / (X + V), lambda x, v: v / (x + v) ** 2),
+        ((X - V) / (X * V), lambda x, v: 1 / x**2),
+        (-(X**-2), lambda x, v: 2 / x**3),
+        (ex.elementary("sin", X**2) / X, lambda x, v: 2 * math.cos(x**2) - math.sin(x**2) / x**2),
+    ],
+)
+def test_sums_products_and_quotients(expression, exact):
+    (value,) = evaluate([differentiate(expression, X)], states={"x": 0.7, "v": -1.9})
+    assert value == pytest.approx(exact(0.7, -1.9), rel=1e-13)
+
+
 def test_power_rules():
     (by_base, by_exponent) = evaluate([differentiate(X**P, X), differentiate(X**P, P)], states={"x": 1.7}, values={"p": 2.5})
     assert by_base == pytest.approx(2.5 * 1.7**1.5, rel=1e-14)

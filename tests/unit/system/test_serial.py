@@ -76,6 +76,15 @@ def test_the_fingerprint_knows_equations_only():
     assert len({reference, *(other.fingerprint() for other in others)}) == 5
 
 
+def test_the_fingerprint_knows_what_sets_the_period():
+    def rig(t, x, *, f=1.0):
+        return -x * f
+
+    made = [system(states="x", forced_at=forced, units={"f": unit})(rig) for forced, unit in (("f", "Hz"), ("f", "rad/s"), (None, "Hz"))]
+    assert made[0].field == made[1].field == made[2].field
+    assert len({one.fingerprint() for one in made}) == 3
+
+
 def test_the_fingerprint_is_that_of_another_process():
     code = "from saltus.models import delangre; print(delangre('c').fingerprint())"
     for seed in ("1", "2"):

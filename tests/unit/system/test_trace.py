@@ -1,6 +1,8 @@
 """Tracing: what a System is made from, and what the errors say."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -107,6 +109,12 @@ def test_names_of_states(states, teaches):
 def test_the_decorator_needs_its_states():
     with pytest.raises(TraceError, match=r'@sl.system\(states="x v"\)'):
         system(states=lambda t, x, v: (v, x))
+
+
+@pytest.mark.parametrize("first", ["import saltus.models", "from saltus.system import System", "sl.system", "pass"])
+def test_the_public_name_is_the_decorator_whatever_was_imported_before(first):
+    code = f"import saltus as sl\n{first}\n@sl.system(states='x')\ndef rig(t, x):\n    return -x\nassert isinstance(rig, sl.System)"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.parametrize(
@@ -261,6 +269,13 @@ class TestPeriodicity:
     def test_a_ramp(self):
         with pytest.raises(TraceError, match="forced_at=None"):
             self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t) * t)
+
+        with pytest.raises(TraceError, match="forced_at=None"):
+            self.forced(lambda t, x, a, f, g: a * t)
+
+    def test_a_weak_drive_beside_a_strong_preload(self):
+        with pytest.raises(TraceError, match="doesn't repeat"):
+            self.forced(lambda t, x, a, f, g: 1e10 + a * cos(f * t))
 
     def test_a_second_frequency_must_be_a_multiple(self):
         made = self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t) + a * cos(2 * pi * g * t))
