@@ -27,17 +27,21 @@ def console(stderr: bool = False) -> Console:
 
 
 def show(table: TextTable) -> None:
-    """Print a table and its notes."""
+    """Print a table and its notes; row by row where the terminal is too narrow for it."""
     screen = console()
-    headings = any(table.columns)
     screen.print(escape(table.title), style="bold")
-    grid = Table(show_header=headings, header_style="dim", box=None, pad_edge=False, padding=(0, 3, 0, 0))
+    grid = Table(show_header=any(table.columns), header_style="dim", box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for number, column in enumerate(table.columns):
         numeric = all(_is_number(row[number]) for row in table.rows if row[number])
-        grid.add_column(escape(column), justify="right" if numeric else "left", overflow="fold")
+        grid.add_column(escape(column), justify="right" if numeric else "left", no_wrap=True)
     for row in table.rows:
         grid.add_row(*map(escape, row))
-    screen.print(grid, no_wrap=not screen.is_terminal)
+    if screen.measure(grid).maximum <= screen.width:
+        screen.print(grid)
+    else:
+        for row in table.rows:
+            lines = [f"{column:>{max(map(len, table.columns))}}  {text}" for column, text in zip(table.columns, row, strict=True) if text]
+            screen.print(escape("\n".join(lines)), end="\n\n")
     for note in table.notes:
         screen.print(escape(note), style="dim")
 

@@ -40,8 +40,9 @@ from saltus.kernels.lanes import *
 from saltus.kernels.trigonometry import sincos, turned
 
 # Kernels own no memory: without reference counts (_nrt=False) passing an array costs nothing (measured: with them, ten times the step).
-kernel = njit(nogil=True, error_model="numpy", _nrt=False)
-inner = njit(nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+# Only `propagate` is called from Python: wrappers for the others would be half of the compile time.
+kernel = njit(nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+inner = njit(nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
 entry = njit("int64({arguments})", nogil=True, cache=True, error_model="numpy", _nrt=False)
 
 '''

@@ -7,8 +7,8 @@ Comput. 18 (1997).
 
 Symbols
 -------
-t, t_new ends of a step; t_leg start of the leg (the first time, or the last contact); t_end end of the trajectory; h = t_new - t; length the
-step length that is asked for; theta = AbsTol/RelTol; err the error estimate on RelTol's scale. Times in s.
+t, t_new ends of a step; t_leg start of the leg (the first time, or the last contact); t_end end of the trajectory; h = t_new - t; length what is
+asked for h; theta = AbsTol/RelTol; err the error estimate on RelTol's scale. Times in s.
 """
 
 import math
@@ -229,7 +229,7 @@ def record_contacts(i, t_hit, batch, work):
 def record(i, g, t_hit, before, after, batch, work):
     """Write one contact, if there is a table and it lies in a period that is kept."""
     period, elapsed = batch.period[i], t_hit - batch.origin[i]
-    count = int(math.floor(elapsed / period))
+    count = math.floor(elapsed / period)
     if batch.rec_i.shape[0] == 0 or count < batch.rec_first[i]:
         return
     r = batch.rec_used[0]

@@ -37,10 +37,10 @@ def changes_sign(work, one, other, g):
 @inner
 def any_sign_change(work, one, other):
     """Whether any gap has another sign at `other` than at `one`."""
+    changes = False
     for g in range(NGUARDS):
-        if changes_sign(work, one, other, g):
-            return True
-    return False
+        changes |= changes_sign(work, one, other, g)
+    return changes
 
 
 @kernel

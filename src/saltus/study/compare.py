@@ -59,9 +59,19 @@ def contact_table(title: str, run: xr.Dataset, compare: Compare, folder: Path, r
         table.append(tuple(line))
         before = number
     method = run.attrs["method"]
-    second = reference.attrs["method"] if reference is not None else "second method"
-    columns = ("", "contact", f"{method} [s]", "printed [s]", "difference [s]", "|x - boundary| [m]", "printed [m]", "exact [s]",
-               f"{second} - exact [s]", "steps of each leg")  # fmt: skip
+    second = reference.attrs["method"] if reference is not None else "reference"
+    columns = (
+        "",
+        "contact",
+        f"{method} [s]",
+        "printed [s]",
+        "difference",
+        "|x - j| [m]",
+        "printed [m]",
+        "exact [s]",
+        f"{second} - exact",
+        "steps",
+    )
     return TextTable(title, columns, tuple(table), _notes(run, exact, reference))
 
 
@@ -78,7 +88,7 @@ def largest_difference(run: xr.Dataset, exact: dict[int, float]) -> tuple[float,
 
 
 def _notes(run: xr.Dataset, exact: dict[int, float], reference: xr.Dataset | None) -> tuple[str, ...]:
-    notes = []
+    notes = ["j: the boundary that is met. steps: of each leg, the leg being the motion from one contact to the next."]
     for one in (run, reference):
         if one is not None and exact:
             worst, count = largest_difference(one, exact)

