@@ -1,7 +1,7 @@
 """What one forcing period of one trajectory costs, and how exact it is: saltus beside its rivals, same work, same run.
 
 Case b4 of the deLangre rig at 15 Hz, starts x in [-5, 5] mm, v in [-1, 1] m/s, contacts located. CPU time of one pinned core, the smallest
-of three repeats, over 100 periods from at least 512 starts (SciPy: a few starts, its cost per trajectory is the same). Errors are of |x|
+of three repeats, over 100 periods from 2048 starts (SciPy: a few starts, its cost per trajectory is the same). Errors are of |x|
 after 5 periods from the 64 grid starts of tests/reference/rig_b4_15hz_5periods.csv, known to 30 digits.
 
     python benchmarks/flow.py                 the table of the README
@@ -112,7 +112,7 @@ def memory() -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--starts", type=int, default=512, help="number of starts (a multiple of 8)")
+    parser.add_argument("--starts", type=int, default=2048, help="number of starts (a multiple of 8)")
     parser.add_argument("--orders", action="store_true", help="cost and error by order and tolerance")
     parser.add_argument("--memory", action="store_true", help="memory of a run from 1e6 starts")
     chosen = parser.parse_args()
