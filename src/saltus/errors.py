@@ -30,6 +30,10 @@ class CacheError(SaltusError, OSError):
     """The folder of generated kernels can't be used."""
 
 
+class SaltusWarning(UserWarning):
+    """Some trajectories did not reach their end."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """A sentence that offers the nearest known name, or lists all of them."""
     known = list(known)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import answers
+from saltus.analysis.messages import warn
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.errors import ParameterError
 from saltus.flow import engine
@@ -93,20 +94,23 @@ def simulate(
     if time_errors not in ("measured", "local"):
         raise ParameterError(f'time_errors must be "measured" or "local", not {time_errors!r}.')
     show, close = engine.reporter(progress)
+    outcome = None
     try:
         outcome = engine.run(system, method, plan.request(group, length), threads, show)
-        if time_errors == "measured" and system.guards:
+        errors = answers.local_time_errors(outcome)
+        if time_errors == "measured" and len(errors):
             check = engine.run(system, method.companion(), plan.contacts_only(group, length), threads, show)
             errors = answers.measured_time_errors(outcome, check)
-        else:
-            errors = answers.local_time_errors(outcome)
     except Interrupted as stop:
-        if isinstance(stop.partial, Outcome):
-            stop.partial = _dataset(system, method, group, length, plan, stop.partial, answers.local_time_errors(stop.partial))
+        so_far = stop.partial if outcome is None else outcome
+        if isinstance(so_far, Outcome):
+            stop.partial = _dataset(system, method, group, length, plan, so_far, answers.local_time_errors(so_far))
         raise
     finally:
         close()
-    return _dataset(system, method, group, length, plan, outcome, errors)
+    result = _dataset(system, method, group, length, plan, outcome, errors)
+    warn(result)
+    return result
 
 
 @dataclass(frozen=True)

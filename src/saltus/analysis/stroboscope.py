@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import answers
+from saltus.analysis.messages import warn
 from saltus.analysis.starts import ensemble, span
 from saltus.errors import ParameterError
 from saltus.flow import engine
@@ -80,10 +81,12 @@ def stroboscope(
 
     show, close = engine.reporter(progress)
     try:
-        return dataset(engine.run(system, method, request, threads, show))
+        result = dataset(engine.run(system, method, request, threads, show))
     except Interrupted as stop:
         if isinstance(stop.partial, Outcome):
             stop.partial = dataset(stop.partial)
         raise
     finally:
         close()
+    warn(result)
+    return result

@@ -31,7 +31,7 @@ class Commands(TyperGroup):
             screen.fail(f"{error.filename or 'a file'}: {error.strerror or error}. Choose another folder, or free some space.")
             raise typer.Exit(REFUSED) from None
         except KeyboardInterrupt:
-            screen.fail("stopped. Files are written in full or not at all; what was said to be written is there.")
+            screen.fail("stopped. Files are written in full or not at all: none is left half-written.")
             raise typer.Exit(INTERRUPTED) from None
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
+from rich.measure import Measurement
 from rich.table import Table
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def show(table: TextTable) -> None:
         grid.add_column(escape(column), justify="right" if numeric else "left", no_wrap=True)
     for row in table.rows:
         grid.add_row(*map(escape, row))
-    if screen.measure(grid).maximum <= screen.width:
+    if Measurement.get(screen, screen.options.update(max_width=10 * LOG_WIDTH), grid).maximum <= screen.width:
         screen.print(grid)
     else:
         for row in table.rows:

@@ -219,10 +219,23 @@ def _open_tables(chunk: _Chunk) -> None:
     chunk.arrays["rec_f"] = np.zeros((size, st.RECORD_FLOATS + chunk.arrays["state"].shape[1] + 1))
 
 
+def _empty_table(chunk: _Chunk) -> None:
+    """Move a chunk's contacts from its table to its lists."""
+    arrays, used = chunk.arrays, int(chunk.arrays["rec_used"][0])
+    if used:
+        integers = arrays["rec_i"][:used].copy()
+        integers[:, st.REC_TRAJECTORY] += chunk.first
+        chunk.integers.append(integers)
+        chunk.floats.append(arrays["rec_f"][:used].copy())
+        arrays["rec_used"][0] = 0
+
+
 def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], request: Request) -> Outcome:
     """Times at the end, and the contacts of all chunks in one sorted table."""
     outcome.time = whole["origin"] + whole["count"] * whole["period"] + whole["phase"]
     whole["status"][whole["status"] == st.RUNNING] = st.NOT_COMPUTED
+    for chunk in chunks:
+        _empty_table(chunk)
     integers = [part for chunk in chunks for part in chunk.integers]
     floats = [part for chunk in chunks for part in chunk.floats]
     if integers:
@@ -238,13 +251,7 @@ def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: threadin
     arrays = chunk.arrays
     while not stop.is_set():
         outcome = module.propagate(*(arrays[name] for name in _ARGUMENTS), SLICE, *workspace)
-        used = int(arrays["rec_used"][0])
-        if used:
-            integers = arrays["rec_i"][:used].copy()
-            integers[:, st.REC_TRAJECTORY] += chunk.first
-            chunk.integers.append(integers)
-            chunk.floats.append(arrays["rec_f"][:used].copy())
-            arrays["rec_used"][0] = 0
+        _empty_table(chunk)
         if shown:
             shown()
         if outcome == st.FINISHED:

@@ -7,13 +7,13 @@ Comput. 18 (1997).
 
 Symbols
 -------
-t, t_new ends of a step; t_leg start of the leg (the first time, or the last contact); t_end end of the trajectory; h = t_new - t; length what is
-asked for h; theta = AbsTol/RelTol; err the error estimate on RelTol's scale. Times in s.
+t, t_new ends of a step; t_leg start of the leg (the first time, or the last contact); t_end end of the trajectory; h = t_new - t; length
+what is asked for h; theta = AbsTol/RelTol; err the error estimate on RelTol's scale. Times in s.
 """
 
 import math
-from collections import namedtuple
 
+from saltus.kernels.batch import Batch
 from saltus.kernels.status import (
     BUDGET_EVENTS,
     BUDGET_STEPS,
@@ -53,12 +53,6 @@ RTOL, ATOL, LOCATE, MAX_STEPS, MAX_EVENTS = range(5)
 POWER = 1 / 5
 #: Below this err/RelTol the rule 1.25 (err/RelTol)^(1/5) <= 0.2 lets a step grow five times; 0.16^5 = 1.048576e-4, less a little.
 TINY = 1.04e-4
-
-Batch = namedtuple(
-    "Batch",
-    "period origin param stride state count phase mode fresh carry status end_count end_phase counters minima "
-    "sample_count sample_fraction cursor samples sample_mode rec_first rec_i rec_f rec_used options",
-)
 
 
 # -- step length -------------------------------------------------------------------------------------------------------------------------
@@ -363,7 +357,7 @@ def advance(i, budget, batch, work):
 def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
               sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, budget,
               work):  # fmt: skip
-    """Move every trajectory whose status is RUNNING to its end, `budget` tries of a step at most. See flow/engine.py for the arrays."""
+    """Move every trajectory whose status is RUNNING to its end, `budget` tries of a step at most. See kernels/batch.py for the arrays."""
     batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
                   sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options)  # fmt: skip
     for i in range(status.shape[0]):

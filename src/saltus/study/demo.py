@@ -125,8 +125,9 @@ def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: st
         n = int(row["response_period"])
         contacts = f"{float(row['contacts_per_response']):g} in {text}" if n else "-"
         beside = "same" if set(neighbours[:, i].tolist()) == {n} else ", ".join(period_text(int(other)) for other in neighbours[:, i])
-        peak, rms = (from_si(float(row[name]), "m", 5) for name in ("x_peak", "x_rms"))
-        rows.append((_start(i), text, beside, contacts, peak, rms, str(int(one["steps"])), str(one["status"].item())))
+        peak, rms = (from_si(float(row[name]), "m", 4) for name in ("x_peak", "x_rms"))
+        status = str(one["status"].item())
+        rows.append((_start(i), text if status == "ok" else status, beside, contacts, peak, rms, str(int(one["steps"]))))
     periodic = found["response_period"] > 0
     notes = [
         f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. Stability isn't examined."
@@ -134,7 +135,7 @@ def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: st
     ]
     if any(row[2] != "same" for row in rows):
         notes.append("Where a start 1 nm away settles to something else, no experiment and no other program need agree.")
-    columns = ("start x, v", "settles to", "1 nm beside", "contacts", "peak |x|", "rms x", "steps", "status")
+    columns = ("start x, v", "settles to", "1 nm off", "contacts", "peak |x|", "rms x", "steps")
     return TextTable(title, columns, tuple(rows), tuple(notes))
 
 

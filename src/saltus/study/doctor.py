@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from saltus.study.table import TextTable
 
 if TYPE_CHECKING:
+    from saltus.flow.methods import Method
     from saltus.system import System
 
 #: x'' = -2 from x = 0, v = 2 meets 0.999 twice in one step, at 1 -+ sqrt(0.001) s.
@@ -68,7 +69,7 @@ def check_table(found: list[Check]) -> TextTable:
     return TextTable("self-check against closed forms", ("case", "error", "allowed", ""), rows)
 
 
-def _parabola(method: object) -> float:
+def _parabola(method: Method) -> float:
     """Largest error of the contact times [s]; infinite if there aren't two."""
     from saltus.analysis import simulate
 
@@ -79,7 +80,7 @@ def _parabola(method: object) -> float:
     return max(abs(float(time) - exact) for time, exact in zip(times, PARABOLA_TIMES, strict=True))
 
 
-def _oscillator(method: object) -> float:
+def _oscillator(method: Method) -> float:
     """Largest error of x and v of x'' = -x after 10 cycles, from x = 1, v = 0."""
     from saltus.analysis import simulate
 

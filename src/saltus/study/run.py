@@ -137,12 +137,11 @@ def _simulate(system: System, study: Study, method: SpecTable, text: str, comput
     if table.periods is not None and system.forced_at is None:
         raise StudyError(f'[simulate] periods: {system.name} has no forcing period. Write t_end = "2 s" in place of it.')
     start, values = quantities.start(system, table.start), quantities.varied(system, table.values)
-    span = {"t_start": quantities.number(table.t_start, "s", "simulate", "t_start")}
-    if table.t_end is not None:
-        span["t_end"] = quantities.number(table.t_end, "s", "simulate", "t_end")
+    t_end = None if table.t_end is None else quantities.number(table.t_end, "s", "simulate", "t_end")
+    t_start = quantities.number(table.t_start, "s", "simulate", "t_start")
     try:
         run = simulate(
-            system, start=start, periods=table.periods, **span, method=method_of(method), samples=table.samples, keep=table.keep,
+            system, start, table.periods, t_end, t_start=t_start, method=method_of(method), samples=table.samples, keep=table.keep,
             values=values, **computing,
         )  # fmt: skip
     except ParameterError as error:

@@ -47,7 +47,7 @@ class Taylor(Table):
     """[method] name = "Taylor": machine precision, every contact."""
 
     name: Literal["Taylor"]
-    order: int | None = Field(None, ge=2, description="Order of the polynomials; by default chosen for speed.", examples=[14])
+    order: int | None = Field(None, ge=6, le=40, description="Order of the series; by default chosen for speed.", examples=[20])
     tolerance: float | None = Field(None, gt=0, description="Relative local error; by default machine precision.", examples=[1e-12])
 
 
