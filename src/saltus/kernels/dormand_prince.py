@@ -17,8 +17,8 @@ import numpy as np
 
 from saltus.kernels.parts import part
 
-# `work` is one array for everything, so that the compiler sees that its parts don't overlap and keeps them in registers (with separate
-# arrays a step takes a tenth longer). Where its parts start: vectors of states - the stages, the states at the ends of the step, a point
+# `work` is one array for everything, so that the compiler sees that its parts don't overlap and keeps them in registers (measured:
+# a few per cent). Where its parts start: vectors of states - the stages, the states at the ends of the step, a point
 # between them, the error estimate divided by h, zeros -
 VECTORS, GAPS, DRIVES = 12, 7, 6
 K1, K2, K3, K4, K5, K6, K7, NODE, NEXT, POINT, ERROR, REST = (NSTATES * row for row in range(VECTORS))
