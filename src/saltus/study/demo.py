@@ -124,7 +124,7 @@ def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: st
         one, row = run.isel(trajectory=i), found.isel(trajectory=i)
         n = int(row["response_period"])
         contacts = f"{float(row['contacts_per_response']):g} in {text}" if n else "-"
-        beside = "same" if set(neighbours[:, i].tolist()) == {n} else ", ".join(period_text(int(other)) for other in neighbours[:, i])
+        beside = _beside(n, neighbours[:, i].tolist())
         peak, rms = (from_si(float(row[name]), "m", 4) for name in ("x_peak", "x_rms"))
         status = str(one["status"].item())
         rows.append((_start(i), text if status == "ok" else status, beside, contacts, peak, rms, str(int(one["steps"]))))
@@ -133,10 +133,17 @@ def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: st
         f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. Stability isn't examined."
         + (f" States repeat to {float(found['mismatch'].where(periodic).max()):.0e} of their range." if periodic.any() else "")
     ]
-    if any(row[2] != "same" for row in rows):
+    if any(row[2] not in ("same", "-") for row in rows):
         notes.append("Where a start 1 nm away settles to something else, no experiment and no other program need agree.")
     columns = ("start x, v", "settles to", "1 nm off", "contacts", "peak |x|", "rms x", "steps")
     return TextTable(title, columns, tuple(rows), tuple(notes))
+
+
+def _beside(n: int, neighbours: list[int]) -> str:
+    """What the neighbours of a start settle to, if it settles itself."""
+    if n == 0:
+        return "-"
+    return "same" if set(neighbours) == {n} else ", ".join(map(period_text, neighbours))
 
 
 def _start(number: int) -> str:

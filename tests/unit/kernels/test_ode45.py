@@ -11,19 +11,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from saltus.codegen import module as codegen
 from saltus.kernels import status as st
 
-REFERENCE = Path(__file__).parents[1] / "reference"
-PREAMBLE = """
-import math
-import numpy as np
-from numba import njit
-kernel = njit(nogil=True, error_model="numpy", _nrt=False)
-inner = njit(nogil=True, error_model="numpy", _nrt=False, forceinline=True)
-F1, F2, F3, I1, I2 = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]", "int64[::1]", "int64[:, ::1]"
-ARGUMENTS = [F1, F1, F2, "int64", F2, I1, F1, I1, I1, F2, I1, I1, F1, I2, F2, I1, F1, I1, F3, I2, I1, I2, F2, I1, F1, "int64", F1]
-entry = njit("int64(" + ", ".join(ARGUMENTS) + ")", nogil=True, error_model="numpy", _nrt=False)
-"""
+REFERENCE = Path(__file__).parents[2] / "reference"
+PREAMBLE = codegen._PREAMBLE.format(title="a test", arguments=", ".join(codegen.BATCH + codegen.ODE45_WORKSPACE))
 # The rig of de Langre et al., p = m zeta f_n alpha K_c j_1 j_2 p f, summed in the order of the paper's equation (3):
 # v' = -2 zeta wn v - wn^2 x - alpha/m x^3 - K_c/m (x beyond the gap) + p_eff cos(w t)/m. Two of Table 2's digits depend on it.
 RIG = """
