@@ -5,7 +5,14 @@ Every motion that they are asked for has a closed form, or an invariant that nee
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
 import saltus as sl
+
+EPS = 2.0**-52
 
 
 @sl.system(states="x v", forced_at="frequency")
@@ -19,9 +26,15 @@ def lab(
 
 
 @sl.system(states="x v a j")
-def quartic(t, x, v, a, j, *, snap=24.0, push=0.0):
+def quartic(t, x, v, a, j, *, snap=24.0, push=0.0, lacunary=0.0):
     """x is a polynomial of degree 4 in time: gaps of any shape, exact in a single step of any length."""
-    return v, a, j, snap + sl.piecewise((push, x > 0), otherwise=0)
+    return v, a, j, snap + sl.piecewise((push, x > 0), otherwise=0) - lacunary * t**4 * x
+
+
+def quartic_with_roots(*roots: float) -> tuple[float, float, float, float]:
+    """Start of `quartic` for which x(t) is the product of (t - root), four roots."""
+    c = np.poly(roots)
+    return c[4], c[3], 2 * c[2], 6 * c[1]
 
 
 @sl.system(states="x1 v1 x2 v2")
@@ -53,3 +66,41 @@ def walls(t, x, v, *, amplitude=0.5, moving_stiffness=0.0, width=2.0, stiffness=
 def slider(t, v, *, force=2.0, friction=1.0, belt=0.0, frequency=1.0):
     """A block on a belt, shaken: Coulomb friction, so both sides may push onto v = belt."""
     return force * sl.cos(2 * sl.pi * frequency * t) - sl.piecewise((friction, v > belt), otherwise=-friction)
+
+
+@sl.system(states="x v")
+def latch(t, x, v, *, half_width=0.5, gain=0.0):
+    """An oscillator with a switch that has hysteresis: its threshold jumps when the velocity changes sign."""
+    threshold = sl.piecewise((half_width, v > 0), otherwise=-half_width)
+    return v, -x - sl.piecewise((gain, x > threshold), otherwise=0)
+
+
+class Contact(NamedTuple):
+    """One row of a table of contacts."""
+
+    time: float
+    guard: str
+    kind: str
+    direction: int
+    velocity: float
+    before: int
+    after: int
+    error: float
+
+
+def contacts(run: xr.Dataset, trajectory: int | None = None) -> list[Contact]:
+    """The table of contacts, of one trajectory if the run has many."""
+    names = ("time", "guard", "kind", "direction", "velocity", "mode_before", "mode_after", "time_error")
+    rows = zip(*(run[f"contact_{name}"].values.tolist() for name in names), strict=True)
+    if trajectory is None:
+        return [Contact(*row) for row in rows]
+    return [Contact(*row) for row, who in zip(rows, run.contact_trajectory.values, strict=True) if who == trajectory]
+
+
+def bits(run: xr.Dataset, trajectory: int | None = None) -> dict[str, bytes]:
+    """Every number of a run (of one of its trajectories), as bytes: equal if and only if the runs are equal to the bit."""
+    if trajectory is not None:
+        run = run.isel(contact=np.flatnonzero(run.contact_trajectory.values == trajectory)) if "contact" in run.dims else run
+        run = run.isel(trajectory=trajectory)
+    left_out = ("contact_trajectory", "trajectory", "guard_boundary")
+    return {str(name): run[name].values.tobytes() for name in run.variables if name not in left_out and run[name].dtype.kind in "fiu"}

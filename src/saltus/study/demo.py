@@ -104,7 +104,7 @@ def draw(result: Demo, file: Path) -> Path:
             plot.phase(result.run, trajectory=i, periods=n, ax=row[1], legend=False)
             if i < len(STARTS) - 1:
                 row[0].set_xlabel("")
-            row[0].set_title(f"x, v = {_start(i)}: {text}", loc="left")
+            row[0].set_title(f"start x, v = {_start(i)}: {text}", loc="left")
         named = {label: handle for handle, label in _handles(axes[:, 0])}
         figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
         figure.savefig(file)
@@ -127,7 +127,7 @@ def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: st
         beside = _beside(n, neighbours[:, i].tolist())
         peak, rms = (from_si(float(row[name]), "m", 4) for name in ("x_peak", "x_rms"))
         status = str(one["status"].item())
-        rows.append((_start(i), text if status == "ok" else status, beside, contacts, peak, rms, str(int(one["steps"]))))
+        rows.append((_start(i), text if status == "ok" else f"{text} ({status})", beside, contacts, peak, rms, str(int(one["steps"]))))
     periodic = found["response_period"] > 0
     notes = [
         f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. Stability isn't examined."
