@@ -62,7 +62,9 @@ def rows(count: int) -> Iterator[tuple[str, float, np.ndarray, float]]:
     """(name, microseconds per period, errors, contacts per period) of everyone."""
     x, v = rig.starts(count)
     for method in (sl.Taylor(), sl.Taylor(tolerance=2.0**-52), sl.ODE45(1e-4, 1e-7), sl.ODE45(1e-4, 1e-7, events="ignore")):
-        title = f"saltus {method.name} " + (f"2^{np.log2(method.tolerance):.0f}" if isinstance(method, sl.Taylor) else f"(1e-4, 1e-7) {method.events}")
+        title = f"saltus {method.name} " + (
+            f"2^{np.log2(method.tolerance):.0f}" if isinstance(method, sl.Taylor) else f"(1e-4, 1e-7) {method.events}"
+        )
         yield (title, *ours(method, x, v))
     x0, v0, exact = reference()
     try:
@@ -96,7 +98,9 @@ def orders(count: int) -> None:
     for order in (14, 16, 18, 20, 22, 24):
         for exponent in (-44, -46, -48, -52):
             us, errors, _ = ours(sl.Taylor(order, tolerance=2.0**exponent), x, v)
-            print(f"order {order:2d}  2^{exponent}  {us:6.3f} us  median {np.median(errors):.1e} m  largest {errors.max():.1e} m", flush=True)
+            print(
+                f"order {order:2d}  2^{exponent}  {us:6.3f} us  median {np.median(errors):.1e} m  largest {errors.max():.1e} m", flush=True
+            )
 
 
 def memory() -> None:

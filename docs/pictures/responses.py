@@ -23,9 +23,7 @@ def main(file: Path) -> None:
     run = sl.simulate(rig, start=STARTS, periods=2000, keep=96)
     periods = sl.settled(run).response_period.values
     with sl.plot.style():
-        figure, axes = plt.subplot_mosaic(
-            [["history"] * 5, list("01234")], figsize=(11, 5), height_ratios=(1, 1.25), layout="constrained"
-        )
+        figure, axes = plt.subplot_mosaic([["history"] * 5, list("01234")], figsize=(11, 5), height_ratios=(1, 1.25), layout="constrained")
         sl.plot.history(run, len(periods) - 1, periods=24, ax=axes["history"], time="T", legend=True)
         axes["history"].set_title(f"{_times(periods[-1])}: 24 forcing periods, every contact marked")
         for i, n in enumerate(periods):

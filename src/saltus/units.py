@@ -33,7 +33,7 @@ _HEAD = re.compile(r"(?:m|s|Hz|N|Pa|J|W|V|A)(?=$|[*/])")
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
-# -- declared units -------------------------------------------------------------------------------------------------------------------
+# -- declared units ------------------------------------------------------------------------------------------------------------
 def check_declared(unit: str, name: str) -> str:
     """A declared unit, checked: a product of coherent SI units.
 
@@ -107,7 +107,7 @@ def _join(parts: Mapping[str, int | float]) -> str:
     return (above or "1") + below
 
 
-# -- text and numbers to SI -----------------------------------------------------------------------------------------------------------
+# -- text and numbers to SI ----------------------------------------------------------------------------------------------------
 def to_si(value: Any, unit: str, name: str) -> float:
     """A value as a number in SI.
 
@@ -227,7 +227,7 @@ def _turn() -> Decimal:
     return _registry().Quantity(Decimal(1), "turn").to_root_units().magnitude
 
 
-# -- SI to text -----------------------------------------------------------------------------------------------------------------------
+# -- SI to text ----------------------------------------------------------------------------------------------------------------
 def from_si(value: float, unit: str, digits: int | None = 6) -> str:
     """A number in SI as people write it: ``0.0004, "m"`` gives ``"0.4 mm"``, ``14000.0, "N/m"`` gives ``"14 kN/m"``.
 

@@ -22,19 +22,28 @@ FREE, CONTACT = 0, 1
         pytest.param((0, 0, 0, -1), FREE, "ok", id="no_acceleration_jerk_out"),
         pytest.param((0, 0, 0, 0), CONTACT, "resting", id="all_zero_rests"),
         pytest.param((-0.0, -0.0, -0.0, -0.0), CONTACT, "resting", id="all_minus_zero_rests"),
-        pytest.param((0, 1e-300, -1, 0), FREE, "ok", id="velocity_counts_however_small"),
+        pytest.param((0, 1e-150, 1, 0), CONTACT, "ok", id="velocity_counts_however_small"),
     ],
 )
 def test_start_on_the_boundary(start, mode, status):
     """No event at t0; the side is the sign of the first derivative of the gap that isn't zero; a few steps, no endless loop."""
     run = sl.simulate(quartic.with_values(snap=0.0), start, t_end=1.0, samples=4)
     assert str(run.status.values) == status
-    assert [c for c in contacts(run) if c.time < 1e-200] == []
+    assert contacts(run) == []
     assert int(run.steps) < 10
     if status == "ok":
         assert run.mode.values[1:].tolist() == [mode] * 4
     assert float(run.end_x) == start[0] + start[1] + start[2] / 2 + start[3] / 6
     assert int(run.mode_violations) == 0
+
+
+@pytest.mark.parametrize("speed", [1e-3, 1e-9, 1e-100, 1e-150])
+def test_start_into_contact_against_the_force_comes_back(speed):
+    """x = speed t - t^2 / 2 from the boundary: in contact at t0 by its velocity, however small, and out at 2 speed."""
+    run = sl.simulate(quartic.with_values(snap=0.0), (0.0, speed, -1.0, 0.0), t_end=1.0, samples=4)
+    (only,) = contacts(run)
+    assert (only.before, only.after, only.kind) == (CONTACT, FREE, "crossing")
+    assert only.time == pytest.approx(2 * speed, rel=1e-15)
 
 
 @pytest.mark.parametrize("slope", [1.0, -1.0])
@@ -58,11 +67,11 @@ def test_start_a_hair_from_the_boundary(height):
 
 def test_start_on_the_boundary_where_the_force_jumps():
     """The side pulled to decides: with preload -3 beyond the boundary and lift -1 before it, v = 0 leaves either way; v = 0+ goes in."""
-    system = lab.with_values(boundary=0.0, lift=-1.0)
+    system = lab.with_values(boundary=0.0, lift=-1.0, frequency=1e3)
     inward = sl.simulate(system.with_values(preload=-3.0), (0.0, 1e-3), t_end=1e-3, samples=2)
     assert (contacts(inward), inward.mode.values.tolist()) == ([], [1, 1, 1])
     assert float(inward.end_x) == pytest.approx(2e-6, rel=1e-12)  # x'' = -1 + 3 beyond: 1e-3 t + t^2
-    out = sl.simulate(system, (0.0, -1e-3), t_end=1.0, samples=2)
+    out = sl.simulate(system, (0.0, -1e-3), t_end=1e-3, samples=2)
     assert (contacts(out), out.mode.values[1:].tolist()) == ([], [0, 0])
 
 
@@ -99,7 +108,8 @@ def test_exactly_zero_and_exactly_on_either_boundary_is_finite(case):
     assert np.isfinite(run.v.values).all()
     assert (run.end_x.values[:4] == run.end_x.values[0]).all()
     assert (run.end_x.values[::2] == run.end_x.values[1::2]).all()
-    assert float(run.contact_time.min()) > 1e-6
+    beside = np.flatnonzero(np.abs(x) == 5e-324)  # these are off the boundary x = 0 of cases b and c, and may cross it at once
+    assert float(run.contact_time[~np.isin(run.contact_trajectory, beside)].min()) > 1e-6
 
 
 def test_rest_on_a_boundary_of_the_rig_without_force():
@@ -131,9 +141,10 @@ def test_start_on_a_curved_boundary(start, inside):
 
 
 def test_start_on_a_moving_wall():
-    """On the wall 0.5 cos(2 pi t) at its turning point t = 0, slower or faster than it: the relative motion decides, no event at t0."""
-    run = sl.simulate(walls, {"x": [0.5, 0.5, 0.5], "v": [0.0, 0.1, -0.1]}, t_end=1e-3, samples=5000)
-    assert run.sizes["contact"] == 1  # the third comes back: -0.1 t = -2 pi^2 t^2 / 2
-    assert float(run.contact_time[0]) == pytest.approx(0.1 / np.pi**2, rel=1e-3) if run.sizes["contact"] else False
+    """On the wall 0.5 cos(2 pi t) at its turning point t = 0: the relative motion decides. Going back at 0.1 it is caught at 0.1 / pi^2."""
+    run = sl.simulate(walls, {"x": [0.5, 0.5, 0.5], "v": [0.0, 0.1, -0.1]}, t_end=0.02, samples=500)
+    (only,) = contacts(run)
     assert int(run.contact_trajectory[0]) == 2
+    assert abs(0.5 - 0.1 * only.time - 0.5 * np.cos(2 * np.pi * only.time)) < 1e-16
+    assert only.time == pytest.approx(0.1 / np.pi**2, rel=1e-3)
     assert (run.mode.values[:2, 1:] & 1 == 1).all()

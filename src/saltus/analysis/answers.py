@@ -48,10 +48,17 @@ def common(system: System, method: Method, group: Ensemble, outcome: Outcome) ->
         varied=group.varied,
         batch=group.batch,
         attrs=attributes(
-            system=system.name, equations=system.equations(), parameters=shared_values(system, group), units=system.units, method=method.name,
-            method_options=method.options(), fingerprint=system.fingerprint(), source=system.source, varied=group.varied,
+            system=system.name,
+            equations=system.equations(),
+            parameters=shared_values(system, group),
+            units=system.units,
+            method=method.name,
+            method_options=method.options(),
+            fingerprint=system.fingerprint(),
+            source=system.source,
+            varied=group.varied,
         ),
-    )  # fmt: skip
+    )
 
 
 def contacts(outcome: Outcome, states: int, time_error: np.ndarray) -> Contacts:

@@ -16,6 +16,7 @@ from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
 from saltus.flow.methods import Method, Taylor
+from saltus.flow.progress import reporter
 from saltus.results import trajectory_dataset
 from saltus.system.system import System
 
@@ -93,7 +94,7 @@ def simulate(
     plan = _plan(system, group, length, samples, keep)
     if time_errors not in ("measured", "local"):
         raise ParameterError(f'time_errors must be "measured" or "local", not {time_errors!r}.')
-    show, close = engine.reporter(progress)
+    show, close = reporter(progress)
     outcome = None
     try:
         outcome = engine.run(system, method, plan.request(group, length), threads, show)

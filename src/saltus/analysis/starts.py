@@ -49,6 +49,8 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
 
     Parameters
     ----------
+    system : System
+        Names of states, parameters and their units.
     start : sequence, mapping or array
         One number (or text with a unit) per state; a mapping of state names to numbers or arrays; or an array (n, states).
     values : mapping, optional
@@ -67,7 +69,9 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     if wrong:
         raise ParameterError(f"starts and values must have one length: {', '.join(wrong)}, the longest has {count}.")
     if count > MOST_TRAJECTORIES:
-        raise ParameterError(f"{count} trajectories in one call are too many for memory. Split them into calls of {MOST_TRAJECTORIES} at most.")
+        raise ParameterError(
+            f"{count} trajectories in one call are too many for memory. Split them into calls of {MOST_TRAJECTORIES} at most."
+        )
     states = np.stack([np.broadcast_to(np.ravel(columns[name]), count) for name in system.states], axis=1).astype(float)
     varied = {name: np.broadcast_to(np.ravel(value), count).astype(float) for name, value in given.items() if np.ndim(value)}
     shared = system.with_values(**{name: value for name, value in given.items() if not np.ndim(value)}).values

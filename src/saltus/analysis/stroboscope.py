@@ -15,6 +15,7 @@ from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
 from saltus.flow.methods import Method, Taylor
+from saltus.flow.progress import reporter
 from saltus.results import stroboscope_dataset
 from saltus.system.system import System
 
@@ -79,7 +80,7 @@ def stroboscope(
             **{**answers.common(system, method, group, outcome), "batch": True},
         )
 
-    show, close = engine.reporter(progress)
+    show, close = reporter(progress)
     try:
         result = dataset(engine.run(system, method, request, threads, show))
     except Interrupted as stop:

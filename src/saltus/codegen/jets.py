@@ -142,7 +142,7 @@ class JetCode:
                 total = self._sum([(self.coefficient(coefficient), value)], total)
         return total
 
-    # -- coefficients of series ------------------------------------------------------------------------------------------------------
+    # -- coefficients of series -------------------------------------------------------------------------------------------------
     def state(self, i: int, k: int) -> str | None:
         """Coefficient k of state i."""
         key = ("state", i, k)
@@ -177,7 +177,7 @@ class JetCode:
     def _state(self, series: Series, k: int) -> str | None:
         return self.state(self._states.index(str(series.payload)), k)
 
-    def _time(self, series: Series, k: int) -> str | None:
+    def _time(self, _series: Series, k: int) -> str | None:
         if k == 0:
             return self._assign("load(clock, 0, LANES) + load(clock, 1, LANES)")
         return self._assign("splat(1.0, LANES)") if k == 1 else None
@@ -267,11 +267,11 @@ class JetCode:
         (a,) = series.operands
         if k == 0:
             return self._assign(f"libm_log({self._zero(self.value(a, 0))})")
-        known = self._convolution(k, lambda i: self._derivative(series, i), lambda i: self.value(a, i), 1, k - 1) if k > 1 else None
+        known = None if k == 1 else self._convolution(k, lambda i: self._derivative(series, i), lambda i: self.value(a, i), 1, k - 1)
         rest = self._difference(self.value(a, k), self._times(known, 1.0 / k))
         return None if rest is None else self._assign(f"{rest} * {self._inverse(a)}")
 
-    # -- sine and cosine ----------------------------------------------------------------------------------------------------------------
+    # -- sine and cosine --------------------------------------------------------------------------------------------------------
     def _sin(self, series: Series, k: int) -> str | None:
         return self._harmonic(series.operands[0], k, "sine")
 
@@ -333,7 +333,7 @@ class JetCode:
         scaled = self._assign(f"{self._memo[key]} * {1.0 / (k * (k - 1))!r}")
         return self._assign(f"{scaled} * {self._harmonic(a, k - 2, part)}")
 
-    # -- functions through their differential equations --------------------------------------------------------------------------------------
+    # -- functions through their differential equations -------------------------------------------------------------------------
     def _tan(self, series: Series, k: int, part: str = "") -> str | None:
         return self._tangent(series, k, part, "libm_tan", 1.0)
 
@@ -364,7 +364,9 @@ class JetCode:
             return self._assign(f"1.0 + {self._zero(square)}") if k == 0 else square
         if k == 0:
             return self._assign(f"libm_atan({self._zero(self.value(a, 0))})")
-        known = self._convolution(k, lambda i: self._derivative(series, i), lambda i: self.value(series, i, "w"), 1, k - 1) if k > 1 else None
+        known = None
+        if k > 1:
+            known = self._convolution(k, lambda i: self._derivative(series, i), lambda i: self.value(series, i, "w"), 1, k - 1)
         rest = self._difference(self.value(a, k), self._times(known, 1.0 / k))
         key = (series, 0, "inverse w")
         if key not in self._memo:
@@ -376,7 +378,7 @@ class JetCode:
         assert isinstance(series.payload, ex.Condition)
         return self._assign(f"select({self._mask(series.payload)}, {a}, {b})")
 
-    # -- what the crossing of contacts needs -------------------------------------------------------------------------------------------------
+    # -- what the crossing of contacts needs ------------------------------------------------------------------------------------
     def size(self, form: Linear) -> str:
         """``|offset| + sum |coefficient * value|``: the scale of the rounding error of a linear form."""
         total = self._assign(f"magnitude({self._as_lane(self.coefficient(form.offset), form.offset)})")

@@ -59,7 +59,12 @@ def lane_width() -> int:
 def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
     """The compiled Taylor flow of a system. Parameters are arguments: new values never recompile."""
     title = f"{system.name}, Taylor order {order}, {lanes} lanes"
-    return _module(title, taylor_head(system, order, lanes), ("taylor_layout.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"), BATCH + TAYLOR_WORKSPACE)
+    return _module(
+        title,
+        taylor_head(system, order, lanes),
+        ("taylor_layout.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"),
+        BATCH + TAYLOR_WORKSPACE,
+    )
 
 
 def ode45_module(system: System) -> ModuleType:
@@ -72,7 +77,7 @@ def _module(title: str, head: str, templates: tuple[str, ...], arguments: tuple[
     preamble = _PREAMBLE.format(title=title, arguments=", ".join(arguments))
     source = "\n".join([preamble, head, *texts.values()])
     key = hashlib.sha256((source + _environment()).encode()).hexdigest()[:32]
-    if numba.config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         return _interpreted(key, preamble + head, templates)
     return load(key, source, title)
 

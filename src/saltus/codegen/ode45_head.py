@@ -110,8 +110,12 @@ def ode45_head(system: System) -> str:
         value = prepare.value(node)
         prepare.lines.append(f"c[{i}] = {value}")
     sizes = dict(
-        NSTATES=len(system.states), NGUARDS=len(gaps), NCONST=len(stages.constants.nodes), NDRIVE=len(stages.drives.nodes), GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
-    )  # fmt: skip
+        NSTATES=len(system.states),
+        NGUARDS=len(gaps),
+        NCONST=len(stages.constants.nodes),
+        NDRIVE=len(stages.drives.nodes),
+        GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
+    )
     return "\n".join(
         [
             *(f"{name} = {value!r}" for name, value in sizes.items()),

@@ -8,6 +8,7 @@ mode-dependent coefficients; pieces that may be undefined on the other side (roo
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from saltus.system import expression as ex
@@ -83,7 +84,7 @@ class SeriesBuilder:
         """The expression as one series."""
         return self._as_series(self.form(node))
 
-    # -- one node -----------------------------------------------------------------------------------------------------------------
+    # -- one node ---------------------------------------------------------------------------------------------------------------
     def _flatten(self, node: Expr) -> Linear:
         if not ex.depends_on(node, ("state", "time")):
             return Linear(node)
@@ -124,7 +125,7 @@ class SeriesBuilder:
         return self._known.setdefault(key, Series("linear", tuple(form.terms), form))
 
     @staticmethod
-    def _combine(a: Linear, b: Linear, op) -> Linear:
+    def _combine(a: Linear, b: Linear, op: Callable[[Expr, Expr], Expr]) -> Linear:
         zero = ex.constant(0.0)
         terms = dict(a.terms)
         for series, coefficient in b.terms.items():
@@ -166,7 +167,9 @@ class SeriesBuilder:
     def _power(self, base: Linear, exponent: Expr) -> Linear:
         coefficient, series = self._split_factor(base)
         if exponent.op == "const" and exponent.payload == int(exponent.payload) and 0 < exponent.payload <= 64:
-            return self._scaled(self._whole_power(coefficient, exponent.payload), self._unit(self._multiply_out(series, int(exponent.payload))))
+            return self._scaled(
+                self._whole_power(coefficient, exponent.payload), self._unit(self._multiply_out(series, int(exponent.payload)))
+            )
         if not is_constant(coefficient, 1.0):
             series = self._as_series(base)
         if is_constant(exponent, 0.5):

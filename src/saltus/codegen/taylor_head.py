@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from saltus.codegen.jets import Constants, JetCode
 from saltus.codegen.scalar import ScalarCode
 from saltus.codegen.series import Linear, SeriesBuilder, is_constant
@@ -18,7 +20,7 @@ def indented(lines: list[str]) -> str:
     return "\n".join("    " + line for line in lines) if lines else "    pass"
 
 
-def parameter_leaf(system: System, states: str | None = None):
+def parameter_leaf(system: System, states: str | None = None) -> Callable[[Expr], str | None]:
     """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions."""
     names, state_names = tuple(system.values), system.states
 
@@ -152,7 +154,7 @@ def _write_guards(system: System, code: JetCode, builder: SeriesBuilder, constan
     for i, (form, boundary) in enumerate(zip(forms, boundaries, strict=True)):
         if boundary:
             x, c = code.state(guards.snap_state[i], 0), f"load(c, {guards.snap_const[i]}, LANES)"
-            value = f"{x} - {c}" if boundary[1] > 0 else f"{c} - {x}"
+            value: str | None = f"{x} - {c}" if boundary[1] > 0 else f"{c} - {x}"
         else:
             value = code.linear(form, 0)
         code.write(own_rows + i, value)

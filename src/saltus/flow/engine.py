@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ import numpy as np
 
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
+from saltus.kernels.batch import Batch
 from saltus.system.system import System
 
 #: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show progress.
@@ -141,7 +141,7 @@ def run(
     outcome, whole = _allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     options = method.numbers(periods)
-    chunks = [_cut(request, whole, first, module, options) for first in range(0, len(request.start), CHUNK)]
+    chunks = [_cut(request, whole, first, options) for first in range(0, len(request.start), CHUNK)]
     workers = min(threads or usable_processors(), max(len(chunks), 1))
     stop = threading.Event()
     try:
@@ -152,9 +152,9 @@ def run(
     except KeyboardInterrupt:
         outcome.complete = False
         interrupted = Interrupted()
-        interrupted.partial = _finish(outcome, whole, chunks, request)
+        interrupted.partial = _finish(outcome, whole, chunks)
         raise interrupted from None
-    return _finish(outcome, whole, chunks, request)
+    return _finish(outcome, whole, chunks)
 
 
 def usable_processors() -> int:
@@ -162,7 +162,7 @@ def usable_processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-# -- arrays ------------------------------------------------------------------------------------------------------------------------------
+# -- arrays --------------------------------------------------------------------------------------------------------------------
 def _allocate(request: Request, states: int, module: ModuleType) -> tuple[Outcome, dict[str, np.ndarray]]:
     n, m = len(request.start), len(request.schedule.count)
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
@@ -192,13 +192,10 @@ def _allocate(request: Request, states: int, module: ModuleType) -> tuple[Outcom
 
 
 #: Order of the arguments of every `propagate`.
-_ARGUMENTS = (
-    "period", "origin", "param", "stride", "state", "count", "phase", "mode", "fresh", "carry", "status", "end_count", "end_phase", "counters",
-    "minima", "sample_count", "sample_fraction", "cursor", "samples", "sample_mode", "rec_first", "rec_i", "rec_f", "rec_used", "options",
-)  # fmt: skip
+_ARGUMENTS = Batch._fields
 
 
-def _cut(request: Request, whole: dict[str, np.ndarray], first: int, module: ModuleType, options: np.ndarray) -> _Chunk:
+def _cut(request: Request, whole: dict[str, np.ndarray], first: int, options: np.ndarray) -> _Chunk:
     """The arrays of one chunk: views of the whole, and tables of its own."""
     last = min(first + CHUNK, len(request.start))
     arrays = {name: array[first:last] for name, array in whole.items()}
@@ -230,7 +227,7 @@ def _empty_table(chunk: _Chunk) -> None:
         arrays["rec_used"][0] = 0
 
 
-def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], request: Request) -> Outcome:
+def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]) -> Outcome:
     """Times at the end, and the contacts of all chunks in one sorted table."""
     outcome.time = whole["origin"] + whole["count"] * whole["period"] + whole["phase"]
     whole["status"][whole["status"] == st.RUNNING] = st.NOT_COMPUTED
@@ -245,7 +242,7 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
     return outcome
 
 
-# -- work ----------------------------------------------------------------------------------------------------------------------------------
+# -- work ----------------------------------------------------------------------------------------------------------------------
 def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: threading.Event, shown: Callable[[], None] | None) -> None:
     """Move a chunk to its end in slices; empties its table of contacts after each."""
     arrays = chunk.arrays
@@ -302,42 +299,3 @@ def _run_on_threads(
             for future in waiting:
                 future.cancel()
             raise
-
-
-def reporter(progress: bool | Callable[[float], None] | None) -> tuple[Callable[[float], None] | None, Callable[[], None]]:
-    """A progress callable and what to call at the end: the user's own, a bar after two seconds on a terminal, or nothing."""
-    if callable(progress):
-        return progress, lambda: None
-    if progress is False or (progress is None and not os.isatty(2)):
-        return None, lambda: None
-    return _Bar().pair()
-
-
-class _Bar:
-    """A rich progress bar that appears only if the work lasts."""
-
-    PATIENCE = 2.0
-
-    def __init__(self) -> None:
-        self._begun = time.monotonic()
-        self._bar = None
-
-    def pair(self) -> tuple[Callable[[float], None], Callable[[], None]]:
-        return self.show, self.close
-
-    def show(self, share: float) -> None:
-        if self._bar is None:
-            if time.monotonic() - self._begun < self.PATIENCE:
-                return
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-            columns = (TextColumn("integrating"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn(), TimeRemainingColumn())
-            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
-            self._bar.add_task("", total=1.0)
-            self._bar.start()
-        self._bar.update(self._bar.task_ids[0], completed=share)
-
-    def close(self) -> None:
-        if self._bar is not None:
-            self._bar.stop()

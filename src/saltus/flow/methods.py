@@ -97,9 +97,11 @@ class Taylor(Method):
         _check_count("max_events", self.max_events, 1)
 
     def kernels(self, system: System) -> ModuleType:
+        """The compiled Taylor flow."""
         return taylor_module(system, self.order, self.lanes or lane_width())
 
     def numbers(self, periods: float) -> np.ndarray:
+        """log2 of the tolerance, step budget, event budget."""
         return np.array([math.log2(self.tolerance), _step_budget(self.max_steps, periods), float(self.max_events)])
 
     def companion(self) -> Taylor:
@@ -143,9 +145,11 @@ class ODE45(Method):
         _check_count("max_events", self.max_events, 1)
 
     def kernels(self, system: System) -> ModuleType:
+        """The compiled ode45."""
         return ode45_module(system)
 
     def numbers(self, periods: float) -> np.ndarray:
+        """RelTol, AbsTol, whether contacts are located, step budget, event budget."""
         locate = 1.0 if self.events == "locate" else 0.0
         return np.array([self.rtol, self.atol, locate, _step_budget(self.max_steps, periods), float(self.max_events)])
 

@@ -47,7 +47,7 @@ D62, D63, D64 = -11 / 7, 11 / 3, -55 / 28
 D72, D73, D74 = 3 / 2, -4.0, 5 / 2
 
 
-# -- the head's functions on parts of `work` -----------------------------------------------------------------------------------------------
+# -- the head's functions on parts of `work` -----------------------------------------------------------------------------------
 @inner
 def drive_at(time, q, work):
     """Time-only values at a time, to `q`."""
@@ -73,7 +73,7 @@ def gap_rates_at(time, state, rate, q, out, work):
     gap_rates(time, y, dy, part(work, C, NCONST), part(work, q, NDRIVE), part(work, out, NGUARDS))
 
 
-# -- one step --------------------------------------------------------------------------------------------------------------------------
+# -- one step ------------------------------------------------------------------------------------------------------------------
 @inner
 def try_step(t, length, t_new, work):
     """The stages of a step of the length asked for, and its end at t_new; returns h = t_new - t, which rounding sets apart from length."""

@@ -130,7 +130,11 @@ def first_crossing(q, degree, shifted, noise, b, bounds, rates, out):
         Whether a root at 0 was divided out: the gap is then ``x * q(x)``, which matters for its depth.
     noise : float
         Rounding error of the gap: extrema within it are undecided.
-    b : float64[DEEPEST + 2, degree + 1]; bounds : float64[DEEPEST + 2, 2]; rates : float64[degree + 1]
+    b : float64[DEEPEST + 2, degree + 1]
+        Work.
+    bounds : float64[DEEPEST + 2, 2]
+        Work.
+    rates : float64[degree + 1]
         Work.
     out : float64[3]
         Receives AT, TOUCH_AT and lowers MARGIN.

@@ -48,7 +48,7 @@ class _MaskModel(models.PrimitiveModel):
         super().__init__(dmm, fe_type, ir.VectorType(ir.IntType(1), fe_type.width))
 
 
-# -- the operations, as NumPy (this is what runs with the JIT off) ----------------------------------------------------------------------
+# -- the operations, as NumPy (this is what runs with the JIT off) -------------------------------------------------------------
 
 
 def load(array, row, width):
@@ -161,7 +161,7 @@ def libm_pow(a, b):
     return np.power(a, b)
 
 
-# -- typing -------------------------------------------------------------------------------------------------------------------------------
+# -- typing --------------------------------------------------------------------------------------------------------------------
 
 
 def _lane_of(args):
@@ -179,7 +179,7 @@ def _register(function, typer, literal=False):
     class _Template(AbstractTemplate):
         prefer_literal = literal
 
-        def generic(self, args, kws):
+        def generic(self, args, kws):  # noqa: ARG002  (Numba's interface)
             return typer(args)
 
     return _Template
@@ -209,7 +209,9 @@ def _type_select(args):
 
 _register(
     load,
-    lambda a: signature(LaneType(a[2].literal_value), types.unliteral(a[0]), types.intp, types.intp) if isinstance(a[2], types.Literal) else None,
+    lambda a: (
+        signature(LaneType(a[2].literal_value), types.unliteral(a[0]), types.intp, types.intp) if isinstance(a[2], types.Literal) else None
+    ),
     literal=True,
 )
 _register(store, lambda a: signature(types.none, a[0], types.intp, a[2]) if isinstance(a[2], LaneType) else None)
@@ -242,7 +244,7 @@ for _f in _COMPARE:
 for _f in (*_LOGIC, operator.invert):
     _register(_f, _mask_logic)
 
-# -- lowering to LLVM -----------------------------------------------------------------------------------------------------------------------
+# -- lowering to LLVM -----------------------------------------------------------------------------------------------------------
 
 
 def _splat(builder, value, width):
@@ -262,7 +264,7 @@ def _any_kinds(count):
     """Every mix of lanes and scalars with at least one lane, as type patterns."""
     kinds = [()]
     for _ in range(count):
-        kinds = [k + (t,) for k in kinds for t in (LaneType, types.Float)]
+        kinds = [(*k, t) for k in kinds for t in (LaneType, types.Float)]
     return [k for k in kinds if LaneType in k]
 
 

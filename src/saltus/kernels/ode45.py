@@ -55,7 +55,7 @@ POWER = 1 / 5
 TINY = 1.04e-4
 
 
-# -- step length -------------------------------------------------------------------------------------------------------------------------
+# -- step length ---------------------------------------------------------------------------------------------------------------
 @inner
 def step(t, t_end, longest, length, rtol, theta, work):
     """One accepted step: (t_new, h, its length, err, rejections). Failed if not err <= rtol: NaN, or no step is short enough."""
@@ -107,7 +107,7 @@ def longest_step(t_leg, t_end):
     return 0.1 * (t_end - t_leg)
 
 
-# -- sides -------------------------------------------------------------------------------------------------------------------------------
+# -- sides ---------------------------------------------------------------------------------------------------------------------
 @inner
 def sides(at, work):
     """Mode bits: bit g is set where gap g is positive."""
@@ -129,7 +129,7 @@ def check_sides(i, batch, work):
         batch.mode[i] = now
 
 
-# -- samples -----------------------------------------------------------------------------------------------------------------------------
+# -- samples -------------------------------------------------------------------------------------------------------------------
 @inner
 def due(i, batch):
     """Time of the next sample, infinite if there is none."""
@@ -171,7 +171,7 @@ def write_samples_here(i, until, batch, work):
         write_sample(i, due(i, batch), NODE, batch, work)
 
 
-# -- contacts ----------------------------------------------------------------------------------------------------------------------------
+# -- contacts ------------------------------------------------------------------------------------------------------------------
 @kernel
 def land(i, t, t_hit, t_new, h, batch, work):
     """Cut the step at a contact: NEXT becomes the state there, K1 its rate, AT_NEXT its gaps; the contact is recorded."""
@@ -239,7 +239,7 @@ def record(i, g, t_hit, before, after, batch, work):
     values[RECORD_FLOATS + NSTATES] = t_hit
 
 
-# -- one trajectory ------------------------------------------------------------------------------------------------------------------------
+# -- one trajectory ------------------------------------------------------------------------------------------------------------
 @inner
 def end_time(i, batch):
     """Time at which a trajectory ends."""

@@ -18,7 +18,10 @@ NOT_COMPUTED = 10
 STATUS = {
     RUNNING: ("running", "not finished yet"),
     OK: ("ok", "reached the end"),
-    GRAZE_UNRESOLVED: ("graze_unresolved", "reached the end, but a graze on the way was shallower than the local error: either outcome is possible"),
+    GRAZE_UNRESOLVED: (
+        "graze_unresolved",
+        "reached the end, but a graze on the way was shallower than the local error: either outcome is possible",
+    ),
     RESTING: ("resting", "the gap and its first three derivatives are zero: resting on a boundary, which this version doesn't follow"),
     SLIDING: ("sliding", "both sides push onto a boundary: the solution slides along it, which this version doesn't follow"),
     BUDGET_STEPS: ("budget_steps", "the step budget was used up"),

@@ -30,7 +30,7 @@ from saltus.kernels.status import (
 )
 
 
-# -- the slow path: one lane that the quadratic bound could not settle ----------------------------------------------------------------
+# -- the slow path: one lane that the quadratic bound could not settle ---------------------------------------------------------
 @kernel
 def scaled_gap(lanes, lane, g, h, slow):
     """P on [0, 1] of one lane into slow.q, the known root divided out; returns the rounding error of the gap."""
@@ -120,7 +120,7 @@ def note_touch(lanes, lane, batch, slow):
     record(lanes, lane, batch, lanes.clock[TAU, lane] + d, g, side, velocity, kind, mode, mode, error, slow.state)
 
 
-# -- landing ----------------------------------------------------------------------------------------------------------------------
+# -- landing -------------------------------------------------------------------------------------------------------------------
 @inner
 def mode_of(lanes, lane):
     """Mode bits of a lane."""

@@ -21,7 +21,7 @@ from saltus.kernels.status import (
 )
 
 
-# -- samples and periods ------------------------------------------------------------------------------------------------------------
+# -- samples and periods -------------------------------------------------------------------------------------------------------
 @kernel
 def write_samples(lanes, lane, batch, start, slow):
     """Write every sample that this step has passed, from its polynomial; at a node, the node's own state."""
@@ -49,7 +49,9 @@ def set_due(lanes, lane, batch):
     who, m = lanes.memo[lane, WHO], batch.cursor[lanes.memo[lane, WHO]]
     lanes.run[DUE, lane] = math.inf
     if m < batch.sample_count.shape[0] and batch.sample_count[m] <= lanes.memo[lane, COUNT]:
-        lanes.run[DUE, lane] = (batch.sample_count[m] - lanes.memo[lane, COUNT]) * batch.period[who] + batch.sample_fraction[m] * batch.period[who]
+        lanes.run[DUE, lane] = (batch.sample_count[m] - lanes.memo[lane, COUNT]) * batch.period[who] + batch.sample_fraction[
+            m
+        ] * batch.period[who]
 
 
 @inner
@@ -133,7 +135,7 @@ def attend(lanes, lane, batch, slow):
     return status
 
 
-# -- filling and emptying lanes -------------------------------------------------------------------------------------------------------------
+# -- filling and emptying lanes ------------------------------------------------------------------------------------------------
 @kernel
 def start_sides(lanes, lane, batch, slow):
     """Sides of all guards from the state; on a boundary the guard is fresh and its side is settled by the first step."""
@@ -205,15 +207,15 @@ def refill(lanes, lane, cursor, batch, slow):
     return cursor
 
 
-# -- the whole batch -------------------------------------------------------------------------------------------------------------------
+# -- the whole batch -----------------------------------------------------------------------------------------------------------
 def workspace():
     """The memory that one call of `propagate` works in; one set for each thread."""
     guards = max(NGUARDS, 1)
-    lanes = Lanes(
-        y=np.zeros((NSTATES, LANES)), side=np.ones((guards, LANES)), fresh=np.zeros((guards, LANES)), clock=np.zeros((TURN + NTURNS, LANES)),
-        c=np.zeros((NCONST, LANES)), work=np.zeros((ROWS, LANES)), bounds=np.zeros((BOUNDS * max(NSERIES, 1), LANES)), poly=np.zeros((ORDER + 1, LANES)), run=np.zeros((RUN_ROWS, LANES)),
-        found=np.zeros((3, LANES)), memo=np.zeros((LANES, MEMO), np.int64),
+    rows = dict(
+        y=NSTATES, side=guards, fresh=guards, clock=TURN + NTURNS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1), poly=ORDER + 1,
+        run=RUN_ROWS, found=3,
     )  # fmt: skip
+    lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: np.zeros((count, LANES)) for name, count in rows.items()})
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)), bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
         out=np.zeros(3), gaps=np.zeros(guards), state=np.zeros(NSTATES), touch=np.zeros(1),

@@ -94,7 +94,11 @@ def locate(lanes, h):
         crosses = crosses & ((~taken) | (a0 < nearest))  # gaps of one state differ by a constant: the nearer closes first
         which = select(crosses, float(g), which)
         if any_lane(crosses):
-            nearest, chosen_row, chosen_s = select(crosses, a0, nearest), select(crosses, float(row), chosen_row), select(crosses, s, chosen_s)
+            nearest, chosen_row, chosen_s = (
+                select(crosses, a0, nearest),
+                select(crosses, float(row), chosen_row),
+                select(crosses, s, chosen_s),
+            )
             copy_gap(lanes.poly, lanes.work, row, s, a0, on_boundary, crosses)
     store(run, LEAST, least)
     which = select(undecided, -1.0, which)

@@ -19,7 +19,7 @@ Periods = int | float | tuple[float, float] | None
 MOST = 8
 
 
-# -- trajectory ---------------------------------------------------------------------------------------------------------------------------
+# -- trajectory ----------------------------------------------------------------------------------------------------------------
 def chosen(run: xr.Dataset, trajectory: Any, caller: str) -> list[int]:
     """Labels of the trajectories to show; an empty list for a run of a single one.
 
@@ -69,7 +69,7 @@ def units_of_states(run: xr.Dataset, units: Mapping[str, str] | None, caller: st
     return {state_named(run, name, caller): unit for name, unit in (units or {}).items()}
 
 
-# -- window -------------------------------------------------------------------------------------------------------------------------------
+# -- window --------------------------------------------------------------------------------------------------------------------
 def window(ds: xr.Dataset, periods: Periods, caller: str, default_share: float = 1.0) -> tuple[float, float]:
     """Begin and end of what is shown, in the run's own coordinate: periods if it is forced, else seconds.
 
@@ -121,7 +121,7 @@ def sample_axis(ds: xr.Dataset) -> np.ndarray:
     return np.asarray(ds["period" if "period" in ds else "time"].values, dtype=float)
 
 
-# -- points -------------------------------------------------------------------------------------------------------------------------------
+# -- points --------------------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Path:
     """Samples and contacts in the window, in the order of time. A piece of curve has the mode of the point at which it begins.

@@ -43,7 +43,7 @@ def style() -> Iterator[None]:
         yield
 
 
-# -- display units ------------------------------------------------------------------------------------------------------------------------
+# -- display units -------------------------------------------------------------------------------------------------------------
 _PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
 _SCALABLE = re.compile(r"(m|s|Hz|N|Pa|J|W|V|A|rad)(?=$|[*/])")
 #: The prefix is the largest with which the largest value is at least this: 0.43 m/s stays, 0.03 m/s becomes 30 mm/s.

@@ -15,7 +15,7 @@ from saltus.results.provenance import content_hash, to_json
 from saltus.results.schema import Variable
 
 
-# -- what the caller hands over -----------------------------------------------------------------------------------------------------------
+# -- what the caller hands over ------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Contacts:
     """The table of contacts, one row each, in the order of trajectory and time.
@@ -74,7 +74,7 @@ class Guards:
     boundaries: np.ndarray
 
 
-# -- assembly -----------------------------------------------------------------------------------------------------------------------------
+# -- assembly ------------------------------------------------------------------------------------------------------------------
 class _Builder:
     """Collects the variables of one Dataset by the table of its kind.
 

@@ -79,7 +79,7 @@ def _has(package: str) -> bool:
     return importlib.util.find_spec(package) is not None
 
 
-# -- CSV ----------------------------------------------------------------------------------------------------------------------------------
+# -- CSV -----------------------------------------------------------------------------------------------------------------------
 def to_csv(ds: xr.Dataset, path: Target) -> Path:
     """Write a result as CSV, numbers with all their digits.
 
@@ -125,7 +125,7 @@ def _write_table(path: Path, table: tables.Table, ds: xr.Dataset) -> None:
         writer.writerows(zip(*(column.tolist() for column in table.values()), strict=True))
 
 
-# -- MATLAB -------------------------------------------------------------------------------------------------------------------------------
+# -- MATLAB --------------------------------------------------------------------------------------------------------------------
 def to_mat(ds: xr.Dataset, path: Target) -> Path:
     """Write a result as a MATLAB file: ``run = load("run.mat"); plot(run.time, run.x)``.
 

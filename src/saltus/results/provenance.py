@@ -95,7 +95,7 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version()} | {package: version(package) for package in _PACKAGES}
 
 
-# -- hash of the numbers ----------------------------------------------------------------------------------------------------------------
+# -- hash of the numbers -------------------------------------------------------------------------------------------------------
 def content_hash(ds: xr.Dataset) -> str:
     """SHA-256 of every variable's name, dims, shape and values, in hexadecimal.
 
@@ -126,7 +126,7 @@ def _canonical(values: np.ndarray) -> bytes | memoryview:
     return "\0".join(map(str, values.ravel().tolist())).encode()
 
 
-# -- for people ---------------------------------------------------------------------------------------------------------------------------
+# -- for people ----------------------------------------------------------------------------------------------------------------
 def describe(ds: xr.Dataset) -> str:
     """A few lines on what a result holds and where it comes from.
 

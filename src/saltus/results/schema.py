@@ -105,7 +105,7 @@ STROBOSCOPE_VARIABLES = {
 TABLES = {TRAJECTORY: TRAJECTORY_VARIABLES, STROBOSCOPE: STROBOSCOPE_VARIABLES}
 
 
-# -- names and units ----------------------------------------------------------------------------------------------------------------------
+# -- names and units -----------------------------------------------------------------------------------------------------------
 def contact_name(state: str) -> str:
     """Name of the variable that holds a state at the contacts: ``contact_x``; ``contact_state_velocity`` where the name is taken."""
     name = f"contact_{state}"
@@ -166,7 +166,7 @@ def check(ds: Any, *, caller: str, kinds: Sequence[str] = (TRAJECTORY, STROBOSCO
         raise ParameterError(f"{caller} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not some variables of it.")
 
 
-# -- after reading a file -----------------------------------------------------------------------------------------------------------------
+# -- after reading a file ------------------------------------------------------------------------------------------------------
 def restore(ds: xr.Dataset) -> xr.Dataset:
     """The Dataset with the types of the tables: netCDF-3 keeps 32-bit integers, and readers differ on text and attributes."""
     table = TABLES[kind_of(ds)]

@@ -50,7 +50,7 @@ class Canonical:
                     return key[1], float(polynomial[moving[0]])
         return None, 0.0
 
-    # -- one node ------------------------------------------------------------------------------------------------------------
+    # -- one node ---------------------------------------------------------------------------------------------------------------
     def _normal(self, node: Expr) -> Polynomial:
         parts = [self._memo[child] for child in node.args]
         match node.op:

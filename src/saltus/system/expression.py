@@ -62,7 +62,7 @@ class Expr:
                 _INTERNED[key] = node
         return node
 
-    # -- arithmetic ----------------------------------------------------------------------------------------------------------
+    # -- arithmetic -------------------------------------------------------------------------------------------------------------
     def __add__(self, other: Operand) -> Expr:
         return add(self, other)
 
@@ -102,7 +102,7 @@ class Expr:
     def __abs__(self) -> Expr:
         return absolute(self)
 
-    # -- comparisons make guards -----------------------------------------------------------------------------------------------
+    # -- comparisons make guards ------------------------------------------------------------------------------------------------
     def __lt__(self, other: Operand) -> Relation:
         return Relation(sub(other, self))
 
@@ -126,7 +126,7 @@ class Expr:
     def __hash__(self) -> int:
         return id(self)
 
-    # -- everything that would need a number ---------------------------------------------------------------------------------
+    # -- everything that would need a number ------------------------------------------------------------------------------------
     def __bool__(self) -> bool:
         raise TraceError(
             "an equation asked whether a traced value is true. It is a symbol here, not a number: "
@@ -157,7 +157,7 @@ class Expr:
         return self
 
 
-# -- conditions -------------------------------------------------------------------------------------------------------------------
+# -- conditions ----------------------------------------------------------------------------------------------------------------
 class Condition:
     """A truth value that depends on the state: sides of guards, joined by ``&``, ``|`` and ``~``."""
 
@@ -221,7 +221,7 @@ def _condition(value: object) -> Condition:
     return value
 
 
-# -- leaves -----------------------------------------------------------------------------------------------------------------------
+# -- leaves --------------------------------------------------------------------------------------------------------------------
 def constant(value: Number) -> Expr:
     """A literal number; it must be finite. Zero has no sign."""
     value = float(value) + 0.0
@@ -262,7 +262,7 @@ def as_expr(value: Operand) -> Expr:
         raise TraceError(f"an equation holds {value!r}, which is neither a number nor a traced value.") from None
 
 
-# -- operations: constants are folded, nothing else is rearranged --------------------------------------------------------------------
+# -- operations: constants are folded, nothing else is rearranged --------------------------------------------------------------
 def add(a: Operand, b: Operand) -> Expr:
     """``a + b``"""
     a, b = as_expr(a), as_expr(b)
@@ -371,7 +371,7 @@ def absolute(a: Operand) -> Expr:
     return select(Relation(a), a, neg(a)) if varies(a) else elementary("sqrt", mul(a, a))
 
 
-# -- walking ------------------------------------------------------------------------------------------------------------------------
+# -- walking -------------------------------------------------------------------------------------------------------------------
 def relations_in(condition: Condition) -> Iterator[Relation]:
     """Every relation in a condition, left to right."""
     if isinstance(condition, Relation):

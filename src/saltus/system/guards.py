@@ -164,7 +164,7 @@ def _check_moves(gap: Expr, kinds: frozenset[str]) -> None:
     )
 
 
-# -- the form of a guard ----------------------------------------------------------------------------------------------------------------
+# -- the form of a guard -------------------------------------------------------------------------------------------------------
 def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
     """The guard of a gap, and whether both have the same sign. Guards get their names later."""
     gap, positive = _without_factor(gap)
@@ -212,7 +212,7 @@ def _negated(a: Expr) -> Expr:
     return ex.neg(a)
 
 
-# -- numbering and names ------------------------------------------------------------------------------------------------------------------
+# -- numbering and names -------------------------------------------------------------------------------------------------------
 def _used_only(field: tuple[Expr, ...], guards: Sequence[Guard]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
     """Leave out guards on which nothing depends, renumber and name the rest."""
     used = bits_in(field)

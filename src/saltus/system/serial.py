@@ -79,7 +79,7 @@ def _condition_data(condition: Condition) -> list[Any]:
     raise TypeError(condition)
 
 
-# -- reading --------------------------------------------------------------------------------------------------------------------------
+# -- reading -------------------------------------------------------------------------------------------------------------------
 def arguments(data: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments of System from :func:`to_dict`'s data.
 

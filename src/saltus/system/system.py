@@ -55,7 +55,7 @@ class System:
             checks.check_range(name, value, self.forced_at)
         checks.check_periodic(self)
 
-    # -- values --------------------------------------------------------------------------------------------------------------
+    # -- values -----------------------------------------------------------------------------------------------------------------
     def with_values(self, **values: Any) -> System:
         """The same equations with other parameter values. Nothing is traced or compiled again.
 
@@ -114,7 +114,7 @@ class System:
         frequency = (values or {}).get(self.forced_at, self.values[self.forced_at])
         return (2 * math.pi if self.units[self.forced_at] == "rad/s" else 1.0) / frequency
 
-    # -- equations -----------------------------------------------------------------------------------------------------------
+    # -- equations --------------------------------------------------------------------------------------------------------------
     @functools.cached_property
     def jacobian(self) -> tuple[tuple[Expr, ...], ...]:
         """Derivative of each entry of the field (row) with respect to each state (column), in a frozen mode."""
@@ -139,7 +139,7 @@ class System:
     def _fingerprint(self) -> str:
         return serial.fingerprint(self)
 
-    # -- units and looks -----------------------------------------------------------------------------------------------------
+    # -- units and looks --------------------------------------------------------------------------------------------------------
     def state_unit(self, name: str) -> str:
         """Unit of a state; ``""`` if not declared. Raises ParameterError for an unknown state."""
         if name not in self.states:
@@ -162,7 +162,7 @@ class System:
 
         return system_html(self)
 
-    # -- data ----------------------------------------------------------------------------------------------------------------
+    # -- data -------------------------------------------------------------------------------------------------------------------
     def to_dict(self) -> dict[str, Any]:
         """The system as JSON-able data, which :meth:`from_dict` reads back to the last bit."""
         return serial.to_dict(self)

@@ -69,7 +69,7 @@ class Writer:
         for guard in guards:
             self._sides.append(self._guard_sides(guard))
 
-    # -- asked from outside --------------------------------------------------------------------------------------------------
+    # -- asked from outside -----------------------------------------------------------------------------------------------------
     def text(self, root: Expr) -> str:
         """The text of an expression."""
         for node in walk(root):
@@ -96,7 +96,7 @@ class Writer:
         """The text of one side of a guard, such as ``x > upper_gap``."""
         return self._sides[guard][0 if positive else 1]
 
-    # -- how things look; a subclass for another notation overrides these ------------------------------------------------------------
+    # -- how things look; a subclass for another notation overrides these -------------------------------------------------------
     greater, less = " > ", " < "
 
     def joint(self, both: bool) -> str:
@@ -144,7 +144,7 @@ class Writer:
         """The line that names a part."""
         return f"{name} = {text}"
 
-    # -- inner working -------------------------------------------------------------------------------------------------------
+    # -- inner working ----------------------------------------------------------------------------------------------------------
     def part(self, node: Expr, strength: int, after_sign: bool = False) -> str:
         """The text of an operand, in parentheses if it binds more weakly than ``strength``."""
         text, own = self._texts[node]

@@ -106,7 +106,7 @@ def system(
     return decorate
 
 
-# -- the signature --------------------------------------------------------------------------------------------------------------------
+# -- the signature -------------------------------------------------------------------------------------------------------------
 def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: str) -> dict[str, Any]:
     """Names and defaults of the parameters; checks the signature."""
     _check_states(states, title)
@@ -166,7 +166,7 @@ def _units(
     return units
 
 
-# -- the call -------------------------------------------------------------------------------------------------------------------------
+# -- the call ------------------------------------------------------------------------------------------------------------------
 def _traced(function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...], title: str) -> tuple[Any, Any]:
     """Field and guards."""
     try:

@@ -79,6 +79,7 @@ def rig_run(starts=STARTS[:1], periods=40, samples=100, batch=False, kinds=None,
         trajectory=np.repeat(np.arange(len(starts)), [len(run[3]) for run in runs]), time=rows[:, 0], time_error=np.full(len(rows), 1e-12),
         guard=rows[:, 1], direction=rows[:, 2], velocity=rows[:, 4], kind=kind, states=rows[:, 3:5], mode_before=rows[:, 5],
         mode_after=rows[:, 6],
+        steps=np.arange(len(rows)),
     )  # fmt: skip
     return trajectory_dataset(
         states=("x", "v"), units=UNITS, time=runs[0][0], period=np.arange(periods * samples + 1) / samples, forcing_period=PERIOD,

@@ -34,7 +34,7 @@ def sine_run(amplitudes=(2e-3,), periods=3, samples=16, batch=False, frequencies
     contacts = Contacts(
         trajectory=table[:, 0], time=table[:, 1], time_error=np.full(len(rows), 1e-16), guard=np.zeros(len(rows)), direction=table[:, 2],
         velocity=table[:, 3], kind=["crossing"] * len(rows), states=np.stack([np.full(len(rows), GAP), table[:, 3]], axis=1),
-        mode_before=~up, mode_after=up,
+        mode_before=~up, mode_after=up, steps=np.arange(len(up)),
     )  # fmt: skip
     count = np.bincount(table[:, 0].astype(int), minlength=n)
     arguments = {

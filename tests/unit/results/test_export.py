@@ -103,7 +103,7 @@ def test_csv_of_contacts(run, tmp_path):
     to_csv(run, tmp_path / "run.csv")
     table = read(tmp_path / "run_contacts.csv")
     assert table.columns.tolist() == ["time [s]", "time_error [s]", "guard", "direction", "velocity [m/s]", "kind", "mode_before",
-                                      "mode_after", "x [m]", "v [m/s]"]  # fmt: skip
+                                      "mode_after", "steps", "x [m]", "v [m/s]"]  # fmt: skip
     assert table["time [s]"].values.tobytes() == run["contact_time"].values.tobytes()
     assert table["kind"].unique().tolist() == ["crossing"]
     assert len(list(tmp_path.iterdir())) == 2
@@ -149,7 +149,7 @@ def test_csv_quotes_what_holds_a_comma(tmp_path):
     run = sine_run(guards=("max(x, 0)",))
     to_csv(run, tmp_path / "run.csv")
     rows = [row for row in csv.reader((tmp_path / "run_contacts.csv").open()) if not row[0].startswith("#")]
-    assert {len(row) for row in rows} == {10}
+    assert {len(row) for row in rows} == {11}
     assert rows[1][2] == "max(x, 0)"
 
 
@@ -191,7 +191,7 @@ def test_mat_names_are_ones_that_matlab_takes(tmp_path):
 
 def _no_contacts(states):
     none = np.empty(0)
-    return Contacts(*[none] * 6, [], np.empty((0, states)), none, none)
+    return Contacts(*[none] * 6, [], np.empty((0, states)), none, none, none)
 
 
 @pytest.mark.parametrize("case", CASES)
