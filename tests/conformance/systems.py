@@ -58,7 +58,7 @@ def walls(t, x, v, *, amplitude=0.5, moving_stiffness=0.0, width=2.0, stiffness=
     """A unit mass between walls: one that moves with time, two at equal distance (abs), and a soft ceiling (max)."""
     wall = amplitude * sl.cos(2 * sl.pi * frequency * t)
     moving = sl.piecewise((moving_stiffness * (x - wall), x > wall), otherwise=0)
-    fixed = sl.piecewise((stiffness * (sl.abs(x) - width) * x / width, sl.abs(x) > width), otherwise=0)
+    fixed = sl.piecewise((stiffness * (sl.abs(x) - width) * x, sl.abs(x) > width), otherwise=0)
     return v, -moving - fixed - ceiling_stiffness * sl.max(x - ceiling, 0)
 
 

@@ -47,7 +47,8 @@ def pair(request):
     system, start, span, contacts = CASES[request.param]
     run = sl.simulate(system, start, **span, samples=50)
     oracles = [
-        heyoka_systems.simulate(request.param, dict(system.values), start, run.end_time.item(), tolerance=tolerance) for tolerance in (1e-16, 1e-13)
+        heyoka_systems.simulate(request.param, dict(system.values), start, run.end_time.item(), tolerance=tolerance)
+        for tolerance in (1e-16, 1e-13)
     ]
     assert oracles[0].times.size == contacts
     return system, run, *oracles
@@ -100,4 +101,4 @@ def test_contact_velocity_is_the_rate_of_the_gap(pair):
     speed = [np.asarray(run[f"contact_{name}"].values) for name in system.states[half:]]
     rates = {"chain": [speed[0], speed[-1] - speed[0]], "gear_pair": [speed[0]], "aeroelastic": [speed[-1]]}[system.name]
     exact = np.array([rates[clearance][i] for i, clearance in enumerate(clearances)])
-    assert np.all(np.abs(run.contact_velocity.values - exact) < 1e-13 * np.max(np.abs(exact)))
+    assert np.max(np.abs(run.contact_velocity.values - exact)) < 1e-13 * np.max(np.abs(exact))

@@ -92,9 +92,7 @@ def chained(system, method, span):
     """End states of a run chained from calls of one span each, and the steps of the first trajectory."""
     state, steps, calls = starts(), 0, round(END / span)
     for i in range(calls):
-        run = sl.simulate(
-            system, state, t_start=i * span, t_end=(i + 1) * span, method=method, samples=1, time_errors="local", threads=1
-        )
+        run = sl.simulate(system, state, t_start=i * span, t_end=(i + 1) * span, method=method, samples=1, time_errors="local", threads=1)
         state, steps = ends(run), steps + int(run.steps[0])
     return state, steps
 

@@ -89,16 +89,16 @@ def test_all_contacts_of_figure_2b(figure_2b):
 def test_velocities_at_the_contacts_of_figure_2b(figure_2b):
     run, table = figure_2b
     exact = [row["velocity_m_per_s"] for row in table]
-    assert np.all(errors(run.contact_v.values, exact) < 1e-14)
-    assert np.all(errors(run.contact_velocity.values, exact) < 1e-14)
+    assert np.max(errors(run.contact_v.values, exact)) < 1e-14
+    assert np.max(errors(run.contact_velocity.values, exact)) < 1e-14
 
 
 def test_contact_time_error_covers_the_error_and_is_not_absurd(figure_2b):
     run, table = figure_2b
     error = errors(run.contact_time.values, [row["t_s"] for row in table])
     claimed = run.contact_time_error.values
-    assert np.all(error <= claimed)
-    assert np.all(claimed < 1e-13)  # the bound on the error itself
+    assert np.max(error / claimed) <= 1
+    assert np.max(claimed) < 1e-13  # the bound on the error itself
     assert np.median(claimed / np.maximum(error, np.spacing(run.contact_time.values))) < 100
 
 
@@ -179,7 +179,9 @@ def rounding(run, sensitivity, tolerance):
 
 
 def end_errors(run, table):
-    return np.stack([errors(run.end_x.values, [r["x_end_m"] for r in table]), errors(run.end_v.values, [r["v_end_m_per_s"] for r in table])], 1)
+    return np.stack(
+        [errors(run.end_x.values, [r["x_end_m"] for r in table]), errors(run.end_v.values, [r["v_end_m_per_s"] for r in table])], 1
+    )
 
 
 def test_sensitivities_are_those_of_the_reference(rigs):
@@ -198,9 +200,9 @@ def test_end_states_err_by_rounding_only(rigs, method):
     assert set(run.status.values) == {"ok"}
     assert run.mode_violations.sum() == 0
     error = end_errors(run, table)
-    assert np.all(error < rounding(run, sensitivity, method.tolerance))
-    assert np.all(error[:, 0] < 1e-14)
-    assert np.all(error[:, 1] < 1e-11)
+    assert np.max(error / rounding(run, sensitivity, method.tolerance)) < 1
+    assert np.max(error[:, 0]) < 1e-14
+    assert np.max(error[:, 1]) < 1e-11
 
 
 def test_the_bound_can_fail(rigs):
@@ -216,8 +218,8 @@ def test_every_contact_is_there_and_its_time_is_as_exact_as_it_says(rigs, method
     assert np.bincount(run.contact_trajectory.values, minlength=len(table)).tolist() == column(table, "contacts").astype(int).tolist()
     exact = [text for row in table for text in row["contact_times_s"].split()]
     error, claimed = errors(run.contact_time.values, exact), run.contact_time_error.values
-    assert np.all(error < 1e-13)
-    assert np.all(error <= claimed)
+    assert np.max(error) < 1e-13
+    assert np.max(error / claimed) <= 1
     assert np.median(claimed / np.maximum(error, np.spacing(run.contact_time.values))) < 100
 
 

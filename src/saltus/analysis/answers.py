@@ -16,7 +16,7 @@ from saltus.system.evaluate import evaluate
 from saltus.system.system import System
 
 #: An error estimate is this many times the largest difference to the companion run so far.
-SAFETY = 2.0
+SAFETY = 4.0
 
 
 def shared_values(system: System, group: Ensemble) -> dict[str, float]:
@@ -94,7 +94,8 @@ def measured_time_errors(outcome: Outcome, companion: Outcome) -> np.ndarray:
     """Error of every contact's time [s], measured against a more exact run of the same trajectories.
 
     The k-th contact of a trajectory is compared with the k-th of its companion; errors grow along a trajectory, so the estimate is
-    twice the largest difference so far, and never less than the local error. From the first contact on at which the two runs meet
+    four times the largest difference so far (both runs round, so one difference can be small by chance), and never less than the local
+    error and four ulp of the time. From the first contact on at which the two runs meet
     different guards (or one of them meets none) nothing is known: infinite.
     """
     ours, theirs = outcome.record_integers, companion.record_integers
@@ -110,7 +111,7 @@ def measured_time_errors(outcome: Outcome, companion: Outcome) -> np.ndarray:
         here = slice(a.start, a.start + same)
         difference = np.abs(outcome.record_floats[here, -1] - companion.record_floats[b.start : b.start + same, -1])
         error[here] = SAFETY * np.maximum.accumulate(difference)
-    return np.maximum(error, local_time_errors(outcome))
+    return np.maximum(error, local_time_errors(outcome) + 4.0 * np.spacing(np.abs(contact_times(outcome))))
 
 
 def _bounds(table: np.ndarray, outcome: Outcome) -> np.ndarray:

@@ -26,7 +26,7 @@ BATCH = (
 )  # fmt: skip
 
 #: Types of the arrays that kernels/taylor_lanes.py:workspace returns.
-TAYLOR_WORKSPACE = (_F2,) * 10 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F1)
+TAYLOR_WORKSPACE = (_F2,) * 11 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2)
 #: Types of the arrays that kernels/dormand_prince.py:workspace returns.
 ODE45_WORKSPACE = (_F1,)
 

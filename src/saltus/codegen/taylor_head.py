@@ -109,17 +109,20 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
         value = constant_code.value(node)
         constant_code.lines.append(f"c[{i}, lane] = {value}")
     series = sorted(set(guards.row))
+    stepped = sorted({*series, *(i * (order + 1) for i in range(len(system.states)))})
     sizes = dict(
         LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order, NCONST=len(constants.rows),
         NTURNS=len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, ROWS=scale_row + len(system.guards),
-        NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSERIES=len(series), SERIES_ROW=tuple(series) or (0,),
-        GUARD_ROW=tuple(guards.row) or (0,), GUARD_SERIES=tuple(series.index(row) for row in guards.row) or (0,),
-        GUARD_SIGN=tuple(guards.sign) or (1.0,),
-        SNAP_STATE=tuple(guards.snap_state) or (-1,), SNAP_CONST=tuple(guards.snap_const) or (-1,),
+        NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped), NSERIES=len(series),
+    )  # fmt: skip
+    tables = dict(
+        STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row, GUARD_SERIES=[series.index(row) for row in guards.row],
+        GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const,
     )  # fmt: skip
     return "\n".join(
         [
             *(f"{name} = {value!r}" for name, value in sizes.items()),
+            *(f"{name} = {tuple(rows) or (0,)!r}" for name, rows in tables.items()),  # Numba can't index an empty tuple
             "",
             f"@kernel\ndef constants(p, c, lane):\n{indented(constant_code.lines)}\n",
             gaps_function(system),

@@ -13,12 +13,20 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from saltus.kernels.trigonometry import two_product
+
 kernel = njit(nogil=True, error_model="numpy", _nrt=False)
 
-# What `first_crossing` decides.
-NO_CROSSING, CROSSES, TOUCHES, TOUCHES_WITHIN_NOISE, ALL_ZERO = range(5)
-# Columns of its output: place of the crossing, of the touch, the smallest extremum that was no crossing.
-AT, TOUCH_AT, MARGIN = range(3)
+# Columns of the output of `first_crossing`: place of the crossing, the smallest minimum that was no crossing.
+AT, MARGIN = range(2)
+# Columns of a touch: place, guard.
+TOUCH_AT, TOUCH_GUARD = range(2)
+#: Rounding error of a sum of terms, in units of their sizes.
+ROUNDING = 4.0 * 2.220446049250313e-16
+#: Places of a touch that differ by less are one: a minimum within rounding is flat over some 1e-8 of the step.
+SAME_TOUCH = 1.0e-6
+#: Touches that one step can hold on record.
+MOST_TOUCHES = 16
 #: Halvings after which an interval counts as a touch: 2**-48 of a step is below its rounding error.
 DEEPEST = 48
 
@@ -39,6 +47,19 @@ def slope(q, degree, x):
     for k in range(degree - 1, 0, -1):
         value = value * x + k * q[k]
     return value
+
+
+@kernel
+def is_exact_zero(q, degree, x):
+    """Whether q(x) = 0 and no operation of Horner's rule rounded: the only zero that a sum of doubles can prove (Dekker 1971)."""
+    value, exact = q[degree], True
+    for k in range(degree - 1, -1, -1):
+        product, rounded = two_product(value, x)
+        total = product + q[k]
+        part = total - product
+        exact = exact and rounded == 0.0 and (product - (total - part)) + (q[k] - part) == 0.0
+        value = total
+    return exact and value == 0.0
 
 
 @kernel
@@ -63,16 +84,20 @@ def to_bernstein(q, degree, b):
     for level in range(1, degree + 1):
         for i in range(degree, level - 1, -1):
             b[i] += b[i - 1]
+    b[degree] = polynomial(q, degree, 1.0)  # the value at the end of the step, without the rounding of the sums
 
 
 @kernel
-def halve(b, row, degree):
-    """Split the interval of one row of Bernstein coefficients (de Casteljau): its right half stays, its left half goes to the next row."""
+def halve(b, bounds, row, degree):
+    """Split the interval of a row of Bernstein coefficients (de Casteljau): its right half stays, its left half goes to the next row."""
     b[row + 1, 0] = b[row, 0]
     for level in range(1, degree + 1):
         for i in range(degree - level + 1):
             b[row, i] = 0.5 * (b[row, i] + b[row, i + 1])
         b[row + 1, level] = b[row, 0]
+    middle = 0.5 * (bounds[row, 0] + bounds[row, 1])
+    bounds[row + 1, 0], bounds[row + 1, 1] = bounds[row, 0], middle
+    bounds[row, 0] = middle
 
 
 @kernel
@@ -107,49 +132,84 @@ def leading_sign(q, degree):
 
 
 @kernel
-def _touch(place, depth, out, outer):
-    """Keep a touch that is no crossing; the first one wins."""
-    if outer == NO_CROSSING:
-        out[TOUCH_AT] = place
-        outer = TOUCHES if depth == 0.0 else TOUCHES_WITHIN_NOISE
-    out[MARGIN] = min(out[MARGIN], abs(depth))
-    return outer
+def turning_place(q, degree, low, high, rates):
+    """The one place in (low, high) where q' goes from - to +; leaves the coefficients of q' in `rates`."""
+    for k in range(degree):
+        rates[k] = (k + 1) * q[k + 1]
+    return refine(rates, degree - 1, low, high, False)
 
 
 @kernel
-def first_crossing(q, degree, shifted, noise, b, bounds, rates, out):
+def rounding(q, degree, shifted, noise, x):
+    """Rounding error of the gap at x: that at 0, and that of its Taylor terms."""
+    total = 0.0
+    for k in range(degree, -1, -1):
+        total = total * x + abs(q[k])
+    return noise + ROUNDING * total * (x if shifted else 1.0)
+
+
+@kernel
+def sign_beyond(b, degree, noise):
+    """Sign of the first of ``b[0..degree]`` that is larger than the noise."""
+    for i in range(degree + 1):
+        if abs(b[i]) > noise:
+            return 1 if b[i] > 0.0 else -1
+    return 0
+
+
+@kernel
+def _note_touch(place, guard, touches, count):
+    """Add a touch to the list, unless it is the one noted last seen from the neighbouring interval; returns the new count."""
+    again = count > 0 and touches[count - 1, TOUCH_GUARD] == guard and abs(touches[count - 1, TOUCH_AT] - place) < SAME_TOUCH
+    if count < MOST_TOUCHES and not again:
+        touches[count, TOUCH_AT], touches[count, TOUCH_GUARD] = place, guard
+        count += 1
+    return count
+
+
+@kernel
+def lowest(b, degree):
+    """The smallest of ``b[0..degree]``: a lower bound of the polynomial on its interval."""
+    least = b[0]
+    for i in range(1, degree + 1):
+        least = min(least, b[i])
+    return least
+
+
+@kernel
+def first_crossing(q, degree, shifted, noise, guard, b, bounds, rates, out, touches, count):
     """Isolate the first place in (0, 1) where q goes below zero.
 
     Parameters
     ----------
     q : float64[degree + 1]
-        Coefficients; the first non-zero one is positive. Its last entry past ``degree`` isn't read.
+        Coefficients; the first non-zero one is positive.
     degree : int
         Degree of q.
     shifted : bool
         Whether a root at 0 was divided out: the gap is then ``x * q(x)``, which matters for its depth.
     noise : float
-        Rounding error of the gap: extrema within it are undecided.
+        Rounding error of the gap's terms at 0. That of its Taylor terms is added; minima within both are undecided.
+    guard : int
+        Number that touches are noted under.
     b : float64[DEEPEST + 2, degree + 1]
         Work.
     bounds : float64[DEEPEST + 2, 2]
         Work.
     rates : float64[degree + 1]
         Work.
-    out : float64[3]
-        Receives AT, TOUCH_AT and lowers MARGIN.
+    out : float64[2]
+        Receives AT and lowers MARGIN.
+    touches : float64[MOST_TOUCHES, 2]
+        Receives the minima within the noise that lie before the crossing, in order.
+    count : int
+        Touches that it holds already.
 
     Returns
     -------
-    (int, int)
-        NO_CROSSING or CROSSES, and NO_CROSSING, TOUCHES or TOUCHES_WITHIN_NOISE for a touch before it.
+    (bool, int)
+        Whether q crosses, and the touches now held.
     """
-    touched = NO_CROSSING
-    least = q[0]
-    for k in range(1, degree + 1):
-        least += min(q[k], 0.0)
-    if least > noise:
-        return NO_CROSSING, touched
     to_bernstein(q, degree, b[0])
     bounds[0, 0], bounds[0, 1] = 0.0, 1.0
     top = 0
@@ -158,43 +218,40 @@ def first_crossing(q, degree, shifted, noise, b, bounds, rates, out):
         changes = variations(b[top], degree)
         if changes == 1:
             out[AT] = refine(q, degree, low, high, True)
-            return CROSSES, touched
-        if changes >= 2:
-            for i in range(degree):
-                rates[i] = b[top, i + 1] - b[top, i]
-            turns = variations(rates, degree - 1)
-            if turns == 1:
-                for k in range(degree):
-                    rates[k] = (k + 1) * q[k + 1]
-                rising = polynomial(rates, degree - 1, high) > 0.0
-                place = refine(rates, degree - 1, low, high, not rising)
-                depth = polynomial(q, degree, place) * (place if shifted else 1.0)
-                if depth < -noise:
-                    out[AT] = refine(q, degree, low, place, True)
-                    return CROSSES, touched
-                if depth <= noise:
-                    touched = _touch(place, depth, out, touched)
-                else:
-                    out[MARGIN] = min(out[MARGIN], depth)
-            elif top >= DEEPEST:
-                touched = _touch(low, noise, out, touched)
-            else:
-                halve(b, top, degree)
-                middle = 0.5 * (low + high)
-                bounds[top, 0] = middle
+            return True, count
+        for i in range(degree):
+            rates[i] = b[top, i + 1] - b[top, i]
+        turns, falls = variations(rates, degree - 1), leading_sign(rates, degree - 1) < 0
+        if turns > 1 and lowest(b[top], degree) <= rounding(q, degree, shifted, noise, high):
+            if top < DEEPEST:
+                halve(b, bounds, top, degree)
                 top += 1
-                bounds[top, 0], bounds[top, 1] = low, middle
                 continue
-        if b[top, degree] == 0.0 and high < 1.0:  # a root exactly where an interval was halved
-            if top > 0 and leading_sign(b[top - 1], degree) < 0:
+            out[MARGIN] = 0.0
+            count = _note_touch(low, guard, touches, count)
+        elif turns == 1 and falls:
+            place = turning_place(q, degree, low, high, rates)
+            depth = polynomial(q, degree, place) * (place if shifted else 1.0)
+            undecided = rounding(q, degree, shifted, noise, place)
+            if depth < -undecided:
+                out[AT] = refine(q, degree, low, place, True)
+                return True, count
+            out[MARGIN] = min(out[MARGIN], abs(depth))
+            if depth <= undecided:
+                count = _note_touch(place, guard, touches, count)
+        if high < 1.0 and abs(b[top, degree]) <= rounding(q, degree, shifted, noise, high):  # zero exactly where an interval was halved
+            following = sign_beyond(b[top - 1], degree, rounding(q, degree, shifted, noise, high))
+            if b[top, degree] == 0.0 and following < 0:
                 out[AT] = high
-                return CROSSES, touched
-            touched = _touch(high, 0.0, out, touched)
+                return True, count
+            if following > 0:
+                out[MARGIN] = min(out[MARGIN], abs(b[top, degree]))
+                count = _note_touch(high, guard, touches, count)
         top -= 1
-    return NO_CROSSING, touched
+    return False, count
 
 
 def work_arrays(degree):
-    """The work of :func:`first_crossing` for polynomials up to ``degree`` (plain Python; kernels allocate their own)."""
+    """The work of :func:`first_crossing` for polynomials up to ``degree``: b, bounds, rates (plain Python; kernels bring their own)."""
     n = degree + 1
     return np.empty((DEEPEST + 2, n)), np.empty((DEEPEST + 2, 2)), np.empty(n)

@@ -2,7 +2,7 @@
 
 import math
 
-from saltus.kernels.isolation import AT, CROSSES, MARGIN, NO_CROSSING, TOUCH_AT, TOUCHES, first_crossing, leading_sign
+from saltus.kernels.isolation import AT, MARGIN, MOST_TOUCHES, ROUNDING, TOUCH_AT, TOUCH_GUARD, first_crossing, is_exact_zero, leading_sign
 from saltus.kernels.status import (
     BUDGET_EVENTS,
     CONTACT_SPEED,
@@ -33,7 +33,7 @@ from saltus.kernels.status import (
 # -- the slow path: one lane that the quadratic bound could not settle ---------------------------------------------------------
 @kernel
 def scaled_gap(lanes, lane, g, h, slow):
-    """P on [0, 1] of one lane into slow.q, the known root divided out; returns the rounding error of the gap."""
+    """P on [0, 1] of one lane into slow.q, the known root divided out; returns the rounding error of the gap's terms at the start."""
     s = lanes.side[g, lane]
     slow.q[0] = s * lanes.work[GAP_ROW + g, lane]
     scale = s * GUARD_SIGN[g]
@@ -44,7 +44,7 @@ def scaled_gap(lanes, lane, g, h, slow):
         for k in range(ORDER):
             slow.q[k] = slow.q[k + 1]
         slow.q[ORDER] = 0.0
-    return NOISE * lanes.work[SCALE_ROW + g, lane]
+    return ROUNDING * (lanes.work[SCALE_ROW + g, lane] + lanes.prior[PRIOR_ROWS * g + OLD, lane])
 
 
 @kernel
@@ -57,33 +57,26 @@ def gap_rate(lanes, lane, g, d):
 
 
 @kernel
-def first_place(lanes, lane, g, h, slow):
-    """Time into the step at which gap g crosses first, beyond h if it doesn't; notes tangencies and rest in `memo`."""
+def first_place(lanes, lane, g, h, slow, count):
+    """Time into the step at which gap g crosses first, beyond h if it doesn't; and the touches now on the list."""
     noise = scaled_gap(lanes, lane, g, h, slow)
     fresh = lanes.fresh[g, lane] > 0.5
     sign = leading_sign(slow.q, ORDER)
     if sign < 0:
-        return 0.0  # on the wrong side from the start of the step on
+        return 0.0, count  # on the wrong side from the start of the step on
     if sign == 0:
         lanes.memo[lane, RESTS] |= 1 << g
-        return 2.0 * h
+        return 2.0 * h, count
     slow.out[MARGIN] = lanes.run[LEAST, lane]
     if not fresh and slow.q[0] == 0.0:  # a node on the boundary that turns back: a tangency at the node
-        note_first_touch(lanes, lane, g, 0.0, GRAZE, slow)
+        slow.touches[count, TOUCH_AT], slow.touches[count, TOUCH_GUARD] = 0.0, g
         slow.out[MARGIN] = 0.0
-    crossing, touched = first_crossing(slow.q, ORDER, fresh, noise, slow.b, slow.bounds, slow.rates, slow.out)
-    if touched != NO_CROSSING:
-        note_first_touch(lanes, lane, g, slow.out[TOUCH_AT] * h, GRAZE if touched == TOUCHES else GRAZE_SHALLOW, slow)
+        count += 1
+    crosses, count = first_crossing(
+        slow.q, ORDER, fresh, noise, g, slow.b, slow.bounds, slow.rates, slow.out, slow.touches, min(count, MOST_TOUCHES - 1)
+    )
     lanes.run[LEAST, lane] = slow.out[MARGIN]
-    return slow.out[AT] * h if crossing == CROSSES else 2.0 * h
-
-
-@kernel
-def note_first_touch(lanes, lane, g, at, kind, slow):
-    """Keep the earliest tangency of this step."""
-    if lanes.memo[lane, TOUCHED] == 0 or at < slow.touch[0]:
-        lanes.memo[lane, TOUCHED], lanes.memo[lane, TOUCH_KIND] = g + 1, kind
-        slow.touch[0] = at
+    return (slow.out[AT] * h if crosses else 2.0 * h), min(count, MOST_TOUCHES - 1)
 
 
 @kernel
@@ -91,10 +84,10 @@ def decide(lanes, lane, batch, slow):
     """Settle one lane's step by isolating the roots of all its gaps; writes DELTA, and the guards that cross to memo[HITS]."""
     h = lanes.run[STEP, lane]
     now = abs(lanes.clock[TAU, lane] + lanes.clock[BASE, lane])
-    first, hits = h, 0
-    lanes.memo[lane, DECIDED], lanes.memo[lane, TOUCHED], lanes.memo[lane, RESTS] = 1, 0, 0
+    first, hits, count = h, 0, 0
+    lanes.memo[lane, DECIDED], lanes.memo[lane, RESTS] = 1, 0
     for g in range(NGUARDS):
-        at = first_place(lanes, lane, g, h, slow)
+        at, count = first_place(lanes, lane, g, h, slow, count)
         if at <= h:
             if hits != 0 and abs(at - first) <= COINCIDENT * now:
                 hits |= 1 << g
@@ -102,22 +95,51 @@ def decide(lanes, lane, batch, slow):
                 hits, first = 1 << g, at
     lanes.found[DELTA, lane] = first
     lanes.memo[lane, HITS] = hits
-    if lanes.memo[lane, TOUCHED] > 0 and slow.touch[0] <= first:
-        note_touch(lanes, lane, batch, slow)
+    note_touches(lanes, lane, batch, slow, first, count)
 
 
 @kernel
-def note_touch(lanes, lane, batch, slow):
-    """Count and record the tangency that the slow path saw."""
-    g, who, kind, d = lanes.memo[lane, TOUCHED] - 1, lanes.memo[lane, WHO], lanes.memo[lane, TOUCH_KIND], slow.touch[0]
+def note_touches(lanes, lane, batch, slow, first, count):
+    """Count and record the tangencies up to `first`, in the order of time."""
+    h = lanes.run[STEP, lane]
+    for _ in range(count):
+        soonest = -1
+        for j in range(count):
+            if slow.touches[j, TOUCH_AT] >= 0.0 and (soonest < 0 or slow.touches[j, TOUCH_AT] < slow.touches[soonest, TOUCH_AT]):
+                soonest = j
+        d = slow.touches[soonest, TOUCH_AT] * h
+        if d <= first:
+            note_touch(lanes, lane, batch, slow, int(slow.touches[soonest, TOUCH_GUARD]), d, lanes.clock[TAU, lane])
+        slow.touches[soonest, TOUCH_AT] = -1.0
+
+
+@kernel
+def touches_exactly(lanes, lane, g, d, slow):
+    """Whether a gap is zero at d with not one operation rounded: else a zero is luck, and the touch unresolved."""
+    if SNAP_STATE[g] >= 0:
+        x, place = lanes.work[GUARD_ROW[g], lane], lanes.c[SNAP_CONST[g], lane]
+        total = x - place
+        part = total - x
+        if (x - (total - part)) + (-place - part) != 0.0:
+            return False
+    slow.q[0] = lanes.work[GAP_ROW + g, lane] * (1.0 if lanes.fresh[g, lane] < 0.5 else 0.0)
+    for k in range(1, ORDER + 1):
+        slow.q[k] = GUARD_SIGN[g] * lanes.work[GUARD_ROW[g] + k, lane]
+    return is_exact_zero(slow.q, ORDER, d)
+
+
+@kernel
+def note_touch(lanes, lane, batch, slow, g, d, start):
+    """Count and record one tangency at time d into the step that began at phase `start`: exact, or within the gap's rounding error."""
+    who, kind = lanes.memo[lane, WHO], GRAZE if touches_exactly(lanes, lane, g, d, slow) else GRAZE_SHALLOW
     state_at(lanes, lane, d, slow.state)
     mode, side = mode_of(lanes, lane), int(lanes.side[g, lane])
     batch.counters[who, GRAZES if kind == GRAZE else UNRESOLVED] += 1
     curve = 2.0 * abs(lanes.work[GUARD_ROW[g] + 2, lane])
-    noise = NOISE * lanes.work[SCALE_ROW + g, lane]
+    noise = ROUNDING * lanes.work[SCALE_ROW + g, lane]
     error = math.sqrt(2.0 * noise / curve) if curve > 0.0 else math.inf
     velocity = gap_rate(lanes, lane, g, d) * side
-    record(lanes, lane, batch, lanes.clock[TAU, lane] + d, g, side, velocity, kind, mode, mode, error, slow.state)
+    record(lanes, lane, batch, start + d, g, side, velocity, kind, mode, mode, error, slow.state)
 
 
 # -- landing -------------------------------------------------------------------------------------------------------------------
@@ -166,26 +188,42 @@ def record(lanes, lane, batch, tau, g, direction, velocity, kind, before, after,
 
 
 @inner
-def time_error(lanes, lane, g, rate, tau):
-    """Local error of a contact's time: rounding error of the gap over its rate, and of the clock."""
+def time_error(lanes, lane, batch, g, rate, tau):
+    """Local error of a contact's time: truncation and rounding of the gap's terms over its rate, and the rounding of the clock."""
     if rate == 0.0:
         return math.inf
-    return NOISE * lanes.work[SCALE_ROW + g, lane] / abs(rate) + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
+    size = lanes.prior[PRIOR_ROWS * g + NEW, lane]
+    return (ROUNDING + 2.0 ** batch.options[0]) * size / abs(rate) + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
 
 
 @inner
 def land(lanes, lane, batch, g, rate, slow):
     """One contact: snap the state to the boundary, change the side, make the guard fresh, count and record."""
-    who = lanes.memo[lane, WHO]
     before = mode_of(lanes, lane)
     if SNAP_STATE[g] >= 0:
         lanes.y[SNAP_STATE[g], lane] = lanes.c[SNAP_CONST[g], lane]
+    lanes.fresh[g, lane] = 1.0
+    change_side(lanes, lane, batch, g, rate, before, slow)
+
+
+@inner
+def is_shallow(lanes, lane, g, rate):
+    """Whether a crossing at this rate goes no deeper than the rounding error of the gap: depth = rate^2 / (2 curvature)."""
+    j, h = BOUNDS * GUARD_SERIES[g], lanes.run[STEP, lane]
+    curvature = 2.0 * (abs(lanes.bounds[j + QUADRATIC, lane]) + 3.0 * abs(lanes.bounds[j + CUBIC, lane]))
+    size = lanes.prior[PRIOR_ROWS * g + NEW, lane] + lanes.prior[PRIOR_ROWS * g + OLD, lane]
+    return rate * rate * h * h <= 2.0 * ROUNDING * size * curvature
+
+
+@kernel
+def change_side(lanes, lane, batch, g, rate, before, slow):
+    """The state is on the other side of a guard: change its bit, count and record."""
+    who = lanes.memo[lane, WHO]
     velocity = rate * lanes.side[g, lane]
     lanes.side[g, lane] = -lanes.side[g, lane]
-    lanes.fresh[g, lane] = 1.0
     if lanes.memo[lane, STARTING] == 1 or lanes.memo[lane, BOUNCES] > 1:
         return  # the side at the start is an initial condition; a return with no time passed was recorded when it came first
-    shallow = rate * rate <= 4.0 * NOISE * lanes.work[SCALE_ROW + g, lane] * abs(lanes.work[GUARD_ROW[g] + 2, lane])
+    shallow = is_shallow(lanes, lane, g, rate)
     batch.counters[who, EVENTS] += 1
     if shallow:
         batch.counters[who, UNRESOLVED] += 1
@@ -194,26 +232,40 @@ def land(lanes, lane, batch, g, rate, slow):
         slow.state[i] = lanes.y[i, lane]
     tau, direction = lanes.clock[TAU, lane], int(lanes.side[g, lane])
     kind = GRAZE_SHALLOW if shallow else CROSSING
-    error = time_error(lanes, lane, g, rate, tau)
+    error = time_error(lanes, lane, batch, g, rate, tau)
     record(lanes, lane, batch, tau, g, direction, velocity, kind, before, mode_of(lanes, lane), error, slow.state)
 
 
 @inner
-def land_all(lanes, lane, batch, hits, slow):
-    """Every contact at the end of this step, together. Returns the status."""
-    who, d = lanes.memo[lane, WHO], lanes.found[DELTA, lane]
+def note_arrival(lanes, lane):
+    """Whether time has passed since the last landing (or the start); counts the landings at one instant."""
     now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
-    if d > 0.0 or now != lanes.run[LANDED, lane]:
+    arrived = lanes.found[DELTA, lane] > 0.0 or now != lanes.run[LANDED, lane]
+    if arrived:
         lanes.memo[lane, BOUNCES], lanes.memo[lane, STARTING], lanes.run[LANDED, lane] = 0, 0, now
     else:
         lanes.memo[lane, BOUNCES] += 1
+    return arrived
+
+
+@inner
+def land_all(lanes, lane, batch, hits, slow):
+    """Every contact at the end of this step, together. Returns the status.
+
+    A gap may hold sides of other guards, and jump when they change: the state is then past that boundary without having met it.
+    """
+    who, d = lanes.memo[lane, WHO], lanes.found[DELTA, lane]
+    arrived = note_arrival(lanes, lane)
     for g in range(NGUARDS):
         if (hits >> g) & 1:
-            noise = NOISE * lanes.work[SCALE_ROW + g, lane]
-            if d == 0.0 and lanes.fresh[g, lane] < 0.5 and lanes.work[GAP_ROW + g, lane] * lanes.side[g, lane] < -noise:
-                batch.counters[who, VIOLATIONS] += 1
-            rate = gap_rate(lanes, lane, g, d) if lanes.memo[lane, DECIDED] == 1 else lanes.found[RATE, lane]
-            land(lanes, lane, batch, g, rate, slow)
+            exactly = lanes.memo[lane, DECIDED] == 1 or batch.rec_i.shape[0] > 0  # Newton's slope is right to some 1e-9
+            rate = gap_rate(lanes, lane, g, d) if exactly else lanes.found[RATE, lane]
+            past = -lanes.side[g, lane] * lanes.work[GAP_ROW + g, lane]
+            if d == 0.0 and lanes.fresh[g, lane] < 0.5 and past > ROUNDING * lanes.work[SCALE_ROW + g, lane]:
+                batch.counters[who, VIOLATIONS] += arrived
+                change_side(lanes, lane, batch, g, rate, mode_of(lanes, lane), slow)
+            else:
+                land(lanes, lane, batch, g, rate, slow)
     if lanes.memo[lane, BOUNCES] > MOST_BOUNCES:
         return SLIDING
     return BUDGET_EVENTS if batch.counters[who, EVENTS] >= batch.options[2] else RUNNING

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from saltus.kernels.batch import Batch
-from saltus.kernels.isolation import DEEPEST
+from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.kernels.status import (
     BUDGET_STEPS,
     FINISHED,
@@ -66,13 +66,24 @@ def set_period(lanes, lane, batch):
 
 @kernel
 def final_contacts(lanes, lane, batch, slow):
-    """A gap that is exactly zero, or past zero by rounding, at the very end is an event there, reported once."""
+    """A gap that is exactly zero, or past zero by rounding, at the very end is an event there, reported once; or a graze if it turns."""
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
-    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, batch.param[lanes.memo[lane, WHO] * batch.stride], slow.gaps)
+    parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
+    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.gaps)
+    d, met = lanes.found[DELTA, lane], 0
     for g in range(NGUARDS):
-        if lanes.fresh[g, lane] < 0.5 and slow.gaps[g] * lanes.side[g, lane] <= 0.0:
-            land(lanes, lane, batch, g, gap_rate(lanes, lane, g, lanes.found[DELTA, lane]), slow)
+        inside = slow.gaps[g] * lanes.side[g, lane]
+        if lanes.fresh[g, lane] < 0.5 and inside <= 0.0:
+            if inside == 0.0 and gap_rate(lanes, lane, g, d) >= 0.0:
+                note_touch(lanes, lane, batch, slow, g, d, lanes.run[START, lane])
+            else:
+                met |= 1 << g
+    if met != 0:
+        note_arrival(lanes, lane)
+    for g in range(NGUARDS):
+        if (met >> g) & 1:
+            land(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow)
 
 
 @inner
@@ -161,6 +172,8 @@ def fill(lanes, lane, who, batch, slow):
     for i in range(NSTATES):
         lanes.y[i, lane] = batch.state[who, i]
         slow.state[i] = batch.state[who, i]
+    for g in range(NGUARDS):
+        lanes.prior[PRIOR_ROWS * g + NEW, lane] = batch.carry[who, CARRIED + g]
     if batch.mode[who] < 0:
         start_sides(lanes, lane, batch, slow)
         if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
@@ -186,6 +199,8 @@ def empty(lanes, lane, batch, status):
         lanes.y[i, lane] = 0.0
     batch.count[who], batch.phase[who] = lanes.memo[lane, COUNT], lanes.clock[TAU, lane]
     batch.mode[who], batch.fresh[who], batch.status[who] = mode_of(lanes, lane), fresh, status
+    for g in range(NGUARDS):
+        batch.carry[who, CARRIED + g] = lanes.prior[PRIOR_ROWS * g + NEW, lane]
     batch.carry[who, 0] = lanes.run[LANDED, lane]
     batch.carry[who, 1], batch.carry[who, 2] = lanes.memo[lane, BOUNCES], lanes.memo[lane, STARTING]
     batch.counters[who, STEPS] = int(lanes.run[TAKEN, lane])
@@ -212,13 +227,13 @@ def workspace():
     """The memory that one call of `propagate` works in; one set for each thread."""
     guards = max(NGUARDS, 1)
     rows = dict(
-        y=NSTATES, side=guards, fresh=guards, clock=TURN + NTURNS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1), poly=ORDER + 1,
-        run=RUN_ROWS, found=3,
+        y=NSTATES, side=guards, fresh=guards, clock=TURN + NTURNS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1), prior=PRIOR_ROWS * guards, poly=ORDER + 1,
+        run=RUN_ROWS, found=FOUND_ROWS,
     )  # fmt: skip
     lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: np.zeros((count, LANES)) for name, count in rows.items()})
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)), bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(3), gaps=np.zeros(guards), state=np.zeros(NSTATES), touch=np.zeros(1),
+        out=np.zeros(2), gaps=np.zeros(guards), state=np.zeros(NSTATES), touches=np.zeros((MOST_TOUCHES, 2)),
     )  # fmt: skip
     return (*lanes, *slow)
 
@@ -226,18 +241,20 @@ def workspace():
 @entry
 def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
               sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, budget,
-              lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_poly, lane_run, lane_found, lane_memo,
-              slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touch):  # fmt: skip
+              lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found, lane_memo,
+              slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches):  # fmt: skip
     """Move every trajectory whose status is RUNNING to its end, `budget` steps of the lanes at most. See flow/engine.py for the arrays."""
     batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
                   sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options)  # fmt: skip
-    lanes = Lanes(lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_poly, lane_run, lane_found, lane_memo)
-    slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touch)
+    lanes = Lanes(
+        lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found, lane_memo
+    )
+    slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches)
     roomy = rec_i.shape[0] - 2 * LANES * (NGUARDS + 1)
     following = 0
     busy = 0
     for lane in range(LANES):
-        lanes.run[END, lane], lanes.run[ACTIVE, lane], lanes.memo[lane, WHO] = 1.0, 0.0, -1
+        lanes.run[END, lane], lanes.run[ACTIVE, lane], lanes.clock[TAU, lane], lanes.memo[lane, WHO] = 1.0, 0.0, 0.0, -1
     for lane in range(LANES):
         following = refill(lanes, lane, following, batch, slow)
         busy += lanes.run[ACTIVE, lane] > 0.5

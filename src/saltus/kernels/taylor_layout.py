@@ -24,23 +24,24 @@ TAU, BASE, TURN = 0, 1, 2
 END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED = range(8)
 RUN_ROWS = 8
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
-LINEAR, QUADRATIC, CUBIC, CHANGE, REST, BOUNDS = range(6)
-# Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none).
-DELTA, RATE, WHICH = range(3)
+LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
+# Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when.
+DELTA, RATE, WHICH, NEAREST, TURNED, FOUND_ROWS = range(6)
 # Columns of `memo`: trajectory, periods, contacts in a row without time passing, whether its mode at the start is still being settled,
-# whether the slow path has decided this step, guards that it found to cross (bits), guards on which the state rests (bits), and the
-# tangency that it saw (guard + 1, kind).
-WHO, COUNT, BOUNCES, STARTING, DECIDED, HITS, RESTS, TOUCHED, TOUCH_KIND = range(9)
-MEMO = 9
-# Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING.
-CARRY = 3
+# whether the slow path has decided this step, guards that it found to cross (bits), guards on which the state rests (bits).
+WHO, COUNT, BOUNCES, STARTING, DECIDED, HITS, RESTS = range(7)
+MEMO = 7
+# Rows of `prior`, for each guard: the size of the terms of its gap up to the step before, and up to this one, each step counting half of
+# the one after it; their rounding is inherited.
+OLD, NEW, PRIOR_ROWS = range(3)
+# Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING, then NEW for each guard.
+CARRIED = 3
+CARRY = CARRIED + NGUARDS
 #: Times within this many ulp are one event (EVENTS.md, rule 6).
 COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
 MOST_BOUNCES = 100
-#: Rounding error of a gap, in units of its terms.
-NOISE = 4.0 * 2.220446049250313e-16
 HUGE = 1.0e300
 
-Lanes = namedtuple("Lanes", "y side fresh clock c work bounds poly run found memo")
-Slow = namedtuple("Slow", "q b bounds rates out gaps state touch")
+Lanes = namedtuple("Lanes", "y side fresh clock c work bounds prior poly run found memo")
+Slow = namedtuple("Slow", "q b bounds rates out gaps state touches")

@@ -1,32 +1,46 @@
 """Template, 2 of 4 of the Taylor flow: one step of all lanes, as arithmetic on lanes."""
 
+from saltus.kernels.isolation import ROUNDING
 from saltus.kernels.lanes import any_lane, bits, coarse_exp2, coarse_log2, fma, larger, load, magnitude, root, select, smaller, splat, store
 
 
 @inner
 def step_length(work, log2_tolerance):
-    """Longest step whose last two terms stay below the tolerance times the leading terms, for every state on its own scale.
+    """Longest step whose last two terms stay below the tolerance times the leading terms, for every series on its own scale.
 
-    After Jorba & Zou (2005), with the scale of a state taken from its value, its rate or its acceleration times the step, whichever
-    allows most: a state that passes through zero doesn't shrink the step, and changing units changes nothing.
+    After Jorba & Zou (2005), with the scale of a series taken from its value, its rate or its acceleration times the step, whichever
+    allows most: a state that passes through zero doesn't shrink the step, and changing units changes nothing. Gaps that aren't a state
+    count too: a wall may move while the body rests.
     """
     log_h = splat(1000.0, LANES)
-    for i in range(NSTATES):
-        base = i * (ORDER + 1)
-        l0 = coarse_log2(load(work, base, LANES)) + log2_tolerance
-        l1 = coarse_log2(load(work, base + 1, LANES)) + log2_tolerance
-        l2 = coarse_log2(load(work, base + 2, LANES)) + log2_tolerance
-        for j in (ORDER - 1, ORDER):
-            last = coarse_log2(load(work, base + j, LANES))
-            best = larger((l0 - last) * (1.0 / j), (l1 - last) * (1.0 / (j - 1)))
-            best = larger(best, (l2 - last) * (1.0 / (j - 2)))
-            log_h = smaller(select(last < -1000.0, 1000.0, best), log_h)
+    for i in range(NSTEPPED):
+        base = STEP_ROW[i]
+        log_h = smaller(longest(work, base, ORDER - 1, log2_tolerance), log_h)
+        log_h = smaller(longest(work, base, ORDER, log2_tolerance), log_h)
+        vanishing = magnitude(load(work, base + ORDER, LANES)) + magnitude(load(work, base + ORDER - 1, LANES)) <= 0.0
+        if any_lane(vanishing):  # a series with holes, or a polynomial: ask the upper half of its terms
+            for j in range((ORDER + 1) // 2, ORDER - 1):
+                log_h = smaller(select(vanishing, longest(work, base, j, log2_tolerance), 1000.0), log_h)
     return coarse_exp2(log_h)
 
 
 @inner
+def longest(work, base, j, log2_tolerance):
+    """log2 of the step at which term j of a series is as large as the tolerance times its first three (at rest: its first ones)."""
+    last = coarse_log2(load(work, base + j, LANES)) - log2_tolerance
+    value, rate, acceleration = load(work, base, LANES), load(work, base + 1, LANES), load(work, base + 2, LANES)
+    by_value, by_rate = (coarse_log2(value) - last) * (1.0 / j), (coarse_log2(rate) - last) * (1.0 / (j - 1))
+    best = larger(larger(by_value, by_rate), (coarse_log2(acceleration) - last) * (1.0 / (j - 2)))
+    at_rest = magnitude(value) + magnitude(rate) + magnitude(acceleration) <= 0.0
+    if any_lane(at_rest):
+        for i in range(3, ORDER // 2):
+            best = select(at_rest, larger(best, (coarse_log2(load(work, base + i, LANES)) - last) * (1.0 / (j - i))), best)
+    return select(last + log2_tolerance < -1000.0, 1000.0, best)
+
+
+@inner
 def bound_series(lanes, h):
-    """For every series that a gap reads: its first three terms at h, its whole change over h, and the bound of what follows its cubic.
+    """For every series that a gap reads: its first three terms at h, its change over h, its slope there, the bound of what follows its cubic.
 
     Fills `bounds`: for x in [0, 1], gap(x h) = gap(0) + t1 x + t2 x^2 + t3 x^3 + rest(x), |rest| <= W/6, |rest'| <= W/2, |rest''| <= W
     with W = sum of k(k-1)|t_k| for k >= 4 (k(k-1) >= 2k >= 6 there).
@@ -34,18 +48,19 @@ def bound_series(lanes, h):
     work, bounds = lanes.work, lanes.bounds
     for j in range(NSERIES):
         row = SERIES_ROW[j]
-        rest = splat(0.0, LANES)
-        change = splat(0.0, LANES)
+        rest, change, turn = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
         for k in range(ORDER, 3, -1):
             term = load(work, row + k, LANES)
             rest = fma(rest, h, magnitude(term) * (k * (k - 1.0)))
             change = fma(change, h, term)
+            turn = fma(turn, h, term * float(k))
         h2 = h * h
         t1, t2, t3 = load(work, row + 1, LANES) * h, load(work, row + 2, LANES) * h2, load(work, row + 3, LANES) * h2 * h
         store(bounds, BOUNDS * j + LINEAR, t1)
         store(bounds, BOUNDS * j + QUADRATIC, t2)
         store(bounds, BOUNDS * j + CUBIC, t3)
         store(bounds, BOUNDS * j + CHANGE, fma(change * h2, h2, t3) + t2 + t1)
+        store(bounds, BOUNDS * j + SLOPE_AT_END, fma(turn * h2, h2, 3.0 * t3) + 2.0 * t2 + t1)
         store(bounds, BOUNDS * j + REST, rest * h2 * h2)
 
 
@@ -55,15 +70,15 @@ def locate(lanes, h):
 
     A gap P (P/x where the root at 0 is known) is p0 + p1 x + p2 x^2 + p3 x^3 + rest on [0, 1]. If it is monotone or concave its end
     decides; if it is convex it crosses once where it ends below zero, and twice where its vertex is proven to be; else its quadratic part
-    less the bounds of what follows decides, or the slow path does.
+    less the bounds of what follows decides, or the slow path does. What lies within the rounding error of the gap is never proven.
     """
-    side, fresh, run, bounds = lanes.side, lanes.fresh, lanes.run, lanes.bounds
+    side, fresh, bounds = lanes.side, lanes.fresh, lanes.bounds
     bound_series(lanes, h)
-    active = load(run, ACTIVE, LANES) > 0.5
+    active = load(lanes.run, ACTIVE, LANES) > 0.5
     which = splat(-1.0, LANES)
     nearest, chosen_row, chosen_s = splat(0.0, LANES), splat(-1.0, LANES), splat(0.0, LANES)
-    least = load(run, LEAST, LANES)
-    undecided = h < 0.0
+    margin, turned_at = splat(HUGE, LANES), splat(0.0, LANES)
+    undecided = splat(0.0, LANES) > 1.0
     for g in range(NGUARDS):
         j = BOUNDS * GUARD_SERIES[g]
         row = GUARD_ROW[g]
@@ -75,6 +90,10 @@ def locate(lanes, h):
         p0, p1, p2 = select(on_boundary, a1, a0), select(on_boundary, a2, a1), select(on_boundary, a3, a2)
         p3 = select(on_boundary, 0.0, a3)
         rest = load(bounds, j + REST, LANES)
+        size = load(lanes.work, SCALE_ROW + g, LANES) + magnitude(a1) + magnitude(a2) + magnitude(a3) + rest
+        inherited = load(lanes.prior, PRIOR_ROWS * g + NEW, LANES)
+        store(lanes.prior, PRIOR_ROWS * g + OLD, inherited)
+        noise = ROUNDING * (size + inherited)
         bend = 2.0 * p2
         turns = (p1 < 0.0) & (p1 + bend > 0.0)
         vertex = p0 - p1 * p1 / (2.0 * bend)
@@ -83,11 +102,14 @@ def locate(lanes, h):
         rises = p1 + smaller(bend, 0.0) + smaller(3.0 * p3, 0.0) - 0.5 * rest > 0.0
         concave = larger(bend, bend + 6.0 * p3) + rest < 0.0
         convex = smaller(bend, bend + 6.0 * p3) - rest > 0.0
-        dips = convex & turns & (6.0 * (vertex + larger(p3, 0.0)) + rest < 0.0)
+        dips = convex & turns & (6.0 * (vertex + larger(p3, 0.0) + noise) + rest < 0.0)
         inside = p0 > 0.0
-        clear = inside & (((falls | rises | concave) & (end > 0.0)) | (6.0 * lowest > rest))
-        crosses = active & inside & (((end < 0.0) & (falls | concave | convex)) | dips)
-        least = select(clear & turns & active & (~on_boundary), smaller(lowest, least), least)
+        clear = inside & (((falls | rises | concave) & (end > noise)) | (6.0 * (lowest - noise) > rest))
+        crosses = active & inside & (((end < -noise) & (falls | concave | convex)) | dips)
+        returns = clear & (~on_boundary) & (a1 < 0.0) & (s * load(bounds, j + SLOPE_AT_END, LANES) > 0.0)
+        place, depth = turning_point(a0, a1, a2, a3)
+        nearer = returns & (depth < margin)
+        margin, turned_at = select(nearer, depth, margin), select(nearer, place * h, turned_at)
         taken = which >= 0.0
         parallel = (magnitude(chosen_row - row) < 0.5) & (s * chosen_s > 0.0) & (magnitude(a0 - nearest) > 0.0) & (~on_boundary)
         undecided = undecided | (active & (~clear) & (~crosses)) | (crosses & taken & (~parallel))
@@ -100,10 +122,20 @@ def locate(lanes, h):
                 select(crosses, s, chosen_s),
             )
             copy_gap(lanes.poly, lanes.work, row, s, a0, on_boundary, crosses)
-    store(run, LEAST, least)
+    store(lanes.found, NEAREST, margin)
+    store(lanes.found, TURNED, turned_at)
     which = select(undecided, -1.0, which)
     store(lanes.found, WHICH, which)
     return undecided
+
+
+@inner
+def turning_point(a0, a1, a2, a3):
+    """Place on [0, 1] and depth of a gap's minimum, from its cubic: the vertex of its quadratic part and one Newton step."""
+    x = larger(smaller(-a1 / (2.0 * a2), 1.0), 0.0)
+    x = x - fma(fma(3.0 * a3, x, 2.0 * a2), x, a1) / fma(6.0 * a3, x, 2.0 * a2)
+    x = larger(smaller(x, 1.0), 0.0)
+    return x, fma(fma(fma(a3, x, a2), x, a1), x, a0)
 
 
 @inner
@@ -121,7 +153,8 @@ def copy_gap(poly, work, row, s, a0, on_boundary, wanted):
 def newton(poly, h, wanted):
     """The root of P in (0, h) in the lanes wanted, P' there, and whether it has converged; started from the root of P's quadratic part.
 
-    The first two steps use only the leading terms. A lane that needs more than three steps gets them without touching the others.
+    The first two steps use only the leading terms. A step is the last if the square of its length times a bound of P''/2 on [0, h] (its
+    first four terms; the rest is smaller) says that what is left is below 1e-17 h. A lane that needs more than three steps gets them without touching the others.
     """
     a, b, c = load(poly, 0, LANES), load(poly, 1, LANES), load(poly, 2, LANES)
     x = 2.0 * a / (root(larger(b * b - 4.0 * a * c, 0.0)) - b)
@@ -129,13 +162,16 @@ def newton(poly, h, wanted):
     x, slope, change = newton_step(poly, x, NEWTON_DEGREE_1)
     x, slope, change = newton_step(poly, x, NEWTON_DEGREE_2)
     x, slope, change = newton_step(poly, x, ORDER)
+    bend = magnitude(c) + h * (
+        3.0 * magnitude(load(poly, 3, LANES)) + h * (6.0 * magnitude(load(poly, 4, LANES)) + h * 10.0 * magnitude(load(poly, 5, LANES)))
+    )
     allowed = 1.0e-17 * h
-    converged = change * change * magnitude(c) <= allowed * magnitude(slope)
+    converged = change * change * bend <= allowed * magnitude(slope)
     more = 0
     while more < 3 and any_lane(wanted & (~converged)):
         closer, steeper, change = newton_step(poly, x, ORDER)
         x, slope = select(converged, x, closer), select(converged, slope, steeper)
-        converged = converged | (change * change * magnitude(c) <= allowed * magnitude(slope))
+        converged = converged | (change * change * bend <= allowed * magnitude(slope))
         more += 1
     return x, slope, converged & (x > 0.0) & (x <= h) & (slope < 0.0)
 
@@ -163,7 +199,7 @@ def refine_crossings(lanes, h, undecided):
         x, slope, converged = newton(lanes.poly, h, crosses)
         undecided = undecided | (crosses & (~converged))
         crosses = crosses & converged
-        on_boundary = h < 0.0
+        on_boundary = splat(0.0, LANES) > 1.0
         for g in range(NGUARDS):
             on_boundary = on_boundary | ((load(lanes.fresh, g, LANES) > 0.5) & (magnitude(which - g) < 0.5))
         store(lanes.found, DELTA, select(crosses, x, h))
@@ -173,10 +209,22 @@ def refine_crossings(lanes, h, undecided):
 
 
 @inner
+def size_of_terms(lanes, g, share):
+    """Size of the terms of a gap over a share of the step: what its rounding error is measured by."""
+    j = BOUNDS * GUARD_SERIES[g]
+    t1, t2 = magnitude(load(lanes.bounds, j + LINEAR, LANES)), magnitude(load(lanes.bounds, j + QUADRATIC, LANES))
+    t3 = magnitude(load(lanes.bounds, j + CUBIC, LANES)) + load(lanes.bounds, j + REST, LANES)
+    return fma(fma(fma(t3, share, t2), share, t1), share, load(lanes.work, SCALE_ROW + g, LANES))
+
+
+@inner
 def advance(lanes, room, most_steps):
     """Evaluate the states at the end of the step, move the clock; returns the lanes that need attention."""
     work, clock, run = lanes.work, lanes.clock, lanes.run
     d = load(lanes.found, DELTA, LANES)
+    turned = load(lanes.found, TURNED, LANES) <= d
+    least = load(run, LEAST, LANES)
+    store(run, LEAST, select(turned, smaller(load(lanes.found, NEAREST, LANES), least), least))
     total = splat(0.0, LANES)
     for i in range(NSTATES):
         base = i * (ORDER + 1)
@@ -185,8 +233,12 @@ def advance(lanes, room, most_steps):
             value = fma(value, d, load(work, base + k, LANES))
         total = total + magnitude(value)
         store(lanes.y, i, value)
+    h = load(run, STEP, LANES)
+    share = select(d < h, d / h, 1.0)
     for g in range(NGUARDS):
         store(lanes.fresh, g, select(d > 0.0, 0.0, load(lanes.fresh, g, LANES)))
+        inherited = 0.5 * load(lanes.prior, PRIOR_ROWS * g + OLD, LANES)
+        store(lanes.prior, PRIOR_ROWS * g + NEW, size_of_terms(lanes, g, share) + inherited)
     start, end = load(clock, TAU, LANES), load(run, END, LANES)
     tau = select(d >= room, end, smaller(start + d, end))
     store(clock, TAU, tau)

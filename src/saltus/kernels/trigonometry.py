@@ -53,8 +53,8 @@ def sincos(angle):
     return s, c
 
 
-@njit
-def _two_product(a, b):
+@njit(_nrt=False)
+def two_product(a, b):
     """``a*b`` as a sum of two doubles (Dekker 1971; no fused multiply-add needed)."""
     p = a * b
     t = 134217729.0 * a
@@ -72,12 +72,12 @@ def turned(rate, period, count):
     Zero if the period holds a whole number of its cycles (to 4 ulp): that is what a harmonic of the forcing means, whatever the rounding
     of 1/f. Else the fraction of a turn is carried in two doubles, so the phase is right to 1e-13 after 1e6 periods.
     """
-    high, low = _two_product(rate, period)
+    high, low = two_product(rate, period)
     turns = high / TWO_PI_1
     if abs(turns - round(turns)) <= 4.0 * 2.220446049250313e-16 * abs(turns):
         return 0.0
-    back, back_low = _two_product(turns, TWO_PI_1)
+    back, back_low = two_product(turns, TWO_PI_1)
     rest = ((high - back) - back_low + low - turns * TWO_PI_2) / TWO_PI_1  # turns + rest is the quotient to 32 digits
-    whole, fraction = _two_product(turns, float(count))
+    whole, fraction = two_product(turns, float(count))
     gained = ((whole - round(whole)) + fraction) + rest * count
     return (gained - round(gained)) * TWO_PI_1

@@ -1,0 +1,128 @@
+"""What a kernel's name depends on: the equations, every template it is made of, versions, processor. Not parameter values."""
+
+from __future__ import annotations
+
+import re
+from importlib import resources
+
+import numba
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.codegen import cache, module
+
+METHODS = {
+    "taylor": lambda system: module.taylor_module(system, 20, 4),
+    "ode45": module.ode45_module,
+}
+
+
+@pytest.fixture
+def key(monkeypatch):
+    """A function: system -> name of its kernel, by one of the methods. Nothing is compiled."""
+    monkeypatch.setattr(module, "load", lambda key, source, title: key)
+    monkeypatch.setattr(module, "_interpreted", lambda key, head, templates: key)
+    module._environment.cache_clear()
+    yield lambda system, method="taylor": METHODS[method](system)
+    module._environment.cache_clear()
+
+
+def equation(power):
+    @sl.system(states="x v", name="same name")
+    def free(t, x, v, *, stiffness=2.0):
+        return v, -stiffness * x**power
+
+    return free
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_values_do_not_matter_and_equations_do(key, method):
+    rig = sl.models.delangre("b")
+    assert (
+        key(rig, method)
+        == key(rig.with_values(contact_stiffness="70 kN/m", frequency="7 Hz"), method)
+        == key(sl.models.delangre("c"), method)
+    )
+    assert key(equation(3), method) == key(equation(3), method)
+    assert key(equation(3), method) != key(equation(5), method)
+
+
+def test_methods_orders_and_lanes_have_kernels_of_their_own(key):
+    rig = sl.models.delangre("b")
+    keys = {module.taylor_module(rig, order, lanes) for order in (19, 20) for lanes in (2, 4, 8)} | {key(rig, "ode45")}
+    assert len(keys) == 7
+
+
+def modules_behind(method):
+    """File names of every text whose code is in a method's kernels: its templates, and what they import from the kernels folder."""
+    folder = resources.files("saltus.kernels")
+    seen, waiting = set(), list(TEMPLATES[method]) + re.findall(r"from saltus\.kernels\.(\w+) import", module._PREAMBLE)
+    while waiting:
+        name = waiting.pop().removesuffix(".py")
+        if name not in seen:
+            seen.add(name)
+            waiting += re.findall(r"from saltus\.kernels\.(\w+) import", folder.joinpath(f"{name}.py").read_text())
+    return sorted(f"{name}.py" for name in seen)
+
+
+def templates_of(method):
+    """Names of the templates that a method puts together."""
+    names = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_module", lambda title, head, templates, arguments: names.extend(templates))
+        METHODS[method](equation(3))
+    return names
+
+
+TEMPLATES = {method: templates_of(method) for method in METHODS}
+
+
+@pytest.mark.parametrize(("method", "edited"), [(method, name) for method in METHODS for name in modules_behind(method)])
+def test_an_edit_of_any_text_behind_a_kernel_gives_it_another_name(key, monkeypatch, method, edited):
+    before = key(equation(3), method)
+    template = module._template
+    monkeypatch.setattr(module, "_template", lambda name: template(name) + ("# edited\n" if name == edited else ""))
+    module._environment.cache_clear()
+    assert key(equation(3), method) != before
+
+
+@pytest.mark.parametrize(("owner", "name"), [(numba, "__version__"), (np, "__version__"), (module.sys, "version")])
+def test_versions_are_in_the_name(key, monkeypatch, owner, name):
+    before = key(equation(3))
+    monkeypatch.setattr(owner, name, "0.0 of another day")
+    module._environment.cache_clear()
+    assert key(equation(3)) != before
+
+
+def test_the_processor_is_in_the_name(key, monkeypatch):
+    before = key(equation(3))
+    monkeypatch.setattr(module.llvm, "get_host_cpu_name", lambda: "another processor")
+    module._environment.cache_clear()
+    assert key(equation(3)) != before
+
+
+@pytest.mark.parametrize(
+    ("features", "lanes"),
+    [({"avx512f": True, "avx512dq": True, "avx2": True, "fma": True}, 8), ({"avx2": True, "fma": True}, 4), ({"avx2": True}, 2), ({}, 2)],
+)
+def test_lane_width_is_the_processors(monkeypatch, features, lanes):
+    monkeypatch.setattr(module.llvm, "get_host_cpu_features", lambda: features)
+    assert module.lane_width() == lanes
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is cached with the JIT off")
+def test_new_values_never_recompile(monkeypatch):
+    """Values of a call, of a system, of a case, of each trajectory: one kernel for all, and once loaded it isn't even looked for."""
+    rig = sl.models.delangre("b")
+    sl.simulate(rig, (1e-3, 0.0), 1, samples=1)
+    before = {entry.name for entry in cache.entries()}
+    monkeypatch.setattr(cache, "_build", None)
+    for other in (
+        rig.with_values(contact_stiffness="70 kN/m"),
+        rig.with_values(frequency="7 Hz", cubic=0.0),
+        sl.models.delangre("a", mass="2 kg"),
+    ):
+        sl.simulate(other, {"x": [0.0, 1e-3], "v": [0.1, 0.0]}, 1, samples=1)
+    sl.stroboscope(rig, (1e-3, 0.0), 2, values={"frequency": [14.0, 15.0, 16.0]})
+    assert {entry.name for entry in cache.entries()} == before
