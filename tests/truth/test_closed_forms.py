@@ -41,7 +41,7 @@ def swing(rig, amplitude, guess, per_period, periods=10):
     return (times[per_period * periods] - times[0]) / periods
 
 
-# -- free vibration ------------------------------------------------------------------------------------------------------------------------
+# -- free vibration --------------------------------------------------------------------------------------------------------------
 
 
 def test_r01_dead_zone_only():
@@ -82,7 +82,7 @@ def test_arcsine_from_the_middle(angle, turned):
     assert abs(run.contact_velocity.values[0] - speed * math.cos(angle)) < 8 * EPS * speed / math.cos(angle)
 
 
-# -- grazing of a forced linear oscillator ---------------------------------------------------------------------------------------------------
+# -- grazing of a forced linear oscillator ---------------------------------------------------------------------------------------
 
 
 def steady_state(rig):
@@ -134,7 +134,7 @@ def test_r06b_grazing_frequency_of_the_rig():
     assert below.sizes["contact"] >= 4
 
 
-# -- contacts whose force jumps ----------------------------------------------------------------------------------------------------------------
+# -- contacts whose force jumps --------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +174,7 @@ def test_r11a_saltation_at_a_dry_friction_crossing(block):
     assert math.isclose(np.diff(run.end_v.values)[0] / 1e-4, float(VALUES["R11a"]), rel_tol=1e-6)
 
 
-# -- invariants of the rig's orbits ------------------------------------------------------------------------------------------------------------
+# -- invariants of the rig's orbits ----------------------------------------------------------------------------------------------
 
 
 def orbits():

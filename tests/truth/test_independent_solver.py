@@ -14,7 +14,7 @@ import saltus as sl
 
 pytest.importorskip("heyoka", reason="extra `reference` isn't installed")
 
-from oracles import heyoka_systems  # noqa: E402
+from oracles import heyoka_systems
 
 TIME, SHARE = 2e-14, 1e-13
 

@@ -227,8 +227,8 @@ def workspace():
     """The memory that one call of `propagate` works in; one set for each thread."""
     guards = max(NGUARDS, 1)
     rows = dict(
-        y=NSTATES, side=guards, fresh=guards, clock=TURN + NTURNS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1), prior=PRIOR_ROWS * guards, poly=ORDER + 1,
-        run=RUN_ROWS, found=FOUND_ROWS,
+        y=NSTATES, side=guards, fresh=guards, clock=TURN + NTURNS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
+        prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS,
     )  # fmt: skip
     lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: np.zeros((count, LANES)) for name, count in rows.items()})
     slow = Slow(
@@ -241,8 +241,8 @@ def workspace():
 @entry
 def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
               sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, budget,
-              lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found, lane_memo,
-              slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches):  # fmt: skip
+              lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found,
+              lane_memo, slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches):  # fmt: skip
     """Move every trajectory whose status is RUNNING to its end, `budget` steps of the lanes at most. See flow/engine.py for the arrays."""
     batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
                   sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options)  # fmt: skip
@@ -254,7 +254,8 @@ def propagate(period, origin, param, stride, state, count, phase, mode, fresh, c
     following = 0
     busy = 0
     for lane in range(LANES):
-        lanes.run[END, lane], lanes.run[ACTIVE, lane], lanes.clock[TAU, lane], lanes.memo[lane, WHO] = 1.0, 0.0, 0.0, -1
+        lanes.run[END, lane], lanes.run[ACTIVE, lane] = 1.0, 0.0
+        lanes.clock[TAU, lane], lanes.memo[lane, WHO] = 0.0, -1
     for lane in range(LANES):
         following = refill(lanes, lane, following, batch, slow)
         busy += lanes.run[ACTIVE, lane] > 0.5

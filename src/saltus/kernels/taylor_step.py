@@ -40,7 +40,7 @@ def longest(work, base, j, log2_tolerance):
 
 @inner
 def bound_series(lanes, h):
-    """For every series that a gap reads: its first three terms at h, its change over h, its slope there, the bound of what follows its cubic.
+    """For every series that a gap reads: its first three terms at h, its change over h, its slope there, a bound of what follows its cubic.
 
     Fills `bounds`: for x in [0, 1], gap(x h) = gap(0) + t1 x + t2 x^2 + t3 x^3 + rest(x), |rest| <= W/6, |rest'| <= W/2, |rest''| <= W
     with W = sum of k(k-1)|t_k| for k >= 4 (k(k-1) >= 2k >= 6 there).
@@ -154,7 +154,8 @@ def newton(poly, h, wanted):
     """The root of P in (0, h) in the lanes wanted, P' there, and whether it has converged; started from the root of P's quadratic part.
 
     The first two steps use only the leading terms. A step is the last if the square of its length times a bound of P''/2 on [0, h] (its
-    first four terms; the rest is smaller) says that what is left is below 1e-17 h. A lane that needs more than three steps gets them without touching the others.
+    first four terms; the rest is smaller) says that what is left is below 1e-17 h. A lane that needs more than three steps gets them
+    without touching the others.
     """
     a, b, c = load(poly, 0, LANES), load(poly, 1, LANES), load(poly, 2, LANES)
     x = 2.0 * a / (root(larger(b * b - 4.0 * a * c, 0.0)) - b)

@@ -1,4 +1,4 @@
-"""The folder of compiled kernels: shared by processes that start at once, damaged, unwritable, cleared. A kernel of one line stands for all."""
+"""The cache: many processes, entries damaged, unwritable, cleared. A kernel of one line stands for all."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def exact():
     with mp.workdps(22):
         for start, a in zip(STARTS, PARAMETERS, strict=True):
 
-            def field(t, y, a=mpf(float(a))):
+            def field(t, y, a=mpf(float(a))):  # noqa: B008
                 turn, push = rates(mp, t, *y, a)
                 return [turn, push + mp.sqrt(y[0] + 2) / 10]
 

@@ -79,7 +79,7 @@ def exact_jets(field, state, time, order=ORDER):
         series = [[mpf(float(y))] for y in state]
         for k in range(order):
             along = [lambda s, c=list(c): mp.polyval(c[::-1], s) for c in series]
-            rates = [mp.taylor(lambda s, i=i: field(mpf(float(time)) + s, *[y(s) for y in along])[i], 0, k)[k] for i in range(len(series))]
+            rates = [mp.taylor(lambda s, i=i: field(mpf(float(time)) + s, *[y(s) for y in along])[i], 0, k)[k] for i in range(len(series))]  # noqa: B023
             for c, rate in zip(series, rates, strict=True):
                 c.append(mp.re(rate) / (k + 1))
         return series
@@ -183,7 +183,7 @@ def test_jets_of_the_rig_in_every_mode():
     _, work = lane_jets(rig, states, times, values, order, period=rig.period())
     for lane in range(LANES):
 
-        def field(t, x, v, mode=np.sign(states[0, lane]) if states[0, lane] < 0 or states[0, lane] > 0.4e-3 else 0):
+        def field(t, x, v, mode=np.sign(states[0, lane]) if states[0, lane] < 0 or states[0, lane] > 0.4e-3 else 0):  # noqa: B008
             wn, w = 2 * mp.pi * p["natural_frequency"], 2 * mp.pi * p["frequency"]
             contact = 0 if mode == 0 else p["contact_stiffness"] * (x + p["lower_gap"] if mode < 0 else x - p["upper_gap"])
             drive = p["force"] * (1 - 18 / w**2) * mp.cos(w * t)
