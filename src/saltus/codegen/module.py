@@ -26,7 +26,7 @@ BATCH = (
 )  # fmt: skip
 
 #: Types of the arrays that kernels/taylor_lanes.py:workspace returns.
-TAYLOR_WORKSPACE = (_F2,) * 11 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2)
+TAYLOR_WORKSPACE = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2)
 #: Types of the arrays that kernels/dormand_prince.py:workspace returns.
 ODE45_WORKSPACE = (_F1,)
 
@@ -84,7 +84,7 @@ def _module(title: str, head: str, templates: tuple[str, ...], arguments: tuple[
 
 def _template(name: str) -> str:
     text = resources.files("saltus.kernels").joinpath(name).read_text()
-    return text.replace("from __future__ import annotations\n", "")
+    return text.replace("from __future__ import annotations\n", "\n")
 
 
 @cache

@@ -66,6 +66,19 @@ def _scale(factor: Expr, c: Expr, by_division: bool = False) -> Expr:
     return ex.div(c, factor) if by_division else ex.mul(c, factor)
 
 
+def _may_hide(series: Series) -> bool:
+    if series.kind in ("state", "time", "linear"):
+        return False
+    if series.kind == "product":
+        return any(s.kind == "time" or (s.kind == "linear" and _of_time(s)) for s in series.operands)
+    return not (series.kind in ("sin", "cos") and _of_time(series.operands[0]))
+
+
+def _of_time(series: Series) -> bool:
+    """Whether a series is time, or a linear form of time only."""
+    return series.kind == "time" or (series.kind == "linear" and all(s.kind == "time" for s in series.operands))
+
+
 class SeriesBuilder:
     """Turns expressions into :class:`Linear` forms over shared series."""
 
@@ -83,6 +96,13 @@ class SeriesBuilder:
     def series(self, node: Expr) -> Series:
         """The expression as one series."""
         return self._as_series(self.form(node))
+
+    def may_hide(self) -> bool:
+        """Whether some series can be asleep where it is expanded and awake within the step, so that its coefficients don't tell.
+
+        ``tanh`` and ``exp`` far from their bend, a high power of time: all but sums and products of states and harmonics of time.
+        """
+        return any(_may_hide(series) for series in self._known.values())
 
     # -- one node ---------------------------------------------------------------------------------------------------------------
     def _flatten(self, node: Expr) -> Linear:

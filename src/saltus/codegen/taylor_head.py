@@ -103,6 +103,10 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
         for k in range(order + 1):
             code.write(i * (order + 1) + k, code.state(i, k))
     guards, rows = _write_guards(system, code, builder, constants, order)
+    probe = JetCode(system.states, fields, builder, constants, 0)
+    probe.harmonics = code.harmonics
+    for i, form in enumerate(fields):
+        probe.write(i, probe.linear(form, 0))
     gap_row, scale_row = rows, rows + len(system.guards)
     constant_code = ScalarCode(parameter_leaf(system))
     for node, i in constants.rows.items():
@@ -114,6 +118,7 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
         LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order, NCONST=len(constants.rows),
         NTURNS=len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, ROWS=scale_row + len(system.guards),
         NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped), NSERIES=len(series),
+        PROBED=builder.may_hide(),
     )  # fmt: skip
     tables: dict[str, list] = dict(
         STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row, GUARD_SERIES=[series.index(row) for row in guards.row],
@@ -128,6 +133,7 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
             gaps_function(system),
             _turns_function(system, code),
             f"@inner\ndef jets(y, side, c, clock, work):\n{indented(code.lines)}\n",
+            f"@inner\ndef rates(y, side, c, clock, work):\n{indented(probe.lines)}\n",
         ]
     )
 

@@ -221,8 +221,12 @@ def change_side(lanes, lane, batch, g, rate, before, slow):
     who = lanes.memo[lane, WHO]
     velocity = rate * lanes.side[g, lane]
     lanes.side[g, lane] = -lanes.side[g, lane]
-    if lanes.memo[lane, STARTING] == 1 or lanes.memo[lane, BOUNCES] > 1:
-        return  # the side at the start is an initial condition; a return with no time passed was recorded when it came first
+    if lanes.memo[lane, STARTING] == 1:  # the side at the start is an initial condition, no event; a sample taken there had to guess it
+        for m in range(batch.cursor[who]):
+            batch.sample_mode[who, m] = mode_of(lanes, lane)
+        return
+    if lanes.memo[lane, BOUNCES] > 1:
+        return  # a return with no time passed was recorded when it came first
     shallow = is_shallow(lanes, lane, g, rate)
     batch.counters[who, EVENTS] += 1
     if shallow:

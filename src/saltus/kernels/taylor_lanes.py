@@ -228,7 +228,8 @@ def workspace():
     guards = max(NGUARDS, 1)
     rows = dict(
         y=NSTATES, side=guards, fresh=guards, clock=TURN + NTURNS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
-        prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS,
+        prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS, probe_y=NSTATES,
+        probe_clock=TURN + NTURNS, probe_rate=2 * NSTATES,
     )  # fmt: skip
     lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: np.zeros((count, LANES)) for name, count in rows.items()})
     slow = Slow(
@@ -242,12 +243,13 @@ def workspace():
 def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
               sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, budget,
               lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found,
-              lane_memo, slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches):  # fmt: skip
+              lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo, slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches):  # fmt: skip
     """Move every trajectory whose status is RUNNING to its end, `budget` steps of the lanes at most. See flow/engine.py for the arrays."""
     batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
                   sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options)  # fmt: skip
     lanes = Lanes(
-        lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found, lane_memo
+        lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found,
+        lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo,
     )
     slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches)
     roomy = rec_i.shape[0] - 2 * LANES * (NGUARDS + 1)

@@ -12,7 +12,8 @@ A guard is *fresh* while its lane stands exactly on the boundary: P(0) = 0, and 
 
 The head supplies the sizes LANES, NSTATES, NGUARDS, ORDER, NCONST, NTURNS, ROWS, NSERIES, the rows SERIES_ROW, GUARD_ROW, GUARD_SERIES,
 GUARD_SIGN, GAP_ROW, SCALE_ROW, SNAP_STATE, SNAP_CONST, the degrees NEWTON_DEGREE_1 and _2, and the functions constants(p, c, lane),
-gaps(t, y, p, out), turns(p, origin, period, count, lane, clock) and jets(y, side, c, clock, work).
+gaps(t, y, p, out), turns(p, origin, period, count, lane, clock), jets(y, side, c, clock, work) and rates(y, side, c, clock, work), the
+right-hand side alone; PROBED says whether a step must be probed with it.
 """
 
 from collections import namedtuple
@@ -42,6 +43,12 @@ COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
 MOST_BOUNCES = 100
 HUGE = 1.0e300
+#: A probed step is at most this share of a period, or of an unforced span (MATLAB's default too).
+LONGEST_SHARE = 0.1
+#: Defect that a sound step may have, in units of the tolerance: the derivative of the last terms is some N times their size.
+DEFECT = 1024.0
+#: Halvings of a step that its probes can ask for.
+MOST_HALVINGS = 40
 
-Lanes = namedtuple("Lanes", "y side fresh clock c work bounds prior poly run found memo")
+Lanes = namedtuple("Lanes", "y side fresh clock c work bounds prior poly run found probe_y probe_clock probe_rate memo")
 Slow = namedtuple("Slow", "q b bounds rates out gaps state touches")

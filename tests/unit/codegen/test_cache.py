@@ -1,4 +1,4 @@
-"""The cache: many processes, entries damaged, unwritable, cleared. A kernel of one line stands for all."""
+"""The folder of compiled kernels: shared by processes that start at once, damaged, unwritable, cleared. One line stands for a kernel."""
 
 from __future__ import annotations
 

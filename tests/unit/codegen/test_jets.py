@@ -73,13 +73,21 @@ def lane_jets(system: System, states, times, values, order=ORDER, period=1.0):
     return head, work
 
 
+def derivative(field, series, time, i, k):
+    """Coefficient k of rate i along the polynomials known so far."""
+
+    def rate(s):
+        return field(time + s, *[mp.polyval(c[::-1], s) for c in series])[i]
+
+    return mp.taylor(rate, 0, k)[k]
+
+
 def exact_jets(field, state, time, order=ORDER):
     """Taylor coefficients of y' = field(t, y): lists of mpf, one for each state."""
     with mp.workdps(60):
         series = [[mpf(float(y))] for y in state]
         for k in range(order):
-            along = [lambda s, c=list(c): mp.polyval(c[::-1], s) for c in series]
-            rates = [mp.taylor(lambda s, i=i: field(mpf(float(time)) + s, *[y(s) for y in along])[i], 0, k)[k] for i in range(len(series))]  # noqa: B023
+            rates = [derivative(field, series, mpf(float(time)), i, k) for i in range(len(series))]
             for c, rate in zip(series, rates, strict=True):
                 c.append(mp.re(rate) / (k + 1))
         return series

@@ -120,7 +120,9 @@ def plain(function, rows, width, results, flags=0):
 def rows(width, count, seed=0, special=True):
     rng = np.random.default_rng(seed)
     values = rng.normal(size=(count, width)) * 10.0 ** rng.integers(-3, 4, (count, width))
-    return rng.permuted(np.where(rng.random((count, width)) < 0.5, rng.choice(SPECIAL, (count, width)), values)) if special else values
+    mixed = np.where(rng.random((count, width)) < 0.5, rng.choice(SPECIAL, (count, width)), values)
+    mixed[:2, 0] = rng.permutation([0.0, -0.0])
+    return mixed if special else values
 
 
 @pytest.mark.nojit
@@ -133,6 +135,8 @@ def test_arithmetic_comparisons_and_choices(width):
         fused = [5, 6, 7]
         rest = [i for i in range(23) if i not in fused]
         assert np.array_equal(found[rest], expected[rest], equal_nan=True)
+        numbers = ~np.isnan(expected[rest])
+        assert np.array_equal(np.signbit(found[rest])[numbers], np.signbit(expected[rest])[numbers])  # 0 and -0 are told apart
         assert found_flags.tolist() == flags.tolist()
         with np.errstate(all="ignore"):
             size = np.abs(arguments[0] * arguments[1]) + np.abs(arguments[2]) + 2 * np.abs(arguments[0]) + np.abs(arguments[1]) + 2
