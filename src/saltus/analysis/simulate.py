@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,7 +16,7 @@ from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
-from saltus.flow.methods import Method, Taylor
+from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.results import trajectory_dataset
 from saltus.system.system import System
@@ -24,8 +25,8 @@ from saltus.system.system import System
 PER_PERIOD = 200
 #: Samples over the whole span of an unforced system.
 PER_SPAN = 2000
-#: Samples beyond which a call is refused: 16 GB of states.
-MOST_SAMPLES = 1_000_000_000
+#: Samples beyond which a call is refused: some 5 GB.
+MOST_SAMPLES = 300_000_000
 
 
 def simulate(
@@ -88,7 +89,7 @@ def simulate(
     Interrupted
         On Ctrl-C; its ``partial`` is the Dataset so far.
     """
-    method = method or Taylor()
+    method = check_method(method)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, t_end, t_start)
     plan = _plan(system, group, length, samples, keep)
@@ -136,19 +137,26 @@ def _plan(system: System, group: Ensemble, length: Span, samples: int | None, ke
         raise ParameterError(f"{system.name} has no forcing period, so keep= has no meaning. Start later, or take fewer samples=.")
     first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
     longest = np.max((length.count + length.phase / length.period) * per)
-    index = np.arange(first * per, int(longest + 1e-9) + 1)
-    if len(index) * group.size * len(system.states) > MOST_SAMPLES:
+    count = int(longest + 1e-9) + 1 - first * per
+    if count * group.size * len(system.states) > MOST_SAMPLES:
         raise ParameterError(
-            f"{group.size} trajectories with {len(index)} samples each don't fit in memory. Give keep= (last periods) or fewer samples=, "
+            f"{group.size} trajectories with {count} samples each don't fit in memory. Give keep= (last periods) or fewer samples=, "
             "or use sl.stroboscope."
         )
+    index = first * per + np.arange(count)
     return _Plan(Schedule(index // per, (index % per) / per), first)
 
 
 def _whole(value: int | None, name: str, default: int) -> int:
     if value is None:
         return default
-    if isinstance(value, bool) or value != int(value) or value < 1:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float | np.number)
+        or not math.isfinite(value)
+        or value != int(value)
+        or value < 1
+    ):
         raise ParameterError(f"{name} must be a whole number of at least 1, not {value!r}.")
     return int(value)
 

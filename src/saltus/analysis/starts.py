@@ -9,12 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, SaltusError, nearest
+from saltus.system import expression as ex
 from saltus.system.system import System
 from saltus.units import to_si
 
 #: Trajectories that a single call may hold before their starts alone fill memory.
 MOST_TRAJECTORIES = 100_000_000
+
+
+#: Different combinations of values whose periodicity is checked; each takes half a millisecond.
+MOST_PERIOD_CHECKS = 2000
 
 
 @dataclass(frozen=True)
@@ -61,8 +66,15 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     ParameterError, UnitError
         If a name is unknown, a number isn't finite, or lengths don't match.
     """
+    if not isinstance(system, System):
+        raise ParameterError(f"the system must be a System, not {type(system).__name__}. Put @sl.system(states=...) above the function.")
+    if values is not None and not isinstance(values, Mapping):
+        raise ParameterError('values must be a mapping, such as values={"frequency": [5.0, 10.0]}.')
     columns = _columns(system, start)
     given = {name: system.resolve(name, value) for name, value in (values or {}).items()}
+    deep = [name for name, value in given.items() if np.ndim(value) > 1]
+    if deep:
+        raise ParameterError(f"values of {deep[0]} must be one number or a one-dimensional array, one for each trajectory.")
     sizes = {name: np.size(array) for name, array in {**columns, **given}.items() if np.ndim(array)}
     count = max(sizes.values(), default=1)
     wrong = [f"{name} has {size}" for name, size in sizes.items() if size not in (1, count)]
@@ -76,9 +88,32 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     varied = {name: np.broadcast_to(np.ravel(value), count).astype(float) for name, value in given.items() if np.ndim(value)}
     shared = system.with_values(**{name: value for name, value in given.items() if not np.ndim(value)}).values
     if varied:
+        _check_period_of_each(system, shared, varied, count)
         rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
         return Ensemble(states, np.stack(rows, axis=1), varied, True)
     return Ensemble(states, np.array([list(shared.values())]), {}, bool(sizes))
+
+
+def _check_period_of_each(system: System, shared: Mapping[str, float], varied: Mapping[str, np.ndarray], count: int) -> None:
+    """The time dependence must repeat with the forcing period for every trajectory, not only for the system's own values.
+
+    Only parameters that the explicit time dependence can see are asked; each different combination once.
+    """
+    if system.forced_at is None:
+        return
+    timed = [node for rate in system.field for node in ex.walk(rate) if ex.depends_on(node, ("time",))]
+    seen = {leaf.payload for node in timed for leaf in ex.walk(node) if leaf.op == "param"}
+    columns = {name: values for name, values in varied.items() if name in seen}
+    done: set[tuple[float, ...]] = set()
+    for i in range(count if columns else 0):
+        key = tuple(float(values[i]) for values in columns.values())
+        if key in done or len(done) >= MOST_PERIOD_CHECKS:
+            continue
+        done.add(key)
+        try:
+            system.with_values(**{**shared, **dict(zip(columns, key, strict=True))})
+        except SaltusError as error:
+            raise ParameterError(f"trajectory {i}: {error}") from None
 
 
 def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
@@ -101,14 +136,18 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
 
 
 def _as_array(start: Any) -> np.ndarray:
+    """Rows as an array; mixed text and numbers stay as they are."""
     try:
-        return np.asarray(start)
+        rows = np.asarray(start)
+        return rows if rows.dtype.kind in "fiu" else np.asarray(start, dtype=object)
     except ValueError:
         raise ParameterError("a start must be a row of numbers, or rows of one length.") from None
 
 
 def _numbers(system: System, name: str, value: Any) -> np.ndarray:
-    array = np.asarray(value)
+    array = np.asarray(value) if isinstance(value, np.ndarray) else _as_array(value)
+    if array.size == 0:
+        raise ParameterError(f"the start of {name} is empty. Give at least one number.")
     if array.dtype.kind in "OUS":
         array = np.array([to_si(item, system.units[name], name) for item in np.ravel(array).tolist()]).reshape(array.shape)
     if array.dtype.kind not in "fiu" or array.ndim > 1:
@@ -142,6 +181,8 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
     """
     begin = _time(t_start, "t_start")
     n = group.size
+    if isinstance(periods, float) and not math.isfinite(periods):
+        raise ParameterError(f"periods must be a whole number of at least 1, not {periods!r}.")
     if (periods is None) == (t_end is None):
         raise ParameterError("give periods= (whole forcing periods) or t_end= (seconds), and only one of them.")
     if periods is not None:

@@ -14,7 +14,7 @@ from saltus.analysis.starts import ensemble, span
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
-from saltus.flow.methods import Method, Taylor
+from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.results import stroboscope_dataset
 from saltus.system.system import System
@@ -59,15 +59,17 @@ def stroboscope(
     Interrupted
         On Ctrl-C; its ``partial`` is the Dataset so far.
     """
-    method = method or Taylor()
+    method = check_method(method)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, None, t_start)
     if keep is not None and (isinstance(keep, bool) or keep != int(keep) or keep < 1):
         raise ParameterError(f"keep must be a whole number of at least 1, not {keep!r}.")
     first = 0 if keep is None else max(int(periods) + 1 - int(keep), 0)
+    if (int(periods) + 1 - first) * group.size * len(system.states) > MOST_VALUES:
+        raise ParameterError(
+            f"{group.size} trajectories with {int(periods) + 1 - first} periods each don't fit in memory. Give keep= (last periods)."
+        )
     kept = np.arange(first, int(periods) + 1, dtype=np.int64)
-    if len(kept) * group.size * len(system.states) > MOST_VALUES:
-        raise ParameterError(f"{group.size} trajectories with {len(kept)} periods each don't fit in memory. Give keep= (last periods).")
     schedule = Schedule(kept, np.zeros(len(kept)))
     request = Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, schedule, None)
 

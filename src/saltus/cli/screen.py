@@ -24,7 +24,7 @@ LOG_WIDTH = 220
 def console(stderr: bool = False) -> Console:
     """A console on the current standard output (or error)."""
     stream = sys.stderr if stderr else sys.stdout
-    return Console(stderr=stderr, highlight=False, width=None if stream.isatty() else LOG_WIDTH, soft_wrap=False)
+    return Console(stderr=stderr, highlight=False, emoji=False, width=None if stream.isatty() else LOG_WIDTH, soft_wrap=False)
 
 
 def show(table: TextTable) -> None:

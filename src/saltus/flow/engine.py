@@ -14,6 +14,7 @@ from types import ModuleType
 
 import numpy as np
 
+from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
@@ -137,6 +138,8 @@ def run(
     Interrupted
         On Ctrl-C, with the partial Outcome.
     """
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+        raise ParameterError(f"threads must be a whole number of at least 1, not {threads!r}.")
     module = method.kernels(system)
     outcome, whole = _allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))

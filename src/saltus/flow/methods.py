@@ -156,3 +156,13 @@ class ODE45(Method):
     def companion(self) -> Taylor:
         """The Taylor flow: exact, beside ode45."""
         return Taylor()
+
+
+def check_method(method: Any) -> Method:
+    """The method itself, the default for None. Raises ParameterError for anything that isn't one."""
+    if method is None:
+        return Taylor()
+    if not isinstance(method, Method):
+        what = method.__name__ + " itself" if isinstance(method, type) else repr(method)
+        raise ParameterError(f"method must be such as sl.Taylor() or sl.ODE45(rtol=1e-4, atol=1e-7), not {what}.")
+    return method

@@ -248,8 +248,21 @@ def propagate(period, origin, param, stride, state, count, phase, mode, fresh, c
     batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
                   sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options)  # fmt: skip
     lanes = Lanes(
-        lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found,
-        lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo,
+        lane_y,
+        lane_side,
+        lane_fresh,
+        lane_clock,
+        lane_c,
+        lane_work,
+        lane_bounds,
+        lane_prior,
+        lane_poly,
+        lane_run,
+        lane_found,
+        lane_probe_y,
+        lane_probe_clock,
+        lane_probe_rate,
+        lane_memo,
     )
     slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches)
     roomy = rec_i.shape[0] - 2 * LANES * (NGUARDS + 1)
