@@ -243,7 +243,8 @@ def workspace():
 def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
               sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, budget,
               lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found,
-              lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo, slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches):  # fmt: skip
+              lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo,
+              slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches):  # fmt: skip
     """Move every trajectory whose status is RUNNING to its end, `budget` steps of the lanes at most. See flow/engine.py for the arrays."""
     batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
                   sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options)  # fmt: skip
