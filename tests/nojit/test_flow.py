@@ -182,7 +182,8 @@ def test_overflow_is_a_status_and_stays_in_its_lane(method):
 
 def test_ode45_follows_a_parabola_to_rounding():
     """The pair is exact for it; the contact lies on its quartic, found to 128 ulp of time."""
-    run = sl.simulate(thrown(0.75), (0.0, 2.0), t_end=1.2, samples=6, method=sl.ODE45())
+    run = sl.simulate(thrown(0.75), (0.0, 2.0), t_end=1.2, samples=100, method=sl.ODE45())  # 100 in a period of 10 s
+    assert run.sizes["time"] == 13
     assert np.allclose(run.contact_time.values, [0.5], rtol=0, atol=128 * np.spacing(1.2))
     assert run.contact_direction.values.tolist() == [1]
     assert np.allclose(run.x.values, 2 * run.time.values - run.time.values**2, rtol=0, atol=1e-14)
@@ -198,6 +199,8 @@ def test_ode45_with_location_on_the_linear_rig():
     assert np.max(error) < 1e-7
     assert np.all(error <= run.contact_time_error.values)
     assert abs(run.end_x.item() - truth.end_x[0]) < 1e-8
+    for k in (1, 2):
+        assert abs(run.x.values[k] - closed_form(rig, 1e-3, 0.05, run.time.values[k]).end_x[0]) < 1e-8
 
 
 def test_ode45_steps_over_contacts_if_told_to():

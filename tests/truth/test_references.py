@@ -223,9 +223,14 @@ def test_every_contact_is_there_and_its_time_is_as_exact_as_it_says(rigs, method
     assert np.median(claimed / np.maximum(error, np.spacing(run.contact_time.values))) < 100
 
 
-@pytest.mark.parametrize(("rig", "number"), [("b4", 129), ("random", 48)])
+@pytest.mark.parametrize(("rig", "number"), [("b4", 128), ("b4", 129), ("b4", 131), ("random", 48)])
 def test_smallest_gap_margin_is_where_the_motion_turned_back(rig, number):
-    """Two rows whose margin is the gap left at a turning point (in the others it is the depth of a contact)."""
+    """Rows whose margin is the gap left at a turning point (in the others it is the depth of a contact)."""
     table, values = RIGS[rig]()
     margin = simulate(table, values, sl.Taylor()).smallest_gap_margin.values[number]
     assert np.isclose(margin, float(table[number]["margin_m"]), rtol=0.05, atol=0)
+
+
+def test_smallest_gap_margin_is_infinite_where_the_motion_never_turned_back():
+    table, values = RIGS["b4"]()
+    assert np.all(np.isinf(simulate(table, values, sl.Taylor()).smallest_gap_margin.values[:64]))  # fast starts: straight through

@@ -107,6 +107,7 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
     probe.harmonics = code.harmonics
     for i, form in enumerate(fields):
         probe.write(i, probe.linear(form, 0))
+        probe.write(2 * len(fields) + i, probe.size(form))
     gap_row, scale_row = rows, rows + len(system.guards)
     constant_code = ScalarCode(parameter_leaf(system))
     for node, i in constants.rows.items():

@@ -229,7 +229,7 @@ def workspace():
     rows = dict(
         y=NSTATES, side=guards, fresh=guards, clock=TURN + NTURNS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
         prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS, probe_y=NSTATES,
-        probe_clock=TURN + NTURNS, probe_rate=2 * NSTATES,
+        probe_clock=TURN + NTURNS, probe_rate=3 * NSTATES,
     )  # fmt: skip
     lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: np.zeros((count, LANES)) for name, count in rows.items()})
     slow = Slow(

@@ -45,7 +45,8 @@ MOST_BOUNCES = 100
 HUGE = 1.0e300
 #: A probed step is at most this share of a period, or of an unforced span (MATLAB's default too).
 LONGEST_SHARE = 0.1
-#: Defect that a sound step may have, in units of the tolerance: the derivative of the last terms is some N times their size.
+#: Defect that a sound step may have, in units of the tolerance and of the rounding of the right-hand side's terms: the derivative of the
+#: last terms is some N times their size.
 DEFECT = 1024.0
 #: Halvings of a step that its probes can ask for.
 MOST_HALVINGS = 40

@@ -76,7 +76,9 @@ def disagrees(lanes, h, share, log2_tolerance):
         base = i * (ORDER + 1)
         rate, slope = load(lanes.probe_rate, i, LANES), load(lanes.probe_rate, NSTATES + i, LANES)
         size = magnitude(load(work, base, LANES)) + h * (magnitude(load(work, base + 1, LANES)) + magnitude(rate))
-        wrong = wrong | (h * magnitude(rate - slope) > DEFECT * coarse_exp2(splat(log2_tolerance, LANES)) * size)
+        rounding = ROUNDING * load(lanes.probe_rate, 2 * NSTATES + i, LANES)
+        allowed = DEFECT * (coarse_exp2(splat(log2_tolerance, LANES)) * size + h * rounding)
+        wrong = wrong | (h * magnitude(rate - slope) > allowed)
     return wrong
 
 
