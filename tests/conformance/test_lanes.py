@@ -18,19 +18,22 @@ COUNT = 37  # no multiple of any lane width
 def _starts(count=COUNT, seed=1):
     rng = np.random.default_rng(seed)
     x, v = rng.uniform(-2, 2, count), rng.uniform(-2, 2, count)
-    x[:4], v[:4] = [0.4, 0.4, 0.0, -0.0], [0.0, 1.0, 0.0, -0.0]
+    x[:6], v[:6] = [0.4, 0.4, 0.4, 0.4, 0.0, -0.0], [0.0, 1.0, -1.0, 0.0, 0.0, -0.0]
     return {"x": x, "v": v}
 
 
 def _values(count=COUNT, seed=2):
     rng = np.random.default_rng(seed)
-    return {
+    values = {
         "frequency": rng.uniform(0.1, 0.6, count),
         "boundary": rng.uniform(-0.5, 1.0, count),
         "stiffness": 10.0 ** rng.uniform(0, 6, count),
         "preload": np.where(rng.random(count) < 0.3, rng.uniform(0, 1, count), 0.0),
         "force": rng.uniform(0.2, 3.0, count),
     }
+    values["boundary"][:4] = 0.4  # these start on their boundary; the first is held there by a preload from both sides
+    values["preload"][:2] = 9.0
+    return values
 
 
 def _run(start=None, values=None, system=SYSTEM, **options):
@@ -55,9 +58,11 @@ def _differing(ours, theirs):
 
 
 def test_the_batch_is_worth_the_comparison(batch):
-    """Thousands of contacts, and states that differ."""
+    """Thousands of contacts, states that differ, starts on the boundary, one that slides from the start."""
     assert batch.sizes["contact"] > 1000
     assert len(np.unique(batch.end_x)) > 30
+    assert {"ok", "sliding"} <= set(batch.status.values.tolist())
+    assert float(batch.end_time[0]) == 0.0
 
 
 def test_alone_or_in_a_batch(batch):

@@ -64,7 +64,7 @@ def clear() -> int:
     count = len(entries())
     if folder().exists():
         for path in folder().iterdir():
-            if (path / MANIFEST).exists() or (path / MODULE).exists():
+            if path.name.startswith(_BUILDING) or (path / MANIFEST).exists() or (path / MODULE).exists():
                 shutil.rmtree(path, ignore_errors=True)
     return count
 
@@ -95,6 +95,7 @@ def load(key: str, source: str, title: str) -> ModuleType:
             return _import(name, final / MODULE)
         except Exception as error:  # whatever a damaged file makes Numba raise: the entry is ours, so build it again
             warnings.warn(f"saltus: the cached kernel {final} could not be loaded ({error!r}); building it again.", stacklevel=2)
+            shutil.rmtree(final, ignore_errors=True)
     return _build(name, final, source, title)
 
 
