@@ -70,8 +70,15 @@ def _may_hide(series: Series) -> bool:
     if series.kind in ("state", "time", "linear"):
         return False
     if series.kind == "product":
-        return any(s.kind == "time" or (s.kind == "linear" and _of_time(s)) for s in series.operands)
+        return _degree_in_time(series) > 8
     return not (series.kind in ("sin", "cos") and _of_time(series.operands[0]))
+
+
+def _degree_in_time(series: Series) -> int:
+    """Power of time in a product."""
+    if series.kind == "product":
+        return sum(_degree_in_time(s) for s in series.operands)
+    return int(_of_time(series))
 
 
 def _of_time(series: Series) -> bool:
