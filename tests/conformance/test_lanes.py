@@ -134,7 +134,7 @@ def test_stroboscope_and_simulate_agree(batch):
     """Two ways to ask for the states at whole periods: the same bits; asking for fewer samples changes nothing."""
     strobe = sl.stroboscope(SYSTEM, _starts(), 12, values=_values(), threads=1)
     for name in ("x", "v"):
-        assert (strobe[name].values == batch[name].values[:, ::7]).all()
+        assert np.array_equal(strobe[name].values, batch[name].values[:, ::7], equal_nan=True)  # NaN after a trajectory that slid
     assert (strobe.steps == batch.steps).all()
     few = _run(values=_values(), samples=1, keep=2)
     assert (few.end_x.values == batch.end_x.values).all()
