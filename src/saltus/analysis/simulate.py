@@ -98,10 +98,11 @@ def simulate(
     show, close = reporter(progress)
     outcome = None
     try:
-        outcome = engine.run(system, method, plan.request(group, length), threads, show)
+        twice = time_errors == "measured" and bool(system.guards)
+        outcome = engine.run(system, method, plan.request(group, length), threads, _part(show, 0.0, 0.5 if twice else 1.0))
         errors = answers.local_time_errors(outcome)
-        if time_errors == "measured" and len(errors):
-            check = engine.run(system, method.companion(), plan.contacts_only(group, length), threads, show)
+        if twice:
+            check = engine.run(system, method.companion(), plan.contacts_only(group, length), threads, _part(show, 0.5, 0.5))
             errors = answers.measured_time_errors(outcome, check)
     except Interrupted as stop:
         so_far = stop.partial if outcome is None else outcome
@@ -113,6 +114,11 @@ def simulate(
     result = _dataset(system, method, group, length, plan, outcome, errors)
     warn(result)
     return result
+
+
+def _part(show: Callable[[float], None] | None, begin: float, share: float) -> Callable[[float], None] | None:
+    """Progress of one of two runs as a part of the whole."""
+    return None if show is None else lambda done: show(begin + share * done)
 
 
 @dataclass(frozen=True)
