@@ -1,5 +1,7 @@
 """Template, 2 of 4 of the Taylor flow: one step of all lanes, as arithmetic on lanes."""
 
+import math
+
 from saltus.kernels.isolation import ROUNDING
 from saltus.kernels.lanes import any_lane, bits, coarse_exp2, coarse_log2, fma, larger, load, magnitude, root, select, smaller, splat, store
 
@@ -121,7 +123,7 @@ def locate(lanes, h):
     active = load(lanes.run, ACTIVE, LANES) > 0.5
     which = splat(-1.0, LANES)
     nearest, chosen_row, chosen_s = splat(0.0, LANES), splat(-1.0, LANES), splat(0.0, LANES)
-    margin, turned_at = splat(HUGE, LANES), splat(0.0, LANES)
+    margin, turned_at = splat(math.inf, LANES), splat(0.0, LANES)
     undecided = splat(0.0, LANES) > 1.0
     for g in range(NGUARDS):
         j = BOUNDS * GUARD_SERIES[g]
