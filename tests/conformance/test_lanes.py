@@ -19,6 +19,7 @@ def _starts(count=COUNT, seed=1):
     rng = np.random.default_rng(seed)
     x, v = rng.uniform(-2, 2, count), rng.uniform(-2, 2, count)
     x[:6], v[:6] = [0.4, 0.4, 0.4, 0.4, 0.0, -0.0], [0.0, 1.0, -1.0, 0.0, 0.0, -0.0]
+    x[-4:], v[-4:] = x[:4], v[:4]
     return {"x": x, "v": v}
 
 
@@ -31,8 +32,8 @@ def _values(count=COUNT, seed=2):
         "preload": np.where(rng.random(count) < 0.3, rng.uniform(0, 1, count), 0.0),
         "force": rng.uniform(0.2, 3.0, count),
     }
-    values["boundary"][:4] = 0.4  # these start on their boundary; the first is held there by a preload from both sides
-    values["preload"][:2] = 9.0
+    for some in (slice(0, 4), slice(-4, None)):  # these start on their boundary; the first of each is held there by a preload
+        values["boundary"][some], values["preload"][some] = 0.4, [9.0, 9.0, 0.0, 0.0]
     return values
 
 
