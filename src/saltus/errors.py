@@ -31,7 +31,7 @@ class CacheError(SaltusError, OSError):
 
 
 class SaltusWarning(UserWarning):
-    """Some trajectories did not reach their end."""
+    """Something that doesn't stop the work but should be known: trajectories that ended early, a cache that can't be used."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -43,13 +43,14 @@ def demo(
     Example: `saltus demo --case c --frequency "5 Hz"`
     """
     from saltus.cli import screen
-    from saltus.results import save
+    from saltus.results import save, usable_folder
     from saltus.study import demo as study
+
+    usable_folder(out)
 
     with screen.working() as progress:
         result = study.demo(frequency, case.value, force, periods, progress)
     screen.show(result.table)
-    out.mkdir(parents=True, exist_ok=True)
     written = [save(result.run, out / "demo.nc"), result.table.write_csv(out / "demo.csv")]
     if plot:
         written.append(study.draw(result, out / "demo.png"))
@@ -72,16 +73,18 @@ def run(
     Example: `saltus run my_study.toml --system my_rig.py:rig`
     """
     from saltus.cli import screen
+    from saltus.results import usable_folder
     from saltus.study.own_system import own_system
     from saltus.study.read import read
     from saltus.study.run import run_study
 
     spec, text = read(study)
     own = own_system(system) if system else None
+    folder = usable_folder(out or Path("saltus-runs") / study.stem)
     with screen.working() as progress:
         outcome = run_study(spec, text, study.parent, own, threads, progress)
     screen.show(outcome.table)
-    screen.files(outcome.write(out or Path("saltus-runs") / study.stem))
+    screen.files(outcome.write(folder))
 
 
 @app.command()
@@ -189,4 +192,5 @@ def cache_clear() -> None:
     from saltus.cli import screen
     from saltus.codegen import cache as kernels
 
-    screen.say(f"deleted {kernels.clear()} entries from {kernels.folder()}")
+    count = kernels.clear()
+    screen.say(f"deleted {count} {'entry' if count == 1 else 'entries'} from {kernels.folder()}")

@@ -6,6 +6,7 @@ checksums is verified before anything is loaded; an entry that doesn't match is 
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import importlib.util
 import json
@@ -20,7 +21,7 @@ from types import ModuleType
 
 import platformdirs
 
-from saltus.errors import CacheError
+from saltus.errors import CacheError, SaltusWarning
 
 MANIFEST = "manifest.json"
 MODULE = "kernels.py"
@@ -94,8 +95,10 @@ def load(key: str, source: str, title: str) -> ModuleType:
         try:
             return _import(name, final / MODULE)
         except Exception as error:  # whatever a damaged file makes Numba raise: the entry is ours, so build it again
-            warnings.warn(f"saltus: the cached kernel {final} could not be loaded ({error!r}); building it again.", stacklevel=2)
+            warnings.warn(f"saltus: the cached kernel {final} could not be loaded ({error!r}); building it again.", SaltusWarning, stacklevel=2)
             shutil.rmtree(final, ignore_errors=True)
+    elif (final / MANIFEST).exists():
+        warnings.warn(f"saltus: the cached kernel {final} is damaged; building it again.", SaltusWarning, stacklevel=2)
     return _build(name, final, source, title)
 
 
@@ -127,38 +130,43 @@ def _import(name: str, file: Path) -> ModuleType:
     return module
 
 
-def _private_folder(key: str) -> Path:
-    """A new folder beside the entries; in the system's temporary folder if the cache can't be written."""
+def _build(name: str, final: Path, source: str, title: str) -> ModuleType:
+    """Compile beside the entries and publish; where that can't be written or is full, in a folder that goes with this process."""
     try:
         folder().mkdir(parents=True, exist_ok=True)
-        return Path(tempfile.mkdtemp(prefix=_BUILDING + key[:12] + "-", dir=folder()))
+        building, module = _compile(name, tempfile.mkdtemp(prefix=f"{_BUILDING}{final.name[:12]}-", dir=folder()), source, title)
     except OSError as error:
         warnings.warn(
-            f"saltus: {folder()} can't be written ({error.strerror}); kernels are compiled for this process only. "
-            "Set SALTUS_CACHE to a folder of yours.",
-            stacklevel=2,
+            f"saltus: {folder()} can't be written ({error.strerror or error}); kernels are compiled for this process only. "
+            "Set SALTUS_CACHE to a folder of yours with free space.",
+            SaltusWarning,
+            stacklevel=4,
         )
+        return _build_for_this_process(name, source, title)
+    _publish(building, final, source)
+    return module
+
+
+def _build_for_this_process(name: str, source: str, title: str) -> ModuleType:
     try:
-        return Path(tempfile.mkdtemp(prefix="saltus-"))
+        building, module = _compile(name, tempfile.mkdtemp(prefix="saltus-"), source, title)
     except OSError as error:
         raise CacheError(f"no folder for generated kernels: {error}. Set SALTUS_CACHE to a folder with free space.") from error
-
-
-def _build(name: str, final: Path, source: str, title: str) -> ModuleType:
-    building = _private_folder(final.name)
-    try:
-        (building / MODULE).write_text(source)
-        module = _import(name, building / MODULE)
-        (building / MANIFEST).write_text(json.dumps({"title": title, "files": _checksums(building)}, indent=1))
-    except OSError as error:
-        shutil.rmtree(building, ignore_errors=True)
-        raise CacheError(f"could not write kernels to {building}: {error}. Free some space, or set SALTUS_CACHE.") from error
-    except BaseException:
-        shutil.rmtree(building, ignore_errors=True)
-        raise
-    if building.parent == final.parent:
-        _publish(building, final, source)
+    atexit.register(shutil.rmtree, building, ignore_errors=True)
     return module
+
+
+def _compile(name: str, building: str, source: str, title: str) -> tuple[Path, ModuleType]:
+    """The module, compiled and with its manifest in a private folder, which is removed if anything goes wrong."""
+    path = Path(building)
+    try:
+        (path / MODULE).write_text(source)
+        module = _import(name, path / MODULE)
+        (path / MANIFEST).write_text(json.dumps({"title": title, "files": _checksums(path)}, indent=1))
+    except BaseException:
+        shutil.rmtree(path, ignore_errors=True)
+        raise
+    return path, module
 
 
 def _publish(building: Path, final: Path, source: str) -> None:

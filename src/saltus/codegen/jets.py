@@ -32,6 +32,17 @@ class Constants:
         return self.rows.setdefault(node, len(self.rows))
 
 
+def _age(series: Series) -> int:
+    """Which coefficients of a sum are known first: those of time, then the states', then those that products of states wait for."""
+    if series.kind == "state":
+        return 1
+    return 2 if _reads_state(series) else 0
+
+
+def _reads_state(series: Series) -> bool:
+    return series.kind == "state" or any(map(_reads_state, series.operands))
+
+
 class JetCode:
     """Emits lane code for the Taylor coefficients of a system.
 
@@ -130,7 +141,7 @@ class JetCode:
         total = self.coefficient(form.offset) if k == 0 and not is_constant(form.offset, 0.0) else None
         if total is not None and form.offset.op == "const":
             total = self._assign(f"splat({total}, LANES)")
-        for series, coefficient in form.terms.items():
+        for series, coefficient in sorted(form.terms.items(), key=lambda term: _age(term[0])) if k else form.terms.items():
             value = self.value(series, k)
             if value is None:
                 continue

@@ -29,7 +29,7 @@ RECORDS = 8192
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a computation. ``partial`` holds what was finished; the rest has status ``not_computed``."""
+    """Ctrl-C during a computation. ``partial`` holds what was finished; the rest has status ``interrupted`` or ``not_computed``."""
 
     partial: object = None
 
@@ -233,7 +233,8 @@ def _empty_table(chunk: _Chunk) -> None:
 def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]) -> Outcome:
     """Times at the end, and the contacts of all chunks in one sorted table."""
     outcome.time = whole["origin"] + whole["count"] * whole["period"] + whole["phase"]
-    whole["status"][whole["status"] == st.RUNNING] = st.NOT_COMPUTED
+    running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
+    whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     for chunk in chunks:
         _empty_table(chunk)
     integers = [part for chunk in chunks for part in chunk.integers]

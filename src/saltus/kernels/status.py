@@ -13,6 +13,7 @@ BUDGET_EVENTS = 7
 NONFINITE = 8
 INVALID = 9
 NOT_COMPUTED = 10
+INTERRUPTED = 11
 
 #: Name and meaning of every status code.
 STATUS = {
@@ -29,6 +30,7 @@ STATUS = {
     NONFINITE: ("nonfinite", "the state or its derivatives overflowed or became NaN"),
     INVALID: ("invalid", "the start or a parameter isn't a finite number"),
     NOT_COMPUTED: ("not_computed", "stopped before this trajectory was begun"),
+    INTERRUPTED: ("interrupted", "stopped on its way"),
 }
 
 # Kinds of contact record.

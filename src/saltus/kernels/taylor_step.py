@@ -225,15 +225,20 @@ def newton(poly, h, wanted):
 
 @inner
 def newton_step(poly, x, degree):
-    """One Newton step with the terms of P up to `degree`."""
-    p = load(poly, degree, LANES)
-    d = p
-    p = fma(p, x, load(poly, degree - 1, LANES))
-    for k in range(degree - 2, -1, -1):
-        d = fma(d, x, p)
-        p = fma(p, x, load(poly, k, LANES))
-    change = p / d
-    return x - change, d, change
+    """One Newton step with the terms of P up to `degree` (at least 4): even and odd terms apart, for half the latency of Horner's rule."""
+    u, top_even, top_odd = x * x, degree - degree % 2, degree - 1 + degree % 2
+    even, odd = load(poly, top_even, LANES), load(poly, top_odd, LANES)
+    even_rate, odd_rate = even, odd
+    even, odd = fma(even, u, load(poly, top_even - 2, LANES)), fma(odd, u, load(poly, top_odd - 2, LANES))
+    for k in range(top_even - 4, -1, -2):
+        even_rate = fma(even_rate, u, even)
+        even = fma(even, u, load(poly, k, LANES))
+    for k in range(top_odd - 4, -1, -2):
+        odd_rate = fma(odd_rate, u, odd)
+        odd = fma(odd, u, load(poly, k, LANES))
+    slope = fma(2.0 * x, fma(x, odd_rate, even_rate), odd)
+    change = fma(odd, x, even) / slope
+    return x - change, slope, change
 
 
 @inner
@@ -265,6 +270,18 @@ def size_of_terms(lanes, g, share):
 
 
 @inner
+def state_after(work, base, d):
+    """Value of a series at d. Even and odd terms apart, the first one added last: half the latency of Horner's rule, one large rounding."""
+    u, top_even, top_odd = d * d, ORDER - ORDER % 2, ORDER - 1 + ORDER % 2
+    even, odd = load(work, base + top_even, LANES), load(work, base + top_odd, LANES)
+    for k in range(top_even - 2, 0, -2):
+        even = fma(even, u, load(work, base + k, LANES))
+    for k in range(top_odd - 2, 0, -2):
+        odd = fma(odd, u, load(work, base + k, LANES))
+    return fma(even, u, odd * d) + load(work, base, LANES)
+
+
+@inner
 def advance(lanes, room, most_steps):
     """Evaluate the states at the end of the step, move the clock; returns the lanes that need attention."""
     work, clock, run = lanes.work, lanes.clock, lanes.run
@@ -274,10 +291,7 @@ def advance(lanes, room, most_steps):
     store(run, LEAST, select(turned, smaller(load(lanes.found, NEAREST, LANES), least), least))
     total = splat(0.0, LANES)
     for i in range(NSTATES):
-        base = i * (ORDER + 1)
-        value = load(work, base + ORDER, LANES)
-        for k in range(ORDER - 1, -1, -1):
-            value = fma(value, d, load(work, base + k, LANES))
+        value = state_after(work, i * (ORDER + 1), d)
         total = total + magnitude(value)
         store(lanes.y, i, value)
     h = load(run, STEP, LANES)

@@ -2,7 +2,7 @@
 
 from saltus.results.assemble import Contacts, Guards, stroboscope_dataset, trajectory_dataset
 from saltus.results.export import save, to_csv, to_mat, to_netcdf
-from saltus.results.files import ResultFileError
+from saltus.results.files import ResultFileError, usable_folder
 from saltus.results.load import load
 from saltus.results.provenance import attributes, content_hash, describe
 
@@ -20,4 +20,5 @@ __all__ = [
     "to_mat",
     "to_netcdf",
     "trajectory_dataset",
+    "usable_folder",
 ]

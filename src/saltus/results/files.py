@@ -57,6 +57,24 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
             part.unlink(missing_ok=True)
 
 
+def usable_folder(path: Path) -> Path:
+    """A folder that can be written to, made if it isn't there: asked before long work, not after it.
+
+    Raises
+    ------
+    ResultFileError
+        If it can't be made or written to.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / f".{uuid.uuid4().hex[:8]}.part"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise ResultFileError(f"{path} can't hold results: {error.strerror or error}. Nothing was computed; choose another folder.") from error
+    return path
+
+
 def _flush(path: Path) -> None:
     """Have what was written to a file, or the names in a folder, reach the disk."""
     if path.is_dir() and os.name == "nt":  # Windows can't open a folder

@@ -103,7 +103,7 @@ def test_cache(monkeypatch, tmp_path):
     (entry / "manifest.json").write_text('{"title": "rig, ode45", "files": {}}')
     assert "rig, ode45" in saltus("cache", "show").output
     assert saltus("cache").output == saltus("cache", "show").output
-    assert "deleted 1 entries" in saltus("cache", "clear").output
+    assert "deleted 1 entry from" in saltus("cache", "clear").output
     assert list(tmp_path.iterdir()) == []
 
 

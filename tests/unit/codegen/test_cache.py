@@ -14,7 +14,7 @@ import numba
 import pytest
 
 from saltus.codegen import cache
-from saltus.errors import CacheError
+from saltus.errors import CacheError, SaltusWarning
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is cached with the JIT off")
 
@@ -100,9 +100,11 @@ def test_a_damaged_entry_is_built_again(folder, damage):
     load()
     DAMAGES[damage](folder / KEY)
     cache.entries()  # shows what is there without failing
-    with warnings.catch_warnings(record=True):
+    with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         assert load().propagate(1) == 2
+    if said:
+        assert {warning.category for warning in said} == {SaltusWarning}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         before = stamps(folder)
@@ -178,6 +180,20 @@ def test_no_folder_at_all(folder, monkeypatch):
     monkeypatch.setattr(cache.tempfile, "mkdtemp", full)
     with pytest.warns(UserWarning, match="can't be written"), pytest.raises(CacheError, match="Set SALTUS_CACHE"):
         load()
+
+
+def test_a_full_disk_costs_time_not_the_run(folder, monkeypatch):
+    write = Path.write_text
+
+    def full_beside_the_entries(path, text, *rest, **options):
+        if folder in path.parents:
+            raise OSError(28, "No space left on device")
+        return write(path, text, *rest, **options)
+
+    monkeypatch.setattr(Path, "write_text", full_beside_the_entries)
+    with pytest.warns(SaltusWarning, match="No space left on device.*Set SALTUS_CACHE"):
+        assert load().propagate(1) == 2
+    assert list(folder.iterdir()) == []
 
 
 def test_a_kernel_that_does_not_compile_leaves_nothing_behind(folder):
