@@ -95,7 +95,9 @@ def load(key: str, source: str, title: str) -> ModuleType:
         try:
             return _import(name, final / MODULE)
         except Exception as error:  # whatever a damaged file makes Numba raise: the entry is ours, so build it again
-            warnings.warn(f"saltus: the cached kernel {final} could not be loaded ({error!r}); building it again.", SaltusWarning, stacklevel=2)
+            warnings.warn(
+                f"saltus: the cached kernel {final} could not be loaded ({error!r}); building it again.", SaltusWarning, stacklevel=2
+            )
             shutil.rmtree(final, ignore_errors=True)
     elif (final / MANIFEST).exists():
         warnings.warn(f"saltus: the cached kernel {final} is damaged; building it again.", SaltusWarning, stacklevel=2)

@@ -26,8 +26,9 @@ END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED = range(8)
 RUN_ROWS = 8
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
-# Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when.
-DELTA, RATE, WHICH, NEAREST, TURNED, FOUND_ROWS = range(6)
+# Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when;
+# of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1).
+DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, FOUND_ROWS = range(9)
 # Columns of `memo`: trajectory, periods, contacts in a row without time passing, whether its mode at the start is still being settled,
 # whether the slow path has decided this step, guards that it found to cross (bits), guards on which the state rests (bits).
 WHO, COUNT, BOUNCES, STARTING, DECIDED, HITS, RESTS = range(7)

@@ -112,7 +112,8 @@ def bound_series(lanes, h):
 
 @inner
 def locate(lanes, h):
-    """Find the lanes whose gaps may close within h. Fills `poly` and WHICH for those with one proven crossing; returns those undecided.
+    """Find the lanes whose gaps may close within h. Fills WHICH, SIGN, DEPTH, ONBOARD (and `poly`, unless
+    all gaps share one series) for those with one proven crossing; returns those undecided.
 
     A gap P (P/x where the root at 0 is known) is p0 + p1 x + p2 x^2 + p3 x^3 + rest on [0, 1]. If it is monotone or concave its end
     decides; if it is convex it crosses once where it ends below zero, and twice where its vertex is proven to be; else its quadratic part
@@ -122,7 +123,7 @@ def locate(lanes, h):
     bound_series(lanes, h)
     active = load(lanes.run, ACTIVE, LANES) > 0.5
     which = splat(-1.0, LANES)
-    nearest, chosen_row, chosen_s = splat(0.0, LANES), splat(-1.0, LANES), splat(0.0, LANES)
+    nearest, chosen_row, chosen_s, chosen_fresh = splat(0.0, LANES), splat(-1.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
     margin, turned_at = splat(math.inf, LANES), splat(0.0, LANES)
     undecided = splat(0.0, LANES) > 1.0
     for g in range(NGUARDS):
@@ -162,14 +163,15 @@ def locate(lanes, h):
         crosses = crosses & ((~taken) | (a0 < nearest))  # gaps of one state differ by a constant: the nearer closes first
         which = select(crosses, float(g), which)
         if any_lane(crosses):
-            nearest, chosen_row, chosen_s = (
-                select(crosses, a0, nearest),
-                select(crosses, float(row), chosen_row),
-                select(crosses, s, chosen_s),
-            )
-            copy_gap(lanes.poly, lanes.work, row, s, a0, on_boundary, crosses)
+            nearest, chosen_s = select(crosses, a0, nearest), select(crosses, s, chosen_s)
+            chosen_row, chosen_fresh = select(crosses, float(row), chosen_row), select(crosses, load(fresh, g, LANES), chosen_fresh)
+            if NSERIES > 1:
+                copy_series(lanes.poly, lanes.work, row, crosses)
     store(lanes.found, NEAREST, margin)
     store(lanes.found, TURNED, turned_at)
+    store(lanes.found, SIGN, chosen_s)
+    store(lanes.found, DEPTH, nearest)
+    store(lanes.found, ONBOARD, chosen_fresh)
     which = select(undecided, -1.0, which)
     store(lanes.found, WHICH, which)
     return undecided
@@ -185,38 +187,37 @@ def turning_point(a0, a1, a2, a3):
 
 
 @inner
-def copy_gap(poly, work, row, s, a0, on_boundary, wanted):
-    """Write P(d), or P(d)/d where the root at 0 is known, to `poly` in the lanes wanted."""
-    below = a0
-    for k in range(ORDER):
-        above = s * load(work, row + k + 1, LANES)
-        store(poly, k, select(wanted, select(on_boundary, above, below), load(poly, k, LANES)))
-        below = above
-    store(poly, ORDER, select(wanted, select(on_boundary, 0.0, below), load(poly, ORDER, LANES)))
+def copy_series(poly, work, row, wanted):
+    """Write a series to `poly` in the lanes wanted; the first term isn't needed."""
+    for k in range(1, ORDER + 1):
+        store(poly, k, select(wanted, load(work, row + k, LANES), load(poly, k, LANES)))
 
 
 @inner
-def newton(poly, h, wanted):
-    """The root of P in (0, h) in the lanes wanted, P' there, and whether it has converged; started from the root of P's quadratic part.
+def newton(terms, base, found, h, wanted):
+    """The root of P, or of P(d)/d where the root at 0 is known, in (0, h) in the lanes wanted; its derivative there; and where it is found.
 
-    The first two steps use only the leading terms. A step is the last if the square of its length times a bound of P''/2 on [0, h] (its
-    first four terms; the rest is smaller) says that what is left is below 1e-17 h. A lane that needs more than three steps gets them
+    P = P(0) + s (X(d) - X(0)) with the series X at `base`: guards of one series share its terms. Started from the root of the quadratic
+    part; the first two steps use only the leading terms. A step is the last if the square of its length times a bound of P''/2 on [0, h]
+    (its first four terms; the rest is smaller) says that what is left is below 1e-17 h. A lane that needs more than three steps gets them
     without touching the others.
     """
-    a, b, c = load(poly, 0, LANES), load(poly, 1, LANES), load(poly, 2, LANES)
+    s, depth, fresh = load(found, SIGN, LANES), load(found, DEPTH, LANES), load(found, ONBOARD, LANES) > 0.5
+    x1, x2, x3 = load(terms, base + 1, LANES), load(terms, base + 2, LANES), load(terms, base + 3, LANES)
+    a, b, c = select(fresh, s * x1, depth), s * select(fresh, x2, x1), s * select(fresh, x3, x2)
     x = 2.0 * a / (root(larger(b * b - 4.0 * a * c, 0.0)) - b)
     x = larger(smaller(x, h), 0.0)
-    x, slope, change = newton_step(poly, x, NEWTON_DEGREE_1)
-    x, slope, change = newton_step(poly, x, NEWTON_DEGREE_2)
-    x, slope, change = newton_step(poly, x, ORDER)
-    bend = magnitude(c) + h * (
-        3.0 * magnitude(load(poly, 3, LANES)) + h * (6.0 * magnitude(load(poly, 4, LANES)) + h * 10.0 * magnitude(load(poly, 5, LANES)))
-    )
+    x, slope, change = newton_step(terms, base, x, s, depth, fresh, NEWTON_DEGREE_1)
+    x, slope, change = newton_step(terms, base, x, s, depth, fresh, NEWTON_DEGREE_2)
+    x, slope, change = newton_step(terms, base, x, s, depth, fresh, ORDER)
+    x4, x5, x6 = load(terms, base + 4, LANES), load(terms, base + 5, LANES), load(terms, base + 6, LANES)
+    third, fourth, fifth = magnitude(select(fresh, x4, x3)), magnitude(select(fresh, x5, x4)), magnitude(select(fresh, x6, x5))
+    bend = fma(fma(fma(10.0 * fifth, h, 6.0 * fourth), h, 3.0 * third), h, magnitude(c))
     allowed = 1.0e-17 * h
     converged = change * change * bend <= allowed * magnitude(slope)
     more = 0
     while more < 3 and any_lane(wanted & (~converged)):
-        closer, steeper, change = newton_step(poly, x, ORDER)
+        closer, steeper, change = newton_step(terms, base, x, s, depth, fresh, ORDER)
         x, slope = select(converged, x, closer), select(converged, slope, steeper)
         converged = converged | (change * change * bend <= allowed * magnitude(slope))
         more += 1
@@ -224,20 +225,22 @@ def newton(poly, h, wanted):
 
 
 @inner
-def newton_step(poly, x, degree):
-    """One Newton step with the terms of P up to `degree` (at least 4): even and odd terms apart, for half the latency of Horner's rule."""
+def newton_step(terms, base, x, s, depth, fresh, degree):
+    """One Newton step with the terms of X up to `degree` (at least 5): even and odd terms apart, for half the latency of Horner's rule."""
     u, top_even, top_odd = x * x, degree - degree % 2, degree - 1 + degree % 2
-    even, odd = load(poly, top_even, LANES), load(poly, top_odd, LANES)
+    even, odd = load(terms, base + top_even, LANES), load(terms, base + top_odd, LANES)  # of Q = (X(d) - X(0))/d: odd/even + d * even/odd
     even_rate, odd_rate = even, odd
-    even, odd = fma(even, u, load(poly, top_even - 2, LANES)), fma(odd, u, load(poly, top_odd - 2, LANES))
-    for k in range(top_even - 4, -1, -2):
+    even, odd = fma(even, u, load(terms, base + top_even - 2, LANES)), fma(odd, u, load(terms, base + top_odd - 2, LANES))
+    for k in range(top_even - 4, 0, -2):
         even_rate = fma(even_rate, u, even)
-        even = fma(even, u, load(poly, k, LANES))
-    for k in range(top_odd - 4, -1, -2):
+        even = fma(even, u, load(terms, base + k, LANES))
+    for k in range(top_odd - 4, 0, -2):
         odd_rate = fma(odd_rate, u, odd)
-        odd = fma(odd, u, load(poly, k, LANES))
-    slope = fma(2.0 * x, fma(x, odd_rate, even_rate), odd)
-    change = fma(odd, x, even) / slope
+        odd = fma(odd, u, load(terms, base + k, LANES))
+    quotient = s * fma(even, x, odd)
+    quotient_rate = s * fma(2.0 * x, fma(x, even_rate, odd_rate), even)
+    slope = select(fresh, quotient_rate, fma(x, quotient_rate, quotient))
+    change = select(fresh, quotient, fma(x, quotient, depth)) / slope
     return x - change, slope, change
 
 
@@ -248,12 +251,13 @@ def refine_crossings(lanes, h, undecided):
     crosses = which >= 0.0
     store(lanes.found, DELTA, h)
     if any_lane(crosses):
-        x, slope, converged = newton(lanes.poly, h, crosses)
+        if NSERIES > 1:
+            x, slope, converged = newton(lanes.poly, 0, lanes.found, h, crosses)
+        else:
+            x, slope, converged = newton(lanes.work, SERIES_ROW[0], lanes.found, h, crosses)
         undecided = undecided | (crosses & (~converged))
         crosses = crosses & converged
-        on_boundary = splat(0.0, LANES) > 1.0
-        for g in range(NGUARDS):
-            on_boundary = on_boundary | ((load(lanes.fresh, g, LANES) > 0.5) & (magnitude(which - g) < 0.5))
+        on_boundary = load(lanes.found, ONBOARD, LANES) > 0.5
         store(lanes.found, DELTA, select(crosses, x, h))
         store(lanes.found, RATE, select(on_boundary, slope * x, slope))
         store(lanes.found, WHICH, select(crosses, which, -1.0))
@@ -271,14 +275,14 @@ def size_of_terms(lanes, g, share):
 
 @inner
 def state_after(work, base, d):
-    """Value of a series at d. Even and odd terms apart, the first one added last: half the latency of Horner's rule, one large rounding."""
+    """Value of a series at d. Even and odd terms apart, for half the latency; the last two sums are Horner's, as is the rounding."""
     u, top_even, top_odd = d * d, ORDER - ORDER % 2, ORDER - 1 + ORDER % 2
     even, odd = load(work, base + top_even, LANES), load(work, base + top_odd, LANES)
     for k in range(top_even - 2, 0, -2):
         even = fma(even, u, load(work, base + k, LANES))
     for k in range(top_odd - 2, 0, -2):
         odd = fma(odd, u, load(work, base + k, LANES))
-    return fma(even, u, odd * d) + load(work, base, LANES)
+    return fma(fma(even, d, odd), d, load(work, base, LANES))
 
 
 @inner

@@ -71,7 +71,9 @@ def usable_folder(path: Path) -> Path:
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise ResultFileError(f"{path} can't hold results: {error.strerror or error}. Nothing was computed; choose another folder.") from error
+        raise ResultFileError(
+            f"{path} can't hold results: {error.strerror or error}. Nothing was computed; choose another folder."
+        ) from error
     return path
 
 
