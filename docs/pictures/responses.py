@@ -31,6 +31,8 @@ def main(file: Path) -> None:
             axes[str(i)].set_title(_times(n), pad=24)
             if i:
                 axes[str(i)].set_ylabel("")
+        handles, _ = axes["4"].get_legend_handles_labels()
+        figure.legend(handles[-1:], ["once a forcing period"], loc="outside lower right")
         figure.savefig(file, dpi=150)
         plt.close(figure)
 

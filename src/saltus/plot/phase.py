@@ -134,6 +134,8 @@ def _dots(ax: Axes, points: np.ndarray, scales: tuple[Scale, Scale], color: str 
     size = 4.5 if len(points) <= 60 else 2.5 if len(points) <= 500 else 1.2
     label = "whole periods" if color is None else name if name not in ax.get_legend_handles_labels()[1] else None
     look = {"marker": "o", "ms": size, "mfc": color or OKABE_ITO["black"], "mec": "white", "mew": 0.4 if size > 2 else 0.0}
+    if color is None and size > 4:  # open circles: filled ones are contacts, in time histories
+        look |= {"ms": 4.2, "mfc": "white", "mec": OKABE_ITO["black"], "mew": 1.1}
     if len(points):
         draw.draw_points(ax, points[:, 0] * scales[0].factor, points[:, 1] * scales[1].factor, zorder=4, label=label, **look)
 

@@ -105,7 +105,7 @@ def draw(result: Demo, file: Path) -> Path:
             if i < len(STARTS) - 1:
                 row[0].set_xlabel("")
             row[0].set_title(f"start x, v = {_start(i)}: {text}", loc="left")
-        named = {label: handle for handle, label in _handles(axes[:, 0])}
+        named = {label: handle for handle, label in _handles(axes.flat)}
         figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
         figure.savefig(file)
         plt.close(figure)
