@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 import sys
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from types import ModuleType
 
@@ -56,6 +56,7 @@ def lane_width() -> int:
     return 4 if features.get("avx2") and features.get("fma") else 2
 
 
+@lru_cache(maxsize=64)
 def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
     """The compiled Taylor flow of a system. Parameters are arguments: new values never recompile."""
     title = f"{system.name}, Taylor order {order}, {lanes} lanes"
@@ -67,9 +68,15 @@ def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
     )
 
 
+@lru_cache(maxsize=64)
 def ode45_module(system: System) -> ModuleType:
     """The compiled ode45 of a system."""
     return _module(f"{system.name}, ode45", ode45_head(system), ("dormand_prince.py", "odezero.py", "ode45.py"), BATCH + ODE45_WORKSPACE)
+
+
+def capture_module() -> ModuleType:
+    """The compiled test of capture, the same for all systems."""
+    return _module("capture", "", ("capture.py",), (_F3, _F2, _F3, _I1, "float64", _I1, _I1))
 
 
 def _module(title: str, head: str, templates: tuple[str, ...], arguments: tuple[str, ...]) -> ModuleType:

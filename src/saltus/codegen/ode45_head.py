@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from saltus.codegen.scalar import ScalarCode
-from saltus.codegen.taylor_head import bits_of, evaluation_order, indented, parameter_leaf
+from saltus.codegen.saltation import jump_function
+from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
+from saltus.codegen.taylor_head import bits_of, evaluation_order
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
 from saltus.system.expression import Expr
@@ -114,6 +115,7 @@ def ode45_head(system: System) -> str:
         NGUARDS=len(gaps),
         NCONST=len(stages.constants.nodes),
         NDRIVE=len(stages.drives.nodes),
+        TANGENT=system.tangent_of is not None,
         GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
     )
     return "\n".join(
@@ -124,6 +126,7 @@ def ode45_head(system: System) -> str:
             f"@kernel\ndef drive(t, c, q):\n{indented(drive.lines)}\n",
             f"@kernel\ndef field(t, y, c, q, out):\n{field}\n",
             f"@kernel\ndef gaps(t, y, c, q, out):\n{gap_values}\n",
+            jump_function(system),
             f"@kernel\ndef gap_rates(t, y, dy, c, q, out):\n{gap_rates}\n",
         ]
     )

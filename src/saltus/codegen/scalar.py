@@ -6,8 +6,28 @@ from collections.abc import Callable, Iterable
 
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
+from saltus.system.system import System
 
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+
+
+def indented(lines: list[str]) -> str:
+    """Lines as a function body."""
+    return "\n".join("    " + line for line in lines) if lines else "    pass"
+
+
+def parameter_leaf(system: System, states: str | None = None) -> Callable[[Expr], str | None]:
+    """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions."""
+    names, state_names = tuple(system.values), system.states
+
+    def leaf(node: Expr) -> str | None:
+        if node.op == "param":
+            return f"p[{names.index(node.payload)}]"
+        if states and node.op == "state":
+            return f"{states}[{state_names.index(node.payload)}]"
+        return "t" if states and node.op == "time" else None
+
+    return leaf
 
 
 def condition_code(condition: ex.Condition, bit: Callable[[int], str], words: tuple[str, str, str] = ("and", "or", "not")) -> str:

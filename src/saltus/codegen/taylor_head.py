@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from saltus.codegen.jets import Constants, JetCode
-from saltus.codegen.scalar import ScalarCode
+from saltus.codegen.saltation import jump_function
+from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.series import Linear, SeriesBuilder, is_constant
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
@@ -13,25 +12,6 @@ from saltus.system.system import System
 
 #: Rows of the clock before the phases of harmonics (kernels/taylor_layout.py: TAU, BASE).
 FIRST_TURN = 2
-
-
-def indented(lines: list[str]) -> str:
-    """Lines as a function body."""
-    return "\n".join("    " + line for line in lines) if lines else "    pass"
-
-
-def parameter_leaf(system: System, states: str | None = None) -> Callable[[Expr], str | None]:
-    """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions."""
-    names, state_names = tuple(system.values), system.states
-
-    def leaf(node: Expr) -> str | None:
-        if node.op == "param":
-            return f"p[{names.index(node.payload)}]"
-        if states and node.op == "state":
-            return f"{states}[{state_names.index(node.payload)}]"
-        return "t" if states and node.op == "time" else None
-
-    return leaf
 
 
 def gaps_function(system: System) -> str:
@@ -119,7 +99,7 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
         LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order, NCONST=len(constants.rows),
         NTURNS=len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, ROWS=scale_row + len(system.guards),
         NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped), NSERIES=len(series),
-        PROBED=builder.may_hide(),
+        PROBED=builder.may_hide(), TANGENT=system.tangent_of is not None,
     )  # fmt: skip
     tables: dict[str, list] = dict(
         STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row, GUARD_SERIES=[series.index(row) for row in guards.row],
@@ -132,6 +112,7 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
             "",
             f"@kernel\ndef constants(p, c, lane):\n{indented(constant_code.lines)}\n",
             gaps_function(system),
+            jump_function(system),
             _turns_function(system, code),
             f"@inner\ndef jets(y, side, c, clock, work):\n{indented(code.lines)}\n",
             f"@inner\ndef rates(y, side, c, clock, work):\n{indented(probe.lines)}\n",

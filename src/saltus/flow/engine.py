@@ -141,7 +141,7 @@ def run(
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
         raise ParameterError(f"threads must be a whole number of at least 1, not {threads!r}.")
     module = method.kernels(system)
-    outcome, whole = _allocate(request, len(system.states), module)
+    outcome, whole = allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     options = method.numbers(periods)
     chunks = [_cut(request, whole, first, options) for first in range(0, len(request.start), CHUNK)]
@@ -166,7 +166,8 @@ def usable_processors() -> int:
 
 
 # -- arrays --------------------------------------------------------------------------------------------------------------------
-def _allocate(request: Request, states: int, module: ModuleType) -> tuple[Outcome, dict[str, np.ndarray]]:
+def allocate(request: Request, states: int, module: ModuleType) -> tuple[Outcome, dict[str, np.ndarray]]:
+    """The arrays that all chunks write to, at the start of a run, and the outcome that shows them."""
     n, m = len(request.start), len(request.schedule.count)
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
     whole = {
@@ -195,7 +196,7 @@ def _allocate(request: Request, states: int, module: ModuleType) -> tuple[Outcom
 
 
 #: Order of the arguments of every `propagate`.
-_ARGUMENTS = Batch._fields
+ARGUMENTS = Batch._fields
 
 
 def _cut(request: Request, whole: dict[str, np.ndarray], first: int, options: np.ndarray) -> _Chunk:
@@ -251,7 +252,7 @@ def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: threadin
     """Move a chunk to its end in slices; empties its table of contacts after each."""
     arrays = chunk.arrays
     while not stop.is_set():
-        outcome = module.propagate(*(arrays[name] for name in _ARGUMENTS), SLICE, *workspace)
+        outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), SLICE, *workspace)
         _empty_table(chunk)
         if shown:
             shown()

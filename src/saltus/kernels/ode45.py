@@ -185,6 +185,8 @@ def land(i, t, t_hit, t_new, h, batch, work):
     gap_rates_at(t_hit, NEXT, K1, Q, RATE, work)
     gap_errors(i, t_hit, batch, work)
     record_contacts(i, t_hit, batch, work)
+    if TANGENT:
+        rate_at(t_hit, NEXT, Q, K1, work)
     gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
 
 
@@ -217,6 +219,19 @@ def record_contacts(i, t_hit, batch, work):
             batch.minima[i, CONTACT_SPEED] = min(batch.minima[i, CONTACT_SPEED], abs(work[RATE + g]))
             record(i, g, t_hit, before, after, batch, work)
     batch.mode[i] = after
+    if TANGENT:
+        saltate(i, t_hit, before, after, batch, work)
+
+
+@inner
+def saltate(i, t_hit, before, after, batch, work):
+    """The jumps of the tangent that the states carry, guard by guard where several cross together."""
+    mode = before
+    for g in range(NGUARDS):
+        if changes_sign(work, LEFT, RIGHT, g):
+            flipped = (mode & ~(1 << g)) | (after & (1 << g))
+            jump(t_hit, part(work, NEXT, NSTATES), batch.param[i * batch.stride], mode, flipped, g)
+            mode = flipped
 
 
 @kernel

@@ -225,6 +225,8 @@ def change_side(lanes, lane, batch, g, rate, before, slow):
         for m in range(batch.cursor[who]):
             batch.sample_mode[who, m] = mode_of(lanes, lane)
         return
+    if TANGENT:
+        saltate(lanes, lane, batch, g, before, slow)
     if lanes.memo[lane, BOUNCES] > 1:
         return  # a return with no time passed was recorded when it came first
     shallow = is_shallow(lanes, lane, g, rate)
@@ -238,6 +240,17 @@ def change_side(lanes, lane, batch, g, rate, before, slow):
     kind = GRAZE_SHALLOW if shallow else CROSSING
     error = time_error(lanes, lane, batch, g, rate, tau)
     record(lanes, lane, batch, tau, g, direction, velocity, kind, before, mode_of(lanes, lane), error, slow.state)
+
+
+@kernel
+def saltate(lanes, lane, batch, g, before, slow):
+    """The jump of the tangent that the states carry, at a crossing of guard g out of mode `before`."""
+    for i in range(NSTATES):
+        slow.state[i] = lanes.y[i, lane]
+    parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
+    jump(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, before, mode_of(lanes, lane), g)
+    for i in range(NSTATES):
+        lanes.y[i, lane] = slow.state[i]
 
 
 @inner

@@ -36,6 +36,8 @@ class System:
         Coherent SI unit of each state and parameter; ``""`` if not declared, ``"1"`` for a plain number; read-only.
     forced_at : str or None
         The parameter that holds the forcing frequency, in Hz or rad/s as its unit says. None for a system without a period.
+    tangent_of : System or None
+        The system whose variational equations this one carries (see tangent.py); None for any other.
     """
 
     name: str
@@ -47,6 +49,7 @@ class System:
     forced_at: str | None = None
     source: str = ""
     description: str = ""
+    tangent_of: System | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", MappingProxyType(dict(self.values)))

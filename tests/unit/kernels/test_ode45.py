@@ -19,7 +19,7 @@ PREAMBLE = codegen._PREAMBLE.format(title="a test", arguments=", ".join(codegen.
 # The rig of de Langre et al., p = m zeta f_n alpha K_c j_1 j_2 p f, summed in the order of the paper's equation (3):
 # v' = -2 zeta wn v - wn^2 x - alpha/m x^3 - K_c/m (x beyond the gap) + p_eff cos(w t)/m. Two of Table 2's digits depend on it.
 RIG = """
-NSTATES, NGUARDS, NCONST, NDRIVE, GAPS_IN_TIME = 2, 2, 9, 1, False
+NSTATES, NGUARDS, NCONST, NDRIVE, GAPS_IN_TIME, TANGENT = 2, 2, 9, 1, False, False
 
 @kernel
 def prepare(p, c):
@@ -44,12 +44,16 @@ def gaps(t, y, c, q, out):
     out[0], out[1] = y[0] - c[0], y[0] - c[1]
 
 @kernel
+def jump(t, y, p, before, after, g):
+    pass
+
+@kernel
 def gap_rates(t, y, dy, c, q, out):
     out[0], out[1] = dy[0], dy[0]
 """
 # x' = a + b x^2 with boundaries at s_0 and at s_1 + r t; p = a b s_0 s_1 r.
 RAMP = """
-NSTATES, NGUARDS, NCONST, NDRIVE, GAPS_IN_TIME = 1, 2, 5, 1, True
+NSTATES, NGUARDS, NCONST, NDRIVE, GAPS_IN_TIME, TANGENT = 1, 2, 5, 1, True, False
 
 @kernel
 def prepare(p, c):
@@ -67,6 +71,10 @@ def field(t, y, c, q, out):
 @kernel
 def gaps(t, y, c, q, out):
     out[0], out[1] = y[0] - c[2], y[0] - c[3] - q[0]
+
+@kernel
+def jump(t, y, p, before, after, g):
+    pass
 
 @kernel
 def gap_rates(t, y, dy, c, q, out):

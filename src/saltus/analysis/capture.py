@@ -1,0 +1,139 @@
+"""Neighbourhoods of periodic attractors in which every trajectory is known to stay: who enters one need not be followed any further.
+
+About each point p of an orbit of period n the ellipsoid |W (x - p)| <= r is written in a norm in which the derivative M of the n-th return
+map contracts (discrete Lyapunov equation). r is taken such that some returns together were seen to contract: each of a set of points on two
+shells comes back at most half as far from p, in that norm, after the very same sequence of contacts as the orbit's own. Then every later
+visit is nearer still. That is a check at points, not a proof for all; within one sequence of contacts the return map is smooth.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
+from scipy.stats import qmc
+
+from saltus.analysis.orbits import Orbit
+from saltus.codegen.module import capture_module
+from saltus.flow.maps import Map
+
+#: Radii tried, in units of the scale of the states: from the whole range down to where only rounding is left.
+RADII = 2.0 ** -np.arange(1.0, 21.0, 0.5)
+#: Points on the outer shell for each dimension beyond the first; the inner shell has as many.
+DIRECTIONS = 16
+#: What is left of the distance after the returns that are looked at together, and how many these may be.
+CONTRACTION, MOST_RETURNS = 0.5, 64
+#: Part of the verified radius that is used.
+SAFETY = 0.9
+
+
+@dataclass(frozen=True)
+class Neighbourhoods:
+    """Ellipsoids about the points of attractors.
+
+    Attributes
+    ----------
+    centres : float64[m, D]
+        Ascending in the first state.
+    weights : float64[m, D, D]
+        W/r of each: inside where |W (x - c)| <= r.
+    owners : int64[m]
+        The attractor of each.
+    """
+
+    centres: np.ndarray
+    weights: np.ndarray
+    owners: np.ndarray
+
+    def capture(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """For trajectories float64[k, n, D]: the attractor that captures each (-1: none), and the index of the point at which it does."""
+        label, when = np.full(len(points), -1, np.int64), np.zeros(len(points), np.int64)
+        if len(self.centres):
+            capture_module().capture(np.ascontiguousarray(points), self.centres, self.weights, self.owners, self._reach(), label, when)
+        return label, when
+
+    def _reach(self) -> float:
+        """Half the largest extent along the first coordinate: sqrt of the corner of (W'W)^-1."""
+        return float(np.sqrt(np.linalg.inv(self.weights.transpose(0, 2, 1) @ self.weights)[:, 0, 0].max()) * (1 + 1e-12))
+
+
+def neighbourhoods(map_: Map, orbits: Sequence[Orbit], scale: np.ndarray) -> Neighbourhoods:
+    """Verified neighbourhoods of stable periodic orbits; an orbit whose contraction can't be verified gets none.
+
+    Parameters
+    ----------
+    map_ : Map
+        The map.
+    orbits : sequence of Orbit
+        Attractors; the index is the owner.
+    scale : float64[D]
+        Range of each state.
+    """
+    parts = [(_verified(map_, orbit, scale), owner) for owner, orbit in enumerate(orbits) if orbit.stable]
+    size = len(scale)
+    centres = np.concatenate([np.zeros((0, size)), *(centre for (centre, _), _ in parts)])
+    weights = np.concatenate([np.zeros((0, size, size)), *(weight for (_, weight), _ in parts)])
+    owners = np.concatenate([np.zeros(0, np.int64), *(np.full(len(centre), owner) for (centre, _), owner in parts)])
+    order = np.argsort(centres[:, 0], kind="stable")
+    return Neighbourhoods(np.ascontiguousarray(centres[order]), np.ascontiguousarray(weights[order]), owners[order].astype(np.int64))
+
+
+def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Centres and weights of one orbit: of each of its points a radius, found by bisection, at which the returns were seen to contract."""
+    n, size = orbit.points.shape
+    iterates = n * _returns(orbit)
+    norms = np.stack([_norm(matrix, scale) for matrix in orbit.monodromy])
+    shell = np.concatenate([_shell(size), 0.5 * _shell(size)])
+    directions = shell @ np.linalg.inv(norms).transpose(0, 2, 1)
+    _, own = map_.sequences(orbit.points, iterates)
+    small, large = np.full(n, len(RADII)), np.full(n, -1)  # indices of radii: the largest that passed, the smallest that failed
+    while (small - large > 1).any():
+        trial = np.minimum((small + large) // 2, len(RADII) - 1)
+        starts = orbit.points[:, None, :] + RADII[trial][:, None, None] * directions
+        ends, met = map_.sequences(starts.reshape(-1, size), iterates)
+        back = np.linalg.norm((ends.reshape(starts.shape) - orbit.points[:, None, :]) @ norms.transpose(0, 2, 1), axis=2)
+        with np.errstate(invalid="ignore"):
+            nearer = (back <= CONTRACTION * RADII[trial][:, None] * np.linalg.norm(shell, axis=1)).all(axis=1)
+        passed = nearer & [_alike(met[k * len(shell) : (k + 1) * len(shell)], own[k]) for k in range(n)]
+        searching = small - large > 1
+        small = np.where(searching & passed, trial, small)
+        large = np.where(searching & ~passed, trial, large)
+    have = small < len(RADII)
+    radius = SAFETY * RADII[small[have]]
+    return orbit.points[have], norms[have] / radius[:, None, None]
+
+
+def _returns(orbit: Orbit) -> int:
+    """Returns after which the linear part alone contracts to half of what is asked for."""
+    slowest = float(np.abs(orbit.multipliers[0]))
+    return 1 if slowest <= 0.5 * CONTRACTION else min(math.ceil(math.log(0.5 * CONTRACTION) / math.log(slowest)), MOST_RETURNS)
+
+
+def _alike(met: list[np.ndarray], own: np.ndarray) -> bool:
+    """Whether all sequences of contacts are that of the orbit, but for a contact at its very start or end."""
+    first, last = own[:1], own[-1:]
+    ends = (np.concatenate([head, middle, tail]) for head in (first[:0], last) for middle in (own, own[1:]) for tail in (first[:0], first))
+    same = {one.tobytes() for one in (*ends, *(np.concatenate([head, own[:-1]]) for head in (first[:0], last)))}
+    return all(one.tobytes() in same for one in met)
+
+
+def _norm(matrix: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """W with |W M x| <= q |W x|, q halfway between the spectral radius of M and 1; W x is at least x in units of the scale."""
+    scaled = matrix * scale[None, :] / scale[:, None]
+    q = 0.5 * (1.0 + np.abs(np.linalg.eigvals(scaled)).max())
+    gram = solve_discrete_lyapunov((scaled / q).T, np.eye(len(scale)))
+    return np.linalg.cholesky(0.5 * (gram + gram.T)).T / scale[None, :]
+
+
+def _shell(size: int) -> np.ndarray:
+    """Points on the unit sphere, float64[count, size]: evenly spaced in the plane, a fixed quasi-random set beyond it."""
+    if size == 1:
+        return np.array([[1.0], [-1.0]])
+    if size == 2:
+        angle = np.arange(2 * DIRECTIONS) * np.pi / DIRECTIONS
+        return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    normal = qmc.MultivariateNormalQMC(np.zeros(size), seed=1).random(DIRECTIONS * (size - 1) * 2)
+    return normal / np.linalg.norm(normal, axis=1)[:, None]

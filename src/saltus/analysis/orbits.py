@@ -1,0 +1,119 @@
+"""Periodic orbits of a map: polished by Newton's method, with their multipliers.
+
+Newton on P^n(x) - x = 0 with the derivative from the tangent flow; Parker & Chua, Practical Numerical Algorithms for Chaotic Systems (1989),
+chapter 5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.flow.maps import Map
+
+#: Newton steps: quadratic convergence needs a handful.
+MOST_STEPS = 30
+#: A step shorter than this times the scale is rounding.
+SHORTEST = 1e-15
+#: Mismatch of a polished orbit in units of the scale that is still rounding; monodromies of stiff orbits amplify it.
+CLOSED = 1e-12
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """An orbit of period n of a map with D states.
+
+    Attributes
+    ----------
+    points : float64[n, D]
+        Its points, in the order in which they are visited; the first is the smallest in the first state.
+    monodromy : float64[n, D, D]
+        Derivative of the n-th return at each of them.
+    multipliers : complex128[D]
+        Its eigenvalues, the largest first.
+    mismatch : float
+        Largest distance between a point and its n-th image, in units of the scale.
+    """
+
+    points: np.ndarray
+    monodromy: np.ndarray
+    multipliers: np.ndarray
+    mismatch: float
+
+    @property
+    def period(self) -> int:
+        """n."""
+        return len(self.points)
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool(np.abs(self.multipliers[0]) < 1.0)
+
+
+def polish(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
+    """The periodic orbit near a point, if Newton's method finds one.
+
+    Parameters
+    ----------
+    map_ : Map
+        The map.
+    start : float64[D]
+        A point near the orbit.
+    n : int
+        Its period; the result has the smallest period that divides n.
+    scale : float64[D]
+        Range of each state.
+
+    Returns
+    -------
+    Orbit or None
+    """
+    x = np.array(start, float)
+    for _ in range(MOST_STEPS):
+        end, matrix = map_.tangent(x[None], n)
+        if not np.isfinite(matrix).all():
+            return None
+        try:
+            step = np.linalg.solve(np.eye(len(x)) - matrix[0], end[0] - x)
+        except np.linalg.LinAlgError:
+            return None
+        x = x + step
+        length = np.abs(step / scale).max()
+        if not length < 1.0:
+            return None
+        if length < SHORTEST:
+            break
+    return _closed(map_, x, n, scale)
+
+
+def _closed(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
+    """The orbit through a point, if it comes back."""
+    points = np.concatenate([x[None], map_.launch(x[None], n).advance(n)[0]])
+    distances = np.abs((points[1:] - x) / scale).max(axis=1)
+    if not np.isfinite(distances).all() or distances[-1] > CLOSED * _stiffness(map_, x, n):
+        return None
+    n = 1 + int(np.argmax(distances <= max(10 * distances[-1], CLOSED)))
+    points = points[:n]
+    points = np.roll(points, -int(np.lexsort(points.T[::-1])[0]), axis=0)
+    _, matrices = map_.tangent(points, n)
+    if not np.isfinite(matrices).all():
+        return None
+    values = np.linalg.eigvals(matrices[0])
+    order = np.lexsort((-values.imag, -np.round(np.abs(values), 12)))
+    return Orbit(points, matrices, values[order], float(distances[n - 1]))
+
+
+def _stiffness(map_: Map, x: np.ndarray, n: int) -> float:
+    """How much the return amplifies rounding."""
+    _, matrix = map_.tangent(x[None], n)
+    return max(1.0, float(np.abs(matrix).max())) if np.isfinite(matrix).all() else 1.0
+
+
+def same(a: Orbit, b: Orbit, scale: np.ndarray, tolerance: float = 1e-6) -> bool:
+    """Whether two orbits are one: equal period, and each point of one lies on the other."""
+    if a.period != b.period:
+        return False
+    distances = np.abs((a.points[:, None] - b.points[None]) / scale).max(axis=2).min(axis=1)
+    return bool(distances.max() < tolerance)

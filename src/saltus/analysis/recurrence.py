@@ -1,0 +1,197 @@
+"""From trajectories of a map to its attractors: settle, notice what recurs, polish it, and find out what never does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from saltus.analysis.capture import Neighbourhoods, neighbourhoods
+from saltus.analysis.orbits import Orbit, polish, same
+from saltus.analysis.wandering import Wandering, merge, survey
+from saltus.flow.maps import Map
+
+#: Longest period looked for [iterates].
+LONGEST = 64
+#: Iterates between two looks: two of the longest periods.
+ROUND = 2 * LONGEST
+#: States a period apart that agree so well, in units of the scale, are worth a try by Newton.
+NEAR = 1e-3
+#: Orbits tried in one round; what isn't tried has its turn in the next.
+TRIES = 12
+#: Trajectories that never recur whose motion is surveyed.
+SURVEYED = 24
+
+
+@dataclass
+class Found:
+    """Attractors of a map, in the order of their ids.
+
+    Attributes
+    ----------
+    orbits : list of Orbit
+        The periodic ones, stable.
+    wandering : list of Wandering
+        Those that never repeat: their ids follow.
+    unstable : list of Orbit
+        Periodic orbits met on the way that don't attract.
+    near : Neighbourhoods
+        Where the periodic ones capture.
+    """
+
+    orbits: list[Orbit] = field(default_factory=list)
+    wandering: list[Wandering] = field(default_factory=list)
+    unstable: list[Orbit] = field(default_factory=list)
+    near: Neighbourhoods = field(default_factory=lambda: Neighbourhoods(np.zeros((0, 0)), np.zeros((0, 0, 0)), np.zeros(0, np.int64)))
+
+    def __len__(self) -> int:
+        return len(self.orbits) + len(self.wandering)
+
+    def ordered(self, map_: Map, scale: np.ndarray) -> Found:
+        """The same with ids that don't depend on the order of discovery: by period, then by size, then by place."""
+        orbits = sorted(self.orbits, key=lambda o: (o.period, *_rounded(o, scale)))
+        wandering = sorted(self.wandering, key=lambda w: (-round(w.exponent, 2), *w.first))
+        return Found(orbits, wandering, self.unstable, neighbourhoods(map_, orbits, scale))
+
+
+def _rounded(orbit: Orbit, scale: np.ndarray) -> tuple[float, ...]:
+    """Size and place of an orbit, coarse enough that rounding can't change their order."""
+    sizes = np.sqrt(np.mean((orbit.points / scale) ** 2, axis=0))
+    return tuple(np.round(np.concatenate([sizes, orbit.points[0] / scale]), 7).tolist())
+
+
+def find(
+    map_: Map,
+    start: np.ndarray,
+    scale: np.ndarray,
+    most: int,
+    known: Found | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Found, np.ndarray, np.ndarray]:
+    """The attractors that trajectories from given starts settle to.
+
+    Parameters
+    ----------
+    map_ : Map
+        The map.
+    start : float64[k, D]
+        Starts.
+    scale : float64[D]
+        Range of each state.
+    most : int
+        Iterates after which a trajectory that hasn't settled is surveyed for chaos.
+    known : Found, optional
+        Attractors that are known already.
+    progress : callable, optional
+        Called with the share done.
+
+    Returns
+    -------
+    found : Found
+        Known and new attractors, in the order of their ids.
+    label : int64[k]
+        The attractor of each start; -1 where none was established.
+    settled : int64[k]
+        Iterates after which it was captured; -1 if it wasn't.
+    """
+    found = known or Found()
+    found = Found(list(found.orbits), list(found.wandering), list(found.unstable), found.near)
+    owner: list[Orbit | Wandering | None] = [None] * len(start)
+    settled = np.full(len(start), -1, np.int64)
+    travel, going = map_.launch(start, most), np.arange(len(start))
+    while len(going) and travel.age < most:
+        points = travel.advance(ROUND)
+        here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
+        while len(here):
+            orbit = _new_orbit(map_, points[here], scale, found)
+            if orbit is None:
+                break
+            found.orbits.append(orbit)
+            found.near = neighbourhoods(map_, found.orbits, scale)
+            here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
+        stay = np.zeros(len(going), bool)
+        stay[here] = travel.going[here]
+        travel.keep(stay)
+        going = going[stay]
+        if progress:
+            progress(max(1.0 - len(going) / len(start), travel.age / most))
+    if len(going):
+        _survey(map_, travel.state, going, scale, found, owner)
+    result = found.ordered(map_, scale)
+    label = np.array([-1 if one is None else _index(result, one) for one in owner], np.int64)
+    return result, label, settled
+
+
+def _index(found: Found, attractor: Orbit | Wandering) -> int:
+    for i, one in enumerate([*found.orbits, *found.wandering]):
+        if one is attractor:
+            return i
+    raise AssertionError("an owner that isn't an attractor")
+
+
+def _captured(found: Found, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray) -> np.ndarray:
+    """Note which of the trajectories are captured, and after how many iterates."""
+    label, when = found.near.capture(points)
+    caught = label >= 0
+    for i, orbit, at in zip(who[caught], label[caught], when[caught], strict=True):
+        owner[i], settled[i] = found.orbits[orbit], age + at + 1
+    return caught
+
+
+def _new_orbit(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found) -> Orbit | None:
+    """An attracting orbit not known yet that one of the trajectories float64[k, ROUND, D] follows, if there is one."""
+    period, mismatch = recurrence(points, scale)
+    tries = [i for i in np.argsort(mismatch, kind="stable") if mismatch[i] < NEAR]
+    seen: list[np.ndarray] = []
+    for i in tries:
+        place = points[i, -1]
+        if any(_lies_on(place, orbit, scale, 10 * mismatch[i]) for orbit in found.unstable) or any(
+            np.abs((place - other) / scale).max() < NEAR for other in seen
+        ):
+            continue
+        if len(seen) >= TRIES:
+            break
+        seen.append(place)
+        orbit = polish(map_, place, int(period[i]), scale)
+        if orbit is None or not _lies_on(place, orbit, scale, 100 * NEAR):
+            continue
+        if not orbit.stable:
+            found.unstable.append(orbit)
+        elif not any(same(orbit, one, scale) for one in found.orbits):
+            return orbit
+    return None
+
+
+def recurrence(points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For trajectories float64[k, m, D]: the smallest n that repeats nearly as well as the best, and how well, in units of the scale."""
+    last = points[:, -1]
+    candidates = []
+    for n in range(1, points.shape[1] // 2 + 1):
+        apart = np.abs((points[:, -1] - points[:, -1 - n]) / scale).max(axis=1)
+        before = np.abs((points[:, -1 - n // 2] - points[:, -1 - n - n // 2]) / scale).max(axis=1)
+        candidates.append(np.maximum(apart, before))
+    mismatch = np.stack(candidates, axis=1)
+    mismatch = np.where(np.isfinite(mismatch), mismatch, np.inf)
+    best = mismatch.min(axis=1)
+    period = 1 + np.argmax(mismatch <= np.maximum(4.0 * best, 1e-12)[:, None], axis=1)
+    return period, np.where(np.isfinite(last).all(axis=1), mismatch[np.arange(len(points)), period - 1], np.inf)
+
+
+def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: float) -> bool:
+    return bool(np.abs((orbit.points - place) / scale).max(axis=1).min() < tolerance)
+
+
+def _survey(map_: Map, state: np.ndarray, who: np.ndarray, scale: np.ndarray, found: Found, owner: list) -> None:
+    """Survey some of the trajectories that never settled, and label all of them by where they wander."""
+    chosen = np.unique(np.linspace(0, len(who) - 1, min(SURVEYED, len(who))).astype(int))
+    seen = survey(map_, state[chosen], scale)
+    found.wandering = merge([*found.wandering, *(one for one in seen if one is not None)])
+    if not found.wandering:
+        return
+    points = map_.launch(state, ROUND).advance(ROUND)
+    for i, trail in zip(who, points, strict=True):
+        shares = [one.share(trail) for one in found.wandering]
+        best = int(np.argmax(shares))
+        if shares[best] > 0.9:
+            owner[i] = found.wandering[best]

@@ -1,0 +1,107 @@
+"""Attractors that never repeat: quasi-periodic and chaotic ones, told apart by their largest Lyapunov exponent, known by where they go.
+
+Exponents: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980), one direction renormalised at every block.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.flow.maps import Map
+
+#: Iterates of one block of the exponent, and blocks.
+BLOCK, BLOCKS = 8, 64
+#: Standard errors that an exponent must be from zero.
+SURE = 4.0
+#: Iterates whose places are noted.
+TRAIL = 4096
+#: Boxes across the range of a state.
+BOXES = 64
+#: Share of the places of one attractor that must lie in the other's boxes for both to be one.
+ALIKE = 0.6
+
+
+@dataclass(frozen=True)
+class Wandering:
+    """An attractor that never repeats.
+
+    Attributes
+    ----------
+    kind : str
+        ``"chaotic"`` or ``"quasi_periodic"``.
+    exponent, exponent_error : float
+        Largest Lyapunov exponent of the map and its standard error [per iterate].
+    points : float64[TRAIL, D]
+        Points on it.
+    scale : float64[D]
+        Range of each state.
+    """
+
+    kind: str
+    exponent: float
+    exponent_error: float
+    points: np.ndarray
+    scale: np.ndarray
+
+    @property
+    def first(self) -> tuple[float, ...]:
+        """Its mean place, for sorting."""
+        return tuple(np.round(self.points.mean(axis=0) / self.scale, 3).tolist())
+
+    def boxes(self) -> set[tuple[int, ...]]:
+        """The boxes that it visits, and their neighbours along each axis."""
+        cells = np.unique(_cells(self.points, self.scale), axis=0)
+        steps = np.concatenate([np.zeros((1, cells.shape[1]), int), np.eye(cells.shape[1], dtype=int), -np.eye(cells.shape[1], dtype=int)])
+        return set(map(tuple, (cells[:, None] + steps[None]).reshape(-1, cells.shape[1]).tolist()))
+
+    def share(self, points: np.ndarray) -> float:
+        """Share of points float64[n, D] that lie in its boxes."""
+        if not np.isfinite(points).all():
+            return 0.0
+        mine = self.boxes()
+        return float(np.mean([tuple(cell) in mine for cell in _cells(points, self.scale).tolist()]))
+
+
+def _cells(points: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    return np.floor(points / scale * BOXES).astype(int)
+
+
+def survey(map_: Map, start: np.ndarray, scale: np.ndarray) -> list[Wandering | None]:
+    """What trajectories from float64[k, D] are, after their transients; None for one that contracts (it has not settled yet) or escapes."""
+    exponents, errors = largest_exponents(map_, start, scale)
+    points = map_.launch(start, TRAIL).advance(TRAIL)
+    found: list[Wandering | None] = []
+    for exponent, error, trail in zip(exponents, errors, points, strict=True):
+        if not (np.isfinite(trail).all() and math.isfinite(exponent)) or exponent < -SURE * error:
+            found.append(None)
+        else:
+            found.append(Wandering("chaotic" if exponent > SURE * error else "quasi_periodic", float(exponent), float(error), trail, scale))
+    return found
+
+
+def largest_exponents(map_: Map, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Largest Lyapunov exponent [per iterate] and its standard error, of trajectories from float64[k, D]."""
+    k, size = start.shape
+    direction = np.zeros((k, size, size))
+    direction[:, :, 0] = scale / math.sqrt(size)
+    state, growths = start, []
+    for _ in range(BLOCKS):
+        state, image = map_.tangent(state, BLOCK, direction)
+        length = np.linalg.norm(image[:, :, 0] / scale, axis=1)
+        growths.append(np.log(length) / BLOCK)
+        direction = np.zeros((k, size, size))
+        direction[:, :, 0] = image[:, :, 0] / length[:, None]
+    blocks = np.array(growths[4:])
+    return blocks.mean(axis=0), blocks.std(axis=0, ddof=1) / math.sqrt(len(blocks))
+
+
+def merge(found: list[Wandering]) -> list[Wandering]:
+    """Those of a list that are different: of two that visit the same boxes the first is kept."""
+    kept: list[Wandering] = []
+    for one in found:
+        if not any(other.kind == one.kind and min(other.share(one.points), one.share(other.points)) > ALIKE for other in kept):
+            kept.append(one)
+    return kept

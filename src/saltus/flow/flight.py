@@ -1,0 +1,113 @@
+"""A flight: many trajectories on their way, moved some periods at a time and thinned out as they arrive."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate
+from saltus.flow.methods import Method
+from saltus.kernels import status as st
+from saltus.system.system import System
+
+#: Steps of the lanes in one call of the kernel.
+SLICE = 1_000_000
+#: Per-trajectory arrays of a batch that follow a trajectory when others leave.
+_FOLLOW = (
+    "period",
+    "origin",
+    "state",
+    "count",
+    "phase",
+    "mode",
+    "fresh",
+    "carry",
+    "status",
+    "end_count",
+    "end_phase",
+    "counters",
+    "minima",
+)
+
+
+class Flight:
+    """Trajectories of one system on one thread, all of the same age in forcing periods.
+
+    Parameters
+    ----------
+    system : System
+        The equations.
+    method : Method
+        How to integrate.
+    start : float64[k, D]
+        States at a whole period.
+    parameters : float64[1 or k, P]
+        Values in the order of ``system.values``.
+    period : float64[k]
+        Forcing period [s].
+    longest : float
+        Periods that will be asked for at most; sets the default step budget.
+    """
+
+    def __init__(self, system: System, method: Method, start: np.ndarray, parameters: np.ndarray, period: np.ndarray, longest: float):
+        count = len(start)
+        self._module = method.kernels(system)
+        self._workspace = self._module.workspace()
+        request = Request(start, parameters, period, 0.0, np.zeros(count, np.int64), np.zeros(count), Schedule.none(), None)
+        _, self._arrays = allocate(request, start.shape[1], self._module)
+        self._arrays["param"] = np.ascontiguousarray(parameters, float)
+        self._options = method.numbers(longest)
+        self.age = 0
+
+    def __len__(self) -> int:
+        return len(self._arrays["status"])
+
+    @property
+    def state(self) -> np.ndarray:
+        """States now, float64[k, D]."""
+        return self._arrays["state"]
+
+    @property
+    def status(self) -> np.ndarray:
+        """Status codes, int64[k]; OK for those that are still on their way."""
+        return self._arrays["status"]
+
+    @property
+    def unresolved(self) -> np.ndarray:
+        """Grazes so far that were shallower than the local error, int64[k]."""
+        return self._arrays["counters"][:, st.UNRESOLVED]
+
+    @property
+    def going(self) -> np.ndarray:
+        """Which trajectories can go on, bool[k]."""
+        return np.isin(self.status, (st.RUNNING, st.OK, st.GRAZE_UNRESOLVED))
+
+    def advance(self, periods: int) -> np.ndarray:
+        """Move on by whole periods.
+
+        Returns
+        -------
+        float64[k, periods, D]
+            States at each of them; NaN from where a trajectory has ended on.
+        """
+        arrays = self._arrays
+        k, states = arrays["state"].shape
+        arrays["status"][self.going] = st.RUNNING
+        arrays["end_count"] = np.full(k, self.age + periods, np.int64)
+        samples = np.full((k, periods, states), np.nan)
+        call = dict(
+            arrays, stride=np.int64(0 if len(arrays["param"]) == 1 else 1), cursor=np.zeros(k, np.int64), samples=samples,
+            sample_count=np.arange(self.age + 1, self.age + periods + 1, dtype=np.int64), sample_fraction=np.zeros(periods),
+            sample_mode=np.zeros((k, periods), np.int64), rec_first=np.zeros(k, np.int64), rec_i=np.zeros((0, st.RECORD_INTEGERS), np.int64),
+            rec_f=np.zeros((0, st.RECORD_FLOATS + states + 1)), rec_used=np.zeros(1, np.int64), options=self._options,
+        )  # fmt: skip
+        while self._module.propagate(*(call[name] for name in ARGUMENTS), SLICE, *self._workspace) == st.PAUSED:
+            pass
+        self.age += periods
+        return samples
+
+    def keep(self, wanted: np.ndarray) -> None:
+        """Let go of the trajectories that aren't wanted, bool[k]."""
+        if len(self._arrays["param"]) > 1:
+            self._arrays["param"] = np.ascontiguousarray(self._arrays["param"][wanted])
+        for name in _FOLLOW:
+            self._arrays[name] = np.ascontiguousarray(self._arrays[name][wanted])

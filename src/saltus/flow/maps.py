@@ -1,0 +1,189 @@
+"""Maps: what attractors and basins are asked of. The stroboscope of a flow, or any function from states to states, behind one interface."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.flow import engine
+from saltus.flow.engine import Request, Schedule
+from saltus.flow.flight import Flight
+from saltus.flow.methods import Method
+from saltus.kernels import status as st
+from saltus.system.system import System
+from saltus.system.tangent import tangent_system
+
+
+class Travel(Protocol):
+    """Trajectories of a map on their way; see :class:`saltus.flow.flight.Flight`."""
+
+    age: int
+
+    def __len__(self) -> int: ...
+    @property
+    def state(self) -> np.ndarray: ...
+    @property
+    def going(self) -> np.ndarray: ...
+    @property
+    def status(self) -> np.ndarray: ...
+    @property
+    def unresolved(self) -> np.ndarray: ...
+    def advance(self, periods: int) -> np.ndarray: ...
+    def keep(self, wanted: np.ndarray) -> None: ...
+
+
+class Map(Protocol):
+    """A map of states to states. k points, D states.
+
+    Attributes
+    ----------
+    states : tuple of str
+        Their names.
+    period : float
+        Time of one iterate [s]; 1 for a map without time.
+    """
+
+    states: tuple[str, ...]
+    period: float
+
+    def launch(self, start: np.ndarray, longest: float) -> Travel:
+        """Trajectories from float64[k, D]; they will be asked for ``longest`` iterates at most."""
+
+    def tangent(self, start: np.ndarray, count: int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """End states float64[k, D] after ``count`` iterates and the derivative times ``directions`` (default: identity) float64[k, D, D]."""
+
+    def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        """End states after ``count`` iterates, and for each start the contacts on the way: guard and direction in one number."""
+
+
+class Stroboscope:
+    """The states of a flow at whole forcing periods, as a map.
+
+    Parameters
+    ----------
+    system : System
+        Equations and values.
+    method : Method
+        How to integrate.
+    every : float, optional
+        Time between two looks [s]: for systems without forcing.
+    threads : int, optional
+        Threads for :meth:`tangent` and :meth:`sequences`.
+    """
+
+    def __init__(self, system: System, method: Method, every: float | None = None, threads: int | None = None):
+        if (every is None) == (system.forced_at is None):
+            told = "has no forcing period: give every=, the time between two looks" if every is None else "is forced: leave every= out"
+            raise ParameterError(f"{system.name} {told}.")
+        self.system, self.method, self.states, self._threads = system, method, system.states, threads
+        self.period = float(system.period() if every is None else every)
+        if not 0 < self.period < math.inf:
+            raise ParameterError(f"every must be a positive time, not {every!r}.")
+        self._parameters = np.array([list(system.values.values())])
+        self._tangent = tangent_system(system)
+
+    def launch(self, start: np.ndarray, longest: float) -> Flight:
+        """See :class:`Map`."""
+        return Flight(self.system, self.method, start, self._parameters, np.full(len(start), self.period), longest)
+
+    def tangent(self, start: np.ndarray, count: int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`Map`."""
+        k, size = start.shape
+        first = np.broadcast_to(np.eye(size), (k, size, size)) if directions is None else directions
+        outcome = self._run(self._tangent, np.concatenate([start, first.reshape(k, size * size)], axis=1), count, None)
+        lost = ~np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED))
+        outcome.state[lost] = np.nan
+        return outcome.state[:, :size], outcome.state[:, size:].reshape(k, size, size)
+
+    def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        """See :class:`Map`."""
+        outcome = self._run(self.system, start, count, 0)
+        table = outcome.record_integers
+        codes = 4 * table[:, st.REC_GUARD] + table[:, st.REC_DIRECTION] + 1 + 1000 * table[:, st.REC_KIND]
+        return outcome.state, np.split(codes, np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(1, len(start))))
+
+    def trajectory(self, start: np.ndarray, count: int, samples: int) -> tuple[np.ndarray, engine.Outcome]:
+        """States at ``samples`` instants of each of ``count`` periods, the start included, float64[k, count * samples, D]; and the outcome."""
+        index = np.arange(count * samples)
+        outcome = self._run(self.system, start, count, 0, Schedule(index // samples, (index % samples) / samples))
+        return outcome.samples, outcome
+
+    def _run(self, system: System, start: np.ndarray, count: int, record: int | None, schedule: Schedule | None = None) -> engine.Outcome:
+        k = len(start)
+        ends = np.full(k, count, np.int64)
+        request = Request(start, self._parameters, np.full(k, self.period), 0.0, ends, np.zeros(k), schedule or Schedule.none(), record)
+        return engine.run(system, self.method, request, self._threads)
+
+
+class FunctionMap:
+    """A map given as a function of arrays: ``image = function(states)`` with float64[k, D] in and out.
+
+    Parameters
+    ----------
+    function : callable
+        The map; must treat each row alone.
+    states : str
+        Names of the states, such as ``"x y"``.
+    derivative : callable
+        ``derivative(states) -> float64[k, D, D]``.
+    """
+
+    def __init__(self, function: Callable[[np.ndarray], np.ndarray], states: str, derivative: Callable[[np.ndarray], np.ndarray]):
+        self.states, self.period = tuple(states.split()), 1.0
+        self._function, self._derivative = function, derivative
+
+    def launch(self, start: np.ndarray, longest: float) -> _Iterates:
+        """See :class:`Map`."""
+        return _Iterates(self._function, start)
+
+    def tangent(self, start: np.ndarray, count: int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`Map`."""
+        state, matrix = start, np.eye(start.shape[1]) if directions is None else directions
+        for _ in range(count):
+            matrix = self._derivative(state) @ matrix
+            state = self._function(state)
+        return state, np.broadcast_to(matrix, (*start.shape, start.shape[1]))
+
+    def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        """See :class:`Map`."""
+        state = start
+        for _ in range(count):
+            state = self._function(state)
+        return state, [np.zeros(0, np.int64)] * len(start)
+
+
+class _Iterates:
+    """Trajectories of a function map."""
+
+    def __init__(self, function: Callable[[np.ndarray], np.ndarray], start: np.ndarray):
+        self._function, self.state, self.age = function, np.array(start, float), 0
+
+    def __len__(self) -> int:
+        return len(self.state)
+
+    @property
+    def going(self) -> np.ndarray:
+        return np.isfinite(self.state).all(axis=1)
+
+    @property
+    def status(self) -> np.ndarray:
+        return np.where(self.going, st.OK, st.NONFINITE)
+
+    @property
+    def unresolved(self) -> np.ndarray:
+        return np.zeros(len(self), np.int64)
+
+    def advance(self, periods: int) -> np.ndarray:
+        points = np.empty((len(self), periods, self.state.shape[1]))
+        with np.errstate(all="ignore"):
+            for j in range(periods):
+                points[:, j] = self.state = self._function(self.state)
+        self.age += periods
+        return points
+
+    def keep(self, wanted: np.ndarray) -> None:
+        self.state = self.state[wanted]

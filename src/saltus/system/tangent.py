@@ -1,0 +1,52 @@
+"""The tangent system: a system together with the derivative of its state with respect to the state at the start.
+
+Between contacts the derivative Y obeys the variational equations dY/dt = J(t, y) Y in the frozen mode. At a contact where the force jumps, Y
+jumps too, by the saltation matrix (codegen/saltation.py). Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems
+(2004), section 7.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+from saltus.system.expression import Expr, add, constant, mul, state
+from saltus.system.system import System
+
+
+def derivative_name(row: str, column: str) -> str:
+    """Name of the state that holds d(row)/d(column at the start)."""
+    return f"d{row}/d{column}(0)"
+
+
+def tangent_system(system: System) -> System:
+    """The system with D states extended to D + D*D: the states, then the rows of Y one after the other.
+
+    Parameter values, guards and forcing are those of the system. Y starts as the identity; its units are those of its row over those of its
+    column.
+    """
+    names, rates, units = _extension(system.states, system.jacobian, tuple(system.units.items()))
+    return replace(system, states=(*system.states, *names), field=(*system.field, *rates), units=dict(units), tangent_of=system)
+
+
+@functools.lru_cache(maxsize=64)
+def _extension(
+    states: tuple[str, ...], jacobian: tuple[tuple[Expr, ...], ...], units: tuple[tuple[str, str], ...]
+) -> tuple[tuple[str, ...], tuple[Expr, ...], tuple[tuple[str, str], ...]]:
+    """Names and rates of the entries of Y, and all units."""
+    rows = [[state(derivative_name(a, b)) for b in states] for a in states]
+    size = range(len(states))
+    rates = tuple(_sum([mul(jacobian[i][k], rows[k][j]) for k in size if not _is_zero(jacobian[i][k])]) for i in size for j in size)
+    names = tuple(derivative_name(a, b) for a in states for b in states)
+    return names, rates, (*units, *((name, "") for name in names))
+
+
+def _is_zero(node: Expr) -> bool:
+    return node.op == "const" and node.payload == 0
+
+
+def _sum(terms: list[Expr]) -> Expr:
+    total = constant(0.0)
+    for i, term in enumerate(terms):
+        total = add(total, term) if i else term
+    return total
