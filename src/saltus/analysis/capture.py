@@ -9,7 +9,6 @@ visit is nearer still. That is a check at points, not a proof for all; within on
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,30 +54,43 @@ class Neighbourhoods:
             capture_module().capture(np.ascontiguousarray(points), self.centres, self.weights, self.owners, self._reach(), label, when)
         return label, when
 
+    @classmethod
+    def none(cls, size: int) -> Neighbourhoods:
+        """No neighbourhoods, of points with so many states."""
+        return cls(np.zeros((0, size)), np.zeros((0, size, size)), np.zeros(0, np.int64))
+
+    def joined(self, other: Neighbourhoods) -> Neighbourhoods:
+        """Those of both, in the order that :meth:`capture` needs."""
+        centres, weights = np.concatenate([self.centres, other.centres]), np.concatenate([self.weights, other.weights])
+        order = np.argsort(centres[:, 0], kind="stable")
+        owners = np.concatenate([self.owners, other.owners])[order]
+        return Neighbourhoods(np.ascontiguousarray(centres[order]), np.ascontiguousarray(weights[order]), owners)
+
+    def renumbered(self, ids: np.ndarray) -> Neighbourhoods:
+        """The same, owner i now being ids[i]."""
+        return Neighbourhoods(self.centres, self.weights, ids[self.owners])
+
     def _reach(self) -> float:
         """Half the largest extent along the first coordinate: sqrt of the corner of (W'W)^-1."""
         return float(np.sqrt(np.linalg.inv(self.weights.transpose(0, 2, 1) @ self.weights)[:, 0, 0].max()) * (1 + 1e-12))
 
 
-def neighbourhoods(map_: Map, orbits: Sequence[Orbit], scale: np.ndarray) -> Neighbourhoods:
-    """Verified neighbourhoods of stable periodic orbits; an orbit whose contraction can't be verified gets none.
+def neighbourhoods(map_: Map, orbit: Orbit, owner: int, scale: np.ndarray) -> Neighbourhoods:
+    """Verified neighbourhoods of the points of a stable periodic orbit; a point whose contraction can't be verified gets none.
 
     Parameters
     ----------
     map_ : Map
         The map.
-    orbits : sequence of Orbit
-        Attractors; the index is the owner.
+    orbit : Orbit
+        An attractor.
+    owner : int
+        Its number.
     scale : float64[D]
         Range of each state.
     """
-    parts = [(_verified(map_, orbit, scale), owner) for owner, orbit in enumerate(orbits) if orbit.stable]
-    size = len(scale)
-    centres = np.concatenate([np.zeros((0, size)), *(centre for (centre, _), _ in parts)])
-    weights = np.concatenate([np.zeros((0, size, size)), *(weight for (_, weight), _ in parts)])
-    owners = np.concatenate([np.zeros(0, np.int64), *(np.full(len(centre), owner) for (centre, _), owner in parts)])
-    order = np.argsort(centres[:, 0], kind="stable")
-    return Neighbourhoods(np.ascontiguousarray(centres[order]), np.ascontiguousarray(weights[order]), owners[order].astype(np.int64))
+    centres, weights = _verified(map_, orbit, scale)
+    return Neighbourhoods.none(len(scale)).joined(Neighbourhoods(centres, weights, np.full(len(centres), owner, np.int64)))
 
 
 def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,8 +16,6 @@ from saltus.flow.maps import Map
 MOST_STEPS = 30
 #: A step shorter than this times the scale is rounding.
 SHORTEST = 1e-15
-#: Mismatch of a polished orbit in units of the scale that is still rounding; monodromies of stiff orbits amplify it.
-CLOSED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -83,7 +81,7 @@ def polish(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | N
         length = np.abs(step / scale).max()
         if not length < 1.0:
             return None
-        if length < SHORTEST:
+        if length < max(SHORTEST, 0.01 * map_.noise):
             break
     return _closed(map_, x, n, scale)
 
@@ -92,9 +90,9 @@ def _closed(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None
     """The orbit through a point, if it comes back."""
     points = np.concatenate([x[None], map_.launch(x[None], n).advance(n)[0]])
     distances = np.abs((points[1:] - x) / scale).max(axis=1)
-    if not np.isfinite(distances).all() or distances[-1] > CLOSED * _stiffness(map_, x, n):
+    if not np.isfinite(distances).all() or distances[-1] > map_.noise * _stiffness(map_, x, n, scale):
         return None
-    n = 1 + int(np.argmax(distances <= max(10 * distances[-1], CLOSED)))
+    n = 1 + int(np.argmax(distances <= max(10 * distances[-1], map_.noise)))
     points = points[:n]
     points = np.roll(points, -int(np.lexsort(points.T[::-1])[0]), axis=0)
     _, matrices = map_.tangent(points, n)
@@ -105,13 +103,13 @@ def _closed(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None
     return Orbit(points, matrices, values[order], float(distances[n - 1]))
 
 
-def _stiffness(map_: Map, x: np.ndarray, n: int) -> float:
+def _stiffness(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> float:
     """How much the return amplifies rounding."""
     _, matrix = map_.tangent(x[None], n)
-    return max(1.0, float(np.abs(matrix).max())) if np.isfinite(matrix).all() else 1.0
+    return max(1.0, float(np.abs(matrix * scale / scale[:, None]).max())) if np.isfinite(matrix).all() else 1.0
 
 
-def same(a: Orbit, b: Orbit, scale: np.ndarray, tolerance: float = 1e-6) -> bool:
+def same(a: Orbit, b: Orbit, scale: np.ndarray, tolerance: float) -> bool:
     """Whether two orbits are one: equal period, and each point of one lies on the other."""
     if a.period != b.period:
         return False

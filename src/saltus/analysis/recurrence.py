@@ -18,10 +18,14 @@ LONGEST = 64
 ROUND = 2 * LONGEST
 #: States a period apart that agree so well, in units of the scale, are worth a try by Newton.
 NEAR = 1e-3
+#: Largest distance between equal orbits, in units of the scale.
+SAME = 1e-6
 #: Orbits tried in one round; what isn't tried has its turn in the next.
 TRIES = 12
 #: Trajectories that never recur whose motion is surveyed.
 SURVEYED = 24
+#: Share of a trajectory's points that must lie in an attractor's boxes to belong to it.
+INSIDE = 0.9
 
 
 @dataclass
@@ -30,29 +34,35 @@ class Found:
 
     Attributes
     ----------
+    near : Neighbourhoods
+        Where the periodic ones capture.
     orbits : list of Orbit
         The periodic ones, stable.
     wandering : list of Wandering
         Those that never repeat: their ids follow.
     unstable : list of Orbit
         Periodic orbits met on the way that don't attract.
-    near : Neighbourhoods
-        Where the periodic ones capture.
     """
 
+    near: Neighbourhoods
     orbits: list[Orbit] = field(default_factory=list)
     wandering: list[Wandering] = field(default_factory=list)
     unstable: list[Orbit] = field(default_factory=list)
-    near: Neighbourhoods = field(default_factory=lambda: Neighbourhoods(np.zeros((0, 0)), np.zeros((0, 0, 0)), np.zeros(0, np.int64)))
 
     def __len__(self) -> int:
         return len(self.orbits) + len(self.wandering)
 
-    def ordered(self, map_: Map, scale: np.ndarray) -> Found:
+    def add(self, map_: Map, orbit: Orbit, scale: np.ndarray) -> None:
+        """One more periodic attractor, and where it captures."""
+        self.near = self.near.joined(neighbourhoods(map_, orbit, len(self.orbits), scale))
+        self.orbits.append(orbit)
+
+    def ordered(self, scale: np.ndarray) -> Found:
         """The same with ids that don't depend on the order of discovery: by period, then by size, then by place."""
-        orbits = sorted(self.orbits, key=lambda o: (o.period, *_rounded(o, scale)))
-        wandering = sorted(self.wandering, key=lambda w: (-round(w.exponent, 2), *w.first))
-        return Found(orbits, wandering, self.unstable, neighbourhoods(map_, orbits, scale))
+        order = sorted(range(len(self.orbits)), key=lambda i: (self.orbits[i].period, *_rounded(self.orbits[i], scale)))
+        wandering = sorted(self.wandering, key=lambda w: (w.kind, *w.first))
+        near = self.near.renumbered(np.argsort(np.array(order, np.int64)))
+        return Found(near, [self.orbits[i] for i in order], wandering, self.unstable)
 
 
 def _rounded(orbit: Orbit, scale: np.ndarray) -> tuple[float, ...]:
@@ -95,8 +105,8 @@ def find(
     settled : int64[k]
         Iterates after which it was captured; -1 if it wasn't.
     """
-    found = known or Found()
-    found = Found(list(found.orbits), list(found.wandering), list(found.unstable), found.near)
+    found = known or Found(Neighbourhoods.none(start.shape[1]))
+    found = Found(found.near, list(found.orbits), list(found.wandering), list(found.unstable))
     owner: list[Orbit | Wandering | None] = [None] * len(start)
     settled = np.full(len(start), -1, np.int64)
     travel, going = map_.launch(start, most), np.arange(len(start))
@@ -107,8 +117,7 @@ def find(
             orbit = _new_orbit(map_, points[here], scale, found)
             if orbit is None:
                 break
-            found.orbits.append(orbit)
-            found.near = neighbourhoods(map_, found.orbits, scale)
+            found.add(map_, orbit, scale)
             here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
         stay = np.zeros(len(going), bool)
         stay[here] = travel.going[here]
@@ -118,7 +127,7 @@ def find(
             progress(max(1.0 - len(going) / len(start), travel.age / most))
     if len(going):
         _survey(map_, travel.state, going, scale, found, owner)
-    result = found.ordered(map_, scale)
+    result = found.ordered(scale)
     label = np.array([-1 if one is None else _index(result, one) for one in owner], np.int64)
     return result, label, settled
 
@@ -142,23 +151,24 @@ def _captured(found: Found, points: np.ndarray, who: np.ndarray, age: int, owner
 def _new_orbit(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found) -> Orbit | None:
     """An attracting orbit not known yet that one of the trajectories float64[k, ROUND, D] follows, if there is one."""
     period, mismatch = recurrence(points, scale)
-    tries = [i for i in np.argsort(mismatch, kind="stable") if mismatch[i] < NEAR]
+    near = max(NEAR, map_.noise)
+    tries = [i for i in np.argsort(mismatch, kind="stable") if mismatch[i] < near]
     seen: list[np.ndarray] = []
     for i in tries:
         place = points[i, -1]
         if any(_lies_on(place, orbit, scale, 10 * mismatch[i]) for orbit in found.unstable) or any(
-            np.abs((place - other) / scale).max() < NEAR for other in seen
+            np.abs((place - other) / scale).max() < near for other in seen
         ):
             continue
         if len(seen) >= TRIES:
             break
         seen.append(place)
         orbit = polish(map_, place, int(period[i]), scale)
-        if orbit is None or not _lies_on(place, orbit, scale, 100 * NEAR):
+        if orbit is None or not _lies_on(place, orbit, scale, 100 * near):
             continue
         if not orbit.stable:
             found.unstable.append(orbit)
-        elif not any(same(orbit, one, scale) for one in found.orbits):
+        elif not any(same(orbit, one, scale, max(SAME, 10 * map_.noise)) for one in found.orbits):
             return orbit
     return None
 
@@ -190,8 +200,7 @@ def _survey(map_: Map, state: np.ndarray, who: np.ndarray, scale: np.ndarray, fo
     if not found.wandering:
         return
     points = map_.launch(state, ROUND).advance(ROUND)
-    for i, trail in zip(who, points, strict=True):
-        shares = [one.share(trail) for one in found.wandering]
-        best = int(np.argmax(shares))
-        if shares[best] > 0.9:
+    shares = np.stack([one.share(points) for one in found.wandering], axis=1)
+    for i, best, share in zip(who, shares.argmax(axis=1), shares.max(axis=1), strict=True):
+        if share >= INSIDE:
             owner[i] = found.wandering[best]

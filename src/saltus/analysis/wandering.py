@@ -5,6 +5,7 @@ Exponents: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980), one dir
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -20,6 +21,8 @@ SURE = 4.0
 TRAIL = 4096
 #: Boxes across the range of a state.
 BOXES = 64
+#: Boxes away from zero beyond which nothing is on an attractor.
+FARTHEST = 2048
 #: Share of the places of one attractor that must lie in the other's boxes for both to be one.
 ALIKE = 0.6
 
@@ -51,22 +54,26 @@ class Wandering:
         """Its mean place, for sorting."""
         return tuple(np.round(self.points.mean(axis=0) / self.scale, 3).tolist())
 
-    def boxes(self) -> set[tuple[int, ...]]:
-        """The boxes that it visits, and their neighbours along each axis."""
-        cells = np.unique(_cells(self.points, self.scale), axis=0)
-        steps = np.concatenate([np.zeros((1, cells.shape[1]), int), np.eye(cells.shape[1], dtype=int), -np.eye(cells.shape[1], dtype=int)])
-        return set(map(tuple, (cells[:, None] + steps[None]).reshape(-1, cells.shape[1]).tolist()))
+    @functools.cached_property
+    def boxes(self) -> np.ndarray:
+        """Codes of the boxes that it visits and of their neighbours along each axis, ascending int64."""
+        cells = np.unique(np.floor(self.points / self.scale * BOXES).astype(np.int64), axis=0)
+        size = cells.shape[1]
+        steps = np.concatenate([np.zeros((1, size), np.int64), np.eye(size, dtype=np.int64), -np.eye(size, dtype=np.int64)])
+        return np.unique(_codes((cells[:, None] + steps).reshape(-1, size)))
 
-    def share(self, points: np.ndarray) -> float:
-        """Share of points float64[n, D] that lie in its boxes."""
-        if not np.isfinite(points).all():
-            return 0.0
-        mine = self.boxes()
-        return float(np.mean([tuple(cell) in mine for cell in _cells(points, self.scale).tolist()]))
+    def share(self, points: np.ndarray) -> np.ndarray:
+        """Share of the points of trajectories float64[k, n, D] that lie in its boxes, float64[k]."""
+        inside = np.isfinite(points).all(axis=2)
+        cells = np.floor(np.where(inside[:, :, None], points, 0.0) / self.scale * BOXES)
+        inside &= (np.abs(cells) < FARTHEST).all(axis=2)
+        codes = _codes(np.where(inside[:, :, None], cells, 0).astype(np.int64))
+        return (inside & np.isin(codes, self.boxes)).mean(axis=1)
 
 
-def _cells(points: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    return np.floor(points / scale * BOXES).astype(int)
+def _codes(cells: np.ndarray) -> np.ndarray:
+    """One number for each box; boxes of more than five states may share one, which only makes the test for an attractor weaker."""
+    return cells @ (2 * FARTHEST) ** np.arange(cells.shape[-1], dtype=np.int64)
 
 
 def survey(map_: Map, start: np.ndarray, scale: np.ndarray) -> list[Wandering | None]:
@@ -102,6 +109,6 @@ def merge(found: list[Wandering]) -> list[Wandering]:
     """Those of a list that are different: of two that visit the same boxes the first is kept."""
     kept: list[Wandering] = []
     for one in found:
-        if not any(other.kind == one.kind and min(other.share(one.points), one.share(other.points)) > ALIKE for other in kept):
+        if not any(other.kind == one.kind and min(other.share(one.points[None])[0], one.share(other.points[None])[0]) > ALIKE for other in kept):
             kept.append(one)
     return kept

@@ -45,10 +45,13 @@ class Map(Protocol):
         Their names.
     period : float
         Time of one iterate [s]; 1 for a map without time.
+    noise : float
+        Mismatch of a closed orbit, relative to the range of the states, that the map's own errors explain.
     """
 
     states: tuple[str, ...]
     period: float
+    noise: float
 
     def launch(self, start: np.ndarray, longest: float) -> Travel:
         """Trajectories from float64[k, D]; they will be asked for ``longest`` iterates at most."""
@@ -85,6 +88,7 @@ class Stroboscope:
             raise ParameterError(f"every must be a positive time, not {every!r}.")
         self._parameters = np.array([list(system.values.values())])
         self._tangent = tangent_system(system)
+        self.noise = method.noise
 
     def launch(self, start: np.ndarray, longest: float) -> Flight:
         """See :class:`Map`."""
@@ -133,7 +137,7 @@ class FunctionMap:
     """
 
     def __init__(self, function: Callable[[np.ndarray], np.ndarray], states: str, derivative: Callable[[np.ndarray], np.ndarray]):
-        self.states, self.period = tuple(states.split()), 1.0
+        self.states, self.period, self.noise = tuple(states.split()), 1.0, 1e-12
         self._function, self._derivative = function, derivative
 
     def launch(self, start: np.ndarray, longest: float) -> _Iterates:

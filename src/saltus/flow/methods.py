@@ -54,6 +54,11 @@ class Method:
         """The options as the kernel reads them, for a run of so many periods."""
         raise NotImplementedError
 
+    @property
+    def noise(self) -> float:
+        """Mismatch of a periodic orbit, relative to the range of the states, that this method's own errors explain."""
+        raise NotImplementedError
+
     def companion(self) -> Method:
         """A more exact method: how far its contact times lie from this one's is the error estimate of this one's."""
         raise NotImplementedError
@@ -104,6 +109,11 @@ class Taylor(Method):
         """log2 of the tolerance, step budget, event budget."""
         return np.array([math.log2(self.tolerance), _step_budget(self.max_steps, periods), float(self.max_events)])
 
+    @property
+    def noise(self) -> float:
+        """Truncation and rounding over some periods."""
+        return max(100.0 * self.tolerance, 1e-12)
+
     def companion(self) -> Taylor:
         """The same series with steps a fifth shorter: other truncation, other rounding, the same compiled kernel."""
         return Taylor(self.order, self.tolerance * 2.0**-6, self.lanes, self.max_steps, self.max_events)
@@ -152,6 +162,11 @@ class ODE45(Method):
         """RelTol, AbsTol, whether contacts are located, step budget, event budget."""
         locate = 1.0 if self.events == "locate" else 0.0
         return np.array([self.rtol, self.atol, locate, _step_budget(self.max_steps, periods), float(self.max_events)])
+
+    @property
+    def noise(self) -> float:
+        """ode45's errors over some periods; where steps change, its map isn't even continuous."""
+        return min(10.0 * self.rtol, 0.01)
 
     def companion(self) -> Taylor:
         """The Taylor flow: exact, beside ode45."""

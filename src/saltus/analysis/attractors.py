@@ -1,0 +1,203 @@
+"""`attractors` and `basin_fractions`: what a system settles to, and how likely each response is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.stats import qmc
+
+from saltus.analysis import uncertainty
+from saltus.analysis.portrait import portraits
+from saltus.analysis.recurrence import find
+from saltus.analysis.settling import UNCONVERGED, Settling, complete, settle
+from saltus.analysis.starts import ensemble
+from saltus.errors import ParameterError, nearest
+from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporter
+from saltus.results import attractors_dataset, attributes
+from saltus.system.system import System
+from saltus.units import to_si
+
+#: Iterates after which the range of the states is taken, where no box gives it.
+SPREAD = 32
+#: Random starts of one task.
+CHUNK = 4096
+
+
+def attractors(
+    system: System,
+    start: Any,
+    *,
+    method: Method | None = None,
+    periods: int = 2000,
+    every: float | str | None = None,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """The attractors that given starts lead to: period, contacts, size, multipliers, margin to the next graze.
+
+    A trajectory is followed until it has settled, not for a fixed number of periods. Periodic responses are polished by Newton's method on
+    the stroboscopic map and verified by their Floquet multipliers; what never repeats is typed by its largest Lyapunov exponent.
+
+    Parameters
+    ----------
+    system : System
+        Equations, contacts and values.
+    start : sequence, mapping or array
+        Starts, as for :func:`saltus.simulate`; one or many.
+    method : Method
+        Default :class:`saltus.Taylor`.
+    periods : int
+        Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
+    every : float or str, optional
+        Time between two looks [s]: needed for a system without forcing.
+    threads : int, optional
+        Default all processors. Results don't depend on it.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds.
+
+    Returns
+    -------
+    Dataset
+        Dim ``attractor``: ``attractor_type``, ``attractor_period`` (the n of nT), ``attractor_contacts``, ``attractor_itinerary``,
+        ``attractor_peak``, ``attractor_rms``, ``attractor_margin``, multipliers, exponent, and its states at whole periods. Dim
+        ``trajectory``: ``basin``, the attractor of each start (-2: none was established), ``periods_to_settle``.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    """
+    group = ensemble(system, start, None)
+    map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
+    scale = _spread(map_, group.start)
+    show, close = reporter(progress)
+    try:
+        found, label, settled = find(map_, group.start, scale, int(periods), progress=show)
+    finally:
+        close()
+    return attractors_dataset(
+        states=system.states, units=system.units, attractors=portraits(map_, found), gap_unit=_gap_unit(system),
+        basin=np.where(label < 0, UNCONVERGED, label), periods_to_settle=settled, attrs=_provenance(system, map_.method, periods),
+    )  # fmt: skip
+
+
+def basin_fractions(
+    system: System,
+    *,
+    samples: int = 10_000,
+    seed: int = 1,
+    at: Mapping[str, Any] | None = None,
+    method: Method | None = None,
+    periods: int = 2000,
+    every: float | str | None = None,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+    **box: Any,
+) -> xr.Dataset:
+    """How likely each response is: random starts from a box of any number of states, with confidence intervals.
+
+    Parameters
+    ----------
+    system, method, periods, every, threads, progress
+        As for :func:`saltus.basins`.
+    samples : int
+        Random starts, uniform over the box.
+    seed : int
+        Of the random numbers: the same seed gives the same starts.
+    at : mapping, optional
+        Starts of the states that have no range; default zero.
+    **box : (low, high)
+        Range of each state that varies [SI or text with a unit].
+
+    Returns
+    -------
+    Dataset
+        As :func:`attractors`, with ``attractor_fraction`` and its 95 % Wilson interval, and ``smallest_basin_seen`` (rule of three).
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    """
+    if isinstance(samples, bool) or samples != int(samples) or samples < 1:
+        raise ParameterError(f"samples must be a whole number of at least 1, not {samples!r}.")
+    ranges = _ranges(system, box)
+    fixed = {name: to_si(value, system.units[name], name) for name, value in _known(system, at or {}).items()}
+    map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
+    drawn = np.random.default_rng(seed).random((int(samples), len(ranges)))
+    start = _fill(system, ranges, fixed, drawn)
+    scale = _spread(map_, start[:CHUNK])
+    show, close = reporter(progress)
+    try:
+        scouts = _fill(system, ranges, fixed, qmc.Halton(len(ranges), scramble=False).random(min(1024, int(samples))))
+        found = find(map_, scouts, scale, int(periods))[0]
+        result = Settling.empty(len(start), len(system.states))
+        for first in range(0, len(start), CHUNK):
+            part = slice(first, min(first + CHUNK, len(start)))
+            result.put(part, settle(map_, start[part], found, int(periods)))
+            if show:
+                show(part.stop / len(start))
+        found = complete(map_, result, found, scale, int(periods))
+    finally:
+        close()
+    table = replace(portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found)))
+    ds = attractors_dataset(
+        states=system.states, units=system.units, attractors=table, gap_unit=_gap_unit(system), basin=result.label,
+        periods_to_settle=result.periods, attrs=_provenance(system, map_.method, periods),
+    )  # fmt: skip
+    return ds.assign_attrs(smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=int(samples), seed=int(seed))
+
+
+def _known(system: System, given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Names checked. Raises ParameterError."""
+    for name in given:
+        if name not in system.states:
+            raise ParameterError(f"{system.name} has no state {name!r}. {nearest(name, system.states)}")
+    return given
+
+
+def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    ranges = {}
+    for name, given in _known(system, box).items():
+        try:
+            low, high = (to_si(value, system.units[name], name) for value in given)
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f'{name} must be (low, high), such as {name}=("-5 mm", "5 mm"): {error}') from None
+        if not low < high:
+            raise ParameterError(f"the range of {name} is empty: {low!r} to {high!r}.")
+        ranges[name] = (low, high)
+    if not ranges:
+        raise ParameterError(f'give a range for at least one state of {", ".join(system.states)}: {system.states[0]}=("-1 mm", "1 mm").')
+    return ranges
+
+
+def _fill(system: System, ranges: Mapping[str, tuple[float, float]], fixed: Mapping[str, float], unit: np.ndarray) -> np.ndarray:
+    """States from numbers in [0, 1), one column for each range."""
+    drawn = {name: low + (high - low) * column for (name, (low, high)), column in zip(ranges.items(), unit.T, strict=True)}
+    return np.stack([drawn.get(name, np.full(len(unit), fixed.get(name, 0.0))) for name in system.states], axis=1)
+
+
+def _spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
+    """Range of each state over the starts and their first iterates; 1 for a state that never moves."""
+    points = np.concatenate([start[:, None], map_.launch(start, SPREAD).advance(SPREAD)], axis=1)
+    points = points[np.isfinite(points).all(axis=(1, 2))].reshape(-1, start.shape[1])
+    wide = np.ptp(points, axis=0) if len(points) else np.ones(start.shape[1])
+    return np.where(wide > 0, wide, 1.0)
+
+
+def _gap_unit(system: System) -> str:
+    units = {system.units[guard.state] for guard in system.guards if guard.state is not None}
+    return units.pop() if len(units) == 1 else ""
+
+
+def _provenance(system: System, method: Method, periods: int) -> dict[str, Any]:
+    return attributes(
+        system=system.name, equations=system.equations(), parameters=system.values, units=system.units, method=method.name,
+        method_options=method.options(), fingerprint=system.fingerprint(), source=system.source, varied=(),
+    ) | {"periods": int(periods)}  # fmt: skip

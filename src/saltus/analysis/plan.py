@@ -1,0 +1,199 @@
+"""The plan of a basin map: which starts, in which chunks, and what each chunk computes. Everything that a store or a cluster needs to know.
+
+Three stages, each a pure function of the plan and of the stages before: *scout* finds the attractors from a fixed sample of the starts,
+*chunk* labels one run of cells with them, *finish* looks after what no known attractor captured and makes the Dataset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.stats import qmc
+
+from saltus.analysis import uncertainty
+from saltus.analysis.portrait import portraits
+from saltus.analysis.recurrence import Found, find
+from saltus.analysis.settling import Settling, complete, settle
+from saltus.errors import ParameterError, nearest
+from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import Method
+from saltus.kernels import status as st
+from saltus.results import attributes, basins_dataset
+from saltus.system.system import System
+from saltus.units import to_si
+
+#: Starts from which attractors are looked for first; a basin of half a per cent is met with 99.4 %.
+SCOUTS = 1024
+#: Cells of one task: seconds of work at most, and enough of them to keep lanes full to the end.
+CHUNK = 4096
+#: Cells recomputed with a more exact method.
+CHECKED = 1000
+#: Cells beyond which a map is refused.
+MOST_CELLS = 400_000_000
+
+
+@dataclass(frozen=True)
+class BasinPlan:
+    """A basin map to be computed.
+
+    Attributes
+    ----------
+    system : System
+        Equations and values.
+    method : Method
+        How to integrate.
+    axes : mapping of str to float64[n]
+        The two states that the map is drawn over, and their values [SI].
+    fixed : mapping of str to float
+        The other states at the start [SI].
+    periods : int
+        Forcing periods that a trajectory is followed at most, before and once more after new attractors are looked for.
+    every : float or None
+        Time between two looks [s] for a system without forcing.
+    """
+
+    system: System
+    method: Method
+    axes: Mapping[str, np.ndarray]
+    fixed: Mapping[str, float]
+    periods: int
+    every: float | None = None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Cells along the two axes."""
+        first, second = (len(values) for values in self.axes.values())
+        return first, second
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return self.shape[0] * self.shape[1]
+
+    @property
+    def chunks(self) -> int:
+        """Number of tasks."""
+        return -(-self.cells // CHUNK)
+
+    def map(self, threads: int | None = None) -> Stroboscope:
+        """The map whose attractors are asked for."""
+        return Stroboscope(self.system, self.method, self.every, threads)
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Range of each state: of an axis its length, of others the largest of those with the same unit, else of any."""
+        lengths = {name: float(np.ptp(values)) for name, values in self.axes.items()}
+        units = self.system.units
+        alike = {name: [length for axis, length in lengths.items() if units[axis] == units[name]] for name in self.system.states}
+        return np.array([lengths.get(name) or max(alike[name] or lengths.values()) for name in self.system.states])
+
+    def starts(self, cells: np.ndarray) -> np.ndarray:
+        """States at the start of cells int64[k] of the flattened grid, float64[k, D]."""
+        rows = dict(zip(self.axes, np.unravel_index(cells, self.shape), strict=True))
+        columns = [self.axes[n][rows[n]] if n in rows else np.full(len(cells), self.fixed[n]) for n in self.system.states]
+        return np.stack(columns, axis=1).astype(float)
+
+    def cells_of(self, chunk: int) -> np.ndarray:
+        """Cells of a chunk, int64[k]."""
+        return np.arange(chunk * CHUNK, min((chunk + 1) * CHUNK, self.cells))
+
+    # -- the three stages -------------------------------------------------------------------------------------------------------
+    def scout(self, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
+        """The attractors that a fixed quasi-random sample of the box leads to."""
+        unit = qmc.Halton(2, scramble=False).random(SCOUTS)
+        low, high = (np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max))
+        drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
+        columns = [drawn.get(name, np.full(SCOUTS, self.fixed.get(name, 0.0))) for name in self.system.states]
+        return find(self.map(threads), np.stack(columns, axis=1), self.scale, self.periods, progress=progress)[0]
+
+    def chunk(self, index: int, found: Found, map_: Stroboscope | None = None) -> Settling:
+        """Where the starts of one chunk lead. One thread."""
+        return settle(map_ or self.map(1), self.starts(self.cells_of(index)), found, self.periods)
+
+    def finish(self, result: Settling, found: Found, threads: int | None = None) -> xr.Dataset:
+        """The Dataset; what is still open is settled first. Changes ``result``."""
+        map_ = self.map(threads)
+        found = complete(map_, result, found, self.scale, self.periods)
+        labels = result.label.reshape(self.shape)
+        table = replace(portraits(map_, found), fractions=uncertainty.fractions(labels, len(found)))
+        gap_units = {self.system.units[g.state] for g in self.system.guards if g.state is not None}
+        ds = basins_dataset(
+            states=self.system.states, units=self.system.units, axes=self.axes, basin=labels,
+            periods_to_settle=result.periods.reshape(self.shape), status=result.status.reshape(self.shape),
+            status_meanings={code: name for code, (name, _) in st.STATUS.items()},
+            grazes_unresolved=result.unresolved.reshape(self.shape), attractors=table,
+            gap_unit=gap_units.pop() if len(gap_units) == 1 else "", attrs=self.attrs(),
+        )  # fmt: skip
+        return ds.assign_attrs(uncertainty.measure(ds), **self._check(result, found))
+
+    def attrs(self) -> dict[str, Any]:
+        """Provenance."""
+        system, method = self.system, self.method
+        return attributes(
+            system=system.name, equations=system.equations(), parameters=system.values, units=system.units, method=method.name,
+            method_options=method.options(), fingerprint=system.fingerprint(), source=system.source, varied=(),
+        ) | {"periods": self.periods}  # fmt: skip
+
+    def _check(self, result: Settling, found: Found) -> dict[str, float | int]:
+        """Recompute a sample of cells by a more exact method: the share whose attractor is another one, with its interval."""
+        chosen = np.unique(np.linspace(0, self.cells - 1, min(CHECKED, self.cells)).astype(int))
+        chosen = chosen[result.label[chosen] >= 0]
+        if not len(chosen):
+            return {"flip_rate": float("nan"), "flip_checked": 0}
+        exact = Stroboscope(self.system, self.method.companion(), self.every, 1)
+        again = settle(exact, self.starts(chosen), found, 2 * self.periods)
+        flips = int(np.count_nonzero(again.label != result.label[chosen]))
+        low, high = uncertainty.wilson(flips, len(chosen))
+        return {"flip_rate": flips / len(chosen), "flip_rate_low": float(low), "flip_rate_high": float(high), "flip_checked": len(chosen)}
+
+
+def basin_plan(
+    system: System, axes: Mapping[str, Any], at: Mapping[str, Any] | None, method: Method, periods: int, every: float | str | None
+) -> BasinPlan:
+    """A plan from what users write, checked.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an axis isn't a state, a range is empty, or the grid is too large.
+    """
+    if not isinstance(system, System):
+        raise ParameterError(f"the system must be a System, not {type(system).__name__}. Put @sl.system(states=...) above the function.")
+    for name in (*axes, *(at or {})):
+        if name not in system.states:
+            raise ParameterError(f"{system.name} has no state {name!r}. {nearest(name, system.states)}")
+    if len(axes) != 2:
+        example = ", ".join(f'{name}=("-1 {system.units[name]}", "1 {system.units[name]}", 400)' for name in system.states[:2])
+        raise ParameterError(f"a basin map has two axes, not {len(axes)}. Give two states with range and number of starts: {example}.")
+    if isinstance(periods, bool) or periods != int(periods) or periods < 1:
+        raise ParameterError(f"periods must be a whole number of at least 1, not {periods!r}.")
+    values = {name: _axis(system, name, given) for name, given in axes.items()}
+    first, second = (len(one) for one in values.values())
+    if first * second > MOST_CELLS:
+        raise ParameterError(f"{first} x {second} cells are more than {MOST_CELLS:.0e}. Take a coarser grid, or sl.basin_fractions.")
+    fixed = {name: to_si((at or {}).get(name, 0.0), system.units[name], name) for name in system.states if name not in axes}
+    seconds = None if every is None else to_si(every, "s", "every")
+    plan = BasinPlan(system, method, values, fixed, int(periods), seconds)
+    plan.map()  # every= is checked where it is used
+    return plan
+
+
+def _axis(system: System, name: str, given: Any) -> np.ndarray:
+    """Starts along one state from (low, high, count) or an array."""
+    if isinstance(given, np.ndarray):
+        values = given.astype(float)
+    else:
+        try:
+            low, high, count = given
+        except (TypeError, ValueError):
+            raise ParameterError(f'{name} must be (low, high, number of starts), such as {name}=("-5 mm", "5 mm", 400), or an array.') from None
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 2:
+            raise ParameterError(f"the number of starts along {name} must be a whole number of at least 2, not {count!r}.")
+        values = np.linspace(to_si(low, system.units[name], name), to_si(high, system.units[name], name), int(count))
+    if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
+        raise ParameterError(f"the starts along {name} must ascend and be finite, at least two of them.")
+    return values

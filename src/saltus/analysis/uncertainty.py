@@ -1,0 +1,210 @@
+"""How far a map of basins can be trusted: shares with intervals, what the grid can miss, and how intricate the boundaries are.
+
+All functions take the labels of the cells of a regular grid, int[nA, nB]. Negative labels are codes (escaped, unconverged, ...), not
+attractors: they have no share, but in the measures of boundaries each code counts as one more class, since a cell that may or may not
+settle is as uncertain as one between two attractors.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from saltus.errors import ParameterError
+from saltus.results.schema import BASINS, NOT_COMPUTED, check
+
+#: Two-sided 95 % quantile of the normal distribution.
+QUANTILE_95 = 1.959963984540054
+#: -ln(0.05): a share p stays unseen in N random cells with probability (1-p)^N < 5 % if p > 3/N.
+RULE_OF_THREE = 3.0
+#: Cells along the side of a box; Daza et al. use 5 in all of their figures.
+BOX = 5
+#: The largest distance looked at is this part of the shorter side of the grid: beyond it the sides are felt.
+LARGEST_DISTANCE = 16
+#: Distances that a slope needs at least, so that it has an error.
+FEWEST_DISTANCES = 3
+
+
+# -- shares --------------------------------------------------------------------------------------------------------------------
+def wilson(count: np.ndarray | int, cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the 95 % score interval of a share ``count / cells``; NaN for no cells.
+
+    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209. Unlike the textbook interval it stays within 0 and 1 and has a width at 0 and at 1.
+    """
+    count = np.asarray(count, dtype=float)
+    if cells == 0:
+        return np.full(count.shape, np.nan), np.full(count.shape, np.nan)
+    share, z2 = count / cells, QUANTILE_95**2
+    centre = (share + z2 / (2 * cells)) / (1 + z2 / cells)
+    half = QUANTILE_95 / (1 + z2 / cells) * np.sqrt(share * (1 - share) / cells + z2 / (4 * cells**2))
+    return np.where(count == 0, 0.0, centre - half), np.where(count == cells, 1.0, centre + half)
+
+
+def fractions(labels: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Share of the starts that lead to each attractor, with a 95 % interval.
+
+    For starts drawn at random the interval is the binomial one: 95 of 100 such samples hold the true share. The cells of a regular grid
+    are not drawn at random. There it says how far the share of as many random starts would scatter; the error of a grid is mostly
+    smaller (of the order of the boundary cells, whose share falls as N^(-alpha/2) with the uncertainty exponent alpha), but an evenly
+    spaced grid can also miss or favour structures of its own spacing, which no interval tells.
+
+    Parameters
+    ----------
+    labels : array of int, any shape
+        Attractor of each start; negative codes where there is none. Starts that weren't computed (-4) don't count; those that escaped or
+        did not settle do, so the shares may sum to less than 1.
+    m : int
+        Number of attractors.
+
+    Returns
+    -------
+    share, low, high : array, shape (m,)
+        NaN if nothing was computed.
+    """
+    labels = np.asarray(labels)
+    cells = int((labels != NOT_COMPUTED).sum())
+    count = np.bincount(labels[labels >= 0], minlength=m)
+    if len(count) > m:
+        raise ParameterError(f"the labels go up to {len(count) - 1}, but there are {m} attractors, 0 to {m - 1}. Give m={len(count)}.")
+    share = count / cells if cells else np.full(m, np.nan)
+    return (share, *wilson(count, cells))
+
+
+def smallest_basin(cells: int) -> float:
+    """Share above which a basin can't have been missed by so many starts, with a confidence of 95 %: 3/N, the rule of three.
+
+    Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743. It holds for starts drawn at random. On a regular grid it says the same of
+    a basin that is scattered finely; a compact one is met for certain as soon as it holds a whole cell, 1/N. 1 if there are fewer than
+    three starts.
+    """
+    return min(RULE_OF_THREE / cells, 1.0) if cells else 1.0
+
+
+# -- boundaries ----------------------------------------------------------------------------------------------------------------
+def basin_entropy(labels: np.ndarray, box: int = BOX) -> tuple[float, float]:
+    """Basin entropy and boundary basin entropy.
+
+    The grid is cut into boxes of box x box cells; each has the Gibbs entropy -sum p ln p of the shares p of the labels in it. Cells left
+    over at the far edges are dropped. The entropy depends on the size of the box and on the grid: compare maps of one grid only. A
+    boundary entropy above ln 2 proves a fractal boundary (between two smooth pieces at most two labels meet in most boxes).
+
+    A. Daza, A. Wagemakers, B. Georgeot, D. Guery-Odelin, M. A. F. Sanjuan, Scientific Reports 6 (2016) 31416.
+
+    Parameters
+    ----------
+    labels : array of int, shape (nA, nB)
+        Attractor or code of each cell; each code is a class of its own.
+    box : int
+        Cells along the side of a box.
+
+    Returns
+    -------
+    entropy : float
+        Mean over all boxes [nat]; NaN if the grid holds no whole box.
+    boundary_entropy : float
+        Mean over the boxes that hold more than one label [nat]; NaN if there is none.
+    """
+    if box < 1:
+        raise ParameterError(f"a box of {box} cells holds nothing: give box=1 or more.")
+    labels = np.asarray(labels)
+    rows, columns = (size // box for size in labels.shape)
+    if rows * columns == 0:
+        return np.nan, np.nan
+    boxes = labels[: rows * box, : columns * box].reshape(rows, box, columns, box)
+    entropy, classes = np.zeros((rows, columns)), np.zeros((rows, columns), dtype=int)
+    for label in np.unique(labels):
+        share = (boxes == label).mean(axis=(1, 3))
+        present = share > 0
+        entropy[present] -= share[present] * np.log(share[present])
+        classes += present
+    mixed = classes > 1
+    return float(entropy.mean()), float(entropy[mixed].mean()) if mixed.any() else np.nan
+
+
+def uncertain_share(labels: np.ndarray, distance: int) -> float:
+    """Share of the cells of which a neighbour ``distance`` cells away, along either axis and to either side, has another label.
+
+    Beyond its edges the grid is continued by its mirror image. That keeps every cell and changes no dimension: a share of the cells that
+    have all four neighbours would grow with the distance for a straight line, one of all cells would fall for noise.
+    """
+    labels = np.asarray(labels)
+    uncertain = np.zeros(labels.shape, dtype=bool)
+    for axis, size in enumerate(labels.shape):
+        place = np.arange(size)
+        below, above = place - distance, place + distance
+        for neighbour in (np.where(below < 0, -1 - below, below), np.where(above >= size, 2 * size - 1 - above, above)):
+            uncertain |= labels != np.take(labels, neighbour, axis=axis)
+    return float(uncertain.mean())
+
+
+def uncertainty_exponent(labels: np.ndarray) -> tuple[float, float, float]:
+    """Uncertainty exponent of the boundaries and their fractal dimension.
+
+    The share f of uncertain cells (:func:`uncertain_share`) is taken at distances of 1, 2, 4, ... cells up to 1/16 of the shorter side of
+    the grid; alpha is the least-squares slope of ln f over ln distance. Cells are points, so their distance is exact and no correction
+    for the size of a box is needed. A smooth boundary has alpha = 1: twice the accuracy of the start, half the doubt. A small alpha
+    means that more accuracy buys little. Where the boundaries fill the plane, f approaches its ceiling at large distances and alpha comes
+    out low.
+
+    S. W. McDonald, C. Grebogi, E. Ott, J. A. Yorke, Physica D 17 (1985) 125.
+
+    Parameters
+    ----------
+    labels : array of int, shape (nA, nB)
+        Attractor or code of each cell; each code is a class of its own.
+
+    Returns
+    -------
+    exponent : float
+        alpha.
+    error : float
+        Standard error of the slope: how far the points are from a line. It knows nothing of structures finer than the grid.
+    dimension : float
+        2 - alpha.
+
+        All three are NaN where there is no boundary, and on a grid of fewer than 64 cells a side, which has fewer than three distances.
+    """
+    largest = min(np.shape(labels)) // LARGEST_DISTANCE
+    distances = 2 ** np.arange(max(largest, 0).bit_length())
+    shares = np.array([uncertain_share(labels, int(distance)) for distance in distances])
+    seen = shares > 0
+    if seen.sum() < FEWEST_DISTANCES:
+        return np.nan, np.nan, np.nan
+    x, y = np.log(distances[seen]), np.log(shares[seen])
+    spread = x - x.mean()
+    alpha = float(spread @ y / (spread @ spread))
+    residual = y - y.mean() - alpha * spread
+    error = float(np.sqrt(residual @ residual / (len(x) - 2) / (spread @ spread)))
+    return alpha, error, 2.0 - alpha
+
+
+# -- a map ---------------------------------------------------------------------------------------------------------------------
+def measure(ds: xr.Dataset) -> dict[str, float | int]:
+    """The trust numbers of a map of basins, to be kept in its attributes.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What ``basins`` returned.
+
+    Returns
+    -------
+    dict
+        ``smallest_basin_seen`` (share of the starts, of those that were computed), ``basin_entropy`` and ``boundary_basin_entropy`` [nat],
+        ``uncertainty_exponent``, ``uncertainty_exponent_error``, ``boundary_dimension``, ``unresolved_cells`` (on whose way a graze was
+        shallower than the local error), ``unsettled_cells`` (that have a code and no attractor).
+    """
+    check(ds, caller="measure", kinds=[BASINS])
+    labels = ds["basin"].values
+    entropy, boundary_entropy = basin_entropy(labels)
+    exponent, error, dimension = uncertainty_exponent(labels)
+    return {
+        "smallest_basin_seen": smallest_basin(int((labels != NOT_COMPUTED).sum())),
+        "basin_entropy": entropy,
+        "boundary_basin_entropy": boundary_entropy,
+        "uncertainty_exponent": exponent,
+        "uncertainty_exponent_error": error,
+        "boundary_dimension": dimension,
+        "unresolved_cells": int((ds["grazes_unresolved"].values > 0).sum()),
+        "unsettled_cells": int((labels < 0).sum()),
+    }
