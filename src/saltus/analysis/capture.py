@@ -19,14 +19,17 @@ from saltus.analysis.orbits import Orbit
 from saltus.codegen.module import capture_module
 from saltus.flow.maps import Map
 
-#: Radii tried, in units of the scale of the states: from the whole range down to where only rounding is left.
-RADII = 2.0 ** -np.arange(1.0, 21.0, 0.5)
+#: Radii tried, in units of the scale of the states: from half the range down to a millionth, then what lies between two of them.
+RADII = 2.0 ** -np.arange(1.0, 21.0, 2.0)
+BETWEEN = (2.0**1.5, 2.0, 2.0**0.5)
 #: Points on the outer shell for each dimension beyond the first; the inner shell has as many.
 DIRECTIONS = 16
 #: What is left of the distance after the returns that are looked at together, and how many these may be.
 CONTRACTION, MOST_RETURNS = 0.5, 64
 #: Part of the verified radius that is used.
 SAFETY = 0.9
+#: Radius in units of the map's own errors where nothing could be verified.
+LUCK = 3.0
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ class Neighbourhoods:
 
 
 def neighbourhoods(map_: Map, orbit: Orbit, owner: int, scale: np.ndarray) -> Neighbourhoods:
-    """Verified neighbourhoods of the points of a stable periodic orbit; a point whose contraction can't be verified gets none.
+    """Verified neighbourhoods of the points of a stable periodic orbit.
 
     Parameters
     ----------
@@ -94,28 +97,38 @@ def neighbourhoods(map_: Map, orbit: Orbit, owner: int, scale: np.ndarray) -> Ne
 
 
 def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Centres and weights of one orbit: of each of its points a radius, found by bisection, at which the returns were seen to contract."""
+    """Weights of the points of one orbit: of each the largest radius tried at which the returns were seen to contract.
+
+    Where no radius passes, what lies within the map's own errors of the point is taken to be on it.
+    """
     n, size = orbit.points.shape
     iterates = n * _returns(orbit)
     norms = np.stack([_norm(matrix, scale) for matrix in orbit.monodromy])
-    shell = np.concatenate([_shell(size), 0.5 * _shell(size)])
-    directions = shell @ np.linalg.inv(norms).transpose(0, 2, 1)
     _, own = map_.sequences(orbit.points, iterates)
-    small, large = np.full(n, len(RADII)), np.full(n, -1)  # indices of radii: the largest that passed, the smallest that failed
-    while (small - large > 1).any():
-        trial = np.minimum((small + large) // 2, len(RADII) - 1)
-        starts = orbit.points[:, None, :] + RADII[trial][:, None, None] * directions
+    shell = np.concatenate([_shell(size), 0.5 * _shell(size)])
+    lengths = np.linalg.norm(shell, axis=1)
+
+    def passes(radius: np.ndarray, which: np.ndarray) -> np.ndarray:
+        starts = orbit.points[which, None, :] + radius[:, None, None] * (shell @ np.linalg.inv(norms[which]).transpose(0, 2, 1))
         ends, met = map_.sequences(starts.reshape(-1, size), iterates)
-        back = np.linalg.norm((ends.reshape(starts.shape) - orbit.points[:, None, :]) @ norms.transpose(0, 2, 1), axis=2)
+        back = np.linalg.norm((ends.reshape(starts.shape) - orbit.points[which, None, :]) @ norms[which].transpose(0, 2, 1), axis=2)
         with np.errstate(invalid="ignore"):
-            nearer = (back <= CONTRACTION * RADII[trial][:, None] * np.linalg.norm(shell, axis=1)).all(axis=1)
-        passed = nearer & [_alike(met[k * len(shell) : (k + 1) * len(shell)], own[k]) for k in range(n)]
-        searching = small - large > 1
-        small = np.where(searching & passed, trial, small)
-        large = np.where(searching & ~passed, trial, large)
-    have = small < len(RADII)
-    radius = SAFETY * RADII[small[have]]
-    return orbit.points[have], norms[have] / radius[:, None, None]
+            nearer = (back <= CONTRACTION * radius[:, None] * lengths).all(axis=1)
+        return nearer & [_alike(met[i * len(shell) : (i + 1) * len(shell)], own[k]) for i, k in enumerate(which)]
+
+    best = np.zeros(n)
+    for radius in RADII:
+        waiting = np.flatnonzero(best == 0.0)
+        if len(waiting):
+            best[waiting[passes(np.full(len(waiting), radius), waiting)]] = radius
+    have = np.flatnonzero((best > 0.0) & (best < RADII[0]))
+    for factor in BETWEEN:  # a little larger still?
+        if len(have):
+            better = passes(best[have] * factor, have)
+            best[have[better]] *= factor
+            have = have[~better]
+    best = np.where(best > 0.0, SAFETY * best, LUCK * map_.noise)
+    return orbit.points, norms / best[:, None, None]
 
 
 def _returns(orbit: Orbit) -> int:

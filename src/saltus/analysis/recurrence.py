@@ -9,8 +9,8 @@ import numpy as np
 
 from saltus.analysis.capture import Neighbourhoods, neighbourhoods
 from saltus.analysis.orbits import Orbit, polish, same
-from saltus.analysis.wandering import Wandering, merge, survey
-from saltus.flow.maps import Map
+from saltus.analysis.wandering import TRAIL, Wandering, merge, survey
+from saltus.flow.maps import Map, Travel
 
 #: Longest period looked for [iterates].
 LONGEST = 64
@@ -126,7 +126,7 @@ def find(
         if progress:
             progress(max(1.0 - len(going) / len(start), travel.age / most))
     if len(going):
-        _survey(map_, travel.state, going, scale, found, owner)
+        _survey(map_, travel, going, scale, found, owner, settled)
     result = found.ordered(scale)
     label = np.array([-1 if one is None else _index(result, one) for one in owner], np.int64)
     return result, label, settled
@@ -192,15 +192,30 @@ def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: floa
     return bool(np.abs((orbit.points - place) / scale).max(axis=1).min() < tolerance)
 
 
-def _survey(map_: Map, state: np.ndarray, who: np.ndarray, scale: np.ndarray, found: Found, owner: list) -> None:
-    """Survey some of the trajectories that never settled, and label all of them by where they wander."""
-    chosen = np.unique(np.linspace(0, len(who) - 1, min(SURVEYED, len(who))).astype(int))
-    seen = survey(map_, state[chosen], scale)
-    found.wandering = merge([*found.wandering, *(one for one in seen if one is not None)])
+def _survey(map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: Found, owner: list, settled: np.ndarray) -> None:
+    """Find out what the trajectories do that never settled: watch them much longer, and call an attractor only what none of them leaves.
+
+    A chaotic saddle holds trajectories for thousands of periods too; what is seen to leave it betrays it.
+    """
+    survivors, trails, leavers = np.arange(len(going)), [], []
+    for _ in range(TRAIL // ROUND):
+        points = travel.advance(ROUND)
+        caught = _captured(found, points, going[survivors], travel.age - ROUND, owner, settled)
+        if trails:
+            leavers += list(trails[-1][caught])
+        stays = ~caught & travel.going
+        travel.keep(stays)
+        survivors, trails = survivors[stays], [*(trail[stays] for trail in trails), points[stays]]
+        if not len(survivors):
+            return
+    chosen = np.unique(np.linspace(0, len(survivors) - 1, min(SURVEYED, len(survivors))).astype(int))
+    points = np.concatenate(trails, axis=1)
+    seen = survey(map_, travel.state[chosen], points[chosen], scale)
+    fresh = [one for one in seen if one is not None and not any(one.share(trail[None])[0] >= INSIDE for trail in leavers)]
+    found.wandering = merge([*found.wandering, *fresh])
     if not found.wandering:
         return
-    points = map_.launch(state, ROUND).advance(ROUND)
-    shares = np.stack([one.share(points) for one in found.wandering], axis=1)
-    for i, best, share in zip(who, shares.argmax(axis=1), shares.max(axis=1), strict=True):
+    shares = np.stack([one.share(points[:, -ROUND:]) for one in found.wandering], axis=1)
+    for i, best, share in zip(going[survivors], shares.argmax(axis=1), shares.max(axis=1), strict=True):
         if share >= INSIDE:
             owner[i] = found.wandering[best]

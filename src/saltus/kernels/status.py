@@ -14,6 +14,7 @@ NONFINITE = 8
 INVALID = 9
 NOT_COMPUTED = 10
 INTERRUPTED = 11
+LONG_TRANSIENT = 12
 
 #: Name and meaning of every status code.
 STATUS = {
@@ -30,6 +31,7 @@ STATUS = {
     NONFINITE: ("nonfinite", "the state or its derivatives overflowed or became NaN"),
     INVALID: ("invalid", "the start or a parameter isn't a finite number"),
     NOT_COMPUTED: ("not_computed", "stopped before this trajectory was begun"),
+    LONG_TRANSIENT: ("long_transient", "still on its way to an attractor after all periods that were allowed"),
     INTERRUPTED: ("interrupted", "stopped on its way"),
 }
 
