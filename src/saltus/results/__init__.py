@@ -1,16 +1,21 @@
 """Results: the schema of every Dataset, where it comes from, and files."""
 
 from saltus.results.assemble import Contacts, Guards, stroboscope_dataset, trajectory_dataset
+from saltus.results.basins import AttractorTable, agreement_dataset, attractors_dataset, basins_dataset
 from saltus.results.export import save, to_csv, to_mat, to_netcdf
 from saltus.results.files import ResultFileError, usable_folder
 from saltus.results.load import load
 from saltus.results.provenance import attributes, content_hash, describe
 
 __all__ = [
+    "AttractorTable",
     "Contacts",
     "Guards",
     "ResultFileError",
+    "agreement_dataset",
+    "attractors_dataset",
     "attributes",
+    "basins_dataset",
     "content_hash",
     "describe",
     "load",

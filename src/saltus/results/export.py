@@ -16,7 +16,7 @@ from saltus.errors import ParameterError, nearest
 from saltus.results import tables
 from saltus.results.files import replacing
 from saltus.results.provenance import describe, file_hash
-from saltus.results.schema import check
+from saltus.results.schema import TABLES, check
 
 Target = str | os.PathLike[str]
 
@@ -61,7 +61,7 @@ def save(ds: xr.Dataset, path: Target) -> Path:
 
 def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
     """Write a result to a netCDF file; see :func:`save`. A checksum of the numbers goes with it."""
-    check(ds, caller="to_netcdf")
+    check(ds, caller="to_netcdf", kinds=list(TABLES))
     engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if _has("h5netcdf") and _has("h5py") else "scipy"
     marked = ds.assign_attrs(file_hash=file_hash(ds))
     try:
@@ -155,7 +155,7 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
     from scipy.io import savemat  # 0.2 s that only this function needs
     from scipy.io.matlab import MatWriteError
 
-    check(ds, caller="to_mat")
+    check(ds, caller="to_mat", kinds=list(TABLES))
     with replacing(Path(path)) as (part,):
         try:
             savemat(part, _matlab(ds), appendmat=False, oned_as="column")

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import check
+from saltus.results.schema import STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
+from saltus.results.summary import summary
 from saltus.units import from_si
 
 #: Packages whose versions can change the digits of a result or the layout of its file.
@@ -133,20 +134,21 @@ def describe(ds: xr.Dataset) -> str:
     Parameters
     ----------
     ds : Dataset
-        What ``simulate`` or ``stroboscope`` returned, or :func:`~saltus.results.load`.
+        What ``simulate``, ``stroboscope``, ``basins``, ``attractors`` or ``compare`` returned, or :func:`~saltus.results.load`.
 
     Returns
     -------
     str
-        System, parameters, method, extent, contacts, status and hash, a line each.
+        System, parameters, method, extent, contacts, status and hash, a line each; of attractors and basins what was found.
     """
-    check(ds, caller="describe")
-    lines = [
-        f"{ds.attrs.get('system', 'system without a name')}: {_parameters(ds)}",
-        f"method   {ds.attrs.get('method', 'unknown')}{_options(ds)}, saltus {ds.attrs.get('saltus_version', 'unknown')}",
-        f"extent   {_extent(ds)}",
-        f"status   {_tally(ds['status'].values)}",
-    ]
+    check(ds, caller="describe", kinds=list(TABLES))
+    lines = [f"{ds.attrs.get('system', 'system without a name')}: {_parameters(ds)}"]
+    if "method" in ds.attrs or kind_of(ds) in (TRAJECTORY, STROBOSCOPE):
+        lines.append(f"method   {ds.attrs.get('method', 'unknown')}{_options(ds)}, saltus {ds.attrs.get('saltus_version', 'unknown')}")
+    if kind_of(ds) in (TRAJECTORY, STROBOSCOPE):
+        lines += [f"extent   {_extent(ds)}", f"status   {_tally(ds['status'].values)}"]
+    else:
+        lines += summary(ds)
     if "contact_kind" in ds:
         lines.append(f"contacts {_tally(ds['contact_kind'].values) if ds.sizes['contact'] else 'none'}")
     return "\n".join([*lines, f"hash     {ds.attrs.get('result_hash', 'none')[:16]}"])

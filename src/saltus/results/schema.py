@@ -5,6 +5,9 @@ state's unit, ``<gap>`` that of the guards' gap functions, ``<gap rate>`` the sa
 
 Dims: ``time`` (samples), ``contact`` (one table for all trajectories), ``guard``, ``trajectory``. When the trajectories of a batch have
 periods of their own, the samples share phases instead of times: the dim is then ``period``, and ``time`` has dims (trajectory, period).
+
+Results about attractors have the dims ``attractor``, ``phase`` (points of an orbit, one a forcing period) and ``multiplier``. What belongs
+to one start has no dims in the table: a map adds the two states that it is drawn over, a list of starts ``trajectory``.
 """
 
 from __future__ import annotations
@@ -22,6 +25,16 @@ from saltus.errors import ParameterError
 #: Version of the tables below, kept in every result as ``schema_version``.
 VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
+BASINS, ATTRACTORS, AGREEMENT = "basins", "attractors", "agreement"
+#: The function that returns each kind.
+MAKERS = {TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare"}
+
+# What stands in ``basin`` for a start that has no attractor.
+ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
+#: Meaning of these codes.
+NO_BASIN = {ESCAPED: "escaped", UNCONVERGED: "unconverged", FAILED: "failed", NOT_COMPUTED: "not_computed"}
+#: Meaning of the values of ``agreement``.
+AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
 
 
 @dataclass(frozen=True)
@@ -37,7 +50,7 @@ class Variable:
     long_name : str
         A few words, as on an axis.
     dtype : str
-        ``f8``, ``i8``, ``i1`` or ``str``.
+        ``f8``, ``i8``, ``i4``, ``i2``, ``i1`` or ``str``.
     """
 
     dims: tuple[str, ...]
@@ -101,8 +114,66 @@ STROBOSCOPE_VARIABLES = {
     "trajectory": Variable((), "1", "trajectory", "i8"),
 }
 
+#: What is known of each attractor, beside the points ``attractor_<state>``. ``<first>``: the unit of the first state.
+ATTRACTOR_VARIABLES = {
+    "attractor": Variable(("attractor",), "1", "attractor", "i8"),
+    "attractor_type": Variable(("attractor",), "", "kind of motion", "str"),
+    "attractor_period": Variable(("attractor",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
+    "attractor_contacts": Variable(
+        ("attractor",), "1", "contacts in one period of the response (in a forcing period if it doesn't repeat)"
+    ),
+    "attractor_itinerary": Variable(("attractor",), "", "modes in the order in which they are visited", "str"),
+    "attractor_peak": Variable(("attractor",), "<first>", "largest magnitude of the first state"),
+    "attractor_rms": Variable(("attractor",), "<first>", "root mean square of the first state"),
+    "attractor_margin": Variable(("attractor",), "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"),
+    "attractor_multiplier_real": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, real part"),
+    "attractor_multiplier_imag": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, imaginary part"),
+    "attractor_exponent": Variable(("attractor",), "1/s", "largest Lyapunov exponent"),
+    "attractor_exponent_error": Variable(("attractor",), "1/s", "error of the largest Lyapunov exponent"),
+    "attractor_fraction": Variable(("attractor",), "1", "share of the starts"),
+    "attractor_fraction_low": Variable(("attractor",), "1", "share of the starts, lower end of the 95 % interval"),
+    "attractor_fraction_high": Variable(("attractor",), "1", "share of the starts, upper end of the 95 % interval"),
+}
+_SETTLED = {
+    "basin": Variable((), "1", "attractor", "i2"),
+    "periods_to_settle": Variable((), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"),
+}
+
+#: Variables of what ``basins`` returns, beside the two states that the map is drawn over.
+BASINS_VARIABLES = {
+    **_SETTLED,
+    "status": Variable((), "1", "how the trajectory ended", "i1"),
+    "grazes_unresolved": Variable((), "1", "grazes shallower than the local error", "i2"),
+    **ATTRACTOR_VARIABLES,
+}
+
+#: Variables of what ``attractors`` and ``basin_fractions`` return.
+ATTRACTORS_VARIABLES = {"trajectory": Variable(("trajectory",), "1", "trajectory", "i8"), **_SETTLED, **ATTRACTOR_VARIABLES}
+
+#: Variables of what ``compare`` returns, beside the two states.
+AGREEMENT_VARIABLES = {
+    "agreement": Variable((), "1", "whether the two maps agree", "i1"),
+    "basin_a": Variable((), "1", "attractor in the first map", "i2"),
+    "basin_b": Variable((), "1", "attractor in the second map, in the numbers of the first", "i2"),
+    "pair": Variable(("pair",), "1", "attractor: those of the first map, then those that only the second has", "i8"),
+    "match_a": Variable(("pair",), "1", "number in the first map, -1 if it isn't there", "i8"),
+    "match_b": Variable(("pair",), "1", "number in the second map, -1 if it isn't there", "i8"),
+    "match_type": Variable(("pair",), "", "kind of motion", "str"),
+    "match_period": Variable(("pair",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
+    "match_fraction_a": Variable(("pair",), "1", "share of the starts in the first map"),
+    "match_fraction_b": Variable(("pair",), "1", "share of the starts in the second map"),
+    "match_agreeing_cells": Variable(("pair",), "1", "starts that lead to it in both maps", "i8"),
+    "match_orbit_distance": Variable(("pair",), "1", "distance of the two orbits in units of the axis ranges"),
+}
+
 #: The table of each kind of result.
-TABLES = {TRAJECTORY: TRAJECTORY_VARIABLES, STROBOSCOPE: STROBOSCOPE_VARIABLES}
+TABLES = {
+    TRAJECTORY: TRAJECTORY_VARIABLES,
+    STROBOSCOPE: STROBOSCOPE_VARIABLES,
+    BASINS: BASINS_VARIABLES,
+    ATTRACTORS: ATTRACTORS_VARIABLES,
+    AGREEMENT: AGREEMENT_VARIABLES,
+}
 
 
 # -- names and units -----------------------------------------------------------------------------------------------------------
@@ -110,6 +181,12 @@ def contact_name(state: str) -> str:
     """Name of the variable that holds a state at the contacts: ``contact_x``; ``contact_state_velocity`` where the name is taken."""
     name = f"contact_{state}"
     return f"contact_state_{state}" if name in TRAJECTORY_VARIABLES else name
+
+
+def attractor_name(state: str) -> str:
+    """Name of the variable that holds the points of the attractors: ``attractor_x``; ``attractor_state_type`` where the name is taken."""
+    name = f"attractor_{state}"
+    return f"attractor_state_{state}" if name in ATTRACTOR_VARIABLES else name
 
 
 def end_name(state: str) -> str:
@@ -125,7 +202,7 @@ def rate_unit(unit: str) -> str:
 
 
 def kind_of(ds: Any) -> str:
-    """``"trajectory"``, ``"stroboscope"`` or ``""`` for anything that isn't a result of saltus."""
+    """A key of :data:`TABLES`, such as ``"trajectory"``; ``""`` for anything that isn't a result of saltus."""
     kind = ds.attrs.get("saltus_result", "") if isinstance(ds, xr.Dataset) else ""
     return kind if kind in TABLES else ""
 
@@ -133,6 +210,12 @@ def kind_of(ds: Any) -> str:
 def states_of(ds: xr.Dataset) -> tuple[str, ...]:
     """Names of the states, in the order of the system."""
     return tuple(ds.attrs["states"].split())
+
+
+def axes_of(ds: xr.Dataset) -> tuple[str, str]:
+    """The two states that a map (of basins, or of the agreement of two) is drawn over."""
+    a, b = ds["basin" if kind_of(ds) == BASINS else "agreement"].dims
+    return str(a), str(b)
 
 
 def sample_dim(ds: xr.Dataset) -> str:
@@ -149,7 +232,7 @@ def forcing_period(ds: xr.Dataset) -> float:
 
 def check(ds: Any, *, caller: str, kinds: Sequence[str] = (TRAJECTORY, STROBOSCOPE)) -> None:
     """Raise a ParameterError unless ``ds`` is a result of saltus of one of these kinds."""
-    wanted = " or ".join({TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope"}[kind] for kind in kinds)
+    wanted = " or ".join(MAKERS[kind] for kind in kinds)
     if not isinstance(ds, xr.Dataset):
         hint = " A DataArray holds one variable: give the whole Dataset." if isinstance(ds, xr.DataArray) else ""
         raise ParameterError(f"{caller} takes the Dataset that {wanted} returns, not a {type(ds).__name__}.{hint}")
@@ -160,10 +243,17 @@ def check(ds: Any, *, caller: str, kinds: Sequence[str] = (TRAJECTORY, STROBOSCO
             f"attributes were dropped on the way (xarray.set_options(keep_attrs=True) keeps them)."
         )
     if kind not in kinds:
-        raise ParameterError(f"{caller} takes what {wanted} returns; this Dataset is from {'simulate' if kind == TRAJECTORY else kind}.")
-    missing = [name for name in (*states_of(ds), "status") if name not in ds]
+        raise ParameterError(f"{caller} takes what {wanted} returns; this Dataset is from {MAKERS[kind]}.")
+    missing = [name for name in _needed(ds, kind) if name not in ds]
     if missing:
         raise ParameterError(f"{caller} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not some variables of it.")
+
+
+def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
+    """Variables without which nothing can be said about a result."""
+    if kind in (TRAJECTORY, STROBOSCOPE):
+        return (*states_of(ds), "status")
+    return {BASINS: ("basin", "status", "attractor_type"), ATTRACTORS: ("attractor_type",), AGREEMENT: ("agreement", "match_a")}[kind]
 
 
 # -- after reading a file ------------------------------------------------------------------------------------------------------
@@ -177,7 +267,10 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
     for name, variable in ds.variables.items():
         dtype = dtypes.get(str(name), "f8")
         data = np.asarray(variable.values).astype(np.str_ if dtype == "str" else dtype)
-        variables[name] = xr.Variable(variable.dims, data, {key: _plain(value) for key, value in variable.attrs.items()})
+        attrs = {key: _plain(value) for key, value in variable.attrs.items()}
+        if "flag_values" in attrs:  # a single number comes back as such, and the codes have the type of their variable
+            attrs["flag_values"] = np.atleast_1d(np.asarray(attrs["flag_values"], dtype=data.dtype))
+        variables[name] = xr.Variable(variable.dims, data, attrs)
     coords = {name: variables.pop(name) for name in ds.coords}
     return xr.Dataset(variables, coords, {key: _plain(value) for key, value in ds.attrs.items()})
 

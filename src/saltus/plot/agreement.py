@@ -1,0 +1,122 @@
+"""Two maps of the same starts, and where they differ."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Patch
+from matplotlib.transforms import ScaledTranslation
+
+from saltus.errors import ParameterError
+from saltus.plot import maps
+from saltus.plot.basins import paint
+from saltus.plot.palette import hues
+from saltus.plot.style import OKABE_ITO, style
+
+_CALLER = "plot.agreement"
+#: Colour and name of each value of the agreement; differences are the news.
+_LOOKS = {
+    1: ("#E4E4E4", "agree"),
+    0: (OKABE_ITO["vermillion"], "differ"),
+    -1: ("#3C3C3C", "not settled in one of them"),
+}
+#: More attractors than this are not named in a legend of their own: the maps of plot.basins do that.
+_NAMED = 8
+
+
+def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
+    """Two maps of basins side by side, and where they differ; with one Axes only where they differ.
+
+    Both maps have the same hues. Titles name the maps (attributes ``name_a`` and ``name_b``, where the Dataset has them) and the share of
+    the starts that settle to the same attractor in both.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What ``sl.agreement`` returned.
+    ax : Axes or array of 3 Axes, optional
+        Where to draw; a new figure of three panels by default.
+
+    Returns
+    -------
+    array of Axes, shape (3,), or Axes
+        The Axes for one that was given.
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is not from ``sl.agreement``, or ``ax`` holds neither one nor three Axes.
+    """
+    maps.check(ds, _CALLER, ["agreement"], ["agreement", "basin_a", "basin_b"])
+    pair = maps.plane(ds, "agreement", _CALLER)
+    if ax is None:
+        with style():
+            _, panels = plt.subplots(1, 3, figsize=(9.0, 3.3), sharex=True, sharey=True)
+            return _three(panels, ds, pair)
+    panels = np.ravel(np.asarray(ax, dtype=object))
+    if panels.size not in (1, 3) or not all(isinstance(one, Axes) for one in panels):
+        raise ParameterError(f"{_CALLER}: ax={type(ax).__name__}. Give one Axes, or three, such as plt.subplots(1, 3) makes.")
+    if panels.size == 1:
+        _difference(panels[0], ds, pair)
+        return panels[0]
+    return _three(panels, ds, pair)
+
+
+def _three(panels: np.ndarray, ds: xr.Dataset, pair: tuple[str, str]) -> np.ndarray:
+    """Both maps and their difference."""
+    scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
+    ids, codes = _occurring(ds)
+    colors = dict(zip(ids, hues(max(ids, default=-1) + 1)[ids], strict=True))
+    for panel, which in zip(panels, "ab", strict=False):
+        maps.draw_cells(panel, ds, pair, scales, paint(ds[f"basin_{which}"].values, colors))
+        panel.set_title(str(ds.attrs.get(f"name_{which}", f"map {which}")))
+    _difference(panels[2], ds, pair)
+    for panel in panels[1:]:
+        panel.set_ylabel("")
+    handles = [Patch(fc=colors[key], label=_name(ds, key)) for key in ids] if len(ids) <= _NAMED else []
+    handles += [Patch(fc=maps.UNSETTLED[code].color, label=maps.UNSETTLED[code].label) for code in codes]
+    if handles:
+        _below(panels[0], handles, columns=2)
+    return panels
+
+
+def _difference(ax: Axes, ds: xr.Dataset, pair: tuple[str, str]) -> None:
+    """Where the maps differ, with the share that agrees as title."""
+    scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
+    values = ds["agreement"].values
+    table = maps.as_bytes(np.array([to_rgb(_LOOKS[key][0]) for key in (-1, 0, 1)]))
+    maps.draw_cells(ax, ds, pair, scales, table[np.nan_to_num(values, nan=-1).astype(np.int64) + 1])
+    settled = int((values >= 0).sum())
+    ax.set_title(f"{maps.share_text((values == 1).sum() / settled)} agree" if settled else "nothing settles in both")
+    handles = [
+        Patch(fc=color, label=f"{name}, {int((values == key).sum())}") for key, (color, name) in _LOOKS.items() if (values == key).any()
+    ]
+    _below(ax, handles, columns=1)
+
+
+def _below(ax: Axes, handles: list[Any], columns: int) -> None:
+    """A legend under the name of the axis."""
+    below = ax.transAxes + ScaledTranslation(0, -0.4, ax.figure.dpi_scale_trans)
+    ax.legend(
+        handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below, ncols=columns, frameon=False, handlelength=1.0,
+        handleheight=0.9, fontsize=7.5, labelspacing=0.35,
+    )  # fmt: skip
+
+
+def _occurring(ds: xr.Dataset) -> tuple[list[int], list[int]]:
+    """Ids of the attractors and codes of the rest that occur in one of the maps."""
+    both = np.concatenate([np.unique(np.nan_to_num(ds[name].values, nan=-4)) for name in ("basin_a", "basin_b")])
+    found = np.unique(both).astype(np.int64).tolist()
+    return [key for key in found if key >= 0], [code for code in maps.UNSETTLED if code in found]
+
+
+def _name(ds: xr.Dataset, key: int) -> str:
+    """An attractor in words where the Dataset describes it, else its number."""
+    if "attractor" in ds.coords and "attractor_period" in ds and key in ds["attractor"].values:
+        return maps.describe(ds.sel(attractor=key))
+    return f"attractor {key}"

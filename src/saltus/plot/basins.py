@@ -1,0 +1,256 @@
+"""Map of basins: which attractor each start settles to, and how soon."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.legend import Legend
+from matplotlib.legend_handler import HandlerBase
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.text import Text
+
+from saltus.plot import axes as draw
+from saltus.plot import maps
+from saltus.plot.palette import shades
+from saltus.plot.style import QUIET, Scale
+
+_CALLER = "plot.basins"
+#: Shades of a hue; the middle one is the hue itself.
+_LEVELS = 65
+#: Share of the settled starts that may be lighter or darker than the ends of the scale: a few late ones would make all others look alike.
+_BEYOND = 0.02
+#: A legend of more entries is set smaller, to stay beside its map.
+_LONG_LEGEND = 14
+
+
+def basins(
+    ds: xr.Dataset,
+    ax: Any = None,
+    legend: bool = True,
+    order: Sequence[int] | None = None,
+    points: bool = True,
+    shade: bool = True,
+) -> Axes:
+    """Map of the basins: a hue for each attractor, darker where it takes longer to settle, near-black where a start doesn't.
+
+    Cells are centred on the starts. White-edged dots are the attractors at whole forcing periods.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What ``sl.basins`` returned.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+    legend : bool
+        Whether to name the attractors, beside the map.
+    order : sequence of int, optional
+        Ids of the attractors in the order of their colours, to give an attractor the same hue in several maps; those left out follow. By
+        default the order of the ids: by period, then by amplitude.
+    points : bool
+        Whether to draw the attractors themselves.
+    shade : bool
+        Whether lightness shows the periods to settle.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is not from ``sl.basins``, or an argument doesn't fit it.
+    """
+    needs = ["basin", "attractor", *(["periods_to_settle"] if shade else [])]
+    maps.check(ds, _CALLER, ["basins"], needs)
+    pair = maps.plane(ds, "basin", _CALLER)
+    colors = maps.colors_of(ds, order, _CALLER)
+    settling = _settling(ds) if shade else None
+    scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
+    with draw.panels(ax, 1, (6.3, 3.9), _CALLER) as (panel,):
+        maps.draw_cells(panel, ds, pair, scales, paint(ds["basin"].values, colors, settling.level(ds) if settling else None))
+        if points:
+            _points(panel, ds, pair, scales, colors)
+        if legend:
+            _legend(panel, ds, pair, colors, settling, points)
+    return panel
+
+
+# -- cells ---------------------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Settling:
+    """Periods to settle as lightness: logarithmic between the few that settle first and the few that settle last."""
+
+    first: float
+    last: float
+
+    def share(self, periods: np.ndarray) -> np.ndarray:
+        """0 for the first, 1 for the last; one is added to the periods, as a start on the attractor takes none."""
+        low, high = np.log1p([self.first, self.last])
+        return np.clip((np.log1p(np.maximum(periods, 0)) - low) / (high - low or 1.0), 0.0, 1.0)
+
+    def level(self, ds: xr.Dataset) -> np.ndarray:
+        """The shade of each cell, 0 to 64."""
+        return np.round((_LEVELS - 1) * self.share(ds["periods_to_settle"].values)).astype(np.int64)
+
+    def ticks(self) -> list[int]:
+        """Both ends and the middle of the scale, as many of these as differ."""
+        middle = np.expm1(0.5 * np.log1p([self.first, self.last]).sum())
+        return sorted({round(value) for value in (self.first, middle, self.last)})
+
+
+def _settling(ds: xr.Dataset) -> Settling | None:
+    """The scale of lightness; None if nothing settles, or all at once."""
+    periods = ds["periods_to_settle"].values
+    settled = periods[(ds["basin"].values >= 0) & (periods >= 0)]
+    if not settled.size:
+        return None
+    first, last = np.quantile(settled, [_BEYOND, 1 - _BEYOND], method="nearest")
+    return Settling(float(first), float(last)) if last > first else None
+
+
+def paint(basin: np.ndarray, colors: Mapping[int, np.ndarray], level: np.ndarray | None = None) -> np.ndarray:
+    """The colour of each cell, uint8, shape (A, B, 3).
+
+    Parameters
+    ----------
+    basin : array, shape (A, B)
+        Attractor ids, and negative codes. NaN, or an id that has no colour, is drawn as not computed.
+    colors : mapping of int to array of shape (3,)
+        The hue of each attractor, sRGB in 0 to 1.
+    level : array of int, shape (A, B), optional
+        Shade of each cell, 0 to 64.
+    """
+    table = np.stack([to_rgb(maps.UNSETTLED[code].color) for code in (-4, -3, -2, -1)])[:, None, :].repeat(_LEVELS, axis=1)
+    if colors:
+        table = np.concatenate([table, shades(np.stack(list(colors.values())), _LEVELS)])
+    row = {code: code + 4 for code in maps.UNSETTLED} | {key: 4 + i for i, key in enumerate(colors)}
+    codes, where = np.unique(np.nan_to_num(np.asarray(basin), nan=-4), return_inverse=True)
+    rows = np.array([row.get(int(code), 0) for code in codes])[where.reshape(np.shape(basin))]
+    return maps.as_bytes(table)[rows, _LEVELS // 2 if level is None else level]
+
+
+# -- attractors ----------------------------------------------------------------------------------------------------------------
+def _stroboscopic(ds: xr.Dataset, pair: tuple[str, str], key: int) -> np.ndarray:
+    """The points of one attractor in the plane of the map [SI], shape (point, 2)."""
+    one = ds.sel(attractor=key)
+    if any(f"attractor_{name}" not in one for name in pair):
+        return np.empty((0, 2))
+    both = np.stack([np.ravel(one[f"attractor_{name}"].values) for name in pair], axis=-1)
+    return both[np.isfinite(both).all(axis=-1)]
+
+
+def _points(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], scales: tuple[Scale, Scale], colors: Mapping[int, np.ndarray]) -> None:
+    """Every attractor at whole periods; those of many points first, so that a single one is never buried."""
+    clouds = {key: _stroboscopic(ds, pair, key) for key in colors}
+    for key in sorted(colors, key=lambda key: -len(clouds[key])):
+        cloud = clouds[key]
+        if not len(cloud):
+            continue
+        size = 5.5 if len(cloud) <= 12 else 4.2 if len(cloud) <= 40 else 2.2
+        at = cloud[:, 0] * scales[0].factor, cloud[:, 1] * scales[1].factor
+        edge = 1.0 if size > 4 else 0.3
+        draw.draw_points(
+            ax, *at, marker="o", ms=size + edge + 0.9, mfc="#222222", mec="none", zorder=4
+        )  # white alone is lost on light tints
+        draw.draw_points(ax, *at, marker="o", ms=size, mfc=colors[key], mec="white", mew=edge, zorder=4, gid=f"attractor {key}")
+
+
+# -- legend --------------------------------------------------------------------------------------------------------------------
+class _Ramp(Rectangle):
+    """Handle of a legend: a row of shades."""
+
+    def __init__(self, row: np.ndarray) -> None:
+        super().__init__((0, 0), 1, 1)
+        self.row = row
+
+
+class _Ruler(Line2D):
+    """Handle of a legend: numbers along the ramps above it."""
+
+    def __init__(self, values: Sequence[int], places: Sequence[float]) -> None:
+        super().__init__([0, 1], [0, 0])
+        self.values, self.places = values, places
+
+
+class _DrawRamp(HandlerBase):
+    """Draw a :class:`_Ramp`."""
+
+    def create_artists(self, legend: Legend, orig_handle: Any, xdescent: float, ydescent: float, width: float,  # noqa: ARG002
+                       height: float, fontsize: float, trans: Any) -> list[Any]:  # noqa: ARG002  # fmt: skip
+        left = np.arange(len(orig_handle.row)) * width / len(orig_handle.row)
+        return [  # each reaches to the end, under the next: no seams
+            Rectangle((x - xdescent, -ydescent), width - x, height, fc=color, lw=0, transform=trans)
+            for x, color in zip(left, orig_handle.row, strict=True)
+        ]
+
+
+class _DrawRuler(HandlerBase):
+    """Draw a :class:`_Ruler`."""
+
+    def create_artists(self, legend: Legend, orig_handle: Any, xdescent: float, ydescent: float, width: float,  # noqa: ARG002
+                       height: float, fontsize: float, trans: Any) -> list[Any]:  # fmt: skip
+        top = height - ydescent + 0.35 * fontsize
+        artists: list[Any] = [Line2D([-xdescent, width - xdescent], [top, top], color=QUIET, lw=0.6, transform=trans)]
+        for value, place in zip(orig_handle.values, orig_handle.places, strict=True):
+            x = place * width - xdescent
+            artists.append(Line2D([x, x], [top, top - 0.25 * fontsize], color=QUIET, lw=0.6, transform=trans))
+            side = "left" if place == 0 else "right" if place == 1 else "center"
+            text = Text(x, top - 0.4 * fontsize, f"{value}", ha=side, va="top", color=QUIET, fontsize=0.8 * fontsize, transform=trans)
+            artists.append(text)
+        return artists
+
+
+def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int, np.ndarray], settling: Settling | None,
+            points: bool) -> None:  # fmt: skip
+    """Name the hues, the shades and the codes that occur, beside the map."""
+    codes, counts = np.unique(np.nan_to_num(ds["basin"].values, nan=-4).astype(np.int64), return_counts=True)
+    shares = dict(zip(codes.tolist(), (counts / ds["basin"].size).tolist(), strict=True))
+    if "attractor_fraction" in ds:
+        shares |= dict(zip(ds["attractor"].values.tolist(), ds["attractor_fraction"].values.tolist(), strict=True))
+    texts = _texts(ds, pair, list(colors), shares)
+    handles: list[Any] = [_Ramp(shades(color[None], _LEVELS if settling else 1)[0][::2]) for color in colors.values()]
+    if settling and colors:
+        ticks = settling.ticks()
+        handles.append(_Ruler(ticks, settling.share(np.array(ticks)).tolist()))
+        texts.append("periods to settle")
+    for code, look in maps.UNSETTLED.items():
+        if code in shares:
+            handles.append(_Ramp(np.array([to_rgb(look.color)])))
+            texts.append(f"{look.label}, {maps.share_text(shares[code])}")
+    if points and colors and any(len(_stroboscopic(ds, pair, key)) for key in colors):
+        handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="#BBBBBB", mec="#222222", mew=0.7))
+        texts.append("attractor at whole periods")
+    if handles:
+        small = len(handles) > _LONG_LEGEND
+        drawing = {_Ramp: _DrawRamp(), _Ruler: _DrawRuler()}
+        ax.legend(
+            handles, texts, handler_map=drawing, loc="upper left", bbox_to_anchor=(1.02, 1), handlelength=5.5, handleheight=0.9,
+            frameon=False, fontsize=6.5 if small else 8, labelspacing=0.35 if small else 0.55,
+        )  # fmt: skip
+
+
+def _texts(ds: xr.Dataset, pair: tuple[str, str], ids: Sequence[int], shares: Mapping[int, float]) -> list[str]:
+    """Each attractor in words, with its share of the cells; alike ones are told apart by their peaks."""
+    names = [maps.describe(ds.sel(attractor=key)) for key in ids]
+    texts = []
+    for key, name in zip(ids, names, strict=True):
+        one = ds.sel(attractor=key)
+        if names.count(name) > 1 and "attractor_peak" in one:
+            name = f"{name}, {maps.peak_text(one)}"
+        texts.append(f"{name}, {maps.share_text(shares.get(key, 0.0))}{_outside(ds, pair, key)}")
+    return texts
+
+
+def _outside(ds: xr.Dataset, pair: tuple[str, str], key: int) -> str:
+    """A remark if no point of the attractor lies in the map, where a reader would look for it."""
+    cloud = _stroboscopic(ds, pair, key)
+    limits = [maps.edges(ds[name].values) for name in pair]
+    inside = np.logical_and.reduce([(cloud[:, i] >= edge.min()) & (cloud[:, i] <= edge.max()) for i, edge in enumerate(limits)])
+    return ", outside the map" if len(cloud) and not inside.any() else ""

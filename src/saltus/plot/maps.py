@@ -1,0 +1,161 @@
+"""What all pictures of basins share: the right Dataset, the starts as cells, codes and colours, attractors in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from saltus.errors import ParameterError
+from saltus.plot.palette import hues
+from saltus.plot.style import Scale, display_scale
+
+#: Kinds of Dataset, and what returns them.
+SOURCES = {"basins": "sl.basins", "attractors": "sl.attractors or sl.basin_fractions", "agreement": "sl.agreement"}
+
+
+@dataclass(frozen=True)
+class Unsettled:
+    """A code for starts that lead to no attractor: its name in a legend and its colour."""
+
+    label: str
+    color: str
+
+
+#: Near-black, so that no shade of a hue is taken for them; pale where nothing is known.
+UNSETTLED = {
+    -1: Unsettled("escaped", "#000000"),
+    -2: Unsettled("not settled", "#1E1E1E"),
+    -3: Unsettled("failed", "#3C3C3C"),
+    -4: Unsettled("not computed", "#E9E9E9"),
+}
+
+
+# -- the Dataset ---------------------------------------------------------------------------------------------------------------
+def check(ds: Any, caller: str, kinds: Sequence[str], needs: Sequence[str]) -> None:
+    """Raise a ParameterError unless ``ds`` is a Dataset of one of these kinds and holds these variables."""
+    wanted = ", or ".join(SOURCES[kind] for kind in kinds)
+    if not isinstance(ds, xr.Dataset):
+        hint = " A DataArray holds one variable: give the whole Dataset." if isinstance(ds, xr.DataArray) else ""
+        raise ParameterError(f"{caller} takes the Dataset that {wanted} returns, not a {type(ds).__name__}.{hint}")
+    kind = ds.attrs.get("kind", "")
+    if not kind:
+        origin = "from simulate or stroboscope (see plot.history, plot.phase)" if "saltus_result" in ds.attrs else "from elsewhere"
+        raise ParameterError(
+            f"{caller} takes the Dataset that {wanted} returns. This one has no attribute 'kind': it is {origin}, or its attributes were "
+            f"dropped on the way (xarray.set_options(keep_attrs=True) keeps them)."
+        )
+    if kind not in kinds:
+        better = f" Draw it with plot.{kind}." if kind in ("basins", "agreement") else ""
+        raise ParameterError(f"{caller} takes what {wanted} returns; this Dataset is of the kind {kind!r}.{better}")
+    missing = [name for name in needs if name not in ds.variables]
+    if missing:
+        raise ParameterError(f"{caller} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not some variables of it.")
+
+
+def ranked(ds: xr.Dataset, order: Sequence[int] | None, caller: str) -> list[int]:
+    """Ids of the attractors in the order of their colours: those of ``order``, then the others.
+
+    Raises
+    ------
+    ParameterError
+        If ``order`` names an attractor twice, or one that there isn't.
+    """
+    known = ds["attractor"].values.tolist()
+    first = [] if order is None else [int(one) for one in np.atleast_1d(order).tolist()]
+    strange = [one for one in first if one not in known]
+    if strange or len(set(first)) < len(first):
+        what = f"there is no attractor {strange[0]}" if strange else "an attractor occurs twice"
+        raise ParameterError(f"{caller}: order={first}, but {what}. Known: {', '.join(map(str, known)) or 'none'}.")
+    return first + [one for one in known if one not in first]
+
+
+def colors_of(ds: xr.Dataset, order: Sequence[int] | None, caller: str) -> dict[int, np.ndarray]:
+    """The hue of each attractor, by id, in the order of the legend."""
+    ids = ranked(ds, order, caller)
+    return dict(zip(ids, hues(len(ids)), strict=True))
+
+
+# -- words ---------------------------------------------------------------------------------------------------------------------
+def describe(one: xr.Dataset) -> str:
+    """An attractor in a few words: ``24T, 60 contacts``; ``chaotic, 2.4 contacts per T``."""
+    period, contacts = int(one["attractor_period"]), float(one["attractor_contacts"])
+    name = f"{period}T" if period > 0 else str(one["attractor_type"].item()).replace("_", "-")
+    if not math.isfinite(contacts):
+        return name
+    if period > 0:
+        return f"{name}, {contacts:.4g} contact{'' if contacts == 1 else 's'}"
+    return f"{name}, {contacts:.3g} contacts per T"
+
+
+def share_text(fraction: float) -> str:
+    """A share in per cent; one that rounds to nothing, or to all, says that it isn't."""
+    if 0 < fraction < 0.0005:
+        return "< 0.1 %"
+    if 0.9995 <= fraction < 1:
+        return "> 99.9 %"
+    return f"{100 * fraction:.1f} %" if 0 < fraction < 1 else f"{100 * fraction:g} %"
+
+
+def peak_text(one: xr.Dataset) -> str:
+    """The largest first state of an attractor, such as ``peak 0.91 mm``."""
+    peak = float(one["attractor_peak"])
+    return f"peak {display_scale(one['attractor_peak'].attrs.get('units', ''), abs(peak)).text(float(f'{peak:.3g}'))}"
+
+
+# -- the starts ----------------------------------------------------------------------------------------------------------------
+def plane(ds: xr.Dataset, variable: str, caller: str) -> tuple[str, str]:
+    """Names of the two states on the axes of a map."""
+    dims = ds[variable].dims
+    if len(dims) != 2 or any(dim not in ds.coords for dim in dims):
+        raise ParameterError(
+            f"{caller}: {variable} has the dims {dims}; a map needs two states with their starts as coordinates. "
+            f"Of more states choose a section first, such as ds.isel({dims[-1] if dims else 'x'}=0)."
+        )
+    if 0 in ds[variable].shape:
+        raise ParameterError(f"{caller}: this map holds no starts (its shape is {ds[variable].shape}).")
+    return str(dims[0]), str(dims[1])
+
+
+def scale_of(ds: xr.Dataset, state: str) -> Scale:
+    """Display unit of one axis of the map."""
+    starts = np.asarray(ds[state].values, dtype=float)
+    return display_scale(ds[state].attrs.get("units", ""), float(np.abs(starts).max()))
+
+
+def edges(starts: np.ndarray) -> np.ndarray:
+    """Edges of the cells around the starts, shape (start + 1,): half-way between neighbours, the outer cells symmetric."""
+    starts = np.asarray(starts, dtype=float)
+    if starts.size == 1:
+        half = 0.5 * abs(starts[0]) or 0.5
+        return np.array([starts[0] - half, starts[0] + half])
+    between = 0.5 * (starts[1:] + starts[:-1])
+    return np.concatenate([[2 * starts[0] - between[0]], between, [2 * starts[-1] - between[-1]]])
+
+
+def draw_cells(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], scales: tuple[Scale, Scale], colors: np.ndarray) -> None:
+    """Colour every cell, uint8, shape (A, B, 3), and name the axes.
+
+    No colours are mixed, however small the cells: a mixture of two hues looks like a third attractor.
+    """
+    x, y = (edges(ds[name].values * scale.factor) for name, scale in zip(pair, scales, strict=True))
+    image = np.ascontiguousarray(colors.swapaxes(0, 1))
+    if all(np.allclose(np.diff(axis), (axis[-1] - axis[0]) / (axis.size - 1), rtol=1e-6, atol=0.0) for axis in (x, y)):
+        extent = (x[0], x[-1], y[0], y[-1])
+        ax.imshow(image, origin="lower", extent=extent, interpolation="nearest", aspect="auto", zorder=0, rasterized=True)
+    else:
+        ax.pcolormesh(x, y, image, zorder=0, rasterized=True)
+    ax.set_xlim(x.min(), x.max())
+    ax.set_ylim(y.min(), y.max())
+    ax.set_xlabel(scales[0].label(pair[0]))
+    ax.set_ylabel(scales[1].label(pair[1]))
+
+
+def as_bytes(rgb: np.ndarray) -> np.ndarray:
+    """sRGB in 0 to 1 as whole numbers, as images are stored."""
+    return np.round(255 * np.asarray(rgb)).astype(np.uint8)

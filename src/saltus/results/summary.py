@@ -1,0 +1,84 @@
+"""What results about attractors say in a few lines: the part of ``describe`` that knows them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from saltus.results.schema import AGREEMENT, BASINS, axes_of, kind_of
+
+#: Attractors that get a line of their own; the others are counted.
+_LINES = 12
+#: Trust numbers of a map, and what they are called in the text.
+_TRUST = {
+    "smallest_basin_seen": "smallest basin seen",
+    "basin_entropy": "basin entropy",
+    "boundary_basin_entropy": "on the boundary",
+    "uncertainty_exponent": "uncertainty exponent",
+}
+
+
+def summary(ds: xr.Dataset) -> list[str]:
+    """Lines on the extent and the content of a map of basins, a list of attractors, or the agreement of two maps."""
+    if kind_of(ds) == AGREEMENT:
+        return [f"extent   {_axes(ds)}", *_agreement(ds)]
+    lines = [f"extent   {_axes(ds)}" if kind_of(ds) == BASINS else f"extent   {_starts(ds)}"]
+    lines += _attractors(ds)
+    if "basin" in ds:
+        lines.append(f"settled  {_unsettled(ds['basin'])}")
+    trust = [f"{words} {ds.attrs[name]:.3g}" for name, words in _TRUST.items() if name in ds.attrs]
+    return lines + ([f"trust    {', '.join(trust)}"] if trust else [])
+
+
+def _axes(ds: xr.Dataset) -> str:
+    parts = []
+    for name in axes_of(ds):
+        values, unit = ds[name].values, ds[name].attrs.get("units", "")
+        parts.append(f"{name} from {values.min():g} to {values.max():g} {unit}".rstrip() if values.size else f"{name} empty")
+    return f"{' x '.join(str(ds.sizes[name]) for name in axes_of(ds))} starts, {', '.join(parts)}"
+
+
+def _starts(ds: xr.Dataset) -> str:
+    return f"{ds.sizes['trajectory']} starts" if "trajectory" in ds.dims else "attractors without their starts"
+
+
+def _attractors(ds: xr.Dataset) -> list[str]:
+    count = ds.sizes["attractor"]
+    unit = ds["attractor_peak"].attrs.get("units", "")
+    lines = [f"found    {count} {'attractor' if count == 1 else 'attractors'}"]
+    for i in range(min(count, _LINES)):
+        one = ds.isel(attractor=i)
+        period = int(one["attractor_period"])
+        name = f"{one['attractor_type'].item()}{f' {period}T' if period else ''}".replace("_", "-")
+        share = f", {float(one['attractor_fraction']):.2%} of the starts" if "attractor_fraction" in one else ""
+        lines.append(f"  {i}: {name}, peak {float(one['attractor_peak']):.4g} {unit}".rstrip() + share)
+    return lines + ([f"  and {count - _LINES} more"] if count > _LINES else [])
+
+
+def _unsettled(basin: xr.DataArray) -> str:
+    """How many starts lead to an attractor, and what became of the others."""
+    meanings = _meanings(basin)
+    codes, counts = np.unique(basin.values, return_counts=True)
+    others = [f"{count} {meanings[int(code)]}" for code, count in zip(codes, counts, strict=True) if code < 0]
+    return ", ".join([f"{int(counts[codes >= 0].sum())} of {basin.size} starts", *others])
+
+
+def _agreement(ds: xr.Dataset) -> list[str]:
+    meanings = _meanings(ds["agreement"])
+    counts = {meanings[code]: int((ds["agreement"].values == code).sum()) for code in sorted(meanings, reverse=True)}
+    a, b = ds["match_a"].values, ds["match_b"].values
+    alone = f"{int((b < 0).sum())} only in the first map, {int((a < 0).sum())} only in the second"
+    share = ds.attrs.get("agreement", np.nan)
+    return [
+        f"maps     {ds.attrs.get('method_a', 'unknown')} and {ds.attrs.get('method_b', 'unknown')}",
+        f"agree    {share:.2%} of the settled starts ({', '.join(f'{count} {word}' for word, count in counts.items())})",
+        f"matched  {int(((a >= 0) & (b >= 0)).sum())} attractors, {alone}",
+    ]
+
+
+def _meanings(variable: xr.DataArray) -> Mapping[int, str]:
+    """Code to word, from the attributes of the variable."""
+    words = variable.attrs["flag_meanings"].split()
+    return dict(zip(np.asarray(variable.attrs["flag_values"]).tolist(), words, strict=True))
