@@ -69,7 +69,7 @@ def jumping(t, x, v, *, stiffness=3.0, preload=0.6, loss=0.8, gap=0.2, other=-0.
 def test_saltation_where_the_force_jumps_against_finite_differences(method, tolerance):
     starts = np.array([[0.9, 0.1], [-0.8, 0.3], [0.0, 1.0], [0.1, -1.4]])
     stroboscope = Stroboscope(jumping, method)
-    end, matrix = stroboscope.tangent(starts, 2)
+    _, matrix = stroboscope.tangent(starts, 2)
     _, met = stroboscope.sequences(starts, 2)
     assert min(map(len, met)) >= 4
     step = 1e-5

@@ -1,7 +1,7 @@
 """Periodic orbits of a map: polished by Newton's method, with their multipliers.
 
-Newton on P^n(x) - x = 0 with the derivative from the tangent flow; Parker & Chua, Practical Numerical Algorithms for Chaotic Systems (1989),
-chapter 5.
+Newton on P^n(x) - x = 0 with the derivative from the tangent flow; Parker & Chua, Practical Numerical Algorithms for Chaotic Systems
+(1989), chapter 5.
 """
 
 from __future__ import annotations

@@ -190,7 +190,9 @@ def _axis(system: System, name: str, given: Any) -> np.ndarray:
         try:
             low, high, count = given
         except (TypeError, ValueError):
-            raise ParameterError(f'{name} must be (low, high, number of starts), such as {name}=("-5 mm", "5 mm", 400), or an array.') from None
+            raise ParameterError(
+                f'{name} must be (low, high, number of starts), such as {name}=("-5 mm", "5 mm", 400), or an array.'
+            ) from None
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 2:
             raise ParameterError(f"the number of starts along {name} must be a whole number of at least 2, not {count!r}.")
         values = np.linspace(to_si(low, system.units[name], name), to_si(high, system.units[name], name), int(count))

@@ -197,7 +197,9 @@ def _survey(map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, fou
 
     A chaotic saddle holds trajectories for thousands of periods too; what is seen to leave it betrays it.
     """
-    survivors, trails, leavers = np.arange(len(going)), [], []
+    survivors = np.arange(len(going))
+    trails: list[np.ndarray] = []
+    leavers: list[np.ndarray] = []
     for _ in range(TRAIL // ROUND):
         points = travel.advance(ROUND)
         caught = _captured(found, points, going[survivors], travel.age - ROUND, owner, settled)

@@ -79,7 +79,7 @@ def _codes(cells: np.ndarray) -> np.ndarray:
 
 
 def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) -> list[Wandering | None]:
-    """What trajectories are, from where they stand, float64[k, D], and from where they were, float64[k, TRAIL, D]; None if that isn't clear."""
+    """What trajectories are, from where they stand, float64[k, D], and were, float64[k, TRAIL, D]; None where that isn't clear."""
     exponents, errors = largest_exponents(map_, start, scale)
     found: list[Wandering | None] = []
     for exponent, error, trail in zip(exponents, errors, points, strict=True):
@@ -110,6 +110,8 @@ def merge(found: list[Wandering]) -> list[Wandering]:
     """Those of a list that are different: of two that visit the same boxes the first is kept."""
     kept: list[Wandering] = []
     for one in found:
-        if not any(other.kind == one.kind and min(other.share(one.points[None])[0], one.share(other.points[None])[0]) > ALIKE for other in kept):
+        if not any(
+            other.kind == one.kind and min(other.share(one.points[None])[0], one.share(other.points[None])[0]) > ALIKE for other in kept
+        ):
             kept.append(one)
     return kept

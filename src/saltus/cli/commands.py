@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from saltus.cli.app import app
+
+if TYPE_CHECKING:
+    from saltus.study.spec import Study
+    from saltus.system import System
 
 
 class Case(StrEnum):
@@ -24,6 +28,23 @@ class Kind(StrEnum):
 
     history = "history"
     phase = "phase"
+    basins = "basins"
+    agreement = "agreement"
+
+
+class Progress(StrEnum):
+    """How progress is shown."""
+
+    bar = "bar"
+    json = "json"
+    none = "none"
+
+
+Threads = Annotated[int | None, typer.Option(min=1, help="Threads; by default one for each usable core.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Basins: processes of a dask cluster on this machine, in place of threads.")]
+Scheduler = Annotated[str, typer.Option(help="Basins: a dask scheduler, tcp://HOST:PORT, or local.")]
+Shard = Annotated[str, typer.Option(help="Basins: K/N, the K-th of N jobs that share the folder; K from 0.")]
+ProgressKind = Annotated[Progress, typer.Option(help="bar; json: a line of JSON on standard error each second; none.")]
 
 
 @app.command()
@@ -62,15 +83,22 @@ def run(
     study: Annotated[Path, typer.Argument(help="The study file (TOML).")],
     system: Annotated[str, typer.Option(help="A system of your own: FILE.py:NAME. Runs that file.")] = "",
     out: Annotated[Path | None, typer.Option(help="Folder for results; default saltus-runs/STUDY.")] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Threads; by default one for each usable core.")] = None,
+    threads: Threads = None,
+    workers: Workers = None,
+    scheduler: Scheduler = "",
+    shard: Shard = "",
+    progress: ProgressKind = Progress.bar,
 ) -> None:
-    """Run a study file: print its table, keep its data.
+    """Run a study file: print its tables, keep its data.
 
-    A study names a model of saltus and its values; it never runs code. A system of your own is given here, by you.
+    A study names a model of saltus and its values; it never runs code. A system of your own is given here, by you. A study of basins is
+    kept chunk by chunk as it is computed: stopped at any moment, by anything, it goes on where it was when it is run again.
 
     Example: `saltus run replications/saunders2021/table2.toml`
 
     Example: `saltus run my_study.toml --system my_rig.py:rig`
+
+    Example: `saltus run replications/saunders2021/fig6b.toml --workers 2`
     """
     from saltus.cli import screen
     from saltus.results import usable_folder
@@ -81,27 +109,93 @@ def run(
     spec, text = read(study)
     own = own_system(system) if system else None
     folder = usable_folder(out or Path("saltus-runs") / study.stem)
-    with screen.working() as progress:
-        outcome = run_study(spec, text, study.parent, own, threads, progress)
+    if spec.basins is not None:
+        _run_maps(spec, text, folder, own, threads, workers, scheduler, shard, progress)
+        return
+    with screen.working() as show:
+        outcome = run_study(spec, text, study.parent, own, threads, show)
     screen.show(outcome.table)
     screen.files(outcome.write(folder))
+
+
+def _run_maps(
+    spec: Study,
+    text: str,
+    folder: Path,
+    own: System | None,
+    threads: int | None,
+    workers: int | None,
+    scheduler: str,
+    shard: str,
+    progress: Progress,
+) -> None:
+    from saltus.cli import screen
+    from saltus.study.maps import Resources, shard_of
+    from saltus.study.maps_run import run_maps
+
+    resources = Resources(threads, workers, scheduler or None, shard_of(shard) if shard else None)
+    with screen.reporting(progress.value) as (report, say):
+        outcome = run_maps(spec, text, folder, own, resources, report, say)
+    for table in outcome.tables:
+        screen.show(table)
+    screen.files(outcome.files)
+    for name in outcome.waiting:
+        screen.say(f"{name}: other shards aren't done yet. When they are: saltus resume {folder}")
+
+
+@app.command()
+def status(
+    store: Annotated[Path, typer.Argument(help="The output folder of a study of basins, or one of its stores.")],
+) -> None:
+    """Show how far the maps of a study are, on this machine and any other that works on the same folder.
+
+    Example: `saltus status saltus-runs/fig6b`
+    """
+    from saltus.cli import screen
+    from saltus.study.maps_run import status_table, statuses
+
+    screen.show(status_table(statuses(store)))
+
+
+@app.command()
+def resume(
+    store: Annotated[Path, typer.Argument(help="The output folder of a study of basins.")],
+    system: Annotated[str, typer.Option(help="The system of your own that it was run with: FILE.py:NAME.")] = "",
+    threads: Threads = None,
+    workers: Workers = None,
+    scheduler: Scheduler = "",
+    shard: Shard = "",
+    progress: ProgressKind = Progress.bar,
+) -> None:
+    """Go on with a study of basins that was stopped: only what is missing or damaged is computed.
+
+    Example: `saltus resume saltus-runs/fig6b`
+    """
+    from saltus.study.maps_run import copy_of
+    from saltus.study.own_system import own_system
+    from saltus.study.read import read
+
+    spec, text = read(copy_of(store))
+    _run_maps(spec, text, store, own_system(system) if system else None, threads, workers, scheduler, shard, progress)
 
 
 @app.command()
 def plot(
     result: Annotated[Path, typer.Argument(help="A result (.nc) that saltus wrote.")],
-    kind: Annotated[Kind, typer.Option(help="history: state against time. phase: velocity against displacement.")] = Kind.history,
+    kind: Annotated[
+        Kind | None, typer.Option(help="history: state against time. phase: velocity against displacement. basins, agreement: maps.")
+    ] = None,
     trajectory: Annotated[int | None, typer.Option(min=0, help="Which trajectory of a batch; by default all, at most 8.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture (.png, .pdf, .svg); default RESULT-KIND.png.")] = None,
 ) -> None:
-    """Draw a result.
+    """Draw a result: history and phase of a run; basins; the agreement of two maps. By default what fits the result.
 
     Example: `saltus plot saltus-demo/demo.nc --trajectory 2 --kind phase -o phase.pdf`
     """
     from saltus.cli import screen
     from saltus.study.draw import draw
 
-    screen.files([draw(result, kind.value, trajectory, out or result.with_name(f"{result.stem}-{kind.value}.png"))])
+    screen.files([draw(result, None if kind is None else kind.value, trajectory, out)])
 
 
 @app.command()

@@ -14,6 +14,7 @@ import os
 import shutil
 import sys
 import tempfile
+import threading
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ from saltus.errors import CacheError, SaltusWarning
 MANIFEST = "manifest.json"
 MODULE = "kernels.py"
 _BUILDING = ".building-"
+_LOADING = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -87,10 +89,13 @@ def load(key: str, source: str, title: str) -> ModuleType:
     CacheError
         If no folder at all can be written.
     """
-    name = f"saltus_kernels_{key}"
+    with _LOADING:  # a module stands in sys.modules before it is complete
+        return _load(f"saltus_kernels_{key}", folder() / key, source, title)
+
+
+def _load(name: str, final: Path, source: str, title: str) -> ModuleType:
     if name in sys.modules:
         return sys.modules[name]
-    final = folder() / key
     if _intact(final, source):
         try:
             return _import(name, final / MODULE)
@@ -142,7 +147,7 @@ def _build(name: str, final: Path, source: str, title: str) -> ModuleType:
             f"saltus: {folder()} can't be written ({error.strerror or error}); kernels are compiled for this process only. "
             "Set SALTUS_CACHE to a folder of yours with free space.",
             SaltusWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
         return _build_for_this_process(name, source, title)
     _publish(building, final, source)

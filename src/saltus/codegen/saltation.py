@@ -1,6 +1,7 @@
 """The jump of the tangent at a contact, generated: the saltation matrix S = I + (f_after - f_before) n' / (n' f_before + g_t).
 
-It is the identity where the force is continuous. Aizerman & Gantmakher, J. Mech. Appl. Math. 11 (1958); Leine & Nijmeijer (2004), section 7.4.
+It is the identity where the force is continuous. Aizerman & Gantmakher, J. Mech. Appl. Math. 11 (1958); Leine & Nijmeijer (2004),
+section 7.4.
 """
 
 from __future__ import annotations

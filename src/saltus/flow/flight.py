@@ -97,7 +97,8 @@ class Flight:
         call = dict(
             arrays, stride=np.int64(0 if len(arrays["param"]) == 1 else 1), cursor=np.zeros(k, np.int64), samples=samples,
             sample_count=np.arange(self.age + 1, self.age + periods + 1, dtype=np.int64), sample_fraction=np.zeros(periods),
-            sample_mode=np.zeros((k, periods), np.int64), rec_first=np.zeros(k, np.int64), rec_i=np.zeros((0, st.RECORD_INTEGERS), np.int64),
+            sample_mode=np.zeros((k, periods), np.int64), rec_first=np.zeros(k, np.int64),
+            rec_i=np.zeros((0, st.RECORD_INTEGERS), np.int64),
             rec_f=np.zeros((0, st.RECORD_FLOATS + states + 1)), rec_used=np.zeros(1, np.int64), options=self._options,
         )  # fmt: skip
         while self._module.propagate(*(call[name] for name in ARGUMENTS), SLICE, *self._workspace) == st.PAUSED:

@@ -24,16 +24,28 @@ class Travel(Protocol):
     age: int
 
     def __len__(self) -> int: ...
+
     @property
-    def state(self) -> np.ndarray: ...
+    def state(self) -> np.ndarray:
+        """States now, float64[k, D]."""
+
     @property
-    def going(self) -> np.ndarray: ...
+    def going(self) -> np.ndarray:
+        """Which can go on, bool[k]."""
+
     @property
-    def status(self) -> np.ndarray: ...
+    def status(self) -> np.ndarray:
+        """Status codes, int64[k]."""
+
     @property
-    def unresolved(self) -> np.ndarray: ...
-    def advance(self, periods: int) -> np.ndarray: ...
-    def keep(self, wanted: np.ndarray) -> None: ...
+    def unresolved(self) -> np.ndarray:
+        """Grazes too shallow to be sure of, int64[k]."""
+
+    def advance(self, periods: int) -> np.ndarray:
+        """States at the next iterates, float64[k, periods, D]."""
+
+    def keep(self, wanted: np.ndarray) -> None:
+        """Let go of those that aren't wanted, bool[k]."""
 
 
 class Map(Protocol):
@@ -57,7 +69,7 @@ class Map(Protocol):
         """Trajectories from float64[k, D]; they will be asked for ``longest`` iterates at most."""
 
     def tangent(self, start: np.ndarray, count: int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """End states float64[k, D] after ``count`` iterates and the derivative times ``directions`` (default: identity) float64[k, D, D]."""
+        """Ends float64[k, D] of ``count`` iterates, and the derivative times ``directions`` (default: identity) float64[k, D, D]."""
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
         """End states after ``count`` iterates, and for each start the contacts on the way: guard and direction in one number."""
@@ -111,7 +123,7 @@ class Stroboscope:
         return outcome.state, np.split(codes, np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(1, len(start))))
 
     def trajectory(self, start: np.ndarray, count: int, samples: int) -> tuple[np.ndarray, engine.Outcome]:
-        """States at ``samples`` instants of each of ``count`` periods, the start included, float64[k, count * samples, D]; and the outcome."""
+        """States at ``samples`` instants of each of ``count`` periods, the start included, float64[k, count * samples, D]; the outcome."""
         index = np.arange(count * samples)
         outcome = self._run(self.system, start, count, 0, Schedule(index // samples, (index % samples) / samples))
         return outcome.samples, outcome
@@ -140,7 +152,7 @@ class FunctionMap:
         self.states, self.period, self.noise = tuple(states.split()), 1.0, 1e-12
         self._function, self._derivative = function, derivative
 
-    def launch(self, start: np.ndarray, longest: float) -> _Iterates:
+    def launch(self, start: np.ndarray, longest: float) -> _Iterates:  # noqa: ARG002
         """See :class:`Map`."""
         return _Iterates(self._function, start)
 

@@ -6,8 +6,8 @@ def capture(points, centres, weights, owners, reach, label, when):
     """Look at every point of every trajectory, in order, until one lies in an ellipsoid |W (p - c)| <= 1.
 
     points f8[k, n, D]; centres f8[m, D], ascending in their first coordinate; weights f8[m, D, D]; owners i8[m], the attractor of each;
-    reach: half the largest extent of an ellipsoid along the first coordinate; out: label i8[k], the owner, or untouched; when i8[k], the index of
-    the point. Returns how many were captured.
+    reach: half the largest extent of an ellipsoid along the first coordinate; out: label i8[k], the owner, or untouched; when i8[k], the
+    index of the point. Returns how many were captured.
     """
     count, size, found = centres.shape[0], points.shape[2], 0
     for i in range(points.shape[0]):

@@ -7,19 +7,19 @@ from pathlib import Path
 from saltus.errors import ParameterError
 
 
-def draw(result: Path, kind: str, trajectory: int | None, file: Path) -> Path:
+def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | None) -> Path:
     """Draw a result to a picture file.
 
     Parameters
     ----------
     result : Path
         A ``.nc`` file that saltus wrote.
-    kind : {"history", "phase"}
-        Which picture.
+    kind : {"history", "phase", "basins", "agreement"}, optional
+        Which picture; by default the one that fits the result.
     trajectory : int, optional
         Which of a batch; all of them, at most 8, by default.
-    file : Path
-        The picture; its suffix says the format.
+    file : Path, optional
+        The picture; its suffix says the format. By default RESULT-KIND.png.
 
     Returns
     -------
@@ -44,10 +44,14 @@ def draw(result: Path, kind: str, trajectory: int | None, file: Path) -> Path:
     from saltus import plot
     from saltus.results import load
 
+    ds = load(result)
+    own = {"basins": "basins", "agreement": "agreement"}.get(str(ds.attrs.get("kind", "")))
+    kind = kind or own or "history"
+    file = file or result.with_name(f"{result.stem}-{kind}.png")
     formats = FigureCanvasBase.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in formats:
         raise ParameterError(f"a picture can't be written as {file.name!r}. Known: {', '.join('.' + name for name in sorted(formats))}.")
-    axes = getattr(plot, kind)(load(result), trajectory=trajectory)
+    axes = getattr(plot, kind)(ds, **({} if own else {"trajectory": trajectory}))
     first = axes.flat[0] if hasattr(axes, "flat") else axes
     first.figure.savefig(file)
     plt.close("all")

@@ -11,9 +11,11 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from saltus.errors import nearest
-from saltus.study.spec import METHODS, Compare, Header, Simulate, Study, SystemTable
+from saltus.study.spec import METHODS, Axis, Basins, Compare, Header, Map, Simulate, Study, SystemTable
 
-TABLES: dict[str, type[BaseModel]] = {"study": Header, "system": SystemTable, "simulate": Simulate, "compare": Compare}
+TABLES: dict[str, type[BaseModel]] = {
+    "study": Header, "system": SystemTable, "simulate": Simulate, "compare": Compare, "basins": Basins, "map": Map, "axes": Axis,
+}  # fmt: skip
 _BRANCHES = re.compile(r"float|str|list\[.*\]")
 _BARE_QUANTITY = re.compile(r"\s*([\w.-]+)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[A-Za-zµ][^#\"']*?)\s*(?:#.*)?")
 _EXPECTED = {
@@ -79,7 +81,7 @@ def _fault(place: tuple, details: list[dict]) -> str:
     if kind == "union_tag_not_found":
         return f'[{".".join(path)}] needs \'name\'. Write name = "Taylor" or name = "ODE45".'
     if kind == "value_error":
-        return f"[{'.'.join(path)}] {first['ctx']['error']}."
+        return f"[{'.'.join(path)}] {first['ctx']['error']}." if path else f"{first['ctx']['error']}."
     if len(details) > 1:
         finite = any(detail["type"] == "finite_number" for detail in details)
         expected = "a finite number" if finite else 'a plain number, or text with a unit, such as "0.4 mm"'
@@ -92,7 +94,8 @@ def _table(place: tuple) -> type[BaseModel] | None:
     """The class of the table at a place in a study."""
     table: type[BaseModel] | None = Study
     for part in place:
-        table = METHODS.get(part) or TABLES.get(part) or (table if part in ("method", "reference") else None)
+        nested = part in ("method", "reference") or isinstance(part, int) or table is Axis
+        table = METHODS.get(part) or TABLES.get(part) or (table if nested else None)
     return table
 
 

@@ -37,9 +37,14 @@ def number(value: Quantity, unit: str, place: str, key: str) -> float:
     return to_si(value, unit, f"[{place}] {key}")
 
 
-def parameters(system: System, values: Mapping[str, Quantity]) -> dict[str, float]:
-    """[system] values in SI. Raises StudyError for a name that the system doesn't have, or for a missing unit."""
-    return {name: number(value, _unit(system, name, system.values, "system"), "system", name) for name, value in values.items()}
+def parameters(system: System, values: Mapping[str, Quantity], place: str = "system") -> dict[str, float]:
+    """Parameter values in SI. Raises StudyError for a name that the system doesn't have, or for a missing unit."""
+    return {name: number(value, _unit(system, name, system.values, place), place, name) for name, value in values.items()}
+
+
+def states(system: System, table: Mapping[str, Quantity], place: str) -> dict[str, float]:
+    """Values of some states in SI. Raises StudyError for an unknown state or a missing unit."""
+    return {name: number(value, _unit(system, name, system.states, place), place, name) for name, value in table.items()}
 
 
 def start(system: System, table: Mapping[str, Start]) -> dict[str, float | list[float]]:

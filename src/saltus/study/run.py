@@ -82,6 +82,8 @@ def run_study(
     StudyError, UnitError, ParameterError
         If the study doesn't fit its system.
     """
+    if study.simulate is None:
+        raise StudyError("this study has [basins]: run it with run_maps.")
     system = system_of(study.system, own)
     if quantities.is_batch(study.simulate) and study.compare is not None:
         raise StudyError("[compare] is for one start: let [simulate] start hold single values.")
@@ -134,6 +136,7 @@ def _simulate(system: System, study: Study, method: SpecTable, text: str, comput
     from saltus.analysis import simulate
 
     table = study.simulate
+    assert table is not None
     if table.periods is not None and system.forced_at is None:
         raise StudyError(f'[simulate] periods: {system.name} has no forcing period. Write t_end = "2 s" in place of it.')
     start, values = quantities.start(system, table.start), quantities.varied(system, table.values)

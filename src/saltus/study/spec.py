@@ -98,11 +98,62 @@ class Compare(Table):
     reference: Method | None = Field(None, description="A second method to run on the same system.", examples=[{"name": "Taylor"}])
 
 
+class Axis(Table):
+    """An axis of a basin map: starts from one value to another, ends included."""
+
+    first: Quantity = Field(description="The first start.", examples=["-5 mm"])
+    last: Quantity = Field(description="The last start.", examples=["5 mm"])
+    count: int = Field(ge=2, description="How many starts.", examples=[400])
+
+
+class Map(Table):
+    """[[basins.map]]: one of the maps of a study, with what sets it apart from the others."""
+
+    name: str = Field(min_length=1, description="What it is called in tables, pictures and file names.", examples=["exact, 25.5 kN/m"])
+    method: Method | None = Field(None, description="How to integrate; the study's [method] by default.", examples=[{"name": "Taylor"}])
+    values: dict[str, Quantity] = Field(
+        default_factory=dict, description="Values that differ from [system].", examples=[{"contact_stiffness": "25.5 kN/m"}]
+    )
+    compare: str | None = Field(None, description="The name of another map to set beside this one, cell by cell.", examples=["exact"])
+
+
+class Basins(Table):
+    """[basins]: which attractor each start of a grid leads to."""
+
+    axes: dict[str, Axis] = Field(
+        min_length=2, max_length=2, description="The two states that the map is drawn over.",
+        examples=[{"x": {"first": "-5 mm", "last": "5 mm", "count": 400}, "v": {"first": "-1 m/s", "last": "1 m/s", "count": 400}}],
+    )  # fmt: skip
+    at: dict[str, Quantity] = Field(default_factory=dict, description="Starts of the other states; 0 by default.", examples=[{"y": "0 mm"}])
+    periods: int = Field(2000, ge=1, description="Forcing periods that a start is followed at most.", examples=[2000])
+    every: Quantity | None = Field(None, description="Time between two looks, for a system without forcing.", examples=["1 s"])
+    map: list[Map] = Field(default_factory=list, description="Several maps of one study.", examples=[[{"name": "exact"}]])
+
+    @model_validator(mode="after")
+    def _names(self) -> Basins:
+        names = [one.name for one in self.map]
+        if len(set(names)) < len(names):
+            raise ValueError("two maps have the same name")
+        for one in self.map:
+            if one.compare is not None and (one.compare not in names or one.compare == one.name):
+                raise ValueError(f"map {one.name!r} is compared with {one.compare!r}, which is no other map of this study")
+        return self
+
+
 class Study(Table):
     """A study file."""
 
     study: Header
     system: SystemTable = SystemTable()
     method: Method = Taylor(name="Taylor")
-    simulate: Simulate
+    simulate: Simulate | None = None
     compare: Compare | None = None
+    basins: Basins | None = None
+
+    @model_validator(mode="after")
+    def _one_question(self) -> Study:
+        if (self.simulate is None) == (self.basins is None):
+            raise ValueError("a study has one table [simulate] or one table [basins]")
+        if self.compare is not None and self.simulate is None:
+            raise ValueError("[compare] goes with [simulate]; maps are compared with compare = in [[basins.map]]")
+        return self

@@ -1,7 +1,7 @@
 """The tangent system: a system together with the derivative of its state with respect to the state at the start.
 
-Between contacts the derivative Y obeys the variational equations dY/dt = J(t, y) Y in the frozen mode. At a contact where the force jumps, Y
-jumps too, by the saltation matrix (codegen/saltation.py). Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems
+Between contacts the derivative Y obeys the variational equations dY/dt = J(t, y) Y in the frozen mode. At a contact where the force jumps,
+Y jumps too, by the saltation matrix (codegen/saltation.py). Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems
 (2004), section 7.
 """
 

@@ -5,6 +5,7 @@ import math
 import os
 import time
 import warnings
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import xarray as xr
 import zarr
 
 from saltus.errors import ParameterError
+from saltus.results import lock
 from saltus.results.durable import seal, unseal
 from saltus.results.lock import overlap
 from saltus.results.store import Store, StoreError
@@ -261,6 +263,38 @@ def test_a_lock_is_for_one_part_of_a_process(store):
     with other.lock():
         pass
     assert store.status().writers == ()
+
+
+def test_the_name_of_a_killed_holder_goes(store):
+    (store.path / "locks" / "0-of-1").write_text(
+        '{"host": "a host with a long name", "process": 1, "since": "2026-01-01 12:00:00+00:00"}' * 2
+    )
+    assert store.status().writers == ()
+    with store.lock():
+        assert store.status().writers[0].startswith(f"process {os.getpid()} on")
+
+
+def test_a_refused_writer_does_not_get_in_the_way(store):
+    other = Store.open(store.path)
+    with store.lock((0, 2)):
+        with pytest.raises(StoreError), other.lock():
+            pass
+        assert not (store.path / "locks" / "0-of-1").exists(), "it looked before it took its own lock"
+
+
+def test_two_that_take_a_lock_at_once_are_not_both_let_in(store, monkeypatch):
+    """Another process takes shard 0 of 2 just after this one has looked."""
+    look = lock._refuse_if_held
+    with ExitStack() as late:
+
+        def look_and_lose(folder, shard, *, others_only):
+            look(folder, shard, others_only=others_only)
+            if not others_only:
+                late.enter_context(lock.exclusive(folder / "0-of-2"))
+
+        monkeypatch.setattr(lock, "_refuse_if_held", look_and_lose)
+        with pytest.raises(StoreError, match="written by another process, shard 0 of 2"), store.lock():
+            pass
 
 
 def test_shards_overlap_where_they_share_a_chunk():

@@ -1,0 +1,82 @@
+"""Attractors and labels as plain data: what a store keeps, and reads back to the last bit. No code is run on reading."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.capture import Neighbourhoods
+from saltus.analysis.orbits import Orbit
+from saltus.analysis.recurrence import Found
+from saltus.analysis.settling import Settling
+from saltus.analysis.wandering import Wandering
+
+#: What is kept of each cell, beside where it ended.
+CELL: dict[str, Any] = {"label": np.int16, "periods": np.int32, "status": np.int8, "unresolved": np.int16}
+
+
+def found_data(found: Found) -> dict[str, Any]:
+    """Attractors as numbers, texts, lists and dicts."""
+    return {
+        "orbits": [_orbit_data(orbit) for orbit in found.orbits],
+        "unstable": [_orbit_data(orbit) for orbit in found.unstable],
+        "wandering": [
+            {"kind": w.kind, "exponent": w.exponent, "error": w.exponent_error, "points": w.points.tolist(), "scale": w.scale.tolist()}
+            for w in found.wandering
+        ],
+        "near": {"centres": found.near.centres.tolist(), "weights": found.near.weights.tolist(), "owners": found.near.owners.tolist()},
+    }
+
+
+def found_from(data: Mapping[str, Any], size: int) -> Found:
+    """Attractors from :func:`found_data`'s result, of a system with so many states."""
+    near = data["near"]
+    return Found(
+        Neighbourhoods(_array(near["centres"], size), _array(near["weights"], size, size), np.array(near["owners"], np.int64)),
+        [_orbit_from(one, size) for one in data["orbits"]],
+        [
+            Wandering(str(one["kind"]), float(one["exponent"]), float(one["error"]), _array(one["points"], size), np.array(one["scale"]))
+            for one in data["wandering"]
+        ],
+        [_orbit_from(one, size) for one in data["unstable"]],
+    )
+
+
+def _orbit_data(orbit: Orbit) -> dict[str, Any]:
+    values = orbit.multipliers
+    return {
+        "points": orbit.points.tolist(), "monodromy": orbit.monodromy.tolist(), "mismatch": orbit.mismatch,
+        "multipliers": [[float(value.real), float(value.imag)] for value in values],
+    }  # fmt: skip
+
+
+def _orbit_from(data: Mapping[str, Any], size: int) -> Orbit:
+    values = np.array([complex(real, imaginary) for real, imaginary in data["multipliers"]])
+    return Orbit(_array(data["points"], size), _array(data["monodromy"], size, size), values, float(data["mismatch"]))
+
+
+def _array(rows: Any, *tail: int) -> np.ndarray:
+    return np.ascontiguousarray(np.array(rows, float).reshape(-1, *tail))
+
+
+def cell_types(states: tuple[str, ...]) -> dict[str, Any]:
+    """Name and type of what is kept of each cell."""
+    return {**CELL, **{f"end_{name}": np.float64 for name in states}}
+
+
+def settling_arrays(part: Settling, states: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """The arrays of some cells, in the types of :func:`cell_types`."""
+    most = np.iinfo(CELL["unresolved"]).max
+    columns = {name: getattr(part, name) for name in CELL} | {"unresolved": np.minimum(part.unresolved, most)}
+    return {name: columns[name].astype(kind) for name, kind in CELL.items()} | {
+        f"end_{name}": np.ascontiguousarray(part.end[:, i]) for i, name in enumerate(states)
+    }
+
+
+def settling_from(arrays: Mapping[str, np.ndarray], states: tuple[str, ...]) -> Settling:
+    """Cells from :func:`settling_arrays`' result."""
+    columns = {name: arrays[name].astype(np.int64) for name in CELL}
+    return Settling(columns["label"], columns["periods"], columns["status"], columns["unresolved"],
+                    np.stack([arrays[f"end_{name}"] for name in states], axis=1))  # fmt: skip

@@ -1,0 +1,176 @@
+"""Bytes that reach the disk together or not at all, and JSON that knows when it was damaged. The ground under a store."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import shutil
+import time
+import uuid
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from saltus.errors import ParameterError, SaltusError
+
+#: A folder takes a moment to make: a draft of one that is older than this [s] was left by a process that was killed.
+_DRAFT_AGE = 60.0
+
+
+class StoreError(SaltusError, OSError):
+    """A store can't be made, resumed, locked, written or read."""
+
+
+def write_together(parts: Path, prefix: str, files: Mapping[Path, bytes]) -> None:
+    """Write files that count only together; the last one says that the others are complete.
+
+    All bytes, those of the last file too, are on the disk before the first name appears: a disk that fills up leaves everything as it
+    was. The last name appears once the other names are on the disk too, so that not even a power cut can leave it alone.
+
+    Parameters
+    ----------
+    parts : Path
+        Folder on the same disk for the drafts; what a killed process leaves behind lies there.
+    prefix : str
+        Beginning of the drafts' names. No other process may be writing under the same one.
+    files : mapping of Path to bytes
+        What to write, in the order in which the names are to appear.
+
+    Raises
+    ------
+    StoreError
+        If the disk is full, the folder is missing or may not be written to.
+    """
+    drafts = {target: parts / f"{prefix}.{number}.part" for number, target in enumerate(files)}
+    *others, last = files
+    try:
+        for target, draft in drafts.items():
+            write(draft, files[target])
+        for target in others:
+            os.replace(drafts[target], target)
+        for folder in dict.fromkeys(target.parent for target in others):
+            flush_names(folder)
+        os.replace(drafts[last], last)
+        flush_names(last.parent)
+    except OSError as error:
+        raise StoreError(
+            f"{last} can't be written: {error.strerror or error}. Nothing half-written was left behind, and what was done stays done: "
+            "make room or mend the disk, then start again."
+        ) from error
+    finally:
+        for draft in drafts.values():
+            with suppress(OSError):  # swept away at the next start
+                draft.unlink(missing_ok=True)
+
+
+def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str]) -> None:
+    """Make a folder that appears under its name with everything in it, or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        Its name, not taken yet.
+    files : mapping of str to bytes
+        What is in it, by path in the folder.
+    folders : iterable of str
+        Folders in it.
+
+    Raises
+    ------
+    StoreError
+        If something stands under the name, or the disk is full.
+    """
+    remove_old_drafts(path)
+    draft = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part")
+    try:
+        for name in folders:
+            (draft / name).mkdir(parents=True)
+        for name, data in files.items():
+            write(draft / name, data)
+        for place in [draft, *(place for place in draft.rglob("*") if place.is_dir())]:
+            flush_names(place)
+        os.rename(draft, path)
+        flush_names(path.parent)
+    except OSError as error:
+        raise StoreError(
+            f"{path} can't be made: {error.strerror or error}. Nothing was left behind; make room or choose another folder."
+        ) from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def remove_old_drafts(path: Path) -> None:
+    """Remove what processes left that were killed within :func:`write_folder`."""
+    for draft in path.parent.iterdir():
+        if draft.name.startswith(f".{path.name}.") and draft.name.endswith(".part") and time.time() - draft.stat().st_mtime > _DRAFT_AGE:
+            shutil.rmtree(draft, ignore_errors=True)
+
+
+def write(path: Path, data: bytes) -> None:
+    """Write a file and wait until its bytes are on the disk."""
+    with path.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def flush_names(folder: Path) -> None:
+    """Wait until the names in a folder are on the disk."""
+    if os.name == "nt":  # Windows can't open a folder
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def read(path: Path) -> bytes | None:
+    """What is in a file; None if it isn't there or the disk can't read it any more."""
+    try:
+        return path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        if error.errno == errno.EIO:
+            return None
+        raise StoreError(f"{path} can't be read: {error.strerror}. Mend its permissions or the disk.") from error
+
+
+def size(path: Path) -> int | None:
+    """Size of a file; None if there is none."""
+    try:
+        return path.stat().st_size if path.is_file() else None
+    except FileNotFoundError:  # a draft that has just taken its place
+        return None
+
+
+def sha256(data: bytes) -> str:
+    """SHA-256 in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def seal(values: Mapping[str, Any]) -> bytes:
+    """JSON text with a checksum of itself; the same values give the same bytes, whatever their order."""
+    return _text({**values, "checksum": sha256(_text(values))})
+
+
+def unseal(data: bytes) -> dict[str, Any] | None:
+    """What :func:`seal` was given; None if one bit of it is not what it was."""
+    try:
+        values = json.loads(data)
+        return values if seal({name: value for name, value in values.items() if name != "checksum"}) == data else None
+    except (ValueError, AttributeError, RecursionError):
+        return None
+
+
+def _text(values: Mapping[str, Any]) -> bytes:
+    try:
+        return json.dumps(values, indent=1, sort_keys=True).encode() + b"\n"
+    except TypeError as error:
+        raise ParameterError(
+            f"only plain values can be stored: None, booleans, numbers, text, lists, dicts with text keys ({error})."
+        ) from None

@@ -1,0 +1,52 @@
+"""Small values that belong to all chunks of a store: one file each, with a checksum inside."""
+
+from __future__ import annotations
+
+import base64
+import re
+from pathlib import Path
+from typing import Any, Literal
+
+from saltus.errors import ParameterError
+from saltus.results.durable import StoreError, read, seal, unseal, write_together
+from saltus.results.lock import WHOLE, exclusive
+
+
+def put_artifact(
+    store: Path, name: str, value: Any, *, existing: Literal["same", "keep", "replace"] = "same", shard: tuple[int, int] = WHOLE
+) -> None:
+    """Keep a value: see :meth:`saltus.results.store.Store.put`. ``shard`` is the lock that this process holds."""
+    data = seal({"base64": base64.b64encode(value).decode()} if isinstance(value, bytes) else {"value": value})
+    file = _file(store, name)
+    with exclusive(store / "locks" / "artifacts", patience=10.0):  # shards may put at the same moment
+        earlier = read(file)
+        intact = earlier is not None and unseal(earlier) is not None
+        if intact and earlier == data:
+            return
+        if intact and existing == "same":
+            raise StoreError(f"{store} keeps another {name!r} already. Use that one: get({name!r}).")
+        if intact and existing == "replace" and shard != WHOLE:
+            raise StoreError(f"{name!r} of {store} can only be replaced under the lock of the whole store.")
+        if not intact or existing == "replace":
+            write_together(store / "parts", "artifact", {file: data})
+
+
+def get_artifact(store: Path, name: str) -> Any:
+    """The value; :class:`StoreError` if there is none, or it is damaged."""
+    data = read(_file(store, name))
+    values = unseal(data or b"")
+    if values is None:
+        state = "has no" if data is None else "has a damaged"
+        raise StoreError(f"{store} {state} {name!r}. Compute it again: put() takes its place.")
+    return base64.b64decode(values["base64"]) if "base64" in values else values["value"]
+
+
+def has_artifact(store: Path, name: str) -> bool:
+    """Whether there is one that isn't damaged."""
+    return unseal(read(_file(store, name)) or b"") is not None
+
+
+def _file(store: Path, name: str) -> Path:
+    if not re.fullmatch(r"[\w-]+", name, re.ASCII):
+        raise ParameterError(f"artifact {name!r}: use letters, digits, _ and -.")
+    return store / "artifacts" / f"{name}.json"
