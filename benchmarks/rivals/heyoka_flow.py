@@ -74,6 +74,18 @@ class Flow:
             end[these] = self.integrator.state.T
         return end
 
+    def stroboscope(self, x: np.ndarray, v: np.ndarray, periods: int, keep: int) -> np.ndarray:
+        """States (starts, keep, 2) at the last of some periods. Only with more lanes than one; any number of starts."""
+        self.contacts[0] = 0
+        times = np.concatenate([[0.0], np.arange(periods - keep + 1, periods + 1) * rig.PERIOD])
+        grid = np.ascontiguousarray(np.repeat(times[:, None], self.lanes, axis=1))
+        points = np.empty((x.size, keep, 2))
+        for at in range(0, x.size, self.lanes):
+            these = np.arange(at, at + self.lanes) % x.size  # lanes to spare at the end do the first starts once more
+            self._begin(x[these], v[these])
+            points[these] = self.integrator.propagate_grid(grid)[-1][1:].transpose(2, 0, 1)
+        return points
+
 
 def measure(x: np.ndarray, v: np.ndarray, *, periods: int = 100, tolerance: float = 1e-12, lanes: int | None = None) -> rig.Measured:
     """CPU time, end states and contacts of heyoka.

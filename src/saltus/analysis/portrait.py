@@ -89,7 +89,7 @@ def _of_motion(map_: Stroboscope, start: np.ndarray, periods: int, samples: int,
     names = [guard.name for guard in map_.system.guards]
     texts = [f"{names[row[st.REC_GUARD]]}{'+' if row[st.REC_DIRECTION] > 0 else '-'}" for row in crossings]
     return _Looks(
-        contacts=len(crossings) / responses,
+        contacts=len(crossings) / responses if map_.method.records_contacts else math.nan,
         itinerary=" ".join(texts) if responses == 1 else "",
         peak=float(np.abs(_extremes(motion[0])).max(initial=np.abs(motion[0]).max())),
         rms=float(np.sqrt(np.mean(motion[0] ** 2))),

@@ -154,9 +154,12 @@ def _write_guards(system: System, code: JetCode, builder: SeriesBuilder, constan
 
 
 def _turns_function(system: System, code: JetCode) -> str:
-    """``turns(p, period, count, lane, clock)``: phase of every harmonic at the start of a period."""
+    """``turns(p, origin, period, count, lane, clock)``: phase of every harmonic at the start of a period; whether one of them drifts."""
     scalar = ScalarCode(parameter_leaf(system))
+    drifting = []
     for (rate, offset), i in code.harmonics.items():
         w, b = scalar.value(rate), scalar.value(offset)
         scalar.lines.append(f"clock[{FIRST_TURN + i}, lane] = {b} + turned({w}, period, count) + turned({w}, origin, 1)")
+        drifting.append(f"turned({w}, period, 1) != 0.0")
+    scalar.lines.append(f"return {' or '.join(drifting) or 'False'}")
     return f"@kernel\ndef turns(p, origin, period, count, lane, clock):\n{indented(scalar.lines)}\n"

@@ -55,6 +55,11 @@ class Method:
         raise NotImplementedError
 
     @property
+    def records_contacts(self) -> bool:
+        """Whether contacts are located, so that there is something to count."""
+        return True
+
+    @property
     def noise(self) -> float:
         """Mismatch of a periodic orbit, relative to the range of the states, that this method's own errors explain."""
         raise NotImplementedError
@@ -162,6 +167,11 @@ class ODE45(Method):
         """RelTol, AbsTol, whether contacts are located, step budget, event budget."""
         locate = 1.0 if self.events == "locate" else 0.0
         return np.array([self.rtol, self.atol, locate, _step_budget(self.max_steps, periods), float(self.max_events)])
+
+    @property
+    def records_contacts(self) -> bool:
+        """Only if they are located."""
+        return self.events == "locate"
 
     @property
     def noise(self) -> float:

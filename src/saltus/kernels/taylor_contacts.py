@@ -135,6 +135,8 @@ def note_touch(lanes, lane, batch, slow, g, d, start):
     state_at(lanes, lane, d, slow.state)
     mode, side = mode_of(lanes, lane), int(lanes.side[g, lane])
     batch.counters[who, GRAZES if kind == GRAZE else UNRESOLVED] += 1
+    if not recorded(lanes, lane, batch):
+        return
     curve = 2.0 * abs(lanes.work[GUARD_ROW[g] + 2, lane])
     noise = ROUNDING * lanes.work[SCALE_ROW + g, lane]
     error = math.sqrt(2.0 * noise / curve) if curve > 0.0 else math.inf
@@ -164,11 +166,15 @@ def state_at(lanes, lane, d, out):
 
 
 @inner
+def recorded(lanes, lane, batch):
+    """Whether the contacts of this period are kept."""
+    return batch.rec_i.shape[0] > 0 and lanes.memo[lane, COUNT] >= batch.rec_first[lanes.memo[lane, WHO]]
+
+
+@inner
 def record(lanes, lane, batch, tau, g, direction, velocity, kind, before, after, error, state):
-    """Append a contact to the records of its trajectory, if it is wanted."""
+    """Append a contact to the records of its trajectory."""
     who = lanes.memo[lane, WHO]
-    if batch.rec_i.shape[0] == 0 or lanes.memo[lane, COUNT] < batch.rec_first[who]:
-        return
     j = batch.rec_used[0]
     batch.rec_used[0] = j + 1
     batch.rec_i[j, REC_TRAJECTORY] = who
@@ -215,7 +221,7 @@ def is_shallow(lanes, lane, g, rate):
     return rate * rate * h * h <= 2.0 * ROUNDING * size * curvature
 
 
-@kernel
+@inner
 def change_side(lanes, lane, batch, g, rate, before, slow):
     """The state is on the other side of a guard: change its bit, count and record."""
     who = lanes.memo[lane, WHO]
@@ -234,6 +240,8 @@ def change_side(lanes, lane, batch, g, rate, before, slow):
     if shallow:
         batch.counters[who, UNRESOLVED] += 1
     batch.minima[who, CONTACT_SPEED] = min(batch.minima[who, CONTACT_SPEED], abs(rate))
+    if not recorded(lanes, lane, batch):
+        return
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     tau, direction = lanes.clock[TAU, lane], int(lanes.side[g, lane])

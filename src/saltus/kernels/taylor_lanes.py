@@ -59,7 +59,8 @@ def set_period(lanes, lane, batch):
     """Everything of a lane that depends on its period count: time base, phases of harmonics, end of the stretch, next sample."""
     who, count = lanes.memo[lane, WHO], lanes.memo[lane, COUNT]
     lanes.clock[BASE, lane] = batch.origin[who] + count * batch.period[who]
-    turns(batch.param[who * batch.stride], batch.origin[who], batch.period[who], count, lane, lanes.clock)
+    if lanes.memo[lane, DRIFTS] == 1:
+        turns(batch.param[who * batch.stride], batch.origin[who], batch.period[who], count, lane, lanes.clock)
     lanes.run[END, lane] = batch.period[who] if count < batch.end_count[who] else batch.end_phase[who]
     set_due(lanes, lane, batch)
 
@@ -164,6 +165,8 @@ def fill(lanes, lane, who, batch, slow):
     lanes.memo[lane, :] = 0
     lanes.memo[lane, WHO], lanes.memo[lane, COUNT] = who, batch.count[who]
     constants(batch.param[who * batch.stride], lanes.c, lane)
+    drifts = turns(batch.param[who * batch.stride], batch.origin[who], batch.period[who], batch.count[who], lane, lanes.clock)
+    lanes.memo[lane, DRIFTS] = 1 if drifts else 0
     lanes.clock[TAU, lane] = batch.phase[who]
     set_period(lanes, lane, batch)
     lanes.run[TAKEN, lane] = batch.counters[who, STEPS]

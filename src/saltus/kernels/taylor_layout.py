@@ -12,8 +12,8 @@ A guard is *fresh* while its lane stands exactly on the boundary: P(0) = 0, and 
 
 The head supplies the sizes LANES, NSTATES, NGUARDS, ORDER, NCONST, NTURNS, ROWS, NSERIES, the rows SERIES_ROW, GUARD_ROW, GUARD_SERIES,
 GUARD_SIGN, GAP_ROW, SCALE_ROW, SNAP_STATE, SNAP_CONST, the degrees NEWTON_DEGREE_1 and _2, and the functions constants(p, c, lane),
-gaps(t, y, p, out), turns(p, origin, period, count, lane, clock), jets(y, side, c, clock, work) and rates(y, side, c, clock, work), the
-right-hand side alone; PROBED says whether a step must be probed with it.
+gaps(t, y, p, out), turns(p, origin, period, count, lane, clock) -> whether they change from period to period, jets(y, side, c, clock,
+work) and rates(y, side, c, clock, work), the right-hand side alone; PROBED says whether a step must be probed with it.
 """
 
 from collections import namedtuple
@@ -30,9 +30,10 @@ LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
 # of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1).
 DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, FOUND_ROWS = range(9)
 # Columns of `memo`: trajectory, periods, contacts in a row without time passing, whether its mode at the start is still being settled,
-# whether the slow path has decided this step, guards that it found to cross (bits), guards on which the state rests (bits).
-WHO, COUNT, BOUNCES, STARTING, DECIDED, HITS, RESTS = range(7)
-MEMO = 7
+# whether the slow path has decided this step, guards that it found to cross (bits), guards on which the state rests (bits), whether a
+# harmonic of time has another phase in every period.
+WHO, COUNT, BOUNCES, STARTING, DECIDED, HITS, RESTS, DRIFTS = range(8)
+MEMO = 8
 # Rows of `prior`, for each guard: the size of the terms of its gap up to the step before, and up to this one, each step counting half of
 # the one after it; their rounding is inherited.
 OLD, NEW, PRIOR_ROWS = range(3)

@@ -25,9 +25,9 @@ def attractor_table(title: str, ds: xr.Dataset) -> TextTable:
         size = math.hypot(float(one["attractor_multiplier_real"][0]), float(one["attractor_multiplier_imag"][0]))
         unit, gap = one["attractor_peak"].attrs.get("units", ""), one["attractor_margin"].attrs.get("units", "")
         rows.append((
-            str(i), period_text(n) if kind == "periodic" else kind.replace("_", "-"), f"{float(one['attractor_contacts']):g}",
+            str(i), period_text(n) if kind == "periodic" else kind.replace("_", "-"), _or_dash(float(one["attractor_contacts"]), "g"),
             from_si(float(one["attractor_peak"]), unit, 4), from_si(float(one["attractor_rms"]), unit, 4),
-            f"{size:.4f}" if math.isfinite(size) else "-",
+            _or_dash(size, ".4f"),
             f"{float(one['attractor_exponent']):.4g} ± {float(one['attractor_exponent_error']):.1g}",
             from_si(float(one["attractor_margin"]), gap, 3),
             f"{100 * float(one['attractor_fraction']):.2f} ± "
@@ -36,6 +36,10 @@ def attractor_table(title: str, ds: xr.Dataset) -> TextTable:
     first = str(ds.attrs["states"]).split()[0]
     columns = ("", "type", "contacts", f"peak |{first}|", f"rms {first}", "|multiplier|", "exponent [1/s]", "to a graze", "share of starts")
     return TextTable(title, columns, tuple(rows), _notes(ds))
+
+
+def _or_dash(value: float, form: str) -> str:
+    return format(value, form) if math.isfinite(value) else "-"
 
 
 def _notes(ds: xr.Dataset) -> tuple[str, ...]:
@@ -68,11 +72,11 @@ def agreement_table(ds: xr.Dataset) -> TextTable:
         shares = [f"{100 * float(one[f'fraction_{side}']):.2f} %" if int(one[side]) >= 0 else "-" for side in "ab"]
         distance = float(one["orbit_distance"])
         rows.append((kind, *(str(one[side]) if int(one[side]) >= 0 else "-" for side in "ab"), *shares,
-                     f"{distance:.1e}" if math.isfinite(distance) else "-"))  # fmt: skip
+                     _or_dash(distance, ".1e")))  # fmt: skip
     a, b = (str(ds.attrs.get(f"name_{side}", side)) for side in "ab")
     values = ds["agreement"].values
     settled = values >= 0
     share = f"{100 * float((values[settled] == 1).mean()):.2f} %" if settled.any() else "none"
-    columns = ("type", f"in {a}", f"in {b}", f"share in {a}", f"share in {b}", "distance of orbits")
+    columns = ("type", "a", "b", "share in a", "share in b", "distance of orbits")
     note = f"The maps agree on {share} of the {int(settled.sum())} starts that settle in both."
-    return TextTable(f"{a} / {b}", columns, tuple(rows), (note,))
+    return TextTable(f"a: {a} / b: {b}", columns, tuple(rows), (note,))

@@ -1,0 +1,50 @@
+"""The benchmark of basins runs, and its rivals' labels mean what ours mean. Rivals themselves are left out: they take minutes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def basins():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT)
+        from benchmarks import basins
+
+        yield basins
+
+
+@pytest.fixture(scope="module")
+def small_map(basins):
+    return basins.ours(6, threads=1)
+
+
+def test_our_part_runs(basins, small_map):
+    seconds, ds = small_map
+    assert seconds.cpu > 0
+    assert seconds.wall > 0
+    assert ds.basin.shape == (6, 6)
+    row = basins.line("saltus, 1 thread", seconds, seconds, "", "all cells")
+    assert row.count("|") == basins.line("other", seconds.scaled(2.0), seconds, basins.percent(ds.basin.values >= 0), "").count("|")
+
+
+def test_orbits_are_labelled_as_themselves_at_any_phase(basins, small_map):
+    from benchmarks.rivals import known_orbits
+
+    orbits = basins.orbits_of(small_map[1])
+    points = np.stack([np.resize(np.roll(orbit, 7, axis=0), (48, 2)) for orbit in orbits])
+    assert known_orbits.label(points, orbits).tolist() == list(range(len(orbits)))
+    points[:, 20] += 2 * known_orbits.MATCH * known_orbits.RANGES
+    assert (known_orbits.label(points, orbits) == -1).all()
+
+
+def test_a_subset_leaves_out_starts_on_a_boundary(basins, small_map):
+    on_boundary = small_map[1].assign_coords(x=np.linspace(-5e-3, 5e-3, 6) + 1e-3)
+    assert 0.0 in on_boundary.x.values
+    subset = basins.subset_of(on_boundary, 1000)
+    assert len(subset.cells) == 30
+    assert not (subset.x == 0.0).any()
+    assert (subset.labels == small_map[1].basin.values.ravel()[subset.cells]).all()
