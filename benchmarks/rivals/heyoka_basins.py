@@ -38,7 +38,7 @@ def labels(flow: Flow, x: np.ndarray, v: np.ndarray, orbits: Sequence[np.ndarray
 
 
 def labels_early(flow: Flow, x: np.ndarray, v: np.ndarray, orbits: Sequence[np.ndarray], most: int, look: int) -> np.ndarray:
-    """The same, but a start is done as soon as ``look`` points in a row follow an orbit, looked at every ``look`` periods up to ``most``."""
+    """The same, but a start is done when ``look`` points in a row follow an orbit, looked at every so many periods up to ``most``."""
     found = np.full(x.size, -1, np.int64)
     going = np.arange(x.size)
     state = np.stack([x, v], axis=1)

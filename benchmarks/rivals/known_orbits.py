@@ -9,7 +9,7 @@ import numpy as np
 #: Ranges of the map's axes, 10 mm and 2 m/s: the units of a distance.
 RANGES = np.array([10e-3, 2.0])
 #: Distance within which all the last points must follow an orbit. Any two orbits of the rig are further apart, and so are the halves of its
-#: 24T (1.5e-3); at 1e-4, one cell in a hundred is still on its way after 648 periods.
+#: 24T (1.5e-3); at 1e-4, three of 400 cells are still on their way after 648 periods.
 MATCH = 1e-3
 
 

@@ -126,7 +126,7 @@ def test_newton_s_map_every_point_of_a_neighbourhood_ends_on_its_root():
 
 @pytest.mark.parametrize("a", [1.5, 2.1, 2.25, 2.29])
 def test_twins_of_the_cubic_map_are_told_apart_point_by_point(a):
-    """Periods 1, 2, 4, 8; the basins of the twins are laced into each other. Labels equal those of uncaptured runs, twins mirror each other."""
+    """Periods 1, 2, 4, 8; the basins are laced into each other. Labels equal those of uncaptured runs, twins mirror each other."""
     map_, scale = cubic(a), np.array([3.0])
     starts = np.linspace(-1.49, 1.49, 2001)[:, None]
     starts = starts[np.abs(starts[:, 0]) > 1e-3]
