@@ -40,8 +40,8 @@ from benchmarks.rivals import rig
 
 #: Periods that rivals let a trajectory settle, and those they look at: all but some 5 of 2000 cells follow an orbit then.
 PERIODS, KEEP = 600, 48
-#: Periods between two looks of the loop that stops early: the whole map takes 26 s with 12, 30 s with 24, 35 s with 48. With 3 it takes 26 s,
-#: and one in 60 of the cells that settle in 50 to 100 periods is taken for settled while it only passes an orbit.
+#: Periods between two looks of the loop that stops early: the whole map takes 26 s with 12, 30 s with 24, 35 s with 48. With 3, also 26 s,
+#: one in 60 of the cells that settle in 50 to 100 periods is taken for settled while it only passes an orbit.
 LOOK = 12
 #: heyoka's tolerances: that of benchmarks/flow.py, and its own default.
 TOLERANCE, OTHER_TOLERANCE = 1e-12, 2.0**-52

@@ -2,9 +2,9 @@
 
 As kind to it as its interface allows, knowing the answer. Time counts periods, so that steps of 1/128 meet whole periods exactly: where
 they don't, it interpolates linearly between the previous *whole period* and the step beyond this one. 120 points are kept, a multiple of
-every period on the rig: means over 48 split the 5T in several clusters, by its phase. Its adaptive RK45 can't be used: ``basin_of_attraction`` hands the whole
-ensemble to the estimate of the first step, as if it were one state. A cluster has no name: its first member's points are compared
-with the known orbits.
+every period on the rig: means over 48 split the 5T in several clusters, by its phase. Its adaptive RK45 can't be used:
+``basin_of_attraction`` hands the whole ensemble to the estimate of the first step, as if it were one state. A cluster has no name: its
+first member's points are compared with the known orbits.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from . import known_orbits, rig
 STEPS = 128
 #: Last points whose mean is clustered.
 KEEP = 120
-#: Reach of a cluster, of means in mm and m/s: those of 5T and 24T are 3.2e-3 apart, those of trajectories that reach one orbit 5e-5 at most.
+#: Reach of a cluster, of means in mm and m/s: 5T and 24T are 3.2e-3 apart, trajectories that reach one orbit 5e-5 at most.
 REACH = 1e-3
 #: Metres in a millimetre: the means are clustered in mm and m/s, in which both states are of like size.
 MM = 1e-3

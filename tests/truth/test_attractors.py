@@ -136,7 +136,7 @@ def test_labels_do_not_depend_on_the_order_of_the_starts_or_on_threads(five):
 
 
 def test_a_weakly_damped_rig_settles_to_periodic_orbits_too():
-    """zeta = 1e-3: a residue needs 2199 periods to fall to 1e-6. Both starts were followed for 30 000 periods: they repeat after 5 and 3."""
+    """zeta = 1e-3: a residue needs 2199 periods to fall to 1e-6. Followed for 30 000 periods both starts repeat, after 5 and 3."""
     rig = sl.models.delangre("b", damping_ratio=1e-3)
     starts = np.array([[1e-3, 0.1], [0.0, 0.0]])
     end = sl.stroboscope(rig, starts, periods=30_000, keep=6)
@@ -163,7 +163,7 @@ def test_twins_of_a_symmetric_rig_are_two_attractors():
     assert len(pair) == 2
     assert {*pair} <= {*ds.basin.values}
     one, other = pair
-    np.testing.assert_allclose(ds.attractor_peak[one], ds.attractor_peak[other], rel=1e-7)
+    np.testing.assert_allclose(ds.attractor_peak[one], ds.attractor_peak[other], rtol=1e-7)
     np.testing.assert_allclose(ds.attractor_rms[one], ds.attractor_rms[other], rtol=1e-10)
     half = sl.simulate(rig, points(ds, one), t_end=0.5 / 16)
     mirrored = -np.stack([half.end_x.values, half.end_v.values], axis=1)

@@ -61,11 +61,11 @@ def drawn(low, high, count=60, seed=1) -> np.ndarray:
     ids=["logistic", "henon"],
 )
 def test_exponents_of_chaotic_maps_and_their_errors(map_, low, high, expected):
-    """24 of them: their mean is right, and their scatter is what they say it is."""
+    """24 of them: their mean is right, and their scatter is no larger than they say (at r = 4 it averages out much sooner)."""
     start = map_.launch(drawn(low, high, 24), 200).advance(200)[:, -1]
     exponents, errors = largest_exponents(map_, start, np.ones(start.shape[1]))
     assert abs(exponents.mean() - expected) < 4 * errors.mean() / math.sqrt(24)
-    assert 0.4 < exponents.std() / errors.mean() < 2.0
+    assert exponents.std() < 2.0 * errors.mean()
     assert errors.max() < 0.05
 
 
@@ -86,7 +86,7 @@ def test_exponents_do_not_depend_on_units(unit):
 
 # -- types ---------------------------------------------------------------------------------------------------------------------
 def test_henon_is_chaotic_and_what_runs_away_is_told():
-    map_, scale, start = henon(1.4), np.array([2.5, 0.8]), drawn((-1, -0.3), (1, 0.3), 200)
+    map_, scale, start = henon(1.4), np.array([2.5, 0.8]), drawn((-1.4, -0.3), (1.4, 0.3), 200)
     with np.errstate(all="ignore"):
         found, label, _ = find(map_, start, scale, 1000)
         result = settle(map_, start, found, 1000)
@@ -94,7 +94,7 @@ def test_henon_is_chaotic_and_what_runs_away_is_told():
     one = found.wandering[0]
     assert abs(one.exponent - 0.41922) < 4 * one.exponent_error
     away = ~np.isfinite(map_.launch(start, 1000).advance(1000)).all(axis=(1, 2))
-    assert 0 < away.sum() < 20
+    assert 0 < away.sum() < 100
     np.testing.assert_array_equal(label, np.where(away, -1, 0))
     np.testing.assert_array_equal(result.label, np.where(away, -1, 0))
 

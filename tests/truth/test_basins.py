@@ -1,0 +1,406 @@
+"""Basins against truth: runs that nothing captured, symmetries, published claims; and that a map is the same however it is computed."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.analysis import plan as plans
+from saltus.analysis.capture import Neighbourhoods
+from saltus.analysis.plan import basin_plan
+from saltus.analysis.recurrence import find
+from saltus.analysis.settling import settle
+
+ORBITS = {row["name"]: row for row in csv.DictReader((Path(__file__).parents[1] / "reference" / "orbits.csv").open())}
+B4 = sl.models.delangre("b")
+GRAZED = sl.models.delangre("c", frequency=5.0, contact_stiffness=2.32e4)
+SPAN_X, SPAN_V = ("-5 mm", "5 mm"), ("-1 m/s", "1 m/s")
+
+
+def box(n):
+    """The paper's box of starts, n x n."""
+    return dict(x=(*SPAN_X, n), v=(*SPAN_V, n), progress=False)
+
+
+@sl.system(states="x v")
+def free(t, x, v, *, damping=0.25, linear=-1.0, cubic=1.0, pumping=0.0):
+    """An oscillator that nothing drives: a double well, or van der Pol's."""
+    return v, -damping * v - pumping * (x**2 - 1) * v - linear * x - cubic * x**3
+
+
+@sl.system(states="x v", forced_at="frequency")
+def duffing(t, x, v, *, damping=0.05, linear=0.0, cubic=1.0, force=7.5, frequency=1 / (2 * math.pi)):
+    """Duffing's oscillator; without the linear spring it is Ueda's."""
+    return v, -damping * v - linear * x - cubic * x**3 + force * sl.cos(2 * sl.pi * frequency * t)
+
+
+def orbit_points(ds, i):
+    n = int(ds.attractor_period[i])
+    return np.stack([ds[f"attractor_{name}"].values[i, :n] for name in ds.attrs["states"].split()], axis=1)
+
+
+def labels_of_plain_runs(system, starts, ds, periods=2000, tolerance=1e-9):
+    """The periodic attractor on which each start ends, after so many periods that nothing interrupts; -1 if on none."""
+    run = sl.stroboscope(system, starts, periods=periods, keep=1)
+    end = np.stack([run.x.values[:, -1], run.v.values[:, -1]], axis=1)
+    distance = np.stack(
+        [np.abs(end[:, None] - orbit_points(ds, i)[None]).max(axis=2).min(axis=1) for i in range(ds.sizes["attractor"])], axis=1
+    )
+    return np.where(distance.min(axis=1) < tolerance, distance.argmin(axis=1), -1)
+
+
+def cells(ds, count, seed=4):
+    """Random cells: their starts and labels."""
+    i, j = (np.random.default_rng(seed).integers(0, n, count) for n in ds.basin.shape)
+    return np.stack([ds.x.values[i], ds.v.values[j]], axis=1), ds.basin.values[i, j]
+
+
+@pytest.fixture(scope="module")
+def five():
+    return sl.basins(B4, **box(40))
+
+
+@pytest.fixture(scope="module")
+def three():
+    """The cells in which the third attractor lives are 14 of 40 000, so the grid is the paper's."""
+    return sl.basins(GRAZED, **box(200))
+
+
+# -- labels --------------------------------------------------------------------------------------------------------------------
+def test_b4_has_five_basins(five):
+    assert five.attractor_period.values.tolist() == [1, 3, 4, 5, 24]
+    assert set(np.unique(five.basin)) == {0, 1, 2, 3, 4}
+    assert five.attractor_fraction.values.sum() == pytest.approx(1.0)
+    assert (five.periods_to_settle.values >= 1).all()
+
+
+def test_labels_of_b4_equal_those_of_runs_that_nothing_captured(five):
+    starts, labels = cells(five, 300)
+    np.testing.assert_array_equal(labels_of_plain_runs(B4, starts, five), labels)
+
+
+def test_labels_of_c4_equal_those_of_runs_that_nothing_captured(three):
+    starts, labels = cells(three, 300)
+    i, j = np.nonzero(three.basin.values == rare_one(three))
+    starts = np.concatenate([starts, np.stack([three.x.values[i], three.v.values[j]], axis=1)])
+    labels = np.concatenate([labels, three.basin.values[i, j]])
+    np.testing.assert_array_equal(labels_of_plain_runs(GRAZED, starts, three), labels)
+
+
+def test_a_trajectory_is_captured_no_later_than_it_has_settled(five):
+    """When it has come within 1e-9 of the range of an orbit it has long been captured."""
+    starts, labels = cells(five, 40)
+    when = five.periods_to_settle.sel(x=starts[:, 0], v=starts[:, 1], method="nearest").values.diagonal()
+    run = sl.stroboscope(B4, starts, periods=800)
+    path = np.stack([run.x.values / 1e-2, run.v.values / 2.0], axis=2)
+    for one, label, captured in zip(path, labels, when, strict=True):
+        distance = np.abs(one[:, None] - orbit_points(five, label)[None] / [1e-2, 2.0]).max(axis=2).min(axis=1)
+        settled = np.flatnonzero(distance < 1e-9)[0]
+        assert captured <= settled
+        assert distance[captured] < 0.5
+
+
+# -- neighbourhoods ------------------------------------------------------------------------------------------------------------
+def inside(near, i, count):
+    """Random points of the i-th ellipsoid, uniform in it."""
+    rng = np.random.default_rng(i)
+    disc = rng.standard_normal((count, 2))
+    disc *= (np.sqrt(rng.random(count)) / np.linalg.norm(disc, axis=1))[:, None]
+    return near.centres[i] + disc @ np.linalg.inv(near.weights[i]).T
+
+
+@pytest.fixture(scope="module")
+def known():
+    """Attractors of b4 with their neighbourhoods."""
+    plan = basin_plan(B4, {"x": (*SPAN_X, 40), "v": (*SPAN_V, 40)}, None, sl.Taylor(), 2000, None)
+    return plan, plan.scout()
+
+
+def test_every_point_of_a_neighbourhood_ends_on_its_attractor(known, five):
+    """2000 points of each of the 37 ellipsoids, for 200 periods that nothing interrupts: 0.94 / s leaves 3e-6 of the distance at most."""
+    plan, found = known
+    starts = np.concatenate([inside(found.near, i, 2000) for i in range(len(found.near.centres))])
+    owners = np.repeat(found.near.owners, 2000)
+    assert [orbit.period for orbit in found.orbits] == five.attractor_period.values.tolist()
+    end = plan.map().sequences(starts, 120)[0]
+    for label, orbit in enumerate(found.orbits):
+        mine = end[owners == label]
+        assert len(mine) == 2000 * orbit.period
+        limit = 1e-2 if orbit.period == 24 else 1e-3  # the 24T contracts by 0.72 in 24 periods
+        distance = np.abs((mine[:, None] - orbit.points[None]) / plan.scale).max(axis=2)
+        assert distance.min(axis=1).max() < limit
+        later = plan.map().sequences(mine[distance.min(axis=1).argsort()[-20:]], 1200)[0]  # the slowest, to the end
+        assert np.abs((later[:, None] - orbit.points[None]) / plan.scale).max(axis=2).min(axis=1).max() < 1e-6
+
+
+def test_neighbourhoods_of_the_five_never_overlap(known):
+    """Every random point of an ellipsoid, and 400 on its edge, lie in none of another attractor."""
+    _, found = known
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    for i, owner in enumerate(found.near.owners):
+        edge = found.near.centres[i] + circle @ np.linalg.inv(found.near.weights[i]).T
+        others = found.near.owners != owner
+        strangers = Neighbourhoods(found.near.centres[others], found.near.weights[others], found.near.owners[others])
+        label, _ = strangers.capture(np.concatenate([inside(found.near, i, 500), edge])[:, None, :])
+        assert (label == -1).all()
+
+
+def test_neighbourhoods_are_worth_having(known):
+    """Of every orbit some points hold more than a thousandth of the range: that's what makes settling soon."""
+    plan, found = known
+    for label in range(5):
+        mine = found.near.weights[found.near.owners == label]
+        radius = 1 / np.linalg.norm(mine * plan.scale, ord=2, axis=(1, 2))
+        assert radius.max() > 1e-3 if label < 4 else radius.max() > 1e-5
+
+
+# -- the same however it is computed -------------------------------------------------------------------------------------------
+def same_to_the_bit(a, b):
+    for name in ("basin", "periods_to_settle", "status", "grazes_unresolved"):
+        np.testing.assert_array_equal(a[name].values, b[name].values)
+    for name in ("attractor_x", "attractor_v", "attractor_multiplier_real", "attractor_rms"):
+        np.testing.assert_array_equal(a[name].values, b[name].values)
+    assert a.attrs["result_hash"] == b.attrs["result_hash"]
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_threads_change_nothing(five, threads):
+    same_to_the_bit(five, sl.basins(B4, threads=threads, **box(40)))
+
+
+@pytest.mark.parametrize("size", [97, 1000])
+def test_the_size_of_chunks_changes_nothing(five, monkeypatch, size):
+    monkeypatch.setattr(plans, "CHUNK", size)
+    same_to_the_bit(five, sl.basins(B4, threads=2, **box(40)))
+
+
+def test_chunks_of_a_chaotic_map_change_nothing(monkeypatch):
+    system = duffing.with_values(damping=0.1, force=12.0)
+    axes = dict(x=(-3, 3, 12), v=(-6, 6, 12), periods=256, progress=False)
+    whole = sl.basins(system, **axes)
+    assert whole.attractor_type.values.tolist() == ["periodic", "chaotic"]
+    monkeypatch.setattr(plans, "CHUNK", 11)
+    same_to_the_bit(whole, sl.basins(system, threads=2, **axes))
+
+
+@pytest.mark.parametrize("scouts", [1, 7, 300])
+def test_ids_and_labels_do_not_depend_on_what_the_scouts_saw(five, monkeypatch, scouts):
+    """With one scout four attractors are found only after the chunks; with others in another order."""
+    monkeypatch.setattr(plans, "SCOUTS", scouts)
+    again = sl.basins(B4, **box(40))
+    np.testing.assert_array_equal(again.basin.values, five.basin.values)
+    np.testing.assert_array_equal(again.attractor_period.values, five.attractor_period.values)
+    np.testing.assert_allclose(again.attractor_x.values, five.attractor_x.values, rtol=0, atol=1e-15)
+
+
+def test_ids_do_not_depend_on_the_order_of_starts():
+    plan = basin_plan(B4, {"x": (*SPAN_X, 10), "v": (*SPAN_V, 10)}, None, sl.Taylor(), 2000, None)
+    starts, order = plan.starts(np.arange(100)), np.random.default_rng(3).permutation(100)
+    found, label, _ = find(plan.map(), starts, plan.scale, 2000)
+    again, label_again, _ = find(plan.map(), starts[order], plan.scale, 2000)
+    assert [orbit.period for orbit in again.orbits] == [orbit.period for orbit in found.orbits]
+    np.testing.assert_array_equal(label_again, label[order])
+    for one, other in zip(found.orbits, again.orbits, strict=True):
+        assert np.abs(one.points - other.points).max() < 1e-15
+
+
+def test_axes_the_other_way_round_give_the_same_map(five):
+    axes = box(40)
+    turned = sl.basins(B4, v=axes["v"], x=axes["x"], progress=False)
+    assert turned.basin.dims == ("v", "x")
+    np.testing.assert_array_equal(turned.basin.values.T, five.basin.values)
+
+
+# -- symmetries ----------------------------------------------------------------------------------------------------------------
+def test_wells_mirror_each_other():
+    """An even number of starts a side: none on the ridge. (x, v) -> (-x, -v) swaps the wells, cell by cell."""
+    ds = sl.basins(free, x=(-2, 2, 24), v=(-2, 2, 24), every=1.0, progress=False)
+    assert ds.attractor_type.values.tolist() == ["periodic"] * 2
+    np.testing.assert_array_equal(ds.basin.values, 1 - ds.basin.values[::-1, ::-1])
+    assert ds.attractor_fraction.values.tolist() == [0.5, 0.5]
+    np.testing.assert_array_equal(ds.periods_to_settle.values, ds.periods_to_settle.values[::-1, ::-1])
+    run = sl.simulate(free, np.stack([a.ravel() for a in np.meshgrid(ds.x, ds.v, indexing="ij")], axis=1), t_end=400.0)
+    right = int(ds.attractor_x.values[:, 0].argmax())
+    np.testing.assert_array_equal(ds.basin.values.ravel(), np.where(run.end_x.values > 0, right, 1 - right))
+
+
+def test_the_ridge_between_the_wells_is_no_third_basin():
+    """An odd number of starts a side: the one in the middle stays on the saddle."""
+    ds = sl.basins(free, x=(-2, 2, 5), v=(-2, 2, 5), every=1.0, progress=False)
+    assert ds.attractor_type.values.tolist() == ["periodic"] * 2
+    assert ds.basin.values[2, 2] == -2
+
+
+# -- claims of the paper -------------------------------------------------------------------------------------------------------
+def rare_one(ds):
+    return int(ds.attractor_fraction.argmin())
+
+
+def test_c_at_5_hz_before_the_graze_has_two_attractors():
+    ds = sl.basins(sl.models.delangre("c", frequency=5.0, contact_stiffness=2.55e4), **box(40))
+    assert ds.attractor_type.values.tolist() == ["periodic"] * 2
+    assert ds.attractor_period.values.tolist() == [1, 1]
+    for name in ("C4_5_K25500_A", "C4_5_K25500_B"):
+        start = np.array([float(ORBITS[name]["x0_m"]), float(ORBITS[name]["v0_m_per_s"])])
+        assert min(np.abs(orbit_points(ds, i) - start).max() for i in range(2)) < 1e-12
+    starts, labels = cells(ds, 100)
+    np.testing.assert_array_equal(labels_of_plain_runs(ds_system(ds), starts, ds), labels)
+
+
+def ds_system(ds):
+    """The rig of the map before the graze."""
+    assert "delangre" in ds.attrs["system"]
+    return sl.models.delangre("c", frequency=5.0, contact_stiffness=2.55e4)
+
+
+def test_c_at_5_hz_after_the_graze_has_three(three):
+    assert three.attractor_period.values.tolist() == [1, 1, 1]
+    assert three.attractor_exponent.values == pytest.approx(-0.942477796076938, abs=1e-11)
+    count = np.bincount(three.basin.values.ravel(), minlength=3)
+    assert count.sum() == 40_000
+    assert 10 <= count.min() <= 20
+    assert three.attrs["smallest_basin_seen"] == pytest.approx(3 / 40_000)
+
+
+def test_the_rare_attractor_is_found_by_starts_alone(three):
+    i, j = np.nonzero(three.basin.values == rare_one(three))
+    ds = sl.attractors(GRAZED, np.stack([three.x.values[i[:3]], three.v.values[j[:3]]], axis=1), progress=False)
+    assert ds.sizes["attractor"] == 1
+    assert np.abs(orbit_points(ds, 0) - orbit_points(three, rare_one(three))).max() < 1e-14
+
+
+def test_c_at_17_hz_doubles_its_period():
+    before = sl.basins(sl.models.delangre("c", frequency=17.0, contact_stiffness=7694.0), **box(40))
+    assert before.attractor_period.values.tolist() == [1]
+    assert (before.basin.values == 0).all()
+    assert abs(before.attractor_x.values[0, 0] - float(ORBITS["C4_17_K7694"]["x0_m"])) < 1e-12
+    after = sl.basins(sl.models.delangre("c", frequency=17.0, contact_stiffness=8833.0), **box(60))
+    assert after.attractor_period.values.tolist() == [1, 2]
+    assert after.attractor_contacts.values.tolist() == [4, 4]
+    assert after.attractor_peak.values[0] > 30 * after.attractor_peak.values[1]
+    assert 0.002 < after.attractor_fraction.values[0] < 0.02
+
+
+@pytest.mark.parametrize(("events", "count"), [("locate", 3), ("ignore", 2)])
+def test_ode45_sees_the_third_attractor_only_if_it_locates_contacts(three, events, count):
+    """The paper's claim, at its tolerances. In exact arithmetic there are three."""
+    ds = sl.basins(GRAZED, method=sl.ODE45(1e-4, 1e-7, events=events), **box(60))
+    assert ds.attractor_type.values.tolist() == ["periodic"] * count
+    assert ds.attractor_period.values.tolist() == [1] * count
+    exact = np.stack([orbit_points(three, i)[0] for i in range(3)])
+    for i in range(count):
+        assert (np.abs(orbit_points(ds, i)[0] - exact) / [1e-2, 2.0]).max(axis=1).min() < 1e-3
+    assert (ds.basin.values >= 0).all()
+
+
+def test_contacts_that_were_not_looked_for_are_not_counted_as_none(three):
+    """ "ignore" records no contact; these orbits meet the springs 4 and 6 times a period."""
+    ds = sl.basins(GRAZED, method=sl.ODE45(1e-4, 1e-7, events="ignore"), **box(8))
+    assert (three.attractor_contacts.values > 0).all()
+    assert np.isnan(ds.attractor_contacts.values).all()
+
+
+# -- codes ---------------------------------------------------------------------------------------------------------------------
+def test_what_runs_away_has_escaped():
+    system = duffing.with_values(damping=0.1, linear=1.0, cubic=-1.0, force=0.1, frequency=0.15)
+    ds = sl.basins(system, x=(-1.5, 1.5, 16), v=(-1, 1, 16), progress=False)
+    assert ds.attractor_period.values.tolist() == [1]
+    escaped = ds.basin.values == -1
+    assert set(np.unique(ds.basin)) == {-1, 0}
+    assert 0.3 < escaped.mean() < 0.9
+    assert (ds.periods_to_settle.values[escaped] == -1).all()
+    assert ds.attractor_fraction.item() == pytest.approx((~escaped).mean())
+    flags = dict(zip(ds.status.attrs["flag_values"].tolist(), ds.status.attrs["flag_meanings"].split(), strict=True))
+    assert {flags[code] for code in ds.status.values[escaped].tolist()} == {"nonfinite"}
+    i, j = np.nonzero(escaped)
+    with pytest.warns(sl.errors.SaltusWarning, match="nonfinite"):
+        run = sl.stroboscope(system, np.stack([ds.x.values[i], ds.v.values[j]], axis=1)[:20], periods=200, keep=1)
+    assert set(run.status.values) == {"nonfinite"}
+
+
+def test_a_budget_that_is_used_up_has_failed_and_not_escaped():
+    ds = sl.basins(B4, method=sl.Taylor(max_steps=40), **box(4))
+    assert set(np.unique(ds.basin)) == {-3}
+    assert ds.sizes["attractor"] == 0
+
+
+def test_too_few_periods_leave_cells_unconverged():
+    ds = sl.basins(sl.models.delangre("b", damping_ratio=1e-3), periods=100, **box(4))
+    assert set(ds.attractor_type.values) <= {"periodic"}
+    assert -2 in ds.basin.values
+    assert (ds.periods_to_settle.values[ds.basin.values < 0] == -1).all()
+
+
+def test_a_weakly_damped_rig_has_periodic_attractors_only():
+    """zeta = 1e-3: settled after some thousand periods, and until then known to be on its way."""
+    rig = sl.models.delangre("b", damping_ratio=1e-3)
+    ds = sl.basins(rig, periods=4000, **box(5))
+    assert set(ds.attractor_type.values) == {"periodic"}
+    starts, labels = cells(ds, 15)
+    np.testing.assert_array_equal(labels_of_plain_runs(rig, starts, ds, periods=20_000), labels)
+
+
+def test_long_chaotic_transients_are_no_attractor():
+    """Case b, 13.5 Hz: transients of more than 1000 periods beside a T and a 2T."""
+    rig = sl.models.delangre("b", frequency=13.5)
+    ds = sl.basins(rig, **box(12))
+    assert ds.attractor_type.values.tolist() == ["periodic"] * 2
+    assert ds.attractor_period.values.tolist() == [1, 2]
+    assert (ds.basin.values >= 0).all()
+    assert ds.periods_to_settle.values.max() > 1000
+    starts, labels = cells(ds, 60)
+    np.testing.assert_array_equal(labels_of_plain_runs(rig, starts, ds, periods=8000), labels)
+
+
+# -- fractions -----------------------------------------------------------------------------------------------------------------
+def test_intervals_of_fractions_hold_those_of_a_fine_map():
+    """Wilson's 95 % intervals; four of them at once are widened to 99.9 %: 3.29 / 1.96 times as wide. The fine map: 200 x 200 cells."""
+    rig = sl.models.delangre("a", frequency=17.0)
+    fine = sl.basins(rig, **box(200))
+    some = sl.basin_fractions(rig, samples=2000, x=SPAN_X, v=SPAN_V, progress=False)
+    assert some.attractor_period.values.tolist() == fine.attractor_period.values.tolist() == [1, 1, 3, 9]
+    share, wide = some.attractor_fraction.values, 3.29 / 1.96
+    assert (share - wide * (share - some.attractor_fraction_low.values) < fine.attractor_fraction.values).all()
+    assert (share + wide * (some.attractor_fraction_high.values - share) > fine.attractor_fraction.values).all()
+    assert (some.attractor_fraction_low < some.attractor_fraction).all()
+    assert (some.attractor_fraction_high - some.attractor_fraction_low < 0.05).all()
+    assert some.attrs["smallest_basin_seen"] == pytest.approx(3 / 2000)
+
+
+def test_the_same_seed_gives_the_same_fractions():
+    def share(seed, **more):
+        return sl.basin_fractions(B4, samples=300, seed=seed, x=SPAN_X, v=SPAN_V, progress=False, **more)
+
+    one, again, other = share(7), share(7, threads=1), share(8)
+    np.testing.assert_array_equal(one.basin.values, again.basin.values)
+    assert one.attrs["result_hash"] == again.attrs["result_hash"]
+    assert (one.basin.values != other.basin.values).any()
+
+
+def test_labels_of_fractions_are_those_of_plain_runs():
+    ds = sl.basin_fractions(B4, samples=200, seed=7, x=SPAN_X, v=SPAN_V, progress=False)
+    unit = np.random.default_rng(7).random((200, 2))
+    starts = np.stack([-5e-3 + 1e-2 * unit[:, 0], -1 + 2 * unit[:, 1]], axis=1)
+    np.testing.assert_array_equal(labels_of_plain_runs(B4, starts, ds), ds.basin.values)
+
+
+def test_fractions_over_one_state():
+    """The rest is zero: x alone, from rest."""
+    ds = sl.basin_fractions(B4, samples=100, x=SPAN_X, progress=False)
+    starts = np.stack([-5e-3 + 1e-2 * np.random.default_rng(1).random((100, 1))[:, 0], np.zeros(100)], axis=1)
+    np.testing.assert_array_equal(labels_of_plain_runs(B4, starts, ds), ds.basin.values)
+
+
+def test_a_settled_chunk_is_a_pure_function(known):
+    """Twice the same, and each trajectory alone the same as among others."""
+    plan, found = known
+    whole = plan.chunk(0, found)
+    some = np.array([0, 17, 399, 1201])
+    alone = settle(plan.map(1), plan.starts(some), found, plan.periods)
+    np.testing.assert_array_equal(alone.label, whole.label[some])
+    np.testing.assert_array_equal(alone.periods, whole.periods[some])
+    np.testing.assert_array_equal(alone.end, whole.end[some])
