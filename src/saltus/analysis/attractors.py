@@ -13,7 +13,7 @@ from scipy.stats import qmc
 from saltus.analysis import uncertainty
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import find
-from saltus.analysis.settling import UNCONVERGED, Settling, complete, settle
+from saltus.analysis.settling import UNCONVERGED, complete, settle_all
 from saltus.analysis.starts import ensemble
 from saltus.errors import ParameterError, nearest
 from saltus.flow.maps import Stroboscope
@@ -25,8 +25,8 @@ from saltus.units import to_si
 
 #: Iterates after which the range of the states is taken, where no box gives it.
 SPREAD = 32
-#: Random starts of one task.
-CHUNK = 4096
+#: Starts that tell the range.
+SPREAD_STARTS = 4096
 
 
 def attractors(
@@ -132,18 +132,13 @@ def basin_fractions(
     map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
     drawn = np.random.default_rng(seed).random((int(samples), len(ranges)))
     start = _fill(system, ranges, fixed, drawn)
-    scale = _spread(map_, start[:CHUNK])
+    scale = _spread(map_, start[:SPREAD_STARTS])
     show, close = reporter(progress)
     try:
         scouts = _fill(system, ranges, fixed, qmc.Halton(len(ranges), scramble=False).random(min(1024, int(samples))))
         found = find(map_, scouts, scale, int(periods))[0]
-        result = Settling.empty(len(start), len(system.states))
-        for first in range(0, len(start), CHUNK):
-            part = slice(first, min(first + CHUNK, len(start)))
-            result.put(part, settle(map_, start[part], found, int(periods)))
-            if show:
-                show(part.stop / len(start))
-        found = complete(map_, result, found, scale, int(periods))
+        result = settle_all(map_, start, found, int(periods), threads, show)
+        found = complete(map_, result, found, scale, int(periods), threads)
     finally:
         close()
     table = replace(portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found)))

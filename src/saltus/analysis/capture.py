@@ -26,6 +26,8 @@ BETWEEN = (2.0**1.5, 2.0, 2.0**0.5)
 DIRECTIONS = 16
 #: What is left of the distance after the returns that are looked at together, and how many these may be.
 CONTRACTION, MOST_RETURNS = 0.5, 64
+#: Points of an orbit that get a neighbourhood: a trajectory on its way passes all of them in a response.
+MOST_POINTS = 8
 #: Part of the verified radius that is used.
 SAFETY = 0.9
 #: Radius in units of the map's own errors where nothing could be verified.
@@ -97,21 +99,23 @@ def neighbourhoods(map_: Map, orbit: Orbit, owner: int, scale: np.ndarray) -> Ne
 
 
 def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weights of the points of one orbit: of each the largest radius tried at which the returns were seen to contract.
+    """Centres and weights about points of one orbit: of each the largest radius tried at which the returns were seen to contract.
 
     Where no radius passes, what lies within the map's own errors of the point is taken to be on it.
     """
-    n, size = orbit.points.shape
-    iterates = n * _returns(orbit)
-    norms = np.stack([_norm(matrix, scale) for matrix in orbit.monodromy])
-    _, own = map_.sequences(orbit.points, iterates)
+    every = -(-orbit.period // MOST_POINTS)
+    points, monodromy = orbit.points[::every], orbit.monodromy[::every]
+    n, size = points.shape
+    iterates = orbit.period * _returns(orbit)
+    norms = np.stack([_norm(matrix, scale) for matrix in monodromy])
+    _, own = map_.sequences(points, iterates)
     shell = np.concatenate([_shell(size), 0.5 * _shell(size)])
     lengths = np.linalg.norm(shell, axis=1)
 
     def passes(radius: np.ndarray, which: np.ndarray) -> np.ndarray:
-        starts = orbit.points[which, None, :] + radius[:, None, None] * (shell @ np.linalg.inv(norms[which]).transpose(0, 2, 1))
+        starts = points[which, None, :] + radius[:, None, None] * (shell @ np.linalg.inv(norms[which]).transpose(0, 2, 1))
         ends, met = map_.sequences(starts.reshape(-1, size), iterates)
-        back = np.linalg.norm((ends.reshape(starts.shape) - orbit.points[which, None, :]) @ norms[which].transpose(0, 2, 1), axis=2)
+        back = np.linalg.norm((ends.reshape(starts.shape) - points[which, None, :]) @ norms[which].transpose(0, 2, 1), axis=2)
         with np.errstate(invalid="ignore"):
             nearer = (back <= CONTRACTION * radius[:, None] * lengths).all(axis=1)
         return nearer & [_alike(met[i * len(shell) : (i + 1) * len(shell)], own[k]) for i, k in enumerate(which)]
@@ -128,7 +132,7 @@ def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, n
             best[have[better]] *= factor
             have = have[~better]
     best = np.where(best > 0.0, SAFETY * best, LUCK * map_.noise)
-    return orbit.points, norms / best[:, None, None]
+    return points, norms / best[:, None, None]
 
 
 def _returns(orbit: Orbit) -> int:

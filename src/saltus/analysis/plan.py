@@ -32,8 +32,8 @@ SCOUTS = 1024
 CHUNK = 4096
 #: Cells recomputed with a more exact method.
 CHECKED = 1000
-#: Cells beyond which a map is refused.
-MOST_CELLS = 400_000_000
+#: Cells beyond which a map is refused: some 5 GB.
+MOST_CELLS = 50_000_000
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class BasinPlan:
     def finish(self, result: Settling, found: Found, threads: int | None = None) -> xr.Dataset:
         """The Dataset; what is still open is settled first. Changes ``result``."""
         map_ = self.map(threads)
-        found = complete(map_, result, found, self.scale, self.periods)
+        found = complete(map_, result, found, self.scale, self.periods, threads)
         labels = result.label.reshape(self.shape)
         table = replace(portraits(map_, found), fractions=uncertainty.fractions(labels, len(found)))
         gap_units = {self.system.units[g.state] for g in self.system.guards if g.state is not None}

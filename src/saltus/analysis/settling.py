@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.analysis.recurrence import INSIDE, Found, find
+from saltus.flow.engine import usable_processors
 from saltus.flow.maps import Map, Travel
 from saltus.kernels import status as st
 
@@ -16,6 +19,8 @@ ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
 OPEN = -5
 #: Iterates between two looks at who has been captured.
 BLOCK = 8
+#: Starts that one thread follows at a time.
+PIECE = 4096
 #: Age at which a trajectory may be taken for one on a chaotic attractor, and between looks after that.
 WANDERS = 64
 #: Trajectories that nothing captured from which new attractors are looked for.
@@ -81,6 +86,20 @@ def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
     return result
 
 
+def settle_all(
+    map_: Map, start: np.ndarray, found: Found, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None
+) -> Settling:
+    """:func:`settle` for any number of starts, in pieces on threads."""
+    result = Settling.empty(len(start), start.shape[1])
+    pieces = [slice(first, first + PIECE) for first in range(0, len(start), PIECE)]
+    with ThreadPoolExecutor(min(threads or usable_processors(), max(len(pieces), 1))) as pool:
+        for done, (piece, part) in enumerate(zip(pieces, pool.map(lambda p: settle(map_, start[p], found, most), pieces), strict=True)):
+            result.put(piece, part)
+            if progress:
+                progress((done + 1) / len(pieces))
+    return result
+
+
 def _write(result: Settling, who: np.ndarray, label: np.ndarray, periods: np.ndarray, travel: Travel, rows: np.ndarray) -> None:
     result.label[who], result.periods[who] = label, np.where(label >= 0, periods, -1)
     result.status[who], result.unresolved[who] = travel.status[rows], travel.unresolved[rows]
@@ -95,7 +114,7 @@ def _label_wandering(found: Found, trail: np.ndarray, label: np.ndarray, periods
     periods[here] = age
 
 
-def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most: int) -> Found:
+def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most: int, threads: int | None = None) -> Found:
     """Look for new attractors where nothing captured, label what they capture, and give all attractors their final ids.
 
     Changes ``result``. The trajectories go on from where they stood. Returns the attractors in their final order.
@@ -106,7 +125,7 @@ def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most:
     sample = opened[np.unique(np.linspace(0, len(opened) - 1, min(SAMPLE, len(opened))).astype(int))]
     wider, _, _ = find(map_, result.end[sample], scale, most, found)
     _renumber(result.label, found, wider)
-    more = settle(map_, result.end[opened], wider, most)
+    more = settle_all(map_, result.end[opened], wider, most, threads)
     more.periods[more.periods >= 0] += most
     more.unresolved[:] += result.unresolved[opened]
     still = more.label == OPEN

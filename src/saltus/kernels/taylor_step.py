@@ -98,9 +98,10 @@ def bound_series(lanes, h):
         for k in range(ORDER, 3, -1):
             term = load(work, row + k, LANES)
             rest = fma(rest, h, magnitude(term) * (k * (k - 1.0)))
+            turn = fma(turn, h, change)
             change = fma(change, h, term)
-            turn = fma(turn, h, term * float(k))
         h2 = h * h
+        turn = fma(turn, h, 4.0 * change)  # of sum t_k h^(k-4), k >= 4: the derivative of h^4 times it, over h^3
         t1, t2, t3 = load(work, row + 1, LANES) * h, load(work, row + 2, LANES) * h2, load(work, row + 3, LANES) * h2 * h
         store(bounds, BOUNDS * j + LINEAR, t1)
         store(bounds, BOUNDS * j + QUADRATIC, t2)

@@ -137,7 +137,8 @@ def jobs_of(study: Study, own: System | None = None) -> list[MapJob]:
     jobs = []
     for one in table.map or [Map(name=study.study.name)]:
         system = base.with_values(**quantities.parameters(base, one.values, "basins.map.values"))
-        jobs.append(MapJob(one.name, _slug(one.name) if table.map else "basins", _plan(table, system, method_of(one.method or study.method)), one.compare))
+        slug = _slug(one.name) if table.map else "basins"
+        jobs.append(MapJob(one.name, slug, _plan(table, system, method_of(one.method or study.method)), one.compare))
     slugs = [job.slug for job in jobs]
     if len(set(slugs)) < len(slugs):
         raise StudyError(f"[[basins.map]] names give the same file names: {', '.join(slugs)}. Let them differ in letters or digits.")
