@@ -112,7 +112,7 @@ def test_published_orbits(name):
 
 
 @pytest.mark.parametrize("name", ORBITS)
-@pytest.mark.parametrize("off", [0.0, 1e-15, 1e-10])
+@pytest.mark.parametrize("off", [0.0, 1e-12, 1e-6])
 def test_a_start_on_the_orbit_belongs_to_it(name, off):
     """The range of such starts says nothing about the size of anything."""
     row = ORBITS[name]
@@ -214,10 +214,12 @@ def test_van_der_pol_seen_by_an_incommensurate_stroboscope_never_repeats():
     assert ds.attractor_peak.item() == pytest.approx(2.00861986087, rel=1e-4)
 
 
-def test_van_der_pol_seen_by_a_commensurate_stroboscope_is_not_chaotic():
-    """Four looks in a period: each phase is an orbit of its own, with a multiplier of exactly 1. Nothing is sensitive."""
+@pytest.mark.parametrize("looks", [1, 4])
+def test_van_der_pol_seen_by_a_commensurate_stroboscope_is_not_chaotic(looks):
+    """So many looks in a period: each phase is an orbit of its own, with a multiplier of exactly 1. Nothing is sensitive."""
     rig = free.with_values(damping=0.0, linear=1.0, cubic=0.0, pumping=1.0)
-    ds = attractors(rig, [[0.5, 0.2], [3.0, 3.0], [1.0, 1.0]], every=6.663286859323130 / 4, progress=False)
+    starts = np.random.default_rng(looks).uniform(-2, 2, (12, 2))
+    ds = attractors(rig, starts, every=6.663286859323130 / looks, progress=False)
     assert "chaotic" not in ds.attractor_type.values
 
 

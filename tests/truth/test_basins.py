@@ -94,7 +94,7 @@ def test_a_trajectory_is_captured_no_later_than_it_has_settled(five):
     """When it has come within 1e-9 of the range of an orbit it has long been captured."""
     starts, labels = cells(five, 40)
     when = five.periods_to_settle.sel(x=starts[:, 0], v=starts[:, 1], method="nearest").values.diagonal()
-    run = sl.stroboscope(B4, starts, periods=800)
+    run = sl.stroboscope(B4, starts, periods=2500)  # the 24T is slow: exp(-0.205 t)
     path = np.stack([run.x.values / 1e-2, run.v.values / 2.0], axis=2)
     for one, label, captured in zip(path, labels, when, strict=True):
         distance = np.abs(one[:, None] - orbit_points(five, label)[None] / [1e-2, 2.0]).max(axis=2).min(axis=1)
@@ -119,21 +119,23 @@ def known():
     return plan, plan.scout()
 
 
-def test_every_point_of_a_neighbourhood_ends_on_its_attractor(known, five):
-    """2000 points of each of the 37 ellipsoids, for 200 periods that nothing interrupts: 0.94 / s leaves 3e-6 of the distance at most."""
+@pytest.mark.parametrize("label", range(5))
+def test_every_point_of_a_neighbourhood_ends_on_its_attractor(known, label):
+    """2000 points of each ellipsoid, in runs that nothing interrupts: all are nearer after some returns, the farthest go on to the end."""
     plan, found = known
-    starts = np.concatenate([inside(found.near, i, 2000) for i in range(len(found.near.centres))])
-    owners = np.repeat(found.near.owners, 2000)
-    assert [orbit.period for orbit in found.orbits] == five.attractor_period.values.tolist()
-    end = plan.map().sequences(starts, 120)[0]
-    for label, orbit in enumerate(found.orbits):
-        mine = end[owners == label]
-        assert len(mine) == 2000 * orbit.period
-        limit = 1e-2 if orbit.period == 24 else 1e-3  # the 24T contracts by 0.72 in 24 periods
-        distance = np.abs((mine[:, None] - orbit.points[None]) / plan.scale).max(axis=2)
-        assert distance.min(axis=1).max() < limit
-        later = plan.map().sequences(mine[distance.min(axis=1).argsort()[-20:]], 1200)[0]  # the slowest, to the end
-        assert np.abs((later[:, None] - orbit.points[None]) / plan.scale).max(axis=2).min(axis=1).max() < 1e-6
+    orbit, mine = found.orbits[label], np.flatnonzero(found.near.owners == label)
+    assert orbit.period == [1, 3, 4, 5, 24][label] >= len(mine) >= 1
+    starts = np.concatenate([inside(found.near, i, 2000) for i in mine])
+    begun, end = distances(plan, starts, orbit), plan.map().sequences(starts, 60 if label < 4 else 24)[0]
+    now = distances(plan, end, orbit)
+    assert now.max() < (0.3 if label < 4 else 0.75) * begun.max()  # exp(-0.94 * 4) of it if it shrank evenly; 0.72
+    later = plan.map().sequences(end[now.argsort()[-50:]], 2400)[0]
+    assert distances(plan, later, orbit).max() < 1e-9
+
+
+def distances(plan, states, orbit):
+    """To the nearest point of an orbit, in units of the range."""
+    return np.abs((states[:, None] - orbit.points[None]) / plan.scale).max(axis=2).min(axis=1)
 
 
 def test_neighbourhoods_of_the_five_never_overlap(known):
@@ -150,12 +152,11 @@ def test_neighbourhoods_of_the_five_never_overlap(known):
 
 
 def test_neighbourhoods_are_worth_having(known):
-    """Of every orbit some points hold more than a thousandth of the range: that's what makes settling soon."""
+    """The largest disc that fits in an ellipsoid of each orbit, in units of the range: that's what makes settling soon."""
     plan, found = known
-    for label in range(5):
-        mine = found.near.weights[found.near.owners == label]
-        radius = 1 / np.linalg.norm(mine * plan.scale, ord=2, axis=(1, 2))
-        assert radius.max() > 1e-3 if label < 4 else radius.max() > 1e-5
+    radius = 1 / np.linalg.norm(found.near.weights * plan.scale, ord=2, axis=(1, 2))
+    largest = [radius[found.near.owners == label].max() for label in range(5)]
+    assert (np.array(largest) > [1e-2, 1e-3, 5e-5, 5e-4, 1e-5]).all()
 
 
 # -- the same however it is computed -------------------------------------------------------------------------------------------
@@ -298,7 +299,7 @@ def test_ode45_sees_the_third_attractor_only_if_it_locates_contacts(three, event
 
 
 def test_contacts_that_were_not_looked_for_are_not_counted_as_none(three):
-    """ "ignore" records no contact; these orbits meet the springs 4 and 6 times a period."""
+    """Without location no contact is recorded; these orbits meet the springs 4 and 6 times a period."""
     ds = sl.basins(GRAZED, method=sl.ODE45(1e-4, 1e-7, events="ignore"), **box(8))
     assert (three.attractor_contacts.values > 0).all()
     assert np.isnan(ds.attractor_contacts.values).all()
@@ -328,32 +329,37 @@ def test_a_budget_that_is_used_up_has_failed_and_not_escaped():
     assert ds.sizes["attractor"] == 0
 
 
-def test_too_few_periods_leave_cells_unconverged():
+def test_too_few_periods_leave_cells_unconverged(monkeypatch):
+    monkeypatch.setattr(plans, "SCOUTS", 32)
     ds = sl.basins(sl.models.delangre("b", damping_ratio=1e-3), periods=100, **box(4))
     assert set(ds.attractor_type.values) <= {"periodic"}
     assert -2 in ds.basin.values
     assert (ds.periods_to_settle.values[ds.basin.values < 0] == -1).all()
 
 
-def test_a_weakly_damped_rig_has_periodic_attractors_only():
+def test_a_weakly_damped_rig_has_periodic_attractors_only(monkeypatch):
     """zeta = 1e-3: settled after some thousand periods, and until then known to be on its way."""
+    monkeypatch.setattr(plans, "SCOUTS", 32)  # each is followed for thousands of periods
     rig = sl.models.delangre("b", damping_ratio=1e-3)
-    ds = sl.basins(rig, periods=4000, **box(5))
+    ds = sl.basins(rig, periods=4000, **box(4))
     assert set(ds.attractor_type.values) == {"periodic"}
-    starts, labels = cells(ds, 15)
+    starts, labels = cells(ds, 10)
     np.testing.assert_array_equal(labels_of_plain_runs(rig, starts, ds, periods=20_000), labels)
 
 
-def test_long_chaotic_transients_are_no_attractor():
-    """Case b, 13.5 Hz: transients of more than 1000 periods beside a T and a 2T."""
+def test_long_chaotic_transients_are_no_attractor(monkeypatch):
+    """Case b, 13.5 Hz: transients of more than 1000 periods beside a T and a 2T; some last beyond 4000 and are told to be unconverged."""
+    monkeypatch.setattr(plans, "SCOUTS", 64)
     rig = sl.models.delangre("b", frequency=13.5)
     ds = sl.basins(rig, **box(12))
     assert ds.attractor_type.values.tolist() == ["periodic"] * 2
     assert ds.attractor_period.values.tolist() == [1, 2]
-    assert (ds.basin.values >= 0).all()
+    assert set(np.unique(ds.basin)) <= {-2, 0, 1}
+    assert (ds.basin.values == -2).mean() < 0.03
     assert ds.periods_to_settle.values.max() > 1000
     starts, labels = cells(ds, 60)
-    np.testing.assert_array_equal(labels_of_plain_runs(rig, starts, ds, periods=8000), labels)
+    plain = labels_of_plain_runs(rig, starts, ds, periods=8000)
+    np.testing.assert_array_equal(plain[labels >= 0], labels[labels >= 0])
 
 
 # -- fractions -----------------------------------------------------------------------------------------------------------------
@@ -373,7 +379,7 @@ def test_intervals_of_fractions_hold_those_of_a_fine_map():
 
 def test_the_same_seed_gives_the_same_fractions():
     def share(seed, **more):
-        return sl.basin_fractions(B4, samples=300, seed=seed, x=SPAN_X, v=SPAN_V, progress=False, **more)
+        return sl.basin_fractions(B4, samples=100, seed=seed, x=SPAN_X, v=SPAN_V, progress=False, **more)
 
     one, again, other = share(7), share(7, threads=1), share(8)
     np.testing.assert_array_equal(one.basin.values, again.basin.values)
@@ -382,8 +388,8 @@ def test_the_same_seed_gives_the_same_fractions():
 
 
 def test_labels_of_fractions_are_those_of_plain_runs():
-    ds = sl.basin_fractions(B4, samples=200, seed=7, x=SPAN_X, v=SPAN_V, progress=False)
-    unit = np.random.default_rng(7).random((200, 2))
+    ds = sl.basin_fractions(B4, samples=100, seed=7, x=SPAN_X, v=SPAN_V, progress=False)
+    unit = np.random.default_rng(7).random((100, 2))
     starts = np.stack([-5e-3 + 1e-2 * unit[:, 0], -1 + 2 * unit[:, 1]], axis=1)
     np.testing.assert_array_equal(labels_of_plain_runs(B4, starts, ds), ds.basin.values)
 

@@ -14,7 +14,7 @@ from saltus.analysis import uncertainty
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import find
 from saltus.analysis.settling import UNCONVERGED, complete, settle_all
-from saltus.analysis.starts import ensemble
+from saltus.analysis.starts import check_system, ensemble, whole
 from saltus.errors import ParameterError, nearest
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
@@ -25,6 +25,8 @@ from saltus.units import to_si
 
 #: Iterates after which the range of the states is taken, where no box gives it.
 SPREAD = 32
+#: Trajectories that are watched between two iterates for it.
+WATCHED = 64
 #: Starts that tell the range.
 SPREAD_STARTS = 4096
 
@@ -73,12 +75,12 @@ def attractors(
     ParameterError, UnitError
         If an argument can't be used.
     """
-    group = ensemble(system, start, None)
+    group, periods = ensemble(system, start, None), whole(periods, "periods")
     map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
     scale = _spread(map_, group.start)
     show, close = reporter(progress)
     try:
-        found, label, settled = find(map_, group.start, scale, int(periods), progress=show)
+        found, label, settled = find(map_, group.start, scale, periods, progress=show)
     finally:
         close()
     return attractors_dataset(
@@ -125,20 +127,22 @@ def basin_fractions(
     ParameterError, UnitError
         If an argument can't be used.
     """
-    if isinstance(samples, bool) or samples != int(samples) or samples < 1:
-        raise ParameterError(f"samples must be a whole number of at least 1, not {samples!r}.")
+    check_system(system)
+    samples, periods, seed = whole(samples, "samples"), whole(periods, "periods"), whole(seed, "seed", 0)
+    if at is not None and not isinstance(at, Mapping):
+        raise ParameterError(f"at must be a mapping of states to starts, not {at!r}.")
     ranges = _ranges(system, box)
     fixed = {name: to_si(value, system.units[name], name) for name, value in _known(system, at or {}).items()}
     map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
-    drawn = np.random.default_rng(seed).random((int(samples), len(ranges)))
+    drawn = np.random.default_rng(seed).random((samples, len(ranges)))
     start = _fill(system, ranges, fixed, drawn)
     scale = _spread(map_, start[:SPREAD_STARTS])
     show, close = reporter(progress)
     try:
-        scouts = _fill(system, ranges, fixed, qmc.Halton(len(ranges), scramble=False).random(min(1024, int(samples))))
-        found = find(map_, scouts, scale, int(periods))[0]
-        result = settle_all(map_, start, found, int(periods), threads, show)
-        found = complete(map_, result, found, scale, int(periods), threads)
+        scouts = _fill(system, ranges, fixed, qmc.Halton(len(ranges), scramble=False).random(min(1024, samples)))
+        found = find(map_, scouts, scale, periods)[0]
+        result = settle_all(map_, start, found, periods, threads, show)
+        found = complete(map_, result, found, scale, periods, threads)
     finally:
         close()
     table = replace(portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found)))
@@ -146,7 +150,7 @@ def basin_fractions(
         states=system.states, units=system.units, attractors=table, gap_unit=_gap_unit(system), basin=result.label,
         periods_to_settle=result.periods, attrs=_provenance(system, map_.method, periods),
     )  # fmt: skip
-    return ds.assign_attrs(smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=int(samples), seed=int(seed))
+    return ds.assign_attrs(smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=samples, seed=seed)
 
 
 def _known(system: System, given: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -179,10 +183,12 @@ def _fill(system: System, ranges: Mapping[str, tuple[float, float]], fixed: Mapp
 
 
 def _spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
-    """Range of each state over the starts and their first iterates; 1 for a state that never moves."""
-    points = np.concatenate([start[:, None], map_.launch(start, SPREAD).advance(SPREAD)], axis=1)
-    points = points[np.isfinite(points).all(axis=(1, 2))].reshape(-1, start.shape[1])
-    wide = np.ptp(points, axis=0) if len(points) else np.ones(start.shape[1])
+    """Range of each state over the starts, their first iterates and the time between two of them; 1 for a state that never moves."""
+    iterates = map_.launch(start, SPREAD).advance(SPREAD)
+    between, _ = map_.trajectory(iterates[:WATCHED, -1][np.isfinite(iterates[:WATCHED, -1]).all(axis=1)], 1, SPREAD)
+    points = np.concatenate([start, iterates.reshape(-1, start.shape[1]), between.reshape(-1, start.shape[1])])
+    points = points[np.isfinite(points).all(axis=1)]
+    wide = np.ptp(points, axis=0)
     return np.where(wide > 0, wide, 1.0)
 
 
@@ -195,4 +201,4 @@ def _provenance(system: System, method: Method, periods: int) -> dict[str, Any]:
     return attributes(
         system=system.name, equations=system.equations(), parameters=system.values, units=system.units, method=method.name,
         method_options=method.options(), fingerprint=system.fingerprint(), source=system.source, varied=(),
-    ) | {"periods": int(periods)}  # fmt: skip
+    ) | {"periods": periods}  # fmt: skip

@@ -56,7 +56,7 @@ class Neighbourhoods:
         """For trajectories float64[k, n, D]: the attractor that captures each (-1: none), and the index of the point at which it does."""
         label, when = np.full(len(points), -1, np.int64), np.zeros(len(points), np.int64)
         if len(self.centres):
-            capture_module().capture(np.ascontiguousarray(points), self.centres, self.weights, self.owners, self._reach(), label, when)
+            capture_module().capture(np.ascontiguousarray(points), self.centres, self.weights, self.owners, self._extents(), label, when)
         return label, when
 
     @classmethod
@@ -75,9 +75,9 @@ class Neighbourhoods:
         """The same, owner i now being ids[i]."""
         return Neighbourhoods(self.centres, self.weights, ids[self.owners])
 
-    def _reach(self) -> float:
-        """Half the largest extent along the first coordinate: sqrt of the corner of (W'W)^-1."""
-        return float(np.sqrt(np.linalg.inv(self.weights.transpose(0, 2, 1) @ self.weights)[:, 0, 0].max()) * (1 + 1e-12))
+    def _extents(self) -> np.ndarray:
+        """Half the extent of each along the first coordinate, float64[m]: sqrt of the corner of (W'W)^-1."""
+        return np.sqrt(np.linalg.inv(self.weights.transpose(0, 2, 1) @ self.weights)[:, 0, 0]) * (1 + 1e-9)
 
 
 def neighbourhoods(map_: Map, orbit: Orbit, owner: int, scale: np.ndarray) -> Neighbourhoods:
@@ -110,14 +110,14 @@ def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, n
     norms = np.stack([_norm(matrix, scale) for matrix in monodromy])
     _, own = map_.sequences(points, iterates)
     shell = np.concatenate([_shell(size), 0.5 * _shell(size)])
-    lengths = np.linalg.norm(shell, axis=1)
+    lengths, asked = np.linalg.norm(shell, axis=1), _asked(orbit)
 
     def passes(radius: np.ndarray, which: np.ndarray) -> np.ndarray:
         starts = points[which, None, :] + radius[:, None, None] * (shell @ np.linalg.inv(norms[which]).transpose(0, 2, 1))
-        ends, met = map_.sequences(starts.reshape(-1, size), iterates)
-        back = np.linalg.norm((ends.reshape(starts.shape) - points[which, None, :]) @ norms[which].transpose(0, 2, 1), axis=2)
-        with np.errstate(invalid="ignore"):
-            nearer = (back <= CONTRACTION * radius[:, None] * lengths).all(axis=1)
+        with np.errstate(all="ignore"):  # what escapes doesn't contract
+            ends, met = map_.sequences(starts.reshape(-1, size), iterates)
+            back = np.linalg.norm((ends.reshape(starts.shape) - points[which, None, :]) @ norms[which].transpose(0, 2, 1), axis=2)
+            nearer = (back <= asked * radius[:, None] * lengths).all(axis=1)
         return nearer & [_alike(met[i * len(shell) : (i + 1) * len(shell)], own[k]) for i, k in enumerate(which)]
 
     best = np.zeros(n)
@@ -136,9 +136,19 @@ def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _returns(orbit: Orbit) -> int:
-    """Returns after which the linear part alone contracts to half of what is asked for."""
+    """Returns after which the linear part alone contracts to half of what is asked for, if these aren't too many."""
     slowest = float(np.abs(orbit.multipliers[0]))
     return 1 if slowest <= 0.5 * CONTRACTION else min(math.ceil(math.log(0.5 * CONTRACTION) / math.log(slowest)), MOST_RETURNS)
+
+
+def _asked(orbit: Orbit) -> float:
+    """What may be left of a distance after those returns: half way to what the norm promises, where that is more than CONTRACTION."""
+    return max(CONTRACTION, 0.5 * (1.0 + _rate(float(np.abs(orbit.multipliers[0]))) ** _returns(orbit)))
+
+
+def _rate(radius: float) -> float:
+    """Rate at which the norm of :func:`_norm` contracts, from the spectral radius."""
+    return 0.5 * (1.0 + radius)
 
 
 def _alike(met: list[np.ndarray], own: np.ndarray) -> bool:
@@ -152,9 +162,12 @@ def _alike(met: list[np.ndarray], own: np.ndarray) -> bool:
 def _norm(matrix: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """W with |W M x| <= q |W x|, q halfway between the spectral radius of M and 1; W x is at least x in units of the scale."""
     scaled = matrix * scale[None, :] / scale[:, None]
-    q = 0.5 * (1.0 + np.abs(np.linalg.eigvals(scaled)).max())
-    gram = solve_discrete_lyapunov((scaled / q).T, np.eye(len(scale)))
-    return np.linalg.cholesky(0.5 * (gram + gram.T)).T / scale[None, :]
+    try:
+        q = _rate(float(np.abs(np.linalg.eigvals(scaled)).max()))
+        gram = solve_discrete_lyapunov((scaled / q).T, np.eye(len(scale)))
+        return np.linalg.cholesky(0.5 * (gram + gram.T)).T / scale[None, :]
+    except np.linalg.LinAlgError:  # next to a bifurcation: nothing to be verified
+        return np.diag(1.0 / scale)
 
 
 def _shell(size: int) -> np.ndarray:
@@ -164,5 +177,6 @@ def _shell(size: int) -> np.ndarray:
     if size == 2:
         angle = np.arange(2 * DIRECTIONS) * np.pi / DIRECTIONS
         return np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    normal = qmc.MultivariateNormalQMC(np.zeros(size), seed=1).random(DIRECTIONS * (size - 1) * 2)
+    count = 2 ** math.ceil(math.log2(DIRECTIONS * (size - 1) * 2))
+    normal = qmc.MultivariateNormalQMC(np.zeros(size), seed=1).random(count)
     return normal / np.linalg.norm(normal, axis=1)[:, None]

@@ -14,6 +14,8 @@ from saltus.flow.maps import Map
 
 #: Newton steps: quadratic convergence needs a handful.
 MOST_STEPS = 30
+#: Distance of a multiplier from the unit circle that rounding can't make.
+MARGINAL = 1e-7
 #: A step shorter than this times the scale is rounding.
 SHORTEST = 1e-15
 
@@ -46,8 +48,8 @@ class Orbit:
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle."""
-        return bool(np.abs(self.multipliers[0]) < 1.0)
+        """Whether all multipliers lie inside the unit circle, by more than rounding."""
+        return bool(np.abs(self.multipliers[0]) < 1.0 - MARGINAL)
 
 
 def polish(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:

@@ -18,6 +18,7 @@ from saltus.analysis import uncertainty
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import Found, find
 from saltus.analysis.settling import Settling, complete, settle
+from saltus.analysis.starts import check_system, whole
 from saltus.errors import ParameterError, nearest
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -161,23 +162,26 @@ def basin_plan(
     ParameterError, UnitError
         If an axis isn't a state, a range is empty, or the grid is too large.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"the system must be a System, not {type(system).__name__}. Put @sl.system(states=...) above the function.")
+    check_system(system)
+    if at is not None and not isinstance(at, Mapping):
+        raise ParameterError(f"at must be a mapping of states to starts, not {at!r}.")
     for name in (*axes, *(at or {})):
         if name not in system.states:
             raise ParameterError(f"{system.name} has no state {name!r}. {nearest(name, system.states)}")
     if len(axes) != 2:
         example = ", ".join(f'{name}=("-1 {system.units[name]}", "1 {system.units[name]}", 400)' for name in system.states[:2])
         raise ParameterError(f"a basin map has two axes, not {len(axes)}. Give two states with range and number of starts: {example}.")
-    if isinstance(periods, bool) or periods != int(periods) or periods < 1:
-        raise ParameterError(f"periods must be a whole number of at least 1, not {periods!r}.")
+    twice = [name for name in axes if name in (at or {})]
+    if twice:
+        raise ParameterError(f"{twice[0]} is an axis of the map and stands in at= too. Leave it out of one of them.")
+    periods = whole(periods, "periods")
     values = {name: _axis(system, name, given) for name, given in axes.items()}
     first, second = (len(one) for one in values.values())
     if first * second > MOST_CELLS:
         raise ParameterError(f"{first} x {second} cells are more than {MOST_CELLS:.0e}. Take a coarser grid, or sl.basin_fractions.")
     fixed = {name: to_si((at or {}).get(name, 0.0), system.units[name], name) for name in system.states if name not in axes}
     seconds = None if every is None else to_si(every, "s", "every")
-    plan = BasinPlan(system, method, values, fixed, int(periods), seconds)
+    plan = BasinPlan(system, method, values, fixed, periods, seconds)
     plan.map()  # every= is checked where it is used
     return plan
 
@@ -185,6 +189,8 @@ def basin_plan(
 def _axis(system: System, name: str, given: Any) -> np.ndarray:
     """Starts along one state from (low, high, count) or an array."""
     if isinstance(given, np.ndarray):
+        if given.dtype.kind not in "fiu":
+            raise ParameterError(f"the starts along {name} must be numbers, not {given.dtype}.")
         values = given.astype(float)
     else:
         try:

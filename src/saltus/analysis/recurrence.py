@@ -213,7 +213,7 @@ def _survey(map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, fou
     chosen = np.unique(np.linspace(0, len(survivors) - 1, min(SURVEYED, len(survivors))).astype(int))
     points = np.concatenate(trails, axis=1)
     seen = survey(map_, travel.state[chosen], points[chosen], scale)
-    fresh = [one for one in seen if one is not None and not any(one.share(trail[None])[0] >= INSIDE for trail in leavers)]
+    fresh = [one for one in seen if not any(one.share(trail[None])[0] >= INSIDE for trail in leavers)]
     found.wandering = merge([*found.wandering, *fresh])
     if not found.wandering:
         return

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,7 +11,7 @@ import xarray as xr
 
 from saltus.analysis import answers
 from saltus.analysis.messages import warn
-from saltus.analysis.starts import Ensemble, Span, ensemble, span
+from saltus.analysis.starts import Ensemble, Span, ensemble, span, whole
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
@@ -154,17 +153,7 @@ def _plan(system: System, group: Ensemble, length: Span, samples: int | None, ke
 
 
 def _whole(value: int | None, name: str, default: int) -> int:
-    if value is None:
-        return default
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float | np.number)
-        or not math.isfinite(value)
-        or value != int(value)
-        or value < 1
-    ):
-        raise ParameterError(f"{name} must be a whole number of at least 1, not {value!r}.")
-    return int(value)
+    return default if value is None else whole(value, name)
 
 
 def _dataset(

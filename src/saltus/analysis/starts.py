@@ -66,8 +66,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     ParameterError, UnitError
         If a name is unknown, a number isn't finite, or lengths don't match.
     """
-    if not isinstance(system, System):
-        raise ParameterError(f"the system must be a System, not {type(system).__name__}. Put @sl.system(states=...) above the function.")
+    check_system(system)
     if values is not None and not isinstance(values, Mapping):
         raise ParameterError('values must be a mapping, such as values={"frequency": [5.0, 10.0]}.')
     columns = _columns(system, start)
@@ -92,6 +91,25 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
         return Ensemble(states, np.stack(rows, axis=1), varied, True)
     return Ensemble(states, np.array([list(shared.values())]), {}, bool(sizes))
+
+
+def check_system(system: Any) -> None:
+    """Raises ParameterError for what isn't a System."""
+    if not isinstance(system, System):
+        raise ParameterError(f"the system must be a System, not {type(system).__name__}. Put @sl.system(states=...) above the function.")
+
+
+def whole(value: Any, name: str, least: int = 1) -> int:
+    """A whole number. Raises ParameterError for anything else, or one below ``least``."""
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float | np.number)
+        or not math.isfinite(value)
+        or value != int(value)
+        or value < least
+    ):
+        raise ParameterError(f"{name} must be a whole number of at least {least}, not {value!r}.")
+    return int(value)
 
 
 def _check_period_of_each(system: System, shared: Mapping[str, float], varied: Mapping[str, np.ndarray], count: int) -> None:

@@ -13,10 +13,14 @@ import numpy as np
 
 from saltus.flow.maps import Map
 
-#: Iterates of one block of the exponent, and blocks.
-BLOCK, BLOCKS = 8, 64
+#: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its way.
+BLOCK, BLOCKS, ALIGNING = 8, 192, 48
 #: Standard errors that an exponent must be from zero.
 SURE = 4.0
+#: Exponent [per iterate] that is taken for zero whatever its error.
+FLOOR = 2e-3
+#: A trail that repeats to this, in units of the scale, is an orbit's; one whose repeats become so many times better is on its way to one.
+REPEATS, SETTLING = 1e-6, 0.05
 #: Standard error [per iterate] beyond which an exponent says nothing.
 UNCLEAR = 0.1
 #: Iterates whose places are noted.
@@ -78,20 +82,64 @@ def _codes(cells: np.ndarray) -> np.ndarray:
     return cells @ (2 * FARTHEST) ** np.arange(cells.shape[-1], dtype=np.int64)
 
 
-def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) -> list[Wandering | None]:
-    """What trajectories are, from where they stand, float64[k, D], and were, float64[k, TRAIL, D]; None where that isn't clear."""
-    exponents, errors = largest_exponents(map_, start, scale)
-    found: list[Wandering | None] = []
-    for exponent, error, trail in zip(exponents, errors, points, strict=True):
-        if not (np.isfinite(trail).all() and math.isfinite(exponent)) or exponent < -SURE * error or error > UNCLEAR:
-            found.append(None)
+def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) -> list[Wandering]:
+    """The attractors on which trajectories wander.
+
+    Parameters
+    ----------
+    map_ : Map
+        The map.
+    start : float64[k, D]
+        Where trajectories stand that have not settled for long.
+    points : float64[k, TRAIL, D]
+        Where they were.
+    scale : float64[D]
+        Range of each state.
+    """
+    usable = [i for i in range(len(start)) if np.isfinite(points[i]).all() and not _settles(points[i], scale)]
+    if not usable:
+        return []
+    halves = largest_exponents(map_, start[usable], scale)
+    groups: list[list[int]] = []
+    trails = [Wandering("", 0.0, 0.0, points[i], scale) for i in usable]
+    for i, trail in enumerate(trails):
+        home = next((group for group in groups if _alike(trails[group[0]], trail)), None)
+        if home is None:
+            groups.append([i])
         else:
-            found.append(Wandering("chaotic" if exponent > SURE * error else "quasi_periodic", float(exponent), float(error), trail, scale))
-    return found
+            home.append(i)
+    kinds = [(group, _kind(halves[:, group])) for group in groups]
+    return [Wandering(*kind, points[usable[group[0]]], scale) for group, kind in kinds if kind is not None]
 
 
-def largest_exponents(map_: Map, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Largest Lyapunov exponent [per iterate] and its standard error, of trajectories from float64[k, D]."""
+def _settles(trail: np.ndarray, scale: np.ndarray) -> bool:
+    """Whether a trail float64[m, D] repeats, or comes to repeat better and better: it is on an orbit, or on its way to one."""
+    part = len(trail) // 16
+    early, late = (_mismatch(piece, scale) for piece in (trail[:part], trail[-part:]))
+    return late < REPEATS or late < SETTLING * early
+
+
+def _mismatch(trail: np.ndarray, scale: np.ndarray) -> float:
+    """Smallest n-step difference, n up to half of the trail: the largest of it over the last quarter."""
+    last = len(trail) // 4
+    return min(float(np.abs((trail[-last:] - trail[-last - n : -n]) / scale).max()) for n in range(1, len(trail) // 2))
+
+
+def _kind(blocks: np.ndarray) -> tuple[str, float, float] | None:
+    """(kind, exponent, its standard error) from growth rates per iterate, float64[blocks, members]; None if they don't say."""
+    if not np.isfinite(blocks).all():
+        return None
+    first, second = np.array_split(blocks, 2)
+    exponent, error = float(blocks.mean()), float(blocks.mean(axis=1).std(ddof=1) / math.sqrt(len(blocks)))
+    if error > UNCLEAR:
+        return None
+    if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():  # growth like t looks positive at first
+        return "chaotic", exponent, error
+    return ("quasi_periodic", exponent, error) if abs(second.mean()) <= max(SURE * error, FLOOR) else None
+
+
+def largest_exponents(map_: Map, start: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Growth rates per iterate of the largest direction, block by block, float64[blocks, k], of trajectories from float64[k, D]."""
     k, size = start.shape
     direction = np.zeros((k, size, size))
     direction[:, :, 0] = scale / math.sqrt(size)
@@ -99,19 +147,21 @@ def largest_exponents(map_: Map, start: np.ndarray, scale: np.ndarray) -> tuple[
     for _ in range(BLOCKS):
         state, image = map_.tangent(state, BLOCK, direction)
         length = np.linalg.norm(image[:, :, 0] / scale, axis=1)
-        growths.append(np.log(length) / BLOCK)
-        direction = np.zeros((k, size, size))
-        direction[:, :, 0] = image[:, :, 0] / length[:, None]
-    blocks = np.array(growths[4:])
-    return blocks.mean(axis=0), blocks.std(axis=0, ddof=1) / math.sqrt(len(blocks))
+        with np.errstate(all="ignore"):
+            growths.append(np.log(length) / BLOCK)
+            direction = np.zeros((k, size, size))
+            direction[:, :, 0] = image[:, :, 0] / length[:, None]
+    return np.array(growths[ALIGNING:])
+
+
+def _alike(one: Wandering, other: Wandering) -> bool:
+    return min(float(other.share(one.points[None])[0]), float(one.share(other.points[None])[0])) > ALIKE
 
 
 def merge(found: list[Wandering]) -> list[Wandering]:
     """Those of a list that are different: of two that visit the same boxes the first is kept."""
     kept: list[Wandering] = []
     for one in found:
-        if not any(
-            other.kind == one.kind and min(other.share(one.points[None])[0], one.share(other.points[None])[0]) > ALIKE for other in kept
-        ):
+        if not any(_alike(one, other) for other in kept):
             kept.append(one)
     return kept

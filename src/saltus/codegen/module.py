@@ -76,7 +76,7 @@ def ode45_module(system: System) -> ModuleType:
 
 def capture_module() -> ModuleType:
     """The compiled test of capture, the same for all systems."""
-    return _module("capture", "", ("capture.py",), (_F3, _F2, _F3, _I1, "float64", _I1, _I1))
+    return _module("capture", "", ("capture.py",), (_F3, _F2, _F3, _I1, _F1, _I1, _I1))
 
 
 def _module(title: str, head: str, templates: tuple[str, ...], arguments: tuple[str, ...]) -> ModuleType:

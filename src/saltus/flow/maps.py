@@ -159,16 +159,18 @@ class FunctionMap:
     def tangent(self, start: np.ndarray, count: int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`Map`."""
         state, matrix = start, np.eye(start.shape[1]) if directions is None else directions
-        for _ in range(count):
-            matrix = self._derivative(state) @ matrix
-            state = self._function(state)
+        with np.errstate(all="ignore"):
+            for _ in range(count):
+                matrix = self._derivative(state) @ matrix
+                state = self._function(state)
         return state, np.broadcast_to(matrix, (*start.shape, start.shape[1]))
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
         """See :class:`Map`."""
         state = start
-        for _ in range(count):
-            state = self._function(state)
+        with np.errstate(all="ignore"):
+            for _ in range(count):
+                state = self._function(state)
         return state, [np.zeros(0, np.int64)] * len(start)
 
 

@@ -2,14 +2,16 @@
 
 
 @entry
-def capture(points, centres, weights, owners, reach, label, when):
+def capture(points, centres, weights, owners, extents, label, when):
     """Look at every point of every trajectory, in order, until one lies in an ellipsoid |W (p - c)| <= 1.
 
     points f8[k, n, D]; centres f8[m, D], ascending in their first coordinate; weights f8[m, D, D]; owners i8[m], the attractor of each;
-    reach: half the largest extent of an ellipsoid along the first coordinate; out: label i8[k], the owner, or untouched; when i8[k], the
+    extents f8[m]: half the extent of each ellipsoid along the first coordinate; out: label i8[k], the owner, or untouched; when i8[k], the
     index of the point. Returns how many were captured.
     """
-    count, size, found = centres.shape[0], points.shape[2], 0
+    count, size, found, reach = centres.shape[0], points.shape[2], 0, 0.0
+    for i in range(count):
+        reach = max(reach, extents[i])
     for i in range(points.shape[0]):
         for j in range(points.shape[1]):
             first = points[i, j, 0]
@@ -22,8 +24,10 @@ def capture(points, centres, weights, owners, reach, label, when):
                     high = middle
             owner = -1
             while low < count and centres[low, 0] <= first + reach:
-                total = 0.0
+                total = 0.0 if abs(first - centres[low, 0]) <= extents[low] else 2.0
                 for row in range(size):
+                    if total > 1.0:
+                        break
                     part = 0.0
                     for column in range(size):
                         part += weights[low, row, column] * (points[i, j, column] - centres[low, column])

@@ -112,6 +112,24 @@ def test_a_strongly_sheared_contraction_is_verified():
     assert np.abs(points).max() < 1e-12
 
 
+class Touching(FunctionMap):
+    """x -> A x, with a contact where |x| > 0.01: it changes nothing but the sequence."""
+
+    def sequences(self, start, count):
+        """See Map."""
+        end, _ = super().sequences(start, count)
+        return end, [np.full(int(abs(row[0]) > 0.01), 3) for row in start]
+
+
+def test_a_neighbourhood_ends_where_the_contacts_change():
+    plain = linear([[0.5, 0.0], [0.0, 0.5]])
+    map_ = Touching(plain._function, "x y", plain._derivative)
+    orbit = polish(map_, np.array([0.1, 0.1]), 1, np.ones(2))
+    edge = inside(neighbourhoods(map_, orbit, 0, np.ones(2)), 0, 2000)[:, 0]
+    assert 0.002 < np.abs(edge).max() <= 0.01
+    assert np.abs(inside(neighbourhoods(plain, orbit, 0, np.ones(2)), 0, 2000)[:, 0]).max() > 0.1
+
+
 def test_newton_s_map_every_point_of_a_neighbourhood_ends_on_its_root():
     map_, scale = newton(), np.array([4.0, 4.0])
     starts = np.random.default_rng(1).uniform(-2, 2, (100, 2))

@@ -204,12 +204,18 @@ def test_shares_of_boxes():
     assert line.share(np.stack([on, off, lost])) == pytest.approx([1.0, 0.0, 1 / 3])
 
 
-def test_one_attractor_seen_twice_is_kept_once_and_twins_are_kept():
+def ring() -> np.ndarray:
     t = np.linspace(0, 2 * np.pi, 4096, endpoint=False)
-    ring = np.stack([np.cos(t), np.sin(t)], axis=1)
-    assert len(merge([wandering(ring + 2), wandering(ring[::-1] + 2)])) == 1
-    assert len(merge([wandering(ring + 2), wandering(-ring - 2)])) == 2
-    assert len(merge([wandering(ring, "chaotic"), wandering(ring, "quasi_periodic")])) == 1  # one set, one type
+    return np.stack([np.cos(t), np.sin(t)], axis=1)
+
+
+def test_one_attractor_seen_twice_is_kept_once_and_twins_are_kept():
+    assert len(merge([wandering(ring() + 2), wandering(ring()[::-1] + 2)])) == 1
+    assert len(merge([wandering(ring() + 2), wandering(-ring() - 2)])) == 2
+
+
+def test_one_set_has_one_type():
+    assert len(merge([wandering(ring(), "chaotic"), wandering(ring(), "quasi_periodic")])) == 1
 
 
 # -- recurrence ----------------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from saltus.cli import app, commands
 
-COMMANDS = ["demo", "run", "plot", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
+COMMANDS = ["demo", "run", "status", "resume", "plot", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
 
 
 def saltus(*arguments: str):
