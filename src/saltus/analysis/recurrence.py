@@ -9,7 +9,7 @@ import numpy as np
 
 from saltus.analysis.capture import Neighbourhoods, neighbourhoods
 from saltus.analysis.orbits import Orbit, polish, same
-from saltus.analysis.wandering import TRAIL, Wandering, merge, survey
+from saltus.analysis.wandering import REPEATS, TRAIL, Wandering, merge, mismatch, survey
 from saltus.flow.maps import Map, Travel
 
 #: Longest period looked for [iterates].
@@ -24,6 +24,8 @@ SAME = 1e-6
 TRIES = 12
 #: Trajectories that never recur whose motion is surveyed.
 SURVEYED = 24
+#: Iterates that they are watched, and what their repeats come to, in units of the scale, when they are on an orbit after all.
+WATCHED, ARRIVED = 32 * 1024, 1e-5
 #: Share of a trajectory's points that must lie in an attractor's boxes to belong to it.
 INSIDE = 0.9
 
@@ -150,13 +152,13 @@ def _captured(found: Found, points: np.ndarray, who: np.ndarray, age: int, owner
 
 def _new_orbit(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found) -> Orbit | None:
     """An attracting orbit not known yet that one of the trajectories float64[k, ROUND, D] follows, if there is one."""
-    period, mismatch = recurrence(points, scale)
+    period, apart = recurrence(points, scale)
     near = max(NEAR, map_.noise)
-    tries = [i for i in np.argsort(mismatch, kind="stable") if mismatch[i] < near]
+    tries = [i for i in np.argsort(apart, kind="stable") if apart[i] < near]
     seen: list[np.ndarray] = []
     for i in tries:
         place = points[i, -1]
-        if any(_lies_on(place, orbit, scale, 10 * mismatch[i]) for orbit in found.unstable) or any(
+        if any(_lies_on(place, orbit, scale, 10 * apart[i]) for orbit in found.unstable) or any(
             np.abs((place - other) / scale).max() < near for other in seen
         ):
             continue
@@ -178,14 +180,14 @@ def recurrence(points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.nd
     last = points[:, -1]
     candidates = []
     for n in range(1, points.shape[1] // 2 + 1):
-        apart = np.abs((points[:, -1] - points[:, -1 - n]) / scale).max(axis=1)
+        now = np.abs((points[:, -1] - points[:, -1 - n]) / scale).max(axis=1)
         before = np.abs((points[:, -1 - n // 2] - points[:, -1 - n - n // 2]) / scale).max(axis=1)
-        candidates.append(np.maximum(apart, before))
-    mismatch = np.stack(candidates, axis=1)
-    mismatch = np.where(np.isfinite(mismatch), mismatch, np.inf)
-    best = mismatch.min(axis=1)
-    period = 1 + np.argmax(mismatch <= np.maximum(4.0 * best, 1e-12)[:, None], axis=1)
-    return period, np.where(np.isfinite(last).all(axis=1), mismatch[np.arange(len(points)), period - 1], np.inf)
+        candidates.append(np.maximum(now, before))
+    apart = np.stack(candidates, axis=1)
+    apart = np.where(np.isfinite(apart), apart, np.inf)
+    best = apart.min(axis=1)
+    period = 1 + np.argmax(apart <= np.maximum(4.0 * best, 1e-12)[:, None], axis=1)
+    return period, np.where(np.isfinite(last).all(axis=1), apart[np.arange(len(points)), period - 1], np.inf)
 
 
 def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: float) -> bool:
@@ -203,8 +205,7 @@ def _survey(map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, fou
     for _ in range(TRAIL // ROUND):
         points = travel.advance(ROUND)
         caught = _captured(found, points, going[survivors], travel.age - ROUND, owner, settled)
-        if trails:
-            leavers += list(trails[-1][caught])
+        leavers += [trail[caught] for trail in trails]
         stays = ~caught & travel.going
         travel.keep(stays)
         survivors, trails = survivors[stays], [*(trail[stays] for trail in trails), points[stays]]
@@ -212,12 +213,38 @@ def _survey(map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, fou
             return
     chosen = np.unique(np.linspace(0, len(survivors) - 1, min(SURVEYED, len(survivors))).astype(int))
     points = np.concatenate(trails, axis=1)
+    chosen = chosen[[mismatch(points[i, -ROUND:], scale) >= ARRIVED for i in chosen]]  # others stay on an orbit that doesn't attract
     seen = survey(map_, travel.state[chosen], points[chosen], scale)
-    fresh = [one for one in seen if not any(one.share(trail[None])[0] >= INSIDE for trail in leavers)]
+    if seen:
+        leavers.append(points[chosen][_leave(map_, travel.state[chosen], found, scale), -ROUND:])
+    fresh = [one for one in seen if not any((one.share(trail) >= INSIDE).any() for trail in leavers if len(trail))]
     found.wandering = merge([*found.wandering, *fresh])
     if not found.wandering:
         return
-    shares = np.stack([one.share(points[:, -ROUND:]) for one in found.wandering], axis=1)
-    for i, best, share in zip(going[survivors], shares.argmax(axis=1), shares.max(axis=1), strict=True):
-        if share >= INSIDE:
-            owner[i] = found.wandering[best]
+    label = wanders_on(found, points[:, -ROUND:], scale)
+    for i, one in zip(going[survivors], label, strict=True):
+        if one >= 0:
+            owner[i] = found.wandering[one]
+
+
+def _leave(map_: Map, state: np.ndarray, found: Found, scale: np.ndarray) -> np.ndarray:
+    """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]."""
+    travel, going = map_.launch(state, WATCHED), np.arange(len(state))
+    left = np.zeros(len(state), bool)
+    while len(going) and travel.age < WATCHED:
+        points = travel.advance(ROUND)
+        arrives = found.near.capture(points)[0] >= 0
+        if travel.age % (8 * ROUND) == 0:
+            arrives |= [mismatch(trail, scale) < ARRIVED for trail in points]
+        left[going[arrives]] = True
+        stays = ~arrives & travel.going
+        travel.keep(stays)
+        going = going[stays]
+    return left
+
+
+def wanders_on(found: Found, trails: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """For trajectories float64[k, m, D]: which attractor of those that never repeat each keeps to, -1 if none; none if it repeats."""
+    shares = np.stack([one.share(trails) for one in found.wandering], axis=1)
+    _, apart = recurrence(trails, scale)
+    return np.where((shares.max(axis=1) >= INSIDE) & (apart > REPEATS), shares.argmax(axis=1), -1)

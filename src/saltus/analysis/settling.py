@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.recurrence import INSIDE, Found, find
+from saltus.analysis.recurrence import Found, find, wanders_on
 from saltus.flow.engine import usable_processors
 from saltus.flow.maps import Map, Travel
 from saltus.kernels import status as st
@@ -75,7 +75,9 @@ def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
         if found.wandering:
             trail = np.concatenate([trail, points], axis=1)[:, -WANDERS:]
             if travel.age % WANDERS == 0:
-                _label_wandering(found, trail, label, periods, travel.age)
+                on = wanders_on(found, trail, found.wandering[0].scale)
+                here = (label < 0) & (on >= 0)
+                label[here], periods[here] = len(found.orbits) + on[here], travel.age
         going = travel.going & (label < 0)
         leaves = np.flatnonzero(~going)
         label[leaves] = np.where(label[leaves] >= 0, label[leaves], np.where(travel.status[leaves] == st.NONFINITE, ESCAPED, FAILED))
@@ -104,14 +106,6 @@ def _write(result: Settling, who: np.ndarray, label: np.ndarray, periods: np.nda
     result.label[who], result.periods[who] = label, np.where(label >= 0, periods, -1)
     result.status[who], result.unresolved[who] = travel.status[rows], travel.unresolved[rows]
     result.end[who] = travel.state[rows]
-
-
-def _label_wandering(found: Found, trail: np.ndarray, label: np.ndarray, periods: np.ndarray, age: int) -> None:
-    """Label those of the trajectories that have kept to the boxes of one attractor that never repeats."""
-    shares = np.stack([one.share(trail) for one in found.wandering], axis=1)
-    here = (label < 0) & (shares.max(axis=1) >= INSIDE)
-    label[here] = len(found.orbits) + shares.argmax(axis=1)[here]
-    periods[here] = age
 
 
 def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most: int, threads: int | None = None) -> Found:

@@ -99,7 +99,7 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
     usable = [i for i in range(len(start)) if np.isfinite(points[i]).all() and not _settles(points[i], scale)]
     if not usable:
         return []
-    halves = largest_exponents(map_, start[usable], scale)
+    blocks = growth_rates(map_, start[usable], scale)
     groups: list[list[int]] = []
     trails = [Wandering("", 0.0, 0.0, points[i], scale) for i in usable]
     for i, trail in enumerate(trails):
@@ -108,18 +108,18 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
             groups.append([i])
         else:
             home.append(i)
-    kinds = [(group, _kind(halves[:, group])) for group in groups]
+    kinds = [(group, _kind(blocks[:, group])) for group in groups]
     return [Wandering(*kind, points[usable[group[0]]], scale) for group, kind in kinds if kind is not None]
 
 
 def _settles(trail: np.ndarray, scale: np.ndarray) -> bool:
     """Whether a trail float64[m, D] repeats, or comes to repeat better and better: it is on an orbit, or on its way to one."""
     part = len(trail) // 16
-    early, late = (_mismatch(piece, scale) for piece in (trail[:part], trail[-part:]))
+    early, late = (mismatch(piece, scale) for piece in (trail[:part], trail[-part:]))
     return late < REPEATS or late < SETTLING * early
 
 
-def _mismatch(trail: np.ndarray, scale: np.ndarray) -> float:
+def mismatch(trail: np.ndarray, scale: np.ndarray) -> float:
     """Smallest n-step difference, n up to half of the trail: the largest of it over the last quarter."""
     last = len(trail) // 4
     return min(float(np.abs((trail[-last:] - trail[-last - n : -n]) / scale).max()) for n in range(1, len(trail) // 2))
@@ -138,7 +138,7 @@ def _kind(blocks: np.ndarray) -> tuple[str, float, float] | None:
     return ("quasi_periodic", exponent, error) if abs(second.mean()) <= max(SURE * error, FLOOR) else None
 
 
-def largest_exponents(map_: Map, start: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Growth rates per iterate of the largest direction, block by block, float64[blocks, k], of trajectories from float64[k, D]."""
     k, size = start.shape
     direction = np.zeros((k, size, size))

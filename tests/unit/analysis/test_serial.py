@@ -50,6 +50,7 @@ def through_a_store(found):
 
 def numbers(found):
     """Every number of it, as bytes, with shapes and types."""
+
     def told(array):
         array = np.asarray(array)
         return array.dtype.str, array.shape, array.tobytes()
@@ -97,7 +98,10 @@ def test_numbers_that_text_may_lose():
     matrices = np.arange(16.0).reshape(4, 2, 2) / 7
     orbit = Orbit(odd, matrices, np.array([0.3 + 0.4j, complex(-0.0, -0.4)]), np.float64(1e-17))
     found = Found(
-        Neighbourhoods(odd.copy(), matrices, np.array([0, 0, 1, 1])), [orbit], [Wandering("quasi_periodic", -0.0, np.nan, odd, SCALE)], [orbit]
+        Neighbourhoods(odd.copy(), matrices, np.array([0, 0, 1, 1])),
+        [orbit],
+        [Wandering("quasi_periodic", -0.0, np.nan, odd, SCALE)],
+        [orbit],
     )
     data = json.loads(json.dumps(found_data(found)))
     again = found_from(data, 2)

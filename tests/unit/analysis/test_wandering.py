@@ -7,10 +7,16 @@ import pytest
 
 from saltus.analysis.recurrence import find, recurrence
 from saltus.analysis.settling import complete, settle
-from saltus.analysis.wandering import Wandering, largest_exponents, merge
+from saltus.analysis.wandering import Wandering, growth_rates, merge
 from saltus.flow.maps import FunctionMap
 
 GOLDEN = math.pi * (math.sqrt(5) - 1)
+
+
+def largest_exponents(map_, start, scale):
+    """Exponents [per iterate] and their standard errors."""
+    blocks = growth_rates(map_, start, scale)
+    return blocks.mean(axis=0), blocks.std(axis=0, ddof=1) / np.sqrt(len(blocks))
 
 
 def logistic(r: float) -> FunctionMap:

@@ -270,7 +270,11 @@ def test_plot_of_a_motion_as_a_map(study, tmp_path, kind):
         ('"-5 mm"', "-5", "[basins.axes] x = -5 has no unit."),
         ("\n[basins]", '\n[[basins.map]]\nname = "a"\n[[basins.map]]\nname = "a"\n[basins]', "two maps have the same name"),
         ("\n[basins]", '\n[[basins.map]]\nname = "a"\ncompare = "b"\n[basins]', "map 'a' is compared with 'b', which is no other map"),
-        ("[basins]", '[simulate]\nstart = { x = "0 mm", v = "0 m/s" }\nperiods = 3\n[basins]', "one table [simulate] or one table [basins]"),
+        (
+            "[basins]",
+            '[simulate]\nstart = { x = "0 mm", v = "0 m/s" }\nperiods = 3\n[basins]',
+            "one table [simulate] or one table [basins]",
+        ),
         (STUDY[STUDY.index("[basins]") :], "", "one table [simulate] or one table [basins]"),
     ],
 )

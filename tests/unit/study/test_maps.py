@@ -58,7 +58,14 @@ def test_maps_have_values_and_methods_of_their_own():
 
 @pytest.mark.parametrize(
     ("name", "slug"),
-    [("exact, 25.5 kN/m", "exact-25.5-kn-m"), ("../../etc/passwd", "etc-passwd"), ("..", "map"), ("µ", "map"), ("A  b", "a-b"), ("a/", "a")],
+    [
+        ("exact, 25.5 kN/m", "exact-25.5-kn-m"),
+        ("../../etc/passwd", "etc-passwd"),
+        ("..", "map"),
+        ("µ", "map"),
+        ("A  b", "a-b"),
+        ("a/", "a"),
+    ],
 )
 def test_a_name_becomes_a_file_name(name, slug):
     """Nothing that leads out of the folder."""
@@ -205,7 +212,9 @@ def test_the_code_is_part_of_the_identity(monkeypatch):
 
     for target in ("taylor_step.py", "settling.py", "engine.py", "trace.py", "recurrence.py", "capture.py", "maps.py", "module.py"):
         with monkeypatch.context() as patch:
-            patch.setattr(maps.resources, "files", lambda package: type("F", (), {"iterdir": lambda _: map(Changed, read(package).iterdir())})())
+            patch.setattr(
+                maps.resources, "files", lambda package: type("F", (), {"iterdir": lambda _: map(Changed, read(package).iterdir())})()
+            )
             assert maps.code_hash.__wrapped__() != before, target
 
 
