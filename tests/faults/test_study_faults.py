@@ -17,11 +17,13 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import saltus as sl
 from saltus.analysis import plan
 from saltus.analysis.plan import BasinPlan
 from saltus.analysis.serial import found_data
+from saltus.cli import app
 from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.store import Store
@@ -45,8 +47,8 @@ axes.x = { first = "-5 mm", last = "5 mm", count = 36 }
 axes.v = { first = "-1 m/s", last = "1 m/s", count = 36 }
 """
 CHUNKS = 27
-#: The command with small chunks (in a worker of dask too, which imports this file first), and a moment between two commits, so that there is
-#: a moment to be killed in. With `serve` it loads everything once and forks a child for each line, which starts within milliseconds.
+#: The command with small chunks (in a worker of dask too, which imports this file first), and a moment between two commits, so that
+#: there is one to be killed in. With `serve` it loads everything once and forks a child for each line, which starts within milliseconds.
 COMMAND = """
 import json, os, signal, sys, time
 import saltus.analysis.plan, saltus.plot, saltus.study.maps, saltus.study.maps_run, saltus.study.read
@@ -172,7 +174,7 @@ def wait_for(condition, seconds=60):
 
 # -- killed ----------------------------------------------------------------------------------------------------------------------
 def test_killed_at_20_random_moments(server, undisturbed, tmp_path):
-    """While attractors are looked for, between chunks, while the table and the pictures are made; then it goes on as if nothing had been."""
+    """While attractors are looked for, between chunks, while table and pictures are made; then it goes on as if nothing had been."""
     moments, folder, progress, killed = random.Random(4), tmp_path / "out", [0], 0
     for _ in range(20):
         child = server.start(*arguments(server, folder), pause=0.004)
@@ -235,8 +237,9 @@ def workers_of(process):
 
 def with_workers(server, folder, count, pause):
     pytest.importorskip("distributed")
+    words = ["run", server.study, "--out", folder, "--workers", count, "--progress", "none"]
     return subprocess.Popen(
-        [sys.executable, str(server.command), "run", str(server.study), "--out", str(folder), "--workers", str(count), "--progress", "none"],
+        [sys.executable, str(server.command), *map(str, words)],
         env=os.environ | {"PAUSE": str(pause)}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
     )  # fmt: skip
 
@@ -397,18 +400,22 @@ def test_a_changed_study_is_refused(server, half, tmp_path, old, new, told):
     assert (half / "study.toml").read_text() == STUDY
 
 
-def test_a_second_process_is_refused(server, undisturbed, tmp_path):
-    """While the first works; it isn't disturbed."""
+def test_a_second_process_is_refused(server, undisturbed, tmp_path, monkeypatch):
+    """While the first works, which is halted for a moment here; it isn't disturbed."""
     folder = tmp_path / "out"
-    first = server.start(*arguments(server, folder), pause=0.1)
+    first = server.start(*arguments(server, folder), pause=0.02)
     wait_for(lambda: committed(folder) >= 2)
-    second = subprocess.run(
-        [sys.executable, str(server.command), *map(str, arguments(server, folder))], capture_output=True, text=True, check=False, timeout=60
-    )
-    assert committed(folder) < CHUNKS, "the first was still at work"
-    assert second.returncode == 2, second.stderr
+    os.kill(first, signal.SIGSTOP)
+    assert committed(folder) < CHUNKS
+    monkeypatch.setattr(plan, "CHUNK", 48)
+    monkeypatch.setattr(maps, "CHUNK", 48)
+    second = CliRunner().invoke(app, ["resume", str(folder), "--threads", "1", "--progress", "none"], catch_exceptions=False)
+    seen = CliRunner().invoke(app, ["status", str(folder)], catch_exceptions=False)
+    os.kill(first, signal.SIGCONT)
+    assert second.exit_code == 2, second.output
     assert f"is being written by process {first} on" in second.stderr
     assert "Wait for it, stop it, or choose another path." in second.stderr
+    assert f"process {first} on" in seen.stdout, "status needs no lock"
     code, text = server.end()
     assert code == 0, text
     as_if_undisturbed(folder, undisturbed)

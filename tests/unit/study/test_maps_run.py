@@ -211,7 +211,7 @@ def test_a_changed_study_is_refused(whole, tmp_path, old, new, told):
 def test_other_code_is_refused(whole, tmp_path, monkeypatch):
     folder = copied(whole, tmp_path / "run")
     monkeypatch.setattr(maps, "code_hash", lambda: "another")
-    with pytest.raises(StoreError, match="code was .* is 'another'"):
+    with pytest.raises(StoreError, match=r"code was .* is 'another'"):
         Run(folder)
 
 
