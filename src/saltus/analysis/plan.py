@@ -201,6 +201,8 @@ def _axis(system: System, name: str, given: Any) -> np.ndarray:
             ) from None
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 2:
             raise ParameterError(f"the number of starts along {name} must be a whole number of at least 2, not {count!r}.")
+        if count > MOST_CELLS:
+            raise ParameterError(f"{count} cells are more than {MOST_CELLS:.0e}. Take a coarser grid, or sl.basin_fractions.")
         values = np.linspace(to_si(low, system.units[name], name), to_si(high, system.units[name], name), int(count))
     if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
         raise ParameterError(f"the starts along {name} must ascend and be finite, at least two of them.")

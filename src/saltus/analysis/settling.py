@@ -74,7 +74,7 @@ def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
         periods = travel.age - points.shape[1] + when + 1
         if found.wandering:
             trail = np.concatenate([trail, points], axis=1)[:, -WANDERS:]
-            if travel.age % WANDERS == 0:
+            if travel.age % WANDERS == 0 or travel.age >= most:
                 on = wanders_on(found, trail, found.wandering[0].scale)
                 here = (label < 0) & (on >= 0)
                 label[here], periods[here] = len(found.orbits) + on[here], travel.age

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from saltus.cli.app import app
+from saltus.errors import StudyError
 
 if TYPE_CHECKING:
     from saltus.study.spec import Study
@@ -112,6 +113,10 @@ def run(
     if spec.basins is not None:
         _run_maps(spec, text, folder, own, threads, workers, scheduler, shard, progress)
         return
+    if workers or scheduler or shard or progress is not Progress.bar:
+        raise StudyError(
+            "--workers, --scheduler, --shard and --progress are for studies of basins; this one has [simulate]. Leave them out."
+        )
     with screen.working() as show:
         outcome = run_study(spec, text, study.parent, own, threads, show)
     screen.show(outcome.table)
@@ -134,8 +139,12 @@ def _run_maps(
     from saltus.study.maps_run import run_maps
 
     resources = Resources(threads, workers, scheduler or None, shard_of(shard) if shard else None)
-    with screen.reporting(progress.value) as (report, say):
-        outcome = run_maps(spec, text, folder, own, resources, report, say)
+    try:
+        with screen.reporting(progress.value) as (report, say):
+            outcome = run_maps(spec, text, folder, own, resources, report, say)
+    except KeyboardInterrupt:
+        screen.fail(f"stopped; what is computed is kept. Go on with: saltus resume {folder}")
+        raise
     for table in outcome.tables:
         screen.show(table)
     screen.files(outcome.files)
@@ -176,6 +185,8 @@ def resume(
     from saltus.study.read import read
 
     spec, text = read(copy_of(store))
+    if spec.basins is None:
+        raise StudyError(f"{store} holds a study without [basins]: there is nothing to resume. Run it again with `saltus run`.")
     _run_maps(spec, text, store, own_system(system) if system else None, threads, workers, scheduler, shard, progress)
 
 

@@ -89,7 +89,7 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
 
     def report_json(report: Report) -> None:
         now = time.perf_counter()
-        if kind == "json" and (now - shown[0] > 1.0 or report.done == report.total):
+        if kind == "json" and (now - shown[0] > 1.0 or report.last):
             shown[0] = now
             left = report.seconds_left
             told = {"map": report.name, "done": report.done, "total": report.total, "seconds": report.seconds, "seconds_left": left}

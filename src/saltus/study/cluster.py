@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 AHEAD = 4
 #: Times that a chunk is given to another worker when its own dies.
 RETRIES = 5
+_SILENT = "the scheduler {} doesn't answer ({}). Start one with `dask scheduler`, or leave --scheduler out."
 
 
 @contextmanager
@@ -47,33 +50,60 @@ def cluster_runner(workers: int | None, scheduler: str | None) -> Iterator[Calla
     try:
         client = Client(scheduler, timeout=10)
     except (OSError, ValueError) as error:
-        told = f"the scheduler {scheduler} doesn't answer ({error}). Start one with `dask scheduler`, or leave --scheduler out."
-        raise StudyError(told) from error
+        raise StudyError(_SILENT.format(scheduler, error)) from error
     with client:
         yield lambda *job: _run(client, *job)
+
+
+def check_scheduler(address: str) -> None:
+    """Raise StudyError if nobody listens there: asked before long work, and answered at once."""
+    place = re.fullmatch(r"(?:\w+://)?(\[.*\]|[^:/]+):(\d+)/?", address)
+    if place is None:
+        raise StudyError(_SILENT.format(address, "that is no address such as tcp://127.0.0.1:8786"))
+    try:
+        socket.create_connection((place[1].strip("[]"), int(place[2])), timeout=5.0).close()
+    except OSError as error:
+        raise StudyError(_SILENT.format(address, error.strerror or error)) from error
 
 
 def _run(client: Any, plan: BasinPlan, found: Found, missing: list[int], keep: Callable, show: Callable[[float], None]) -> None:
     """Hand out chunks, keep what comes back, hand out more; a chunk whose worker dies goes to another one."""
     from distributed import as_completed
 
+    try:
+        client.wait_for_workers(1, timeout=30)
+    except TimeoutError as error:
+        raise StudyError("the scheduler has no workers. Start some with `dask worker ADDRESS`, or leave --scheduler out.") from error
     shared = client.scatter((plan, found), broadcast=True)
-    waiting = iter(missing)
+    waiting, tries = iter(missing), dict.fromkeys(missing, 0)
     width = max(AHEAD * max(len(client.scheduler_info()["workers"]), 1), AHEAD)
-    first = [index for _, index in zip(range(width), waiting, strict=False)]
-    running = as_completed((_submit(client, shared, index) for index in first), with_results=True)
-    for done, (_, (index, part)) in enumerate(running, start=1):
-        keep(index, part)
+    indices = {_submit(client, shared, index): index for _, index in zip(range(width), waiting, strict=False)}
+    running, done = as_completed(list(indices)), 0
+    for future in running:
+        index = indices.pop(future)
+        if future.status != "finished":  # every worker that knew the plan is gone: tell it to those that came in their place
+            tries[index] += 1
+            if tries[index] > RETRIES:
+                raise StudyError(f"chunk {index} failed on {RETRIES} workers, the last time with {future.exception()!r}.")
+            shared = client.scatter((plan, found), broadcast=True)
+            again = _submit(client, shared, index)
+            indices[again] = index
+            running.add(again)
+            continue
+        keep(index, future.result())
+        done += 1
         show(done / len(missing))
         following = next(waiting, None)
         if following is not None:
-            running.add(_submit(client, shared, following))
+            added = _submit(client, shared, following)
+            indices[added] = following
+            running.add(added)
 
 
 def _submit(client: Any, shared: Any, index: int) -> Any:
     return client.submit(_chunk, shared, index, retries=RETRIES, pure=False)
 
 
-def _chunk(shared: tuple[BasinPlan, Found], index: int) -> tuple[int, Settling]:
+def _chunk(shared: tuple[BasinPlan, Found], index: int) -> Settling:
     plan, found = shared
-    return index, plan.chunk(index, found)
+    return plan.chunk(index, found)

@@ -47,6 +47,11 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
     ds = load(result)
     own = {"basins": "basins", "agreement": "agreement"}.get(str(ds.attrs.get("kind", "")))
     kind = kind or own or "history"
+    maps = ("basins", "agreement")
+    if (kind in maps or own is not None) and kind != own:
+        raise ParameterError(f"{result} holds {own or 'a run'}: it can't be drawn as {kind}. Leave --kind out.")
+    if own is not None and trajectory is not None:
+        raise ParameterError(f"{result} holds {own}, no trajectories. Leave --trajectory out.")
     file = file or result.with_name(f"{result.stem}-{kind}.png")
     formats = FigureCanvasBase.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in formats:

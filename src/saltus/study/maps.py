@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 LARGE = 20
 #: Cells whose labels are timed for the estimate.
 TIMED = 512
+#: Ends of the names of files that belong to a map.
+ATTRACTORS, AGREEMENT = "-attractors", "-agreement"
 #: Folder of a study's stores, in its output folder.
 STORES = "stores"
 
@@ -85,6 +87,7 @@ class Report:
     total: int
     seconds: float
     computed: int
+    last: bool = False
 
     @property
     def seconds_left(self) -> float | None:
@@ -104,7 +107,7 @@ class MapJob:
     def identity(self) -> dict[str, str]:
         """What must be the same to go on with a store."""
         plan = self.plan
-        axes = {name: f"{values[0]!r} to {values[-1]!r} in {len(values)}" for name, values in plan.axes.items()}
+        axes = {name: f"{float(values[0])!r} to {float(values[-1])!r} in {len(values)}" for name, values in plan.axes.items()}
         return {
             "equations": plan.system.fingerprint(), "values": to_json(dict(plan.system.values)), "method": plan.method.name,
             "method options": to_json(plan.method.options()), "axes": to_json(axes), "at": to_json(dict(plan.fixed)),
@@ -139,9 +142,9 @@ def jobs_of(study: Study, own: System | None = None) -> list[MapJob]:
         system = base.with_values(**quantities.parameters(base, one.values, "basins.map.values"))
         slug = _slug(one.name) if table.map else "basins"
         jobs.append(MapJob(one.name, slug, _plan(table, system, method_of(one.method or study.method)), one.compare))
-    slugs = [job.slug for job in jobs]
+    slugs = [job.slug + end for job in jobs for end in ("", ATTRACTORS, *([AGREEMENT] if job.compare else []))]
     if len(set(slugs)) < len(slugs):
-        raise StudyError(f"[[basins.map]] names give the same file names: {', '.join(slugs)}. Let them differ in letters or digits.")
+        raise StudyError(f"[[basins.map]] names give the same file names, among {', '.join(slugs)}. Let them differ in letters or digits.")
     return jobs
 
 
@@ -177,13 +180,13 @@ def compute(job: MapJob, store: Store, resources_: Resources, report: Callable[[
     with store.lock(shard):
         damaged = store.verify()
         if damaged:
-            say(f"{job.name}: {len(damaged)} damaged chunks are computed again")
+            say(f"{job.name}: damaged chunks that are computed again: {len(damaged)}")
         found = _attractors(job, store, resources_)
         missing = store.missing(shard)
         if len(missing) >= LARGE:
             say(f"{job.name}: {estimate(job.plan, found, resources_)}")
+        begin, count = time.perf_counter(), [0]
         if missing:
-            begin, count = time.perf_counter(), [0]
 
             def keep(index: int, part: Settling) -> None:
                 store.commit(index, settling_arrays(part, job.plan.system.states))
@@ -194,7 +197,7 @@ def compute(job: MapJob, store: Store, resources_: Resources, report: Callable[[
 
             with _runner(resources_) as run:
                 run(job.plan, found, missing, keep, show)
-            show(1.0)
+        report(Report(job.name, int(store.done().sum()), job.plan.chunks, time.perf_counter() - begin, count[0], last=True))
     return not store.missing()
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from saltus.errors import StudyError
-from saltus.study.maps import STORES, MapJob, Report, Resources, compute, finish, jobs_of, open_store
+from saltus.results.files import replacing
+from saltus.study.maps import AGREEMENT, ATTRACTORS, STORES, MapJob, Report, Resources, compute, finish, jobs_of, open_store
 from saltus.study.maps_table import agreement_table, attractor_table
 from saltus.study.spec import Study
 from saltus.study.table import TextTable
@@ -69,8 +70,13 @@ def run_maps(
         If a store in the folder was made from something else: names what differs.
     """
     jobs = jobs_of(study, own)
+    if resources.scheduler not in (None, "local"):
+        from saltus.study.cluster import check_scheduler
+
+        check_scheduler(str(resources.scheduler))
     stores = {job.name: open_store(job, folder) for job in jobs}
-    (folder / COPY).write_text(text, encoding="utf-8")
+    with replacing(folder / COPY) as (part,):
+        part.write_text(text, encoding="utf-8")
     outcome, maps = MapOutcome(), {}
     for job in jobs:
         if not compute(job, stores[job.name], resources, report, say):
@@ -100,7 +106,7 @@ def _write_map(job: MapJob, ds: xr.Dataset, folder: Path, outcome: MapOutcome, p
             outcome.files.append(_picture(axes.figure, folder / f"{job.slug}.png"))
             if ds.sizes["attractor"] > 0 and ds.attrs["method"] == "Taylor":
                 figure = plot.gallery(ds, _motions(job, ds), attractors=list(range(min(ds.sizes["attractor"], GALLERY))))
-                outcome.files.append(_picture(figure, folder / f"{job.slug}-attractors.png"))
+                outcome.files.append(_picture(figure, folder / f"{job.slug}{ATTRACTORS}.png"))
 
 
 def _write_agreement(job: MapJob, ds: xr.Dataset, other: xr.Dataset, folder: Path, outcome: MapOutcome, pictures: bool) -> None:
@@ -109,7 +115,7 @@ def _write_agreement(job: MapJob, ds: xr.Dataset, other: xr.Dataset, folder: Pat
 
     both = compare(other, ds).assign_attrs(name_a=str(job.compare), name_b=job.name)
     table = agreement_table(both)
-    name = f"{job.slug}-agreement"
+    name = f"{job.slug}{AGREEMENT}"
     outcome.tables.append(table)
     outcome.files += [save(both, folder / f"{name}.nc"), table.write_csv(folder / f"{name}.csv")]
     if pictures:
@@ -134,7 +140,8 @@ def _motions(job: MapJob, ds: xr.Dataset) -> xr.Dataset:
 def _picture(figure: object, file: Path) -> Path:
     import matplotlib.pyplot as plt
 
-    figure.savefig(file, dpi=150)  # type: ignore[attr-defined]
+    with replacing(file) as (part,):
+        figure.savefig(part, dpi=150, format=file.suffix[1:])  # type: ignore[attr-defined]
     plt.close("all")
     return file
 

@@ -121,7 +121,7 @@ class Basins(Table):
     """[basins]: which attractor each start of a grid leads to."""
 
     axes: dict[str, Axis] = Field(
-        min_length=2, max_length=2, description="The two states that the map is drawn over.",
+        description="The two states that the map is drawn over.",
         examples=[{"x": {"first": "-5 mm", "last": "5 mm", "count": 400}, "v": {"first": "-1 m/s", "last": "1 m/s", "count": 400}}],
     )  # fmt: skip
     at: dict[str, Quantity] = Field(default_factory=dict, description="Starts of the other states; 0 by default.", examples=[{"y": "0 mm"}])
@@ -130,7 +130,9 @@ class Basins(Table):
     map: list[Map] = Field(default_factory=list, description="Several maps of one study.", examples=[[{"name": "exact"}]])
 
     @model_validator(mode="after")
-    def _names(self) -> Basins:
+    def _fits(self) -> Basins:
+        if len(self.axes) != 2:
+            raise ValueError(f"a map has two axes, such as axes.x and axes.v, not {len(self.axes)}")
         names = [one.name for one in self.map]
         if len(set(names)) < len(names):
             raise ValueError("two maps have the same name")

@@ -29,7 +29,9 @@ class TextTable:
 
     def write_csv(self, path: Path) -> Path:
         """Write the table as CSV, the notes as comment lines above it."""
-        with path.open("w", newline="", encoding="utf-8") as file:
+        from saltus.results.files import replacing
+
+        with replacing(path) as (part,), part.open("w", newline="", encoding="utf-8") as file:
             file.writelines(f"# {note}\n" for note in (self.title, *self.notes))
             csv.writer(file).writerows([self.columns, *self.rows])
         return path

@@ -131,7 +131,6 @@ def test_progress_in_json(study, tmp_path):
     assert not result.stdout.startswith("{")
 
 
-@pytest.mark.xfail(strict=True, reason="defect: a finished map reports nothing; who reads JSON never sees done == total")
 def test_progress_in_json_of_a_finished_map(finished):
     result = saltus("resume", finished[0], "--progress", "json", "--threads", 1)
     assert json.loads(result.stderr.splitlines()[-1])["done"] == 8
@@ -217,7 +216,6 @@ def test_resume_where_nothing_is(tmp_path, finished):
     refused(saltus("resume", finished[0] / "stores"), "holds no study.toml")
 
 
-@pytest.mark.xfail(strict=True, raises=AssertionError, reason="defect: `resume` of a [simulate] study ends in an AssertionError")
 def test_resume_of_a_study_of_motions(tmp_path):
     (tmp_path / "study.toml").write_text(MOTION)
     refused(saltus("resume", tmp_path), "basins")
@@ -254,7 +252,6 @@ def test_plot_of_a_map_as_something_else(finished, tmp_path, kind):
     refused(saltus("plot", finished[0] / "basins.nc", "--kind", kind, "-o", tmp_path / "map.png"), "basins")
 
 
-@pytest.mark.xfail(strict=True, raises=TypeError, reason="defect: `plot run.nc --kind basins` ends in a TypeError")
 @pytest.mark.parametrize("kind", ["basins", "agreement"])
 def test_plot_of_a_motion_as_a_map(study, tmp_path, kind):
     assert saltus("run", study(MOTION), "--out", tmp_path / "out").exit_code == 0
@@ -307,7 +304,6 @@ def dead_port():
     return f"tcp://127.0.0.1:{port}"
 
 
-@pytest.mark.xfail(strict=True, reason="defect: it takes ten seconds and more, though the port answers at once that nobody is there")
 def test_a_dead_scheduler_is_told_at_once(stopped, dead_port):
     pytest.importorskip("distributed")
     begin = time.perf_counter()
@@ -321,7 +317,6 @@ def test_nonsense_for_a_scheduler(stopped, address):
     refused(saltus("resume", stopped, "--scheduler", address, "--progress", "none"), f"the scheduler {address} doesn't answer")
 
 
-@pytest.mark.xfail(strict=True, reason="defect: attractors are looked for first, which may take minutes, then the scheduler is asked for")
 def test_a_scheduler_is_asked_for_before_anything_is_computed(study, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(plan.BasinPlan, "scout", lambda *_: pytest.fail("attractors are looked for"))
@@ -333,6 +328,5 @@ def test_a_cluster_without_dask(stopped, monkeypatch):
     refused(saltus("resume", stopped, "--workers", 2, "--progress", "none"), 'Install "saltus[cluster]"')
 
 
-@pytest.mark.xfail(strict=True, reason="defect: options of basins are dropped without a word where a study has none")
 def test_options_of_basins_for_a_study_of_motions(study, tmp_path):
     assert saltus("run", study(MOTION), "--out", tmp_path / "out", "--shard", "nonsense").exit_code == 2

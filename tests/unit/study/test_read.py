@@ -55,7 +55,7 @@ def test_not_toml(text, parts):
         (HEAD + "nme = 3", "[study] has no key 'nme'. Did you mean 'name'?"),
         (WHOLE + "sampels = 3", "[simulate] has no key 'sampels'. Did you mean 'samples'?"),
         (HEAD + "[simulat]", "the file has no table 'simulat'. Did you mean 'simulate'?"),
-        (HEAD, "a table [simulate] is missing."),
+        (HEAD, "a study has one table [simulate] or one table [basins]."),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),
         (WHOLE.replace("3", "3.0"), "[simulate] periods = 3.0 must be a whole number. For example: periods = 60"),
@@ -95,6 +95,6 @@ def test_not_text(tmp_path):
 def test_schema_tells_editors_the_keys():
     schema = Study.model_json_schema()
     json.dumps(schema)
-    assert set(schema["properties"]) == {"study", "system", "method", "simulate", "compare"}
+    assert set(schema["properties"]) == {"study", "system", "method", "simulate", "compare", "basins"}
     assert schema["$defs"]["Simulate"]["additionalProperties"] is False
     assert schema["$defs"]["SystemTable"]["additionalProperties"] != {}, "values are numbers or text"
