@@ -31,7 +31,7 @@ MOST_POINTS = 8
 #: Part of the verified radius that is used.
 SAFETY = 0.9
 #: Radius in units of the map's own errors where nothing could be verified.
-LUCK = 3.0
+LUCK = 1.0
 
 
 @dataclass(frozen=True)

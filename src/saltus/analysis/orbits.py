@@ -16,6 +16,8 @@ from saltus.flow.maps import Map
 MOST_STEPS = 30
 #: Distance of a multiplier from the unit circle that rounding can't make.
 MARGINAL = 1e-7
+#: Mismatch up to which a stiff orbit may amplify rounding.
+AMPLIFIED = 1e-9
 #: A step shorter than this times the scale is rounding.
 SHORTEST = 1e-15
 
@@ -92,7 +94,8 @@ def _closed(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None
     """The orbit through a point, if it comes back."""
     points = np.concatenate([x[None], map_.launch(x[None], n).advance(n)[0]])
     distances = np.abs((points[1:] - x) / scale).max(axis=1)
-    if not np.isfinite(distances).all() or distances[-1] > map_.noise * _stiffness(map_, x, n, scale):
+    allowed = max(min(map_.noise * _stiffness(map_, x, n, scale), AMPLIFIED), 2.0 * map_.noise)
+    if not np.isfinite(distances).all() or distances[-1] > allowed:
         return None
     n = 1 + int(np.argmax(distances <= max(10 * distances[-1], map_.noise)))
     points = points[:n]

@@ -170,7 +170,7 @@ def _new_orbit(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found) -
             continue
         if not orbit.stable:
             found.unstable.append(orbit)
-        elif not any(same(orbit, one, scale, max(SAME, 10 * map_.noise)) for one in found.orbits):
+        elif not any(same(orbit, one, scale, max(SAME, 4 * map_.noise)) for one in found.orbits):
             return orbit
     return None
 

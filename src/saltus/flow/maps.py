@@ -17,6 +17,9 @@ from saltus.kernels import status as st
 from saltus.system.system import System
 from saltus.system.tangent import tangent_system
 
+#: Looks at the mode in each period, where contacts aren't located.
+LOOKS = 32
+
 
 class Travel(Protocol):
     """Trajectories of a map on their way; see :class:`saltus.flow.flight.Flight`."""
@@ -117,10 +120,18 @@ class Stroboscope:
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
         """See :class:`Map`."""
+        if not self.method.records_contacts:
+            return self._modes(start, count)
         outcome = self._run(self.system, start, count, 0)
         table = outcome.record_integers
         codes = 4 * table[:, st.REC_GUARD] + table[:, st.REC_DIRECTION] + 1 + 1000 * table[:, st.REC_KIND]
         return outcome.state, np.split(codes, np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(1, len(start))))
+
+    def _modes(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Where contacts aren't located: the modes in which the motion is seen, one after the other, stand for them."""
+        index = np.arange(count * LOOKS)
+        outcome = self._run(self.system, start, count, None, Schedule(index // LOOKS, (index % LOOKS) / LOOKS))
+        return outcome.state, [row[np.flatnonzero(np.diff(row, prepend=-1))] for row in outcome.sample_mode]
 
     def trajectory(self, start: np.ndarray, count: int, samples: int) -> tuple[np.ndarray, engine.Outcome]:
         """States at ``samples`` instants of each of ``count`` periods, the start included, float64[k, count * samples, D]; the outcome."""

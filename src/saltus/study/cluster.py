@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import socket
 from collections.abc import Callable, Iterator
@@ -81,16 +82,19 @@ def _run(client: Any, plan: BasinPlan, found: Found, missing: list[int], keep: C
     running, done = as_completed(list(indices)), 0
     for future in running:
         index = indices.pop(future)
-        if future.status != "finished":  # every worker that knew the plan is gone: tell it to those that came in their place
+        try:
+            part = future.result()
+        except (Exception, asyncio.CancelledError) as error:  # every worker that knew the plan is gone: tell it to their successors
             tries[index] += 1
             if tries[index] > RETRIES:
-                raise StudyError(f"chunk {index} failed on {RETRIES} workers, the last time with {future.exception()!r}.")
+                raise StudyError(f"chunk {index} failed on {RETRIES} workers, the last time with {error!r}.") from error
+            client.wait_for_workers(1, timeout=60)
             shared = client.scatter((plan, found), broadcast=True)
             again = _submit(client, shared, index)
             indices[again] = index
             running.add(again)
             continue
-        keep(index, future.result())
+        keep(index, part)
         done += 1
         show(done / len(missing))
         following = next(waiting, None)
