@@ -66,7 +66,6 @@ class JetCode:
         self._states, self._fields, self._builder, self._order = states, fields, builder, order
         self._constants = constants
         self._memo: dict[tuple, str | None] = {}
-        self._derivatives: dict[tuple[Expr, Expr, int], Expr] = {}
         self._coefficients: dict[Expr, str] = {}
         self._masks: dict[ex.Condition, str] = {}
         self._count = 0
@@ -143,10 +142,6 @@ class JetCode:
         if total is not None and form.offset.op == "const":
             total = self._assign(f"splat({total}, LANES)")
         for series, coefficient in sorted(form.terms.items(), key=lambda term: _age(term[0])) if k else form.terms.items():
-            forcing = self._harmonic_of_time(series) if k else None
-            if forcing is not None and not ex.depends_on(coefficient, ("select",)):
-                total = self._sum([self._forcing_term(forcing, coefficient, k)], total)
-                continue
             value = self.value(series, k)
             if value is None:
                 continue
@@ -348,24 +343,6 @@ class JetCode:
             self._memo[key] = self._assign(f"-({rate} * {rate})")
         scaled = self._assign(f"{self._memo[key]} * {1.0 / (k * (k - 1))!r}")
         return self._assign(f"{scaled} * {self._harmonic(a, k - 2, part)}")
-
-    def _harmonic_of_time(self, series: Series) -> tuple[Series, tuple[Expr, Expr], str] | None:
-        """(argument, frequency, part) of a sine or cosine of time alone."""
-        if series.kind not in ("sin", "cos"):
-            return None
-        frequency = self._time_frequency(series.operands[0])
-        return None if frequency is None else (series.operands[0], frequency, "sine" if series.kind == "sin" else "cosine")
-
-    def _forcing_term(self, forcing: tuple[Series, tuple[Expr, Expr], str], coefficient: Expr, k: int) -> tuple[str, str]:
-        """Coefficient k of ``coefficient * sin(rate*t + offset)``: what is worked out once a trajectory, times a sine or cosine."""
-        a, (rate, _), part = forcing
-        other = "cosine" if part == "sine" else "sine"
-        sign = 1.0 if (k % 4 in (0, 1) if part == "sine" else k % 4 in (0, 3)) else -1.0
-        once = self._derivatives.setdefault((rate, coefficient, 0), coefficient)
-        for i in range(1, k + 1):
-            once = self._derivatives.setdefault((rate, coefficient, i), ex.div(ex.mul(once, rate), ex.constant(float(i))))
-        constant = self._constants.index(ex.neg(once) if sign < 0 else once)
-        return f"load(c, {constant}, LANES)", str(self._harmonic(a, 0, part if k % 2 == 0 else other))
 
     # -- functions through their differential equations -------------------------------------------------------------------------
     def _tan(self, series: Series, k: int, part: str = "") -> str | None:
