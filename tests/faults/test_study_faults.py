@@ -34,18 +34,7 @@ from saltus.study.read import parse
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and fork are POSIX")
 
-STUDY = """
-[study]
-name = "small"
-[system]
-model = "delangre"
-case = "b"
-force = "4 N"
-frequency = "16 Hz"
-[basins]
-axes.x = { first = "-5 mm", last = "5 mm", count = 36 }
-axes.v = { first = "-1 m/s", last = "1 m/s", count = 36 }
-"""
+STUDY = small_study(36)
 CHUNKS = 27
 #: The command with small chunks (in a worker of dask too, which imports this file first), and a moment between two commits, so that
 #: there is one to be killed in. With `serve` it loads everything once and forks a child for each line, which starts within milliseconds.
@@ -54,6 +43,7 @@ import json, os, signal, sys, time
 import saltus.analysis.plan, saltus.plot, saltus.study.maps, saltus.study.maps_run, saltus.study.read
 from saltus.cli import main
 from saltus.results.store import Store
+from small_study import small_study
 
 saltus.analysis.plan.CHUNK = saltus.study.maps.CHUNK = 48
 saltus.analysis.plan.SCOUTS, saltus.analysis.plan.CHECKED = 256, 64

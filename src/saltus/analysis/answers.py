@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -47,18 +47,29 @@ def common(system: System, method: Method, group: Ensemble, outcome: Outcome) ->
         minima={name: outcome.minima[:, i] for i, name in enumerate(st.MINIMA)},
         varied=group.varied,
         batch=group.batch,
-        attrs=attributes(
-            system=system.name,
-            equations=system.equations(),
-            parameters=shared_values(system, group),
-            units=system.units,
-            method=method.name,
-            method_options=method.options(),
-            fingerprint=system.fingerprint(),
-            source=system.source,
-            varied=group.varied,
-        ),
+        attrs=provenance(system, method, shared_values(system, group), group.varied),
     )
+
+
+def provenance(system: System, method: Method, values: Mapping[str, float], varied: Iterable[str] = ()) -> dict[str, Any]:
+    """Attributes that say where a result comes from; ``values`` are those of its parameters, but for the ``varied`` ones."""
+    return attributes(
+        system=system.name,
+        equations=system.equations(),
+        parameters=values,
+        units=system.units,
+        method=method.name,
+        method_options=method.options(),
+        fingerprint=system.fingerprint(),
+        source=system.source,
+        varied=varied,
+    )
+
+
+def gap_unit(system: System) -> str:
+    """Unit of the gaps of all guards, ``""`` if they differ or aren't known."""
+    units = {system.units[guard.state] for guard in system.guards if guard.state is not None}
+    return units.pop() if len(units) == 1 else ""
 
 
 def contacts(outcome: Outcome, states: int, time_error: np.ndarray) -> Contacts:

@@ -11,15 +11,17 @@ import xarray as xr
 from scipy.stats import qmc
 
 from saltus.analysis import uncertainty
+from saltus.analysis.answers import gap_unit, provenance
+from saltus.analysis.plan import SCOUTS
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import find
 from saltus.analysis.settling import UNCONVERGED, complete, settle_all
-from saltus.analysis.starts import check_system, ensemble, whole
-from saltus.errors import ParameterError, nearest
+from saltus.analysis.starts import check_system, ensemble, fill, fixed_states, whole
+from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
-from saltus.results import attractors_dataset, attributes
+from saltus.results import attractors_dataset
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -84,8 +86,9 @@ def attractors(
     finally:
         close()
     return attractors_dataset(
-        states=system.states, units=system.units, attractors=portraits(map_, found), gap_unit=_gap_unit(system),
-        basin=np.where(label < 0, UNCONVERGED, label), periods_to_settle=settled, attrs=_provenance(system, map_.method, periods),
+        states=system.states, units=system.units, attractors=portraits(map_, found), gap_unit=gap_unit(system),
+        basin=np.where(label < 0, UNCONVERGED, label), periods_to_settle=settled,
+        attrs=provenance(system, map_.method, system.values) | {"periods": periods},
     )  # fmt: skip
 
 
@@ -129,17 +132,14 @@ def basin_fractions(
     """
     check_system(system)
     samples, periods, seed = whole(samples, "samples"), whole(periods, "periods"), whole(seed, "seed", 0)
-    if at is not None and not isinstance(at, Mapping):
-        raise ParameterError(f"at must be a mapping of states to starts, not {at!r}.")
+    fixed = fixed_states(system, at, box)
     ranges = _ranges(system, box)
-    fixed = {name: to_si(value, system.units[name], name) for name, value in _known(system, at or {}).items()}
     map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
-    drawn = np.random.default_rng(seed).random((samples, len(ranges)))
-    start = _fill(system, ranges, fixed, drawn)
+    start = fill(system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed)
     scale = _spread(map_, start[:SPREAD_STARTS])
     show, close = reporter(progress)
     try:
-        scouts = _fill(system, ranges, fixed, qmc.Halton(len(ranges), scramble=False).random(min(1024, samples)))
+        scouts = fill(system, _draw(ranges, qmc.Halton(len(ranges), scramble=False).random(min(SCOUTS, samples))), fixed)
         found = find(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
@@ -147,23 +147,15 @@ def basin_fractions(
         close()
     table = replace(portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found)))
     ds = attractors_dataset(
-        states=system.states, units=system.units, attractors=table, gap_unit=_gap_unit(system), basin=result.label,
-        periods_to_settle=result.periods, attrs=_provenance(system, map_.method, periods),
+        states=system.states, units=system.units, attractors=table, gap_unit=gap_unit(system), basin=result.label,
+        periods_to_settle=result.periods, attrs=provenance(system, map_.method, system.values) | {"periods": periods},
     )  # fmt: skip
     return ds.assign_attrs(smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=samples, seed=seed)
 
 
-def _known(system: System, given: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Names checked. Raises ParameterError."""
-    for name in given:
-        if name not in system.states:
-            raise ParameterError(f"{system.name} has no state {name!r}. {nearest(name, system.states)}")
-    return given
-
-
 def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     ranges = {}
-    for name, given in _known(system, box).items():
+    for name, given in box.items():
         try:
             low, high = (to_si(value, system.units[name], name) for value in given)
         except (TypeError, ValueError) as error:
@@ -176,10 +168,9 @@ def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, fl
     return ranges
 
 
-def _fill(system: System, ranges: Mapping[str, tuple[float, float]], fixed: Mapping[str, float], unit: np.ndarray) -> np.ndarray:
-    """States from numbers in [0, 1), one column for each range."""
-    drawn = {name: low + (high - low) * column for (name, (low, high)), column in zip(ranges.items(), unit.T, strict=True)}
-    return np.stack([drawn.get(name, np.full(len(unit), fixed.get(name, 0.0))) for name in system.states], axis=1)
+def _draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[str, np.ndarray]:
+    """Starts of the states that have a range, from numbers in [0, 1), one column for each."""
+    return {name: low + (high - low) * column for (name, (low, high)), column in zip(ranges.items(), unit.T, strict=True)}
 
 
 def _spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
@@ -190,15 +181,3 @@ def _spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
     points = points[np.isfinite(points).all(axis=1)]
     wide = np.ptp(points, axis=0)
     return np.where(wide > 0, wide, 1.0)
-
-
-def _gap_unit(system: System) -> str:
-    units = {system.units[guard.state] for guard in system.guards if guard.state is not None}
-    return units.pop() if len(units) == 1 else ""
-
-
-def _provenance(system: System, method: Method, periods: int) -> dict[str, Any]:
-    return attributes(
-        system=system.name, equations=system.equations(), parameters=system.values, units=system.units, method=method.name,
-        method_options=method.options(), fingerprint=system.fingerprint(), source=system.source, varied=(),
-    ) | {"periods": periods}  # fmt: skip

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import xarray as xr
@@ -12,9 +10,10 @@ import xarray as xr
 from saltus.analysis.plan import BasinPlan, basin_plan
 from saltus.analysis.recurrence import Found
 from saltus.analysis.settling import Settling
-from saltus.flow.engine import Interrupted, usable_processors
+from saltus.flow.engine import Interrupted
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.flow.threads import on_threads
 from saltus.system.system import System
 
 #: Share of the progress that the search for attractors takes.
@@ -86,7 +85,7 @@ def basins(
         return plan.finish(result, found, threads)
     except KeyboardInterrupt:
         interrupted = Interrupted()
-        interrupted.partial = None if found is None else plan.finish(result, found, threads)
+        interrupted.partial = None if found is None else plan.dataset(result, found, threads)
         raise interrupted from None
     finally:
         close()
@@ -95,40 +94,15 @@ def basins(
 def label_all(
     plan: BasinPlan,
     found: Found,
-    chunks: Any,
+    chunks: Sequence[int],
     done: Callable[[int, Settling], None],
     threads: int | None,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Label chunks on threads; ``done(index, settling)`` is called from this thread as each is ready, in any order.
-
-    Raises whatever a chunk raises; on Ctrl-C the chunks under way are waited for, the rest is left.
-    """
-    chunks = list(chunks)
-    workers = min(threads or usable_processors(), max(len(chunks), 1))
+    """Label chunks on threads; ``done(index, settling)`` is called from this thread as each is ready, in any order."""
     map_ = plan.map(1)
     map_.launch(plan.starts(plan.cells_of(0)[:1]), 1)  # compiles before threads ask for it
-    stop = threading.Event()
-
-    def work(index: int) -> tuple[int, Settling] | None:
-        return None if stop.is_set() else (index, plan.chunk(index, found, map_))
-
-    with ThreadPoolExecutor(workers) as pool:
-        waiting: set[Future] = {pool.submit(work, index) for index in chunks}
-        try:
-            while waiting:
-                ready, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
-                for future in ready:
-                    outcome = future.result()
-                    if outcome is not None:
-                        done(*outcome)
-                if progress:
-                    progress(1.0 - len(waiting) / max(len(chunks), 1))
-        except BaseException:
-            stop.set()
-            for future in waiting:
-                future.cancel()
-            raise
+    on_threads(lambda index: plan.chunk(index, found, map_), chunks, done, threads, progress)
 
 
 def _part(show: Callable[[float], None] | None, begin: float, end: float) -> Callable[[float], None] | None:

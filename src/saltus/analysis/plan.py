@@ -15,15 +15,17 @@ import xarray as xr
 from scipy.stats import qmc
 
 from saltus.analysis import uncertainty
+from saltus.analysis.answers import gap_unit, provenance
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import Found, find
-from saltus.analysis.settling import Settling, complete, settle
-from saltus.analysis.starts import check_system, whole
-from saltus.errors import ParameterError, nearest
+from saltus.analysis.settling import OPEN, UNCONVERGED, Settling, complete, settle
+from saltus.analysis.starts import check_system, fill, fixed_states, whole
+from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
-from saltus.results import attributes, basins_dataset
+from saltus.results import basins_dataset
+from saltus.results.provenance import to_json
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -95,8 +97,7 @@ class BasinPlan:
     def starts(self, cells: np.ndarray) -> np.ndarray:
         """States at the start of cells int64[k] of the flattened grid, float64[k, D]."""
         rows = dict(zip(self.axes, np.unravel_index(cells, self.shape), strict=True))
-        columns = [self.axes[n][rows[n]] if n in rows else np.full(len(cells), self.fixed[n]) for n in self.system.states]
-        return np.stack(columns, axis=1).astype(float)
+        return fill(self.system, {name: self.axes[name][row] for name, row in rows.items()}, self.fixed)
 
     def cells_of(self, chunk: int) -> np.ndarray:
         """Cells of a chunk, int64[k]."""
@@ -108,43 +109,47 @@ class BasinPlan:
         unit = qmc.Halton(2, scramble=False).random(SCOUTS)
         low, high = (np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max))
         drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
-        columns = [drawn.get(name, np.full(SCOUTS, self.fixed.get(name, 0.0))) for name in self.system.states]
-        return find(self.map(threads), np.stack(columns, axis=1), self.scale, self.periods, progress=progress)[0]
+        return find(self.map(threads), fill(self.system, drawn, self.fixed), self.scale, self.periods, progress=progress)[0]
+
+    def sample(self, count: int) -> np.ndarray:
+        """Some of the cells, drawn at random, always the same ones: int64[count at most], ascending."""
+        return np.sort(np.random.default_rng(0).choice(self.cells, min(count, self.cells), replace=False))
 
     def chunk(self, index: int, found: Found, map_: Stroboscope | None = None) -> Settling:
         """Where the starts of one chunk lead. One thread."""
         return settle(map_ or self.map(1), self.starts(self.cells_of(index)), found, self.periods)
 
     def finish(self, result: Settling, found: Found, threads: int | None = None) -> xr.Dataset:
-        """The Dataset; what is still open is settled first. Changes ``result``."""
+        """The Dataset; what is still open is settled first, and a sample is checked. Changes ``result``."""
+        found = complete(self.map(threads), result, found, self.scale, self.periods, threads)
+        return self.dataset(result, found, threads).assign_attrs(self._check(result, found))
+
+    def dataset(self, result: Settling, found: Found, threads: int | None = None) -> xr.Dataset:
+        """The Dataset of what is known; what is still open counts as unconverged. Changes ``result``."""
         map_ = self.map(threads)
-        found = complete(map_, result, found, self.scale, self.periods, threads)
+        result.label[result.label == OPEN] = UNCONVERGED
         labels = result.label.reshape(self.shape)
         table = replace(portraits(map_, found), fractions=uncertainty.fractions(labels, len(found)))
-        gap_units = {self.system.units[g.state] for g in self.system.guards if g.state is not None}
         ds = basins_dataset(
             states=self.system.states, units=self.system.units, axes=self.axes, basin=labels,
             periods_to_settle=result.periods.reshape(self.shape), status=result.status.reshape(self.shape),
             status_meanings={code: name for code, (name, _) in st.STATUS.items()},
             grazes_unresolved=result.unresolved.reshape(self.shape), attractors=table,
-            gap_unit=gap_units.pop() if len(gap_units) == 1 else "", attrs=self.attrs(),
+            gap_unit=gap_unit(self.system), attrs=self.attrs(),
         )  # fmt: skip
-        return ds.assign_attrs(uncertainty.measure(ds), **self._check(result, found))
+        return ds.assign_attrs(uncertainty.measure(ds), flip_rate=np.nan, flip_checked=0)
 
     def attrs(self) -> dict[str, Any]:
         """Provenance."""
-        system, method = self.system, self.method
-        return attributes(
-            system=system.name, equations=system.equations(), parameters=system.values, units=system.units, method=method.name,
-            method_options=method.options(), fingerprint=system.fingerprint(), source=system.source, varied=(),
-        ) | {"periods": self.periods}  # fmt: skip
+        every = {} if self.every is None else {"every": self.every}
+        return provenance(self.system, self.method, self.system.values) | {"periods": self.periods, "at": to_json(dict(self.fixed))} | every
 
     def _check(self, result: Settling, found: Found) -> dict[str, float | int]:
-        """Recompute a sample of cells by a more exact method: the share whose attractor is another one, with its interval."""
-        chosen = np.unique(np.linspace(0, self.cells - 1, min(CHECKED, self.cells)).astype(int))
+        """Recompute a random sample of settled cells by a more exact method: the share that leads elsewhere, with its interval."""
+        chosen = self.sample(CHECKED)
         chosen = chosen[result.label[chosen] >= 0]
         if not len(chosen):
-            return {"flip_rate": float("nan"), "flip_checked": 0}
+            return {}
         exact = Stroboscope(self.system, self.method.companion(), self.every, 1)
         again = settle(exact, self.starts(chosen), found, 2 * self.periods)
         flips = int(np.count_nonzero(again.label != result.label[chosen]))
@@ -163,23 +168,15 @@ def basin_plan(
         If an axis isn't a state, a range is empty, or the grid is too large.
     """
     check_system(system)
-    if at is not None and not isinstance(at, Mapping):
-        raise ParameterError(f"at must be a mapping of states to starts, not {at!r}.")
-    for name in (*axes, *(at or {})):
-        if name not in system.states:
-            raise ParameterError(f"{system.name} has no state {name!r}. {nearest(name, system.states)}")
+    fixed = fixed_states(system, at, axes)
     if len(axes) != 2:
         example = ", ".join(f'{name}=("-1 {system.units[name]}", "1 {system.units[name]}", 400)' for name in system.states[:2])
         raise ParameterError(f"a basin map has two axes, not {len(axes)}. Give two states with range and number of starts: {example}.")
-    twice = [name for name in axes if name in (at or {})]
-    if twice:
-        raise ParameterError(f"{twice[0]} is an axis of the map and stands in at= too. Leave it out of one of them.")
     periods = whole(periods, "periods")
     values = {name: _axis(system, name, given) for name, given in axes.items()}
     first, second = (len(one) for one in values.values())
     if first * second > MOST_CELLS:
         raise ParameterError(f"{first} x {second} cells are more than {MOST_CELLS:.0e}. Take a coarser grid, or sl.basin_fractions.")
-    fixed = {name: to_si((at or {}).get(name, 0.0), system.units[name], name) for name in system.states if name not in axes}
     seconds = None if every is None else to_si(every, "s", "every")
     plan = BasinPlan(system, method, values, fixed, periods, seconds)
     plan.map()  # every= is checked where it is used

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.analysis.recurrence import Found, find, wanders_on
-from saltus.flow.engine import usable_processors
 from saltus.flow.maps import Map, Travel
+from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 
 #: Codes of cells that belong to no attractor.
@@ -94,11 +93,7 @@ def settle_all(
     """:func:`settle` for any number of starts, in pieces on threads."""
     result = Settling.empty(len(start), start.shape[1])
     pieces = [slice(first, first + PIECE) for first in range(0, len(start), PIECE)]
-    with ThreadPoolExecutor(min(threads or usable_processors(), max(len(pieces), 1))) as pool:
-        for done, (piece, part) in enumerate(zip(pieces, pool.map(lambda p: settle(map_, start[p], found, most), pieces), strict=True)):
-            result.put(piece, part)
-            if progress:
-                progress((done + 1) / len(pieces))
+    on_threads(lambda piece: settle(map_, start[piece], found, most), pieces, result.put, threads, progress)
     return result
 
 
@@ -116,7 +111,7 @@ def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most:
     opened = np.flatnonzero(result.label == OPEN)
     if not len(opened):
         return found
-    sample = opened[np.unique(np.linspace(0, len(opened) - 1, min(SAMPLE, len(opened))).astype(int))]
+    sample = np.sort(np.random.default_rng(0).choice(opened, min(SAMPLE, len(opened)), replace=False))
     wider, _, _ = find(map_, result.end[sample], scale, most, found)
     _renumber(result.label, found, wider)
     more = settle_all(map_, result.end[opened], wider, most, threads)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,6 +97,32 @@ def check_system(system: Any) -> None:
     """Raises ParameterError for what isn't a System."""
     if not isinstance(system, System):
         raise ParameterError(f"the system must be a System, not {type(system).__name__}. Put @sl.system(states=...) above the function.")
+
+
+def fill(system: System, columns: Mapping[str, np.ndarray], fixed: Mapping[str, float]) -> np.ndarray:
+    """States float64[k, D] from float64[k] for some of them; the others are fixed, at zero if nothing is said."""
+    count = len(next(iter(columns.values())))
+    return np.stack([columns[n] if n in columns else np.full(count, fixed.get(n, 0.0)) for n in system.states], axis=1).astype(float)
+
+
+def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, float]:
+    """Starts [SI] of the states that don't move over a map or a box; default zero.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If ``at`` isn't a mapping, names an unknown state, or one of those that move; if a name of those isn't a state.
+    """
+    if at is not None and not isinstance(at, Mapping):
+        raise ParameterError(f"at must be a mapping of states to starts, not {at!r}.")
+    given, moving = at or {}, list(moving)
+    for name in (*moving, *given):
+        if name not in system.states:
+            raise ParameterError(f"{system.name} has no state {name!r}. {nearest(name, system.states)}")
+    twice = [name for name in moving if name in given]
+    if twice:
+        raise ParameterError(f"{twice[0]} has a range and stands in at= too. Leave it out of one of them.")
+    return {name: to_si(given.get(name, 0.0), system.units[name], name) for name in system.states if name not in moving}
 
 
 def whole(value: Any, name: str, least: int = 1) -> int:

@@ -5,7 +5,6 @@ Every trajectory is independent of all others, so chunks may be cut and threads 
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -16,6 +15,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
+from saltus.flow.threads import usable_processors
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.system.system import System
@@ -158,11 +158,6 @@ def run(
         interrupted.partial = _finish(outcome, whole, chunks)
         raise interrupted from None
     return _finish(outcome, whole, chunks)
-
-
-def usable_processors() -> int:
-    """Processors that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 # -- arrays --------------------------------------------------------------------------------------------------------------------

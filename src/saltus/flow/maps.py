@@ -124,7 +124,7 @@ class Stroboscope:
             return self._modes(start, count)
         outcome = self._run(self.system, start, count, 0)
         table = outcome.record_integers
-        codes = 4 * table[:, st.REC_GUARD] + table[:, st.REC_DIRECTION] + 1 + 1000 * table[:, st.REC_KIND]
+        codes = np.ravel_multi_index((table[:, st.REC_KIND], table[:, st.REC_DIRECTION] + 1, table[:, st.REC_GUARD]), (3, 3, 2**31))
         return outcome.state, np.split(codes, np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(1, len(start))))
 
     def _modes(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:

@@ -17,6 +17,7 @@ from saltus.plot import maps
 from saltus.plot.basins import paint
 from saltus.plot.palette import hues
 from saltus.plot.style import OKABE_ITO, style
+from saltus.results.schema import kind_text
 
 _CALLER = "plot.agreement"
 #: Colour and name of each value of the agreement; differences are the news.
@@ -25,6 +26,7 @@ _LOOKS = {
     0: (OKABE_ITO["vermillion"], "differ"),
     -1: ("#3C3C3C", "not settled in one of them"),
 }
+_WHERE = {(True, True): "in both", (True, False): "left only", (False, True): "right only"}
 #: More attractors than this are not named in a legend of their own: the maps of plot.basins do that.
 _NAMED = 8
 
@@ -38,7 +40,7 @@ def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     Parameters
     ----------
     ds : Dataset
-        What ``sl.agreement`` returned.
+        What ``sl.compare`` returned.
     ax : Axes or array of 3 Axes, optional
         Where to draw; a new figure of three panels by default.
 
@@ -50,9 +52,9 @@ def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     Raises
     ------
     ParameterError
-        If ``ds`` is not from ``sl.agreement``, or ``ax`` holds neither one nor three Axes.
+        If ``ds`` is not from ``sl.compare``, or ``ax`` holds neither one nor three Axes.
     """
-    maps.check(ds, _CALLER, ["agreement"], ["agreement", "basin_a", "basin_b"])
+    maps.check(ds, _CALLER, ["agreement"], ["agreement", "basin_a", "basin_b", "match_a", "match_b", "match_type", "match_period"])
     pair = maps.plane(ds, "agreement", _CALLER)
     if ax is None:
         with style():
@@ -116,7 +118,7 @@ def _occurring(ds: xr.Dataset) -> tuple[list[int], list[int]]:
 
 
 def _name(ds: xr.Dataset, key: int) -> str:
-    """An attractor in words where the Dataset describes it, else its number."""
-    if "attractor" in ds.coords and "attractor_period" in ds and key in ds["attractor"].values:
-        return maps.describe(ds.sel(attractor=key))
-    return f"attractor {key}"
+    """A pair of attractors in words: ``3T, in both``."""
+    pair = ds.sel(pair=key)
+    known = int(pair["match_a"]) >= 0, int(pair["match_b"]) >= 0
+    return f"{kind_text(str(pair['match_type'].item()), int(pair['match_period']))}, {_WHERE[known]}"

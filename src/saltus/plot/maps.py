@@ -14,9 +14,10 @@ from matplotlib.axes import Axes
 from saltus.errors import ParameterError
 from saltus.plot.palette import hues
 from saltus.plot.style import Scale, display_scale
+from saltus.results.schema import kind_of, kind_text
 
 #: Kinds of Dataset, and what returns them.
-SOURCES = {"basins": "sl.basins", "attractors": "sl.attractors or sl.basin_fractions", "agreement": "sl.agreement"}
+SOURCES = {"basins": "sl.basins", "attractors": "sl.attractors or sl.basin_fractions", "agreement": "sl.compare"}
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,12 @@ UNSETTLED = {
 }
 
 
+#: What draws other kinds of results.
+_BETTER = {
+    "basins": "plot.basins", "agreement": "plot.agreement", "trajectory": "plot.history or plot.phase", "stroboscope": "plot.phase",
+}  # fmt: skip
+
+
 # -- the Dataset ---------------------------------------------------------------------------------------------------------------
 def check(ds: Any, caller: str, kinds: Sequence[str], needs: Sequence[str]) -> None:
     """Raise a ParameterError unless ``ds`` is a Dataset of one of these kinds and holds these variables."""
@@ -43,15 +50,14 @@ def check(ds: Any, caller: str, kinds: Sequence[str], needs: Sequence[str]) -> N
     if not isinstance(ds, xr.Dataset):
         hint = " A DataArray holds one variable: give the whole Dataset." if isinstance(ds, xr.DataArray) else ""
         raise ParameterError(f"{caller} takes the Dataset that {wanted} returns, not a {type(ds).__name__}.{hint}")
-    kind = ds.attrs.get("kind", "")
+    kind = kind_of(ds)
     if not kind:
-        origin = "from simulate or stroboscope (see plot.history, plot.phase)" if "saltus_result" in ds.attrs else "from elsewhere"
         raise ParameterError(
-            f"{caller} takes the Dataset that {wanted} returns. This one has no attribute 'kind': it is {origin}, or its attributes were "
-            f"dropped on the way (xarray.set_options(keep_attrs=True) keeps them)."
+            f"{caller} takes the Dataset that {wanted} returns. This one has no attribute 'saltus_result': it is from elsewhere, or its "
+            f"attributes were dropped on the way (xarray.set_options(keep_attrs=True) keeps them)."
         )
     if kind not in kinds:
-        better = f" Draw it with plot.{kind}." if kind in ("basins", "agreement") else ""
+        better = f" Draw it with {_BETTER[kind]}." if kind in _BETTER else ""
         raise ParameterError(f"{caller} takes what {wanted} returns; this Dataset is of the kind {kind!r}.{better}")
     missing = [name for name in needs if name not in ds.variables]
     if missing:
@@ -85,7 +91,7 @@ def colors_of(ds: xr.Dataset, order: Sequence[int] | None, caller: str) -> dict[
 def describe(one: xr.Dataset) -> str:
     """An attractor in a few words: ``24T, 60 contacts``; ``chaotic, 2.4 contacts per T``."""
     period, contacts = int(one["attractor_period"]), float(one["attractor_contacts"])
-    name = f"{period}T" if period > 0 else str(one["attractor_type"].item()).replace("_", "-")
+    name = kind_text(str(one["attractor_type"].item()), period)
     if not math.isfinite(contacts):
         return name
     if period > 0:

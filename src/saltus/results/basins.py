@@ -141,7 +141,7 @@ class _Builder:
     def dataset(self, attrs: Mapping[str, Any]) -> xr.Dataset:
         """The Dataset, with the hash of its numbers."""
         plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
-        own = {"saltus_result": self.kind, "kind": self.kind, "schema_version": schema.VERSION, "states": " ".join(self.states)}
+        own = {"saltus_result": self.kind, "schema_version": schema.VERSION, "states": " ".join(self.states)}
         ds = xr.Dataset(self.data, self.coords, {**plain, **own})
         ds.attrs["result_hash"] = content_hash(ds)
         return ds

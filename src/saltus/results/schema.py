@@ -207,6 +207,16 @@ def kind_of(ds: Any) -> str:
     return kind if kind in TABLES else ""
 
 
+def period_text(n: int, none: str = "not periodic") -> str:
+    """``T``, ``3T``; ``none`` for 0."""
+    return {0: none, 1: "T"}.get(n, f"{n}T")
+
+
+def kind_text(kind: str, n: int) -> str:
+    """A motion in a word: ``T``, ``3T``, ``quasi-periodic``, ``chaotic``."""
+    return period_text(n) if n > 0 else kind.replace("_", "-")
+
+
 def states_of(ds: xr.Dataset) -> tuple[str, ...]:
     """Names of the states, in the order of the system."""
     return tuple(ds.attrs["states"].split())

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.analysis.settled import LAST, settled
-from saltus.study.report import period_text, response_texts
+from saltus.results.schema import period_text
+from saltus.study.report import response_texts
 from saltus.study.table import TextTable
 from saltus.units import from_si
 

@@ -43,9 +43,10 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
 
     from saltus import plot
     from saltus.results import load
+    from saltus.results.schema import kind_of
 
     ds = load(result)
-    own = {"basins": "basins", "agreement": "agreement"}.get(str(ds.attrs.get("kind", "")))
+    own = {"basins": "basins", "agreement": "agreement"}.get(kind_of(ds))
     kind = kind or own or "history"
     maps = ("basins", "agreement")
     if (kind in maps or own is not None) and kind != own:

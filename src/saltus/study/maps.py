@@ -13,14 +13,12 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from saltus.analysis.basins import label_all
 from saltus.analysis.plan import CHUNK, BasinPlan, basin_plan
 from saltus.analysis.serial import cell_types, found_data, found_from, settling_arrays, settling_from
 from saltus.analysis.settling import Settling, settle
 from saltus.errors import StudyError
-from saltus.flow.engine import usable_processors
+from saltus.flow.threads import usable_processors
 from saltus.results.provenance import to_json, version
 from saltus.results.store import Store
 from saltus.study import quantities
@@ -229,7 +227,7 @@ def finish(job: MapJob, store: Store, threads: int | None = None) -> xr.Dataset:
 
 def estimate(plan: BasinPlan, found: Found, resources_: Resources) -> str:
     """A sentence on the time, memory and disk that a map will take, from a few hundred of its cells."""
-    cells = np.unique(np.linspace(0, plan.cells - 1, min(TIMED, plan.cells)).astype(int))
+    cells = plan.sample(TIMED)
     map_ = plan.map(1)
     map_.launch(plan.starts(cells[:1]), 1).advance(1)  # compiles, if it must
     begin = time.perf_counter()

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.results.schema import axes_of
-from saltus.study.report import period_text
+from saltus.results.schema import axes_of, kind_text
 from saltus.study.table import TextTable
 from saltus.units import from_si
 
@@ -25,7 +24,7 @@ def attractor_table(title: str, ds: xr.Dataset) -> TextTable:
         size = math.hypot(float(one["attractor_multiplier_real"][0]), float(one["attractor_multiplier_imag"][0]))
         unit, gap = one["attractor_peak"].attrs.get("units", ""), one["attractor_margin"].attrs.get("units", "")
         rows.append((
-            str(i), period_text(n) if kind == "periodic" else kind.replace("_", "-"), _or_dash(float(one["attractor_contacts"]), "g"),
+            str(i), kind_text(kind, n), _or_dash(float(one["attractor_contacts"]), "g"),
             from_si(float(one["attractor_peak"]), unit, 4), from_si(float(one["attractor_rms"]), unit, 4),
             _or_dash(size, ".4f"),
             f"{float(one['attractor_exponent']):.4g} ± {float(one['attractor_exponent_error']):.1g}",
@@ -68,7 +67,7 @@ def agreement_table(ds: xr.Dataset) -> TextTable:
     rows = []
     for i in range(ds.sizes["pair"]):
         one = {name: ds[f"match_{name}"].values[i] for name in ("a", "b", "type", "period", "fraction_a", "fraction_b", "orbit_distance")}
-        kind = period_text(int(one["period"])) if one["type"] == "periodic" else str(one["type"])
+        kind = kind_text(str(one["type"]), int(one["period"]))
         shares = [f"{100 * float(one[f'fraction_{side}']):.2f} %" if int(one[side]) >= 0 else "-" for side in "ab"]
         distance = float(one["orbit_distance"])
         rows.append((kind, *(str(one[side]) if int(one[side]) >= 0 else "-" for side in "ab"), *shares,

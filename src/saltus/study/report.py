@@ -9,7 +9,7 @@ import numpy as np
 from saltus.analysis.settled import settled
 from saltus.errors import ParameterError
 from saltus.kernels.status import STATUS
-from saltus.results.schema import end_name, states_of
+from saltus.results.schema import end_name, period_text, states_of
 from saltus.study.table import TextTable
 from saltus.units import from_si
 
@@ -53,11 +53,6 @@ def response_texts(run: xr.Dataset) -> list[str]:
         return []
     none = f"not periodic within {found.attrs['longest_period']}T"
     return [period_text(int(n), none) for n in np.atleast_1d(found["response_period"].values)]
-
-
-def period_text(n: int, none: str = "not periodic") -> str:
-    """``T``, ``3T``; ``none`` for 0."""
-    return {0: none, 1: "T"}.get(n, f"{n}T")
 
 
 def _notes(batch: xr.Dataset, shown: int) -> tuple[str, ...]:

@@ -178,7 +178,7 @@ def test_maps_without_any_attractor():
 def test_the_result_says_where_both_come_from():
     b = basins(parameters='{"gap": 2e-3, "force": 4}', method="ode45").assign_attrs(units='{"gap": "mm"}')
     ds = compare(basins(parameters='{"gap": 1e-3, "force": 4}'), b)
-    assert ds.attrs["kind"] == "agreement"
+    assert ds.attrs["saltus_result"] == "agreement"
     assert (ds.attrs["method_a"], ds.attrs["method_b"]) == ("taylor", "ode45")
     assert (ds.attrs["result_hash_a"], ds.attrs["result_hash_b"]) == (basins().attrs["result_hash"], b.attrs["result_hash"])
     assert ds.attrs["parameters_b"] == '{"gap": 2e-3, "force": 4}'

@@ -17,20 +17,10 @@ from saltus.cli import app
 from saltus.results import load
 from saltus.results.store import Store
 from saltus.study import maps
+from small_study import small_study
 
 #: 256 starts in eight chunks.
-STUDY = """
-[study]
-name = "small"
-[system]
-model = "delangre"
-case = "b"
-force = "4 N"
-frequency = "16 Hz"
-[basins]
-axes.x = { first = "-5 mm", last = "5 mm", count = 16 }
-axes.v = { first = "-1 m/s", last = "1 m/s", count = 16 }
-"""
+STUDY = small_study(16)
 MOTION = """
 [study]
 name = "a motion"

@@ -31,7 +31,7 @@ def attractors(x, v, period, contacts, kind=None, fraction=None, kind_attr="attr
         "attractor_v": (("attractor", "phase"), points[1], {"units": "m/s"}),
         "attractor_fraction": ("attractor", np.full(m, 1 / max(m, 1)) if fraction is None else np.array(fraction)),
     }
-    return xr.Dataset(data | more, {"attractor": np.arange(m)}, {"kind": kind_attr})
+    return xr.Dataset(data | more, {"attractor": np.arange(m)}, {"saltus_result": kind_attr})
 
 
 def basins_map(basin, periods_to_settle=None, x=None, v=None, known=None):
@@ -49,7 +49,7 @@ def basins_map(basin, periods_to_settle=None, x=None, v=None, known=None):
     data = {"basin": (("x", "v"), basin.astype("i2") if basin.dtype.kind != "f" else basin, CODES),
             "periods_to_settle": (("x", "v"), np.asarray(settle).astype("i4"))}  # fmt: skip
     axes = {"x": ("x", x, {"units": "m"}), "v": ("v", v, {"units": "m/s"})}
-    return known.assign(data).assign_coords(axes).assign_attrs(kind="basins")
+    return known.assign(data).assign_coords(axes).assign_attrs(saltus_result="basins")
 
 
 def agreement_map(a, b):
@@ -61,4 +61,13 @@ def agreement_map(a, b):
         "x": ("x", np.linspace(-5e-3, 5e-3, a.shape[0]), {"units": "m"}),
         "v": ("v", np.linspace(-0.5, 0.5, a.shape[1]), {"units": "m/s"}),
     }
-    return xr.Dataset({"agreement": (dims, agree), "basin_a": (dims, a), "basin_b": (dims, b)}, axes, {"kind": "agreement"})
+    ids = np.arange(max(int(a.max()), int(b.max()), -1) + 1)
+    match = {
+        "a": np.where(np.isin(ids, a), ids, -1),
+        "b": np.where(np.isin(ids, b), ids, -1),
+        "period": ids + 1,
+        "type": ["periodic"] * ids.size,
+    }
+    pairs = {f"match_{name}": ("pair", np.asarray(column, dtype="U" if name == "type" else int)) for name, column in match.items()}
+    cells = {"agreement": (dims, agree), "basin_a": (dims, a), "basin_b": (dims, b)}
+    return xr.Dataset(cells | pairs, axes | {"pair": ids}, {"saltus_result": "agreement"})

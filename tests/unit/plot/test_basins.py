@@ -89,8 +89,8 @@ def test_order_gives_the_hues_and_the_legend():
     ds = basins_map(np.array([[0, 1], [2, 2]]))
     ax = basins(ds, shade=False, order=[2, 0])
     assert np.array_equal(pixels(ax)[[1, 0, 0], [0, 0, 1]], np.round(255 * palette.hues(3)).astype(int))
-    assert [text.split(",")[0] for text in texts(ax)[:3]] == ["3T", "1T", "2T"]
-    assert [text.split(",")[0] for text in texts(basins(ds))[:3]] == ["1T", "2T", "3T"]
+    assert [text.split(",")[0] for text in texts(ax)[:3]] == ["3T", "T", "2T"]
+    assert [text.split(",")[0] for text in texts(basins(ds))[:3]] == ["T", "2T", "3T"]
 
 
 def test_cells_are_centred_on_the_starts():
@@ -191,7 +191,7 @@ def test_scale_of_lightness_is_labelled_with_its_ends_and_middle():
 def test_alike_attractors_are_told_apart_by_their_peaks():
     known = attractors([[1e-3], [-2e-3]], [[0.0], [0.0]], [1, 1], [1, 1], fraction=[0.5, 0.5])
     ax = basins(basins_map(np.array([[0, 1], [1, 0]]), known=known))
-    assert texts(ax)[:2] == ["1T, 1 contact, peak 1 mm, 50.0 %", "1T, 1 contact, peak 2 mm, 50.0 %"]
+    assert texts(ax)[:2] == ["T, 1 contact, peak 1 mm, 50.0 %", "T, 1 contact, peak 2 mm, 50.0 %"]
 
 
 def test_an_attractor_outside_the_map_is_said_to_be():
@@ -213,10 +213,10 @@ def test_the_wrong_dataset_is_told_what_to_give(run):
     for wrong, message in [
         ([1], r"plot.basins takes the Dataset that sl.basins returns, not a list"),
         (good["basin"], "give the whole Dataset"),
-        (run, r"from simulate or stroboscope \(see plot.history"),
+        (run, "Draw it with plot.history or plot.phase"),
         (xr.Dataset(), "from elsewhere"),
-        (good.assign_attrs(kind="agreement"), r"kind 'agreement'\. Draw it with plot.agreement"),
-        (good.assign_attrs(kind="attractors"), "kind 'attractors'"),
+        (good.assign_attrs(saltus_result="agreement"), r"kind 'agreement'\. Draw it with plot.agreement"),
+        (good.assign_attrs(saltus_result="attractors"), "kind 'attractors'"),
         (good.drop_vars("periods_to_settle"), "misses periods_to_settle"),
         (good.isel(v=0), "a map needs two states"),
         (good.isel(v=[]), "holds no starts"),

@@ -60,7 +60,7 @@ def test_some_attractors_in_another_order(known, batch):
     figure = gallery(known, batch, [2, 0])
     assert [row[0].get_title(loc="left")[:7] for row in rows(figure)] == ["chaotic", "3T, 8 c"]
     turned = rows(gallery(known, batch, order=[3]))
-    assert turned[0, 0].get_title(loc="left").startswith("1T")
+    assert turned[0, 0].get_title(loc="left").startswith("T")
     mine = next(one for one in turned[0, 2].lines if one.get_gid() == "attractor 3")
     assert np.allclose(mine.get_markerfacecolor(), palette.hues(1)[0])
 
@@ -77,8 +77,8 @@ def test_without_stroboscopic_points_two_columns_remain(known, batch):
 @pytest.mark.parametrize(
     ("which", "message"),
     [
-        ("map", "plot.gallery takes the Dataset that sl.basins, or sl.attractors"),
-        ("runs", "plot.gallery takes the Dataset that simulate returns"),
+        ("map", "plot.gallery takes what sl.basins, or sl.attractors"),
+        ("runs", "plot.gallery takes what simulate returns"),
         ("points", "takes what simulate returns"),
         ("few", r"runs holds 2 trajectories, none for attractor 2 of 4.*trajectory i starts on attractor i"),
         ("id", "no attractor 7. Known: 0, 1, 2, 3"),

@@ -11,19 +11,9 @@ from saltus.errors import SaltusError, StudyError, UnitError
 from saltus.study import maps
 from saltus.study.maps import MapJob, Report, Resources, jobs_of, shard_of
 from saltus.study.read import parse
+from small_study import small_study
 
-BASE = """
-[study]
-name = "small"
-[system]
-model = "delangre"
-case = "b"
-force = "4 N"
-frequency = "16 Hz"
-[basins]
-axes.x = { first = "-5 mm", last = "5 mm", count = 6 }
-axes.v = { first = "-1 m/s", last = "1 m/s", count = 4 }
-"""
+BASE = small_study(6, 4)
 MAPS = BASE + '[[basins.map]]\nname = "first"\n[[basins.map]]\nname = "second"\n'
 
 

@@ -16,20 +16,10 @@ from saltus.study import maps, maps_run
 from saltus.study.maps import Resources, jobs_of
 from saltus.study.maps_run import copy_of, run_maps, status_table, statuses
 from saltus.study.read import parse
+from small_study import small_study
 
 #: 576 starts in 12 chunks; four attractors.
-STUDY = """
-[study]
-name = "small"
-[system]
-model = "delangre"
-case = "b"
-force = "4 N"
-frequency = "16 Hz"
-[basins]
-axes.x = { first = "-5 mm", last = "5 mm", count = 24 }
-axes.v = { first = "-1 m/s", last = "1 m/s", count = 24 }
-"""
+STUDY = small_study(24)
 #: 64 starts in two chunks, twice.
 PAIR = STUDY.replace("count = 24", "count = 8") + (
     '[[basins.map]]\nname = "16 Hz"\n[[basins.map]]\nname = "7 Hz"\nvalues = { frequency = "7 Hz" }\ncompare = "16 Hz"\n'

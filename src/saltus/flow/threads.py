@@ -1,0 +1,49 @@
+"""Independent pieces of work on threads, with Ctrl-C between them."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def usable_processors() -> int:
+    """Processors that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def on_threads(
+    work: Callable[[Item], Result],
+    items: Sequence[Item],
+    done: Callable[[Item, Result], None],
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Call ``work(item)`` for every item, and ``done(item, result)`` from this thread as each is ready, in any order.
+
+    Raises whatever a piece raises. On that, and on Ctrl-C, pieces under way are waited for and the rest is left.
+    """
+    stop = threading.Event()
+
+    def one(item: Item) -> tuple[Item, Result] | None:
+        return None if stop.is_set() else (item, work(item))
+
+    with ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool:
+        waiting: set[Future] = {pool.submit(one, item) for item in items}
+        try:
+            while waiting:
+                ready, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in ready:
+                    done(*future.result())
+                if progress:
+                    progress(1.0 - len(waiting) / len(items))
+        except BaseException:
+            stop.set()
+            for future in waiting:
+                future.cancel()
+            raise
