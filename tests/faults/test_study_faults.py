@@ -31,6 +31,7 @@ from saltus.study import maps
 from saltus.study.maps import Resources, compute, finish, jobs_of, open_store
 from saltus.study.maps_table import attractor_table
 from saltus.study.read import parse
+from small_study import small_study
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and fork are POSIX")
 
@@ -43,7 +44,6 @@ import json, os, signal, sys, time
 import saltus.analysis.plan, saltus.plot, saltus.study.maps, saltus.study.maps_run, saltus.study.read
 from saltus.cli import main
 from saltus.results.store import Store
-from small_study import small_study
 
 saltus.analysis.plan.CHUNK = saltus.study.maps.CHUNK = 48
 saltus.analysis.plan.SCOUTS, saltus.analysis.plan.CHECKED = 256, 64
