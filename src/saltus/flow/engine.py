@@ -148,10 +148,7 @@ def run(
     workers = min(threads or usable_processors(), max(len(chunks), 1))
     stop = threading.Event()
     try:
-        if workers == 1:
-            _run_here(chunks, module, stop, progress)
-        else:
-            _run_on_threads(chunks, module, stop, progress, workers)
+        _run_chunks(chunks, module, stop, progress, workers)
     except KeyboardInterrupt:
         outcome.complete = False
         interrupted = Interrupted()
@@ -243,14 +240,12 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
 
 
 # -- work ----------------------------------------------------------------------------------------------------------------------
-def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: threading.Event, shown: Callable[[], None] | None) -> None:
+def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: threading.Event) -> None:
     """Move a chunk to its end in slices; empties its table of contacts after each."""
     arrays = chunk.arrays
     while not stop.is_set():
         outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), SLICE, *workspace)
         _empty_table(chunk)
-        if shown:
-            shown()
         if outcome == st.FINISHED:
             return
 
@@ -267,27 +262,22 @@ def _behind(arrays: dict[str, np.ndarray]) -> float:
     return float(np.sum(np.where(arrays["status"] == st.RUNNING, at, 1.0)))
 
 
-def _run_here(chunks: list[_Chunk], module: ModuleType, stop: threading.Event, progress: Callable[[float], None] | None) -> None:
-    workspace = module.workspace()
-    for chunk in chunks:
-        _open_tables(chunk)
-        _advance(chunk, module, workspace, stop, (lambda: progress(_share_done(chunks))) if progress else None)
-
-
-def _run_on_threads(
+def _run_chunks(
     chunks: list[_Chunk], module: ModuleType, stop: threading.Event, progress: Callable[[float], None] | None, workers: int
 ) -> None:
+    """All chunks, on threads even if it is one: Python raises Ctrl-C in the main thread, which would cut a table of contacts in two."""
     local = threading.local()
 
     def work(chunk: _Chunk) -> None:
         if not hasattr(local, "workspace"):
             local.workspace = module.workspace()
         _open_tables(chunk)
-        _advance(chunk, module, local.workspace, stop, None)
+        _advance(chunk, module, local.workspace, stop)
 
     with ThreadPoolExecutor(workers) as pool:
-        waiting: set[Future] = {pool.submit(work, chunk) for chunk in chunks}
+        waiting: set[Future] = set()
         try:
+            waiting |= {pool.submit(work, chunk) for chunk in chunks}
             while waiting:
                 done, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -296,6 +286,5 @@ def _run_on_threads(
                     progress(_share_done(chunks))
         except BaseException:
             stop.set()
-            for future in waiting:
-                future.cancel()
+            pool.shutdown(wait=True, cancel_futures=True)
             raise

@@ -34,8 +34,9 @@ def on_threads(
         return None if stop.is_set() else (item, work(item))
 
     with ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool:
-        waiting: set[Future] = {pool.submit(one, item) for item in items}
+        waiting: set[Future] = set()
         try:
+            waiting |= {pool.submit(one, item) for item in items}
             while waiting:
                 ready, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
                 for future in ready:
@@ -44,6 +45,5 @@ def on_threads(
                     progress(1.0 - len(waiting) / len(items))
         except BaseException:
             stop.set()
-            for future in waiting:
-                future.cancel()
+            pool.shutdown(wait=True, cancel_futures=True)
             raise

@@ -1,0 +1,47 @@
+"""Ctrl-C while trajectories are computed: at whatever moment it comes, what is kept is the beginning of the undisturbed answer."""
+
+import _thread
+import time
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.flow import engine
+
+START = {"x": np.linspace(-4e-3, 4e-3, 24), "v": np.linspace(-0.5, 0.5, 24)}
+
+
+class Interrupting(list):
+    """A list on whose third addition Ctrl-C is pressed."""
+
+    def append(self, item):
+        super().append(item)
+        if len(self) == 3:
+            _thread.interrupt_main()
+            time.sleep(0.2)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, monkeypatch):
+    """Pressed between the two halves of a record: the worst moment."""
+    rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    monkeypatch.setattr(engine, "CHUNK", 8)
+    monkeypatch.setattr(engine, "SLICE", 200)
+    whole = sl.simulate(rig, START, periods=60, threads=threads)
+    cut = engine._cut
+
+    def interrupting(*args):
+        chunk = cut(*args)
+        chunk.integers = Interrupting()
+        return chunk
+
+    monkeypatch.setattr(engine, "_cut", interrupting)
+    with pytest.raises(sl.Interrupted) as stopped:
+        sl.simulate(rig, START, periods=60, threads=threads)
+    part = stopped.value.partial
+    assert 0 < part.sizes["contact"] < whole.sizes["contact"]
+    for row in range(len(START["x"])):
+        mine = part.contact_time.values[part.contact_trajectory.values == row]
+        theirs = whole.contact_time.values[whole.contact_trajectory.values == row]
+        np.testing.assert_array_equal(mine, theirs[: len(mine)])
