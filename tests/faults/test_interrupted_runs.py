@@ -24,7 +24,7 @@ class Interrupting(list):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, monkeypatch):
-    """Pressed between the two halves of a record: the worst moment."""
+    """Pressed while a table of contacts is put away, and again and again while the run ends."""
     rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
     monkeypatch.setattr(engine, "CHUNK", 8)
     monkeypatch.setattr(engine, "SLICE", 200)
@@ -33,7 +33,7 @@ def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, monk
 
     def interrupting(*args):
         chunk = cut(*args)
-        chunk.integers = Interrupting()
+        chunk.contacts = Interrupting()
         return chunk
 
     monkeypatch.setattr(engine, "_cut", interrupting)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 from scipy.stats import qmc
 
-from saltus.analysis.orbits import Orbit
+from saltus.analysis.orbits import JITTER, Orbit
 from saltus.codegen.module import capture_module
 from saltus.flow.maps import Map
 
@@ -30,8 +30,6 @@ CONTRACTION, MOST_RETURNS = 0.5, 64
 MOST_POINTS = 8
 #: Part of the verified radius that is used.
 SAFETY = 0.9
-#: Radius in units of the map's own errors where nothing could be verified.
-LUCK = 1.0
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,7 @@ def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, n
             better = passes(best[have] * factor, have)
             best[have[better]] *= factor
             have = have[~better]
-    best = np.where(best > 0.0, SAFETY * best, LUCK * map_.noise)
+    best = np.where(best > 0.0, SAFETY * best, max(map_.noise, JITTER * orbit.mismatch))
     return points, norms / best[:, None, None]
 
 

@@ -1,4 +1,4 @@
-"""Periodic orbits of a map: polished by Newton's method, with their multipliers.
+"""Periodic orbits of a map: polished by Newton's method, with their multipliers; those of an inexact map (ode45's) are followed instead.
 
 Newton on P^n(x) - x = 0 with the derivative from the tangent flow; Parker & Chua, Practical Numerical Algorithms for Chaotic Systems
 (1989), chapter 5.
@@ -18,6 +18,14 @@ MOST_STEPS = 30
 MARGINAL = 1e-7
 #: Mismatch up to which a stiff orbit may amplify rounding.
 AMPLIFIED = 1e-9
+#: Noise up to which a map is exact but for rounding; Newton's method is for such maps.
+ROUNDING = 1e-9
+#: Iterates after which a trajectory of an inexact map has settled, and returns whose mean is taken then.
+FOLLOWED, LAST = 400, 8
+#: Places of one orbit lie within so many times its mismatch.
+JITTER = 5.0
+#: Scatter below which nothing is looked for in it.
+SHOWING = 1e-6
 #: A step shorter than this times the scale is rounding.
 SHORTEST = 1e-15
 
@@ -72,6 +80,8 @@ def polish(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | N
     -------
     Orbit or None
     """
+    if map_.noise > ROUNDING:
+        return _followed(map_, start, n, scale)
     x = np.array(start, float)
     for _ in range(MOST_STEPS):
         end, matrix = map_.tangent(x[None], n)
@@ -85,27 +95,56 @@ def polish(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | N
         length = np.abs(step / scale).max()
         if not length < 1.0:
             return None
-        if length < max(SHORTEST, 0.01 * map_.noise):
+        if length < SHORTEST:
             break
     return _closed(map_, x, n, scale)
+
+
+def _followed(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
+    """The orbit that a trajectory of an inexact map settles on: the mean of its last returns.
+
+    ode45 restarted at every period has another fixed point than ode45 that goes on: a twentieth of the range apart at (1e-4, 1e-7) where
+    damping is weak. What a run settles on is its attractor.
+    """
+    returns = max(-(-FOLLOWED // n), 2 * LAST)
+    last = map_.launch(start[None], returns * n + 1).advance(returns * n + 1)[0, :-1][-LAST * n :]
+    points, scatter = _mean(last, n, scale)
+    if not scatter <= 2.0 * map_.noise:
+        return None
+    double, less = _mean(last, 2 * n, scale)
+    if scatter > SHOWING and less < 0.25 * scatter:  # two loops that lie side by side
+        return _orbit(map_, double, less)
+    shifts = [np.abs((np.roll(points, -m, axis=0) - points) / scale).max() for m in range(1, n + 1)]
+    points = points[: 1 + int(np.argmax(np.array(shifts) <= 4.0 * scatter + SHORTEST))]
+    return _orbit(map_, points, scatter)
+
+
+def _mean(points: np.ndarray, n: int, scale: np.ndarray) -> tuple[np.ndarray, float]:
+    """Mean of the returns of period n in float64[m n, D], float64[n, D], and how far one lies from it at most."""
+    returns = points.reshape(-1, n, points.shape[1])
+    mean = returns.mean(axis=0)
+    return mean, float(np.abs((returns - mean) / scale).max())
 
 
 def _closed(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
     """The orbit through a point, if it comes back."""
     points = np.concatenate([x[None], map_.launch(x[None], n).advance(n)[0]])
     distances = np.abs((points[1:] - x) / scale).max(axis=1)
-    allowed = max(min(map_.noise * _stiffness(map_, x, n, scale), AMPLIFIED), 2.0 * map_.noise)
-    if not np.isfinite(distances).all() or distances[-1] > allowed:
+    if not np.isfinite(distances).all() or distances[-1] > min(map_.noise * _stiffness(map_, x, n, scale), AMPLIFIED):
         return None
     n = 1 + int(np.argmax(distances <= max(10 * distances[-1], map_.noise)))
-    points = points[:n]
+    return _orbit(map_, points[:n], float(distances[n - 1]))
+
+
+def _orbit(map_: Map, points: np.ndarray, mismatch: float) -> Orbit | None:
+    """An orbit from its points: which is the first, monodromy, multipliers."""
     points = np.roll(points, -int(np.lexsort(points.T[::-1])[0]), axis=0)
-    _, matrices = map_.tangent(points, n)
+    _, matrices = map_.tangent(points, len(points))
     if not np.isfinite(matrices).all():
         return None
     values = np.linalg.eigvals(matrices[0])
     order = np.lexsort((-values.imag, -np.round(np.abs(values), 12)))
-    return Orbit(points, matrices, values[order], float(distances[n - 1]))
+    return Orbit(points, matrices, values[order], mismatch)
 
 
 def _stiffness(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> float:
@@ -115,8 +154,8 @@ def _stiffness(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> float:
 
 
 def same(a: Orbit, b: Orbit, scale: np.ndarray, tolerance: float) -> bool:
-    """Whether two orbits are one: equal period, and each point of one lies on the other."""
+    """Whether two orbits are one: equal period, and each point of one lies on the other, within what the two are known to."""
     if a.period != b.period:
         return False
     distances = np.abs((a.points[:, None] - b.points[None]) / scale).max(axis=2).min(axis=1)
-    return bool(distances.max() < tolerance)
+    return bool(distances.max() < max(tolerance, JITTER * (a.mismatch + b.mismatch)))

@@ -111,8 +111,7 @@ class _Chunk:
     first: int
     arrays: dict[str, np.ndarray]
     keeps_contacts: bool
-    integers: list[np.ndarray] = field(default_factory=list)
-    floats: list[np.ndarray] = field(default_factory=list)
+    contacts: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
 
 
 def run(
@@ -213,13 +212,12 @@ def _open_tables(chunk: _Chunk) -> None:
 
 
 def _empty_table(chunk: _Chunk) -> None:
-    """Move a chunk's contacts from its table to its lists."""
+    """Move a chunk's contacts from its table to its list."""
     arrays, used = chunk.arrays, int(chunk.arrays["rec_used"][0])
     if used:
         integers = arrays["rec_i"][:used].copy()
         integers[:, st.REC_TRAJECTORY] += chunk.first
-        chunk.integers.append(integers)
-        chunk.floats.append(arrays["rec_f"][:used].copy())
+        chunk.contacts.append((integers, arrays["rec_f"][:used].copy()))
         arrays["rec_used"][0] = 0
 
 
@@ -228,12 +226,8 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
     outcome.time = whole["origin"] + whole["count"] * whole["period"] + whole["phase"]
     running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
-    for chunk in chunks:
-        _empty_table(chunk)
-    integers = [part for chunk in chunks for part in chunk.integers]
-    floats = [part for chunk in chunks for part in chunk.floats]
-    if integers:
-        table, numbers = np.concatenate(integers), np.concatenate(floats)
+    if contacts := [part for chunk in chunks for part in chunk.contacts]:
+        table, numbers = (np.concatenate(half) for half in zip(*contacts, strict=True))
         order = np.lexsort((np.arange(len(table)), table[:, st.REC_TRAJECTORY]))
         outcome.record_integers, outcome.record_floats = table[order], numbers[order]
     return outcome
