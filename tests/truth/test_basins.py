@@ -238,7 +238,7 @@ def test_the_ridge_between_the_wells_is_no_third_basin():
 
 # -- claims of the paper -------------------------------------------------------------------------------------------------------
 def rare_one(ds):
-    return int(ds.attractor_fraction.argmin())
+    return int(ds.attractor_fraction.values.argmin())
 
 
 def test_c_at_5_hz_before_the_graze_has_two_attractors():
@@ -296,6 +296,23 @@ def test_ode45_sees_the_third_attractor_only_if_it_locates_contacts(three, event
     for i in range(count):
         assert (np.abs(orbit_points(ds, i)[0] - exact) / [1e-2, 2.0]).max(axis=1).min() < 1e-3
     assert (ds.basin.values >= 0).all()
+
+
+@pytest.mark.parametrize("events", ["locate", "ignore"])
+def test_attractors_of_ode45_are_those_that_its_runs_settle_on(events):
+    """Restarted every period, ode45 has other fixed points than ode45 that goes on; labels must be of the latter."""
+    rig = sl.models.delangre("c", frequency=17.0, contact_stiffness=8833.0)
+    method = sl.ODE45(1e-4, 1e-7, events=events)
+    ds = sl.basins(rig, **box(30), method=method)
+    assert ds.attrs["unsettled_cells"] == 0
+    starts, labels = cells(ds, 60)
+    run = sl.stroboscope(rig, {"x": starts[:, 0], "v": starts[:, 1]}, periods=1500, keep=4, method=method)
+    apart = np.abs(run.x.values[:, -1:] - run.x.values[:, -3:-1][:, ::-1])
+    period = np.where(apart[:, 0] < 1e-4, 1, np.where(apart[:, 1] < 1e-4, 2, 0))
+    np.testing.assert_array_equal(ds.attractor_period.values[labels], period)
+    amplitude = np.abs(run.x.values).max(axis=1)
+    nearest = np.abs(amplitude[:, None] - np.nanmax(np.abs(ds.attractor_x.values), axis=1)[None]).argmin(axis=1)
+    np.testing.assert_array_equal(labels, nearest)
 
 
 def test_contacts_that_were_not_looked_for_are_not_counted_as_none(three):

@@ -22,8 +22,8 @@ AMPLIFIED = 1e-9
 ROUNDING = 1e-9
 #: Iterates after which a trajectory of an inexact map has settled, and returns whose mean is taken then.
 FOLLOWED, LAST = 400, 8
-#: Places of one orbit lie within so many times its mismatch.
-JITTER = 5.0
+#: Scatter of the returns to one place, in units of the map's noise, that its errors may make; places lie so many scatters apart.
+JITTER, APART = 2.0, 5.0
 #: Scatter below which nothing is looked for in it.
 SHOWING = 1e-6
 #: A step shorter than this times the scale is rounding.
@@ -109,14 +109,20 @@ def _followed(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit 
     returns = max(-(-FOLLOWED // n), 2 * LAST)
     last = map_.launch(start[None], returns * n + 1).advance(returns * n + 1)[0, :-1][-LAST * n :]
     points, scatter = _mean(last, n, scale)
-    if not scatter <= 2.0 * map_.noise:
+    if not scatter <= JITTER * map_.noise:
         return None
     double, less = _mean(last, 2 * n, scale)
     if scatter > SHOWING and less < 0.25 * scatter:  # two loops that lie side by side
-        return _orbit(map_, double, less)
-    shifts = [np.abs((np.roll(points, -m, axis=0) - points) / scale).max() for m in range(1, n + 1)]
-    points = points[: 1 + int(np.argmax(np.array(shifts) <= 4.0 * scatter + SHORTEST))]
-    return _orbit(map_, points, scatter)
+        points, scatter = double, less
+    shifts = [np.abs((np.roll(points, -m, axis=0) - points) / scale).max() for m in range(1, len(points) + 1)]
+    points = points[: 1 + int(np.argmax(np.array(shifts) <= max(scatter, SHORTEST)))]
+    return _orbit(map_, points, scatter) if _spacing(points, scale) >= APART * scatter else None
+
+
+def _spacing(points: np.ndarray, scale: np.ndarray) -> float:
+    """Least distance between two of the points, in units of the scale; inf for one point."""
+    distances = np.abs((points[:, None] - points[None]) / scale).max(axis=2)
+    return float((distances + np.diag(np.full(len(points), np.inf))).min())
 
 
 def _mean(points: np.ndarray, n: int, scale: np.ndarray) -> tuple[np.ndarray, float]:
@@ -154,8 +160,8 @@ def _stiffness(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> float:
 
 
 def same(a: Orbit, b: Orbit, scale: np.ndarray, tolerance: float) -> bool:
-    """Whether two orbits are one: equal period, and each point of one lies on the other, within what the two are known to."""
+    """Whether two orbits are one: equal period, and each point of one lies on the other."""
     if a.period != b.period:
         return False
     distances = np.abs((a.points[:, None] - b.points[None]) / scale).max(axis=2).min(axis=1)
-    return bool(distances.max() < max(tolerance, JITTER * (a.mismatch + b.mismatch)))
+    return bool(distances.max() < tolerance)
