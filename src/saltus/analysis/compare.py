@@ -18,6 +18,8 @@ from saltus.results.schema import BASINS, attractor_name, axes_of, check, states
 #: Largest distance of two orbits that count as one, in units of the axis ranges: far above what methods differ by on one attractor,
 #: below what tells neighbours on the rig apart.
 TOLERANCE = 0.01
+#: Orbits of equal peak and rms count as one up to so many times that distance: errors of a weakly damped response add up in its phase.
+SHIFTED = 10.0
 #: Largest difference of two grids that is rounding, in units of the axis range.
 _ROUNDING = 1e-9
 #: Attributes of both maps that the result keeps, with _a and _b.
@@ -31,7 +33,8 @@ def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANC
 
     Attractors are matched one to one. Only those of equal type and period can be the same, and only within ``tolerance``. Among periodic
     ones the nearest go together: the distance of two orbits is the largest difference of their stroboscopic points, at the best shift of
-    the phase, in units of the axis ranges. Motions that don't repeat have no points to compare; they can be the same if peak and rms of
+    the phase, in units of the axis ranges. Up to ten times ``tolerance`` apart they can still be the same if their peaks and rms are within
+    it: in a weakly damped response the errors of a method shift the phase. Motions that don't repeat have no points to compare; they can be the same if peak and rms of
     the first state are within ``tolerance``, and those go together that share the most cells (mirror twins have equal peaks).
 
     Parameters
@@ -124,7 +127,7 @@ def _difference(a: xr.Dataset, b: xr.Dataset) -> str:
 def _match(a: xr.Dataset, b: xr.Dataset, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """For each attractor of a: its partner in b (-1: none), and their distance (NaN)."""
     distance = _distances(a, b)
-    possible = distance <= tolerance
+    possible = (distance <= tolerance) | ((distance <= SHIFTED * tolerance) & (_level_distances(a, b) <= tolerance))
     cost = np.where(possible, distance / (tolerance or 1.0), _NEVER)
     aperiodic = possible & (a["attractor_period"].values[:, None] == 0)
     cost[aperiodic] = (1.0 - _shared_cells(a, b))[aperiodic]
@@ -137,19 +140,22 @@ def _match(a: xr.Dataset, b: xr.Dataset, tolerance: float) -> tuple[np.ndarray, 
 
 def _distances(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
     """Distance of every attractor of a from every one of b; infinite where type or period differ."""
-    names = states_of(a)
-    scale = _scales(a, b)
-    size = (a.sizes["attractor"], b.sizes["attractor"])
-    result = np.full(size, np.inf)
+    names, scale, levels = states_of(a), _scales(a, b), _level_distances(a, b)
+    result = np.full(levels.shape, np.inf)
     points = [np.stack([ds[attractor_name(name)].values for name in names], axis=-1) / scale for ds in (a, b)]
-    levels = [np.stack([ds["attractor_peak"].values, ds["attractor_rms"].values], axis=-1) / scale[0] for ds in (a, b)]
     types, periods = ([ds[name].values for ds in (a, b)] for name in ("attractor_type", "attractor_period"))
-    for i, j in np.ndindex(size):
+    for i, j in np.ndindex(*levels.shape):
         n = int(periods[0][i])
         if types[0][i] != types[1][j] or n != periods[1][j]:
             continue
-        result[i, j] = _orbit_distance(points[0][i, :n], points[1][j, :n]) if n else np.abs(levels[0][i] - levels[1][j]).max()
+        result[i, j] = _orbit_distance(points[0][i, :n], points[1][j, :n]) if n else levels[i, j]
     return np.where(np.isnan(result), np.inf, result)
+
+
+def _level_distances(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
+    """Difference in peak or rms, the larger, of every attractor of a from every one of b, in units of the first axis' range."""
+    levels = [np.stack([ds["attractor_peak"].values, ds["attractor_rms"].values], axis=-1) / _scales(a, b)[0] for ds in (a, b)]
+    return np.abs(levels[0][:, None] - levels[1][None]).max(axis=2)
 
 
 def _orbit_distance(p: np.ndarray, q: np.ndarray) -> float:
