@@ -113,9 +113,9 @@ def _followed(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit 
         return None
     double, less = _mean(last, 2 * n, scale)
     if scatter > SHOWING and less < 0.25 * scatter:  # two loops that lie side by side
-        points, scatter = double, less
+        points = double
     shifts = [np.abs((np.roll(points, -m, axis=0) - points) / scale).max() for m in range(1, len(points) + 1)]
-    points = points[: 1 + int(np.argmax(np.array(shifts) <= max(scatter, SHORTEST)))]
+    points, scatter = _mean(last, 1 + int(np.argmax(np.array(shifts) <= map_.noise)), scale)  # loops that its errors alone part are one
     return _orbit(map_, points, scatter) if _spacing(points, scale) >= APART * scatter else None
 
 
@@ -160,8 +160,8 @@ def _stiffness(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> float:
 
 
 def same(a: Orbit, b: Orbit, scale: np.ndarray, tolerance: float) -> bool:
-    """Whether two orbits are one: equal period, and each point of one lies on the other."""
-    if a.period != b.period:
+    """Whether two orbits are one, or one the other several times over: each point of one lies on the other."""
+    if max(a.period, b.period) % min(a.period, b.period):
         return False
     distances = np.abs((a.points[:, None] - b.points[None]) / scale).max(axis=2).min(axis=1)
     return bool(distances.max() < tolerance)
