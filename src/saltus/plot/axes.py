@@ -101,16 +101,17 @@ def draw_gaps(ax: Axes, direction: Direction, regions: Regions, scale: Scale, la
         line(place, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid=tag)
         if label and low <= place <= high:
             lower = i == 0 and len(regions.boundaries) > 1 and place - low > 0.12 * (high - low)  # else it meets the ticks
-            _name_gap(ax, direction, place, f"{boundary.label}\n{scale.text(boundary.value)}", lower)
+            high_up = direction == "y" and high - place < 0.12 * (high - low)  # else it meets the title
+            _name_gap(ax, direction, place, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up)
 
 
-def _name_gap(ax: Axes, direction: Direction, place: float, text: str, lower: bool) -> None:
-    """Name a gap line outside the axes; the lowest one keeps away from the others."""
+def _name_gap(ax: Axes, direction: Direction, place: float, text: str, below: bool) -> None:
+    """Name a gap line outside the axes, on its lower (left) side if asked to."""
     look: dict[str, Any] = {"color": QUIET, "fontsize": 7, "linespacing": 1.1}
     if direction == "y":
-        ax.text(1.01, place, text, transform=ax.get_yaxis_transform(), va="top" if lower else "bottom", ha="left", **look)
+        ax.text(1.01, place, text, transform=ax.get_yaxis_transform(), va="top" if below else "bottom", ha="left", **look)
     else:
-        ax.text(place, 1.01, text, transform=ax.get_xaxis_transform(), va="bottom", ha="right" if lower else "left", **look)
+        ax.text(place, 1.01, text, transform=ax.get_xaxis_transform(), va="bottom", ha="right" if below else "left", **look)
 
 
 def legend(ax: Axes, regions: Regions, **place: Any) -> None:
