@@ -33,9 +33,10 @@ def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANC
 
     Attractors are matched one to one. Only those of equal type and period can be the same, and only within ``tolerance``. Among periodic
     ones the nearest go together: the distance of two orbits is the largest difference of their stroboscopic points, at the best shift of
-    the phase, in units of the axis ranges. Up to ten times ``tolerance`` apart they can still be the same if their peaks and rms are within
-    it: in a weakly damped response the errors of a method shift the phase. Motions that don't repeat have no points to compare; they can be the same if peak and rms of
-    the first state are within ``tolerance``, and those go together that share the most cells (mirror twins have equal peaks).
+    the phase, in units of the axis ranges. Up to ten times ``tolerance`` apart they can still be the same if their peaks and rms are
+    within it: in a weakly damped response the errors of a method shift the phase. Motions that don't repeat have no points to compare;
+    they can be the same if peak and rms of the first state are within ``tolerance``, and those go together that share the most cells
+    (mirror twins have equal peaks).
 
     Parameters
     ----------

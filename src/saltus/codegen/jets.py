@@ -11,6 +11,8 @@ Evaluating Derivatives (2008), table 13.2.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable
 
 from saltus.codegen.scalar import condition_code
@@ -19,6 +21,8 @@ from saltus.system import expression as ex
 from saltus.system.expression import Expr
 
 MASK_WORDS = ("&", "|", "~")
+#: Operations, one after the other, in a sine.
+SINE = 12
 
 
 class Constants:
@@ -32,15 +36,9 @@ class Constants:
         return self.rows.setdefault(node, len(self.rows))
 
 
-def _age(series: Series) -> int:
-    """Which coefficients of a sum are known first: those of time, then the states', then those that products of states wait for."""
-    if series.kind == "state":
-        return 1
-    return 2 if _reads_state(series) else 0
-
-
-def _reads_state(series: Series) -> bool:
-    return series.kind == "state" or any(map(_reads_state, series.operands))
+def _number(coefficient: Expr) -> float:
+    """A literal coefficient's value, else NaN."""
+    return float(coefficient.payload) if coefficient.op == "const" else math.nan
 
 
 class JetCode:
@@ -68,6 +66,7 @@ class JetCode:
         self._memo: dict[tuple, str | None] = {}
         self._coefficients: dict[Expr, str] = {}
         self._masks: dict[ex.Condition, str] = {}
+        self._depth: dict[str, int] = {}
         self._count = 0
 
     # -- names ------------------------------------------------------------------------------------------------------------------
@@ -75,7 +74,12 @@ class JetCode:
         name = f"s{self._count}"
         self._count += 1
         self.lines.append(f"{name} = {code}")
+        self._depth[name] = 1 + self._wait(code)
         return name
+
+    def _wait(self, code: str) -> int:
+        """Operations that must end, one after the other, before this code can begin."""
+        return max((self._depth.get(name, 0) for name in re.findall(r"\bs\d+\b", code)), default=0)
 
     def coefficient(self, node: Expr) -> str:
         """Code for a coefficient: a literal, a row of ``c``, or an expression of those and mode masks."""
@@ -120,9 +124,9 @@ class JetCode:
 
     # -- sums -------------------------------------------------------------------------------------------------------------------
     def _sum(self, products: list[tuple[str, str] | tuple[str]], start: str | None = None) -> str | None:
-        """``start + a*b + ...`` as a chain of fused multiply-adds, in the order given."""
+        """``start + a*b + ...`` as a chain of fused multiply-adds, what is known last at its end."""
         total = start
-        for factors in products:
+        for factors in sorted(products, key=lambda factors: self._wait(" ".join(factors))):
             if len(factors) == 1:
                 total = factors[0] if total is None else self._assign(f"{total} + {factors[0]}")
             elif total is None:
@@ -141,10 +145,8 @@ class JetCode:
         total = self.coefficient(form.offset) if k == 0 and not is_constant(form.offset, 0.0) else None
         if total is not None and form.offset.op == "const":
             total = self._assign(f"splat({total}, LANES)")
-        for series, coefficient in sorted(form.terms.items(), key=lambda term: _age(term[0])) if k else form.terms.items():
-            value = self.value(series, k)
-            if value is None:
-                continue
+        terms = [term for series, coefficient in form.terms.items() if (term := self._term(series, coefficient, k))]
+        for value, coefficient in sorted(terms, key=lambda term: self._wait(term[0])):
             if is_constant(coefficient, 1.0):
                 total = value if total is None else self._assign(f"{total} + {value}")
             elif is_constant(coefficient, -1.0):
@@ -152,6 +154,16 @@ class JetCode:
             else:
                 total = self._sum([(self.coefficient(coefficient), value)], total)
         return total
+
+    def _term(self, series: Series, coefficient: Expr, k: int) -> tuple[str, Expr] | None:
+        """Coefficient k of a series and what it is multiplied by: a forcing's amplitude goes into its recurrence, once for all k."""
+        frequency = self._time_frequency(series.operands[0]) if series.kind in ("sin", "cos") else None
+        if frequency is not None and abs(_number(coefficient)) != 1.0:
+            part = "sine" if series.kind == "sin" else "cosine"
+            value = self._forcing(series.operands[0], frequency, k, part, self._as_lane(self.coefficient(coefficient), coefficient))
+            return value, ex.constant(1.0)
+        plain = self.value(series, k)
+        return None if plain is None else (plain, coefficient)
 
     # -- coefficients of series -------------------------------------------------------------------------------------------------
     def state(self, i: int, k: int) -> str | None:
@@ -180,9 +192,8 @@ class JetCode:
         return self._memo[key]
 
     def _convolution(self, k: int, left: Callable, right: Callable, first: int, last: int) -> str | None:
-        """``sum(left(i) * right(k - i) for i in first..last)``, middle terms first, the ends (newest coefficients) last."""
-        order = sorted(range(last, first - 1, -1), key=lambda i: min(i - first, last - i), reverse=True)
-        products = [(left(i), right(k - i)) for i in order]
+        """``sum(left(i) * right(k - i) for i in first..last)``."""
+        products = [(left(i), right(k - i)) for i in range(first, last + 1)]
         return self._sum([(a, b) for a, b in products if a is not None and b is not None])
 
     def _state(self, series: Series, k: int) -> str | None:
@@ -298,9 +309,10 @@ class JetCode:
                 names = f"s{self._count}", f"s{self._count + 1}"
                 self._count += 2
                 self.lines.append(f"{names[0]}, {names[1]} = sincos({angle})")
+                self._depth |= dict.fromkeys(names, self._wait(angle) + SINE)
                 self._memo[a, 0, "sine"], self._memo[a, 0, "cosine"] = names
             elif frequency is not None:
-                self._memo[key] = self._forcing(a, frequency, k, part)
+                return self._forcing(a, frequency, k, part)
             else:
                 other, sign = ("cosine", 1.0) if part == "sine" else ("sine", -1.0)
                 total = self._convolution(k, lambda i: self._derivative(a, i), lambda i: self._harmonic(a, i, other), 1, k)
@@ -331,18 +343,29 @@ class JetCode:
             self._memo[key] = self._assign(self._as_lane(self.coefficient(rate), rate))
         return str(self._memo[key])
 
-    def _forcing(self, a: Series, frequency: tuple[Expr, Expr], k: int, part: str) -> str:
-        """Coefficient of sin or cos(rate*t + offset): two orders back times -rate^2/(k(k-1))."""
+    def _forcing(self, a: Series, frequency: tuple[Expr, Expr], k: int, part: str, amplitude: str = "") -> str:
+        """Coefficient of sin or cos(rate*t + offset), times an amplitude: two orders back times -rate^2/(k(k-1))."""
+        key = (a, k, part, amplitude)
+        if key not in self._memo:
+            self._memo[key] = self._assign(self._forcing_code(a, frequency, k, part, amplitude))
+        return str(self._memo[key])
+
+    def _forcing_code(self, a: Series, frequency: tuple[Expr, Expr], k: int, part: str, amplitude: str) -> str:
+        if k == 0:
+            return f"{amplitude} * {self._harmonic(a, 0, part)}"
         rate = self._rate(frequency)
         if k == 1:
-            other = self._harmonic(a, 0, "cosine" if part == "sine" else "sine")
-            product = self._assign(f"{rate} * {other}")
-            return product if part == "sine" else self._assign(f"-{product}")
-        key = (frequency[0], 0, "squared")
-        if key not in self._memo:
-            self._memo[key] = self._assign(f"-({rate} * {rate})")
-        scaled = self._assign(f"{self._memo[key]} * {1.0 / (k * (k - 1))!r}")
-        return self._assign(f"{scaled} * {self._harmonic(a, k - 2, part)}")
+            other = "cosine" if part == "sine" else "sine"
+            first = self._forcing(a, frequency, 0, other, amplitude) if amplitude else self._harmonic(a, 0, other)
+            return f"{rate} * {first}" if part == "sine" else f"-({rate} * {first})"
+        squared = (frequency[0], 0, "squared")
+        if squared not in self._memo:
+            self._memo[squared] = self._assign(f"-({rate} * {rate})")
+        share = (frequency[0], k, "share")
+        if share not in self._memo:
+            self._memo[share] = self._assign(f"{self._memo[squared]} * {1.0 / (k * (k - 1))!r}")
+        before = self._forcing(a, frequency, k - 2, part, amplitude) if amplitude or k > 2 else self._harmonic(a, 0, part)
+        return f"{self._memo[share]} * {before}"
 
     # -- functions through their differential equations -------------------------------------------------------------------------
     def _tan(self, series: Series, k: int, part: str = "") -> str | None:

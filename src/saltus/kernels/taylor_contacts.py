@@ -5,9 +5,7 @@ import math
 from saltus.kernels.isolation import AT, MARGIN, MOST_TOUCHES, ROUNDING, TOUCH_AT, TOUCH_GUARD, first_crossing, is_exact_zero, leading_sign
 from saltus.kernels.status import (
     BUDGET_EVENTS,
-    CONTACT_SPEED,
     CROSSING,
-    EVENTS,
     GRAZE,
     GRAZE_SHALLOW,
     GRAZES,
@@ -25,7 +23,6 @@ from saltus.kernels.status import (
     RECORD_FLOATS,
     RUNNING,
     SLIDING,
-    UNRESOLVED,
     VIOLATIONS,
 )
 
@@ -134,7 +131,10 @@ def note_touch(lanes, lane, batch, slow, g, d, start):
     who, kind = lanes.memo[lane, WHO], GRAZE if touches_exactly(lanes, lane, g, d, slow) else GRAZE_SHALLOW
     state_at(lanes, lane, d, slow.state)
     mode, side = mode_of(lanes, lane), int(lanes.side[g, lane])
-    batch.counters[who, GRAZES if kind == GRAZE else UNRESOLVED] += 1
+    if kind == GRAZE:
+        batch.counters[who, GRAZES] += 1
+    else:
+        lanes.run[SHALLOW, lane] += 1.0
     if not recorded(lanes, lane, batch):
         return
     curve = 2.0 * abs(lanes.work[GUARD_ROW[g] + 2, lane])
@@ -227,19 +227,19 @@ def change_side(lanes, lane, batch, g, rate, before, slow):
     who = lanes.memo[lane, WHO]
     velocity = rate * lanes.side[g, lane]
     lanes.side[g, lane] = -lanes.side[g, lane]
-    if lanes.memo[lane, STARTING] == 1:  # the side at the start is an initial condition, no event; a sample taken there had to guess it
+    if lanes.run[STARTING, lane] > 0.5:  # the side at the start is an initial condition, no event; a sample taken there had to guess it
         for m in range(batch.cursor[who]):
             batch.sample_mode[who, m] = mode_of(lanes, lane)
         return
     if TANGENT:
         saltate(lanes, lane, batch, g, before, slow)
-    if lanes.memo[lane, BOUNCES] > 1:
+    if lanes.run[BOUNCES, lane] > 1.5:
         return  # a return with no time passed was recorded when it came first
     shallow = is_shallow(lanes, lane, g, rate)
-    batch.counters[who, EVENTS] += 1
+    lanes.run[MET, lane] += 1.0
     if shallow:
-        batch.counters[who, UNRESOLVED] += 1
-    batch.minima[who, CONTACT_SPEED] = min(batch.minima[who, CONTACT_SPEED], abs(rate))
+        lanes.run[SHALLOW, lane] += 1.0
+    lanes.run[SLOWEST, lane] = min(lanes.run[SLOWEST, lane], abs(rate))
     if not recorded(lanes, lane, batch):
         return
     for i in range(NSTATES):
@@ -267,9 +267,9 @@ def note_arrival(lanes, lane):
     now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
     arrived = lanes.found[DELTA, lane] > 0.0 or now != lanes.run[LANDED, lane]
     if arrived:
-        lanes.memo[lane, BOUNCES], lanes.memo[lane, STARTING], lanes.run[LANDED, lane] = 0, 0, now
+        lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[LANDED, lane] = 0.0, 0.0, now
     else:
-        lanes.memo[lane, BOUNCES] += 1
+        lanes.run[BOUNCES, lane] += 1.0
     return arrived
 
 
@@ -291,6 +291,6 @@ def land_all(lanes, lane, batch, hits, slow):
                 change_side(lanes, lane, batch, g, rate, mode_of(lanes, lane), slow)
             else:
                 land(lanes, lane, batch, g, rate, slow)
-    if lanes.memo[lane, BOUNCES] > MOST_BOUNCES:
+    if lanes.run[BOUNCES, lane] > MOST_BOUNCES:
         return SLIDING
-    return BUDGET_EVENTS if batch.counters[who, EVENTS] >= batch.options[2] else RUNNING
+    return BUDGET_EVENTS if lanes.run[MET, lane] >= batch.options[2] else RUNNING

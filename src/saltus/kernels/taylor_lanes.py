@@ -7,7 +7,10 @@ import numpy as np
 from saltus.kernels.batch import Batch
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.kernels.status import (
+    BUDGET_EVENTS,
     BUDGET_STEPS,
+    CONTACT_SPEED,
+    EVENTS,
     FINISHED,
     GAP_MARGIN,
     GRAZE_UNRESOLVED,
@@ -102,7 +105,7 @@ def end_stretch(lanes, lane, batch, slow):
     final_contacts(lanes, lane, batch, slow)
     if lanes.memo[lane, RESTS] != 0:
         return RESTING
-    return GRAZE_UNRESOLVED if batch.counters[who, UNRESOLVED] > 0 else OK
+    return GRAZE_UNRESOLVED if lanes.run[SHALLOW, lane] > 0.0 else OK
 
 
 @inner
@@ -143,6 +146,8 @@ def attend(lanes, lane, batch, slow):
         status = end_stretch(lanes, lane, batch, slow)
     if status == RUNNING and lanes.run[TAKEN, lane] > batch.options[1]:
         status = BUDGET_STEPS
+    if status == RUNNING and lanes.run[MET, lane] >= batch.options[2]:
+        status = BUDGET_EVENTS
     lanes.memo[lane, DECIDED] = 0
     return status
 
@@ -155,7 +160,7 @@ def start_sides(lanes, lane, batch, slow):
     for g in range(NGUARDS):
         lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
         lanes.fresh[g, lane] = 1.0 if slow.gaps[g] == 0.0 else 0.0
-    lanes.memo[lane, STARTING] = 1
+    lanes.run[STARTING, lane] = 1.0
     lanes.run[LANDED, lane] = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
 
 
@@ -170,7 +175,9 @@ def fill(lanes, lane, who, batch, slow):
     lanes.clock[TAU, lane] = batch.phase[who]
     set_period(lanes, lane, batch)
     lanes.run[TAKEN, lane] = batch.counters[who, STEPS]
-    lanes.run[LEAST, lane] = batch.minima[who, GAP_MARGIN]
+    lanes.run[MET, lane], lanes.run[SHALLOW, lane] = batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED]
+    lanes.run[LEAST, lane], lanes.run[SLOWEST, lane] = batch.minima[who, GAP_MARGIN], batch.minima[who, CONTACT_SPEED]
+    lanes.run[BOUNCES, lane], lanes.run[STARTING, lane] = 0.0, 0.0
     lanes.run[ACTIVE, lane] = 1.0
     for i in range(NSTATES):
         lanes.y[i, lane] = batch.state[who, i]
@@ -186,7 +193,7 @@ def fill(lanes, lane, who, batch, slow):
         lanes.side[g, lane] = 1.0 if (batch.mode[who] >> g) & 1 else -1.0
         lanes.fresh[g, lane] = 1.0 if (batch.fresh[who] >> g) & 1 else 0.0
     lanes.run[LANDED, lane] = batch.carry[who, 0]
-    lanes.memo[lane, BOUNCES], lanes.memo[lane, STARTING] = int(batch.carry[who, 1]), int(batch.carry[who, 2])
+    lanes.run[BOUNCES, lane], lanes.run[STARTING, lane] = batch.carry[who, 1], batch.carry[who, 2]
 
 
 @kernel
@@ -205,9 +212,10 @@ def empty(lanes, lane, batch, status):
     for g in range(NGUARDS):
         batch.carry[who, CARRIED + g] = lanes.prior[PRIOR_ROWS * g + NEW, lane]
     batch.carry[who, 0] = lanes.run[LANDED, lane]
-    batch.carry[who, 1], batch.carry[who, 2] = lanes.memo[lane, BOUNCES], lanes.memo[lane, STARTING]
+    batch.carry[who, 1], batch.carry[who, 2] = lanes.run[BOUNCES, lane], lanes.run[STARTING, lane]
     batch.counters[who, STEPS] = int(lanes.run[TAKEN, lane])
-    batch.minima[who, GAP_MARGIN] = lanes.run[LEAST, lane]
+    batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED] = int(lanes.run[MET, lane]), int(lanes.run[SHALLOW, lane])
+    batch.minima[who, GAP_MARGIN], batch.minima[who, CONTACT_SPEED] = lanes.run[LEAST, lane], lanes.run[SLOWEST, lane]
     lanes.run[ACTIVE, lane] = 0.0
     lanes.memo[lane, WHO] = -1
 
@@ -226,6 +234,13 @@ def refill(lanes, lane, cursor, batch, slow):
 
 
 # -- the whole batch -----------------------------------------------------------------------------------------------------------
+def rows_of_lanes(count):
+    """Zeros float64[count, LANES] that begin at a cache line: a row that lies in two costs twice."""
+    room = np.zeros(count * LANES + 8)
+    first = -room.ctypes.data // 8 % 8
+    return room[first : first + count * LANES].reshape(count, LANES)
+
+
 def workspace():
     """The memory that one call of `propagate` works in; one set for each thread."""
     guards = max(NGUARDS, 1)
@@ -234,7 +249,7 @@ def workspace():
         prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS, probe_y=NSTATES,
         probe_clock=TURN + NTURNS, probe_rate=3 * NSTATES,
     )  # fmt: skip
-    lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: np.zeros((count, LANES)) for name, count in rows.items()})
+    lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: rows_of_lanes(count) for name, count in rows.items()})
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)), bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
         out=np.zeros(2), gaps=np.zeros(guards), state=np.zeros(NSTATES), touches=np.zeros((MOST_TOUCHES, 2)),
@@ -272,22 +287,24 @@ def propagate(period, origin, param, stride, state, count, phase, mode, fresh, c
     roomy = rec_i.shape[0] - 2 * LANES * (NGUARDS + 1)
     following = 0
     busy = 0
-    for lane in range(LANES):
-        lanes.run[END, lane], lanes.run[ACTIVE, lane] = 1.0, 0.0
-        lanes.clock[TAU, lane], lanes.memo[lane, WHO] = 0.0, -1
+    store(lanes.run, END, splat(1.0, LANES))
+    store(lanes.run, ACTIVE, splat(0.0, LANES))
+    store(lanes.clock, TAU, splat(0.0, LANES))
+    lanes.memo[:, WHO] = -1
     for lane in range(LANES):
         following = refill(lanes, lane, following, batch, slow)
         busy += lanes.run[ACTIVE, lane] > 0.5
     while busy > 0 and budget > 0 and (roomy <= 0 or rec_used[0] <= roomy):
         budget -= 1
         attention = step_all(lanes, batch, slow)
-        for lane in range(LANES):
-            if (attention >> lane) & 1:
-                outcome = attend(lanes, lane, batch, slow)
-                if outcome != RUNNING:
-                    empty(lanes, lane, batch, outcome)
-                    following = refill(lanes, lane, following, batch, slow)
-                    busy -= lanes.run[ACTIVE, lane] < 0.5
+        while attention != 0:
+            lane = lowest_bit(attention)
+            attention &= attention - 1
+            outcome = attend(lanes, lane, batch, slow)
+            if outcome != RUNNING:
+                empty(lanes, lane, batch, outcome)
+                following = refill(lanes, lane, following, batch, slow)
+                busy -= lanes.run[ACTIVE, lane] < 0.5
     for lane in range(LANES):
         if lanes.run[ACTIVE, lane] > 0.5:
             empty(lanes, lane, batch, RUNNING)

@@ -1,8 +1,9 @@
 """Template, 1 of 4 of the Taylor flow: what its work arrays hold. codegen puts a generated head before the four.
 
-One step of all lanes reads: jets -> step length -> locate contacts -> advance (taylor_step.py), then attend to the lanes where something
-happened: a contact (taylor_contacts.py), the end of a period, a sample, the end (taylor_lanes.py). Steps are arithmetic on lanes without
-branches on their contents, or with branches that only skip work; so a trajectory's digits don't depend on its neighbours.
+One step of all lanes reads: jets -> step length -> locate contacts -> advance and land (taylor_step.py), then attend to the lanes where
+more happened: a contact to be recorded or hard to settle (taylor_contacts.py), the end of a period, a sample, the end (taylor_lanes.py).
+Steps are arithmetic on lanes without branches on their contents, or with branches that only skip work; so a trajectory's digits don't
+depend on its neighbours.
 
 Symbols
 -------
@@ -21,19 +22,19 @@ from collections import namedtuple
 # Rows of `clock`: phase, time at phase zero, then one phase offset for each harmonic of the forcing.
 TAU, BASE, TURN = 0, 1, 2
 # Rows of `run`: the phase at which the current stretch ends, the next sample's phase, steps taken, smallest gap margin, active (0/1), the
-# step length, the phase at its start, time of the last landing.
-END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED = range(8)
-RUN_ROWS = 8
+# step length, the phase at its start, time of the last landing, contacts in a row without time passing, whether the mode at the start is
+# still being settled (0/1); contacts so far, those too shallow to be sure of, the slowest.
+END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED, BOUNCES, STARTING, MET, SHALLOW, SLOWEST = range(13)
+RUN_ROWS = 13
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
 # Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when;
 # of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1).
 DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, FOUND_ROWS = range(9)
-# Columns of `memo`: trajectory, periods, contacts in a row without time passing, whether its mode at the start is still being settled,
-# whether the slow path has decided this step, guards that it found to cross (bits), guards on which the state rests (bits), whether a
-# harmonic of time has another phase in every period.
-WHO, COUNT, BOUNCES, STARTING, DECIDED, HITS, RESTS, DRIFTS = range(8)
-MEMO = 8
+# Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that it found to cross (bits), guards on
+# which the state rests (bits), whether a harmonic of time has another phase in every period.
+WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS = range(6)
+MEMO = 6
 # Rows of `prior`, for each guard: the size of the terms of its gap up to the step before, and up to this one, each step counting half of
 # the one after it; their rounding is inherited.
 OLD, NEW, PRIOR_ROWS = range(3)

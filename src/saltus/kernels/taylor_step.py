@@ -144,7 +144,8 @@ def locate(lanes, h):
         noise = ROUNDING * (size + inherited)
         bend = 2.0 * p2
         turns = (p1 < 0.0) & (p1 + bend > 0.0)
-        vertex = p0 - p1 * p1 / (2.0 * bend)
+        flat_at = -p1 / bend  # where the quadratic part turns
+        vertex = p0 + 0.5 * p1 * flat_at
         lowest = select(turns, vertex, smaller(p0, p0 + p1 + p2)) + smaller(p3, 0.0)
         falls = p1 + larger(bend, 0.0) + larger(3.0 * p3, 0.0) + 0.5 * rest < 0.0
         rises = p1 + smaller(bend, 0.0) + smaller(3.0 * p3, 0.0) - 0.5 * rest > 0.0
@@ -155,7 +156,8 @@ def locate(lanes, h):
         clear = inside & (((falls | rises | concave) & (end > noise)) | (6.0 * (lowest - noise) > rest))
         crosses = active & inside & (((end < -noise) & (falls | concave | convex)) | dips)
         returns = clear & (~on_boundary) & (a1 < 0.0) & (s * load(bounds, j + SLOPE_AT_END, LANES) > 0.0)
-        place, depth = turning_point(a0, a1, a2, a3)
+        place = larger(smaller(flat_at, 1.0), 0.0)
+        depth = fma(fma(fma(a3, place, a2), place, a1), place, a0)
         nearer = returns & (depth < margin)
         margin, turned_at = select(nearer, depth, margin), select(nearer, place * h, turned_at)
         taken = which >= 0.0
@@ -176,15 +178,6 @@ def locate(lanes, h):
     which = select(undecided, -1.0, which)
     store(lanes.found, WHICH, which)
     return undecided
-
-
-@inner
-def turning_point(a0, a1, a2, a3):
-    """Place on [0, 1] and depth of a gap's minimum, from its cubic: the vertex of its quadratic part and one Newton step."""
-    x = larger(smaller(-a1 / (2.0 * a2), 1.0), 0.0)
-    x = x - fma(fma(3.0 * a3, x, 2.0 * a2), x, a1) / fma(6.0 * a3, x, 2.0 * a2)
-    x = larger(smaller(x, 1.0), 0.0)
-    return x, fma(fma(fma(a3, x, a2), x, a1), x, a0)
 
 
 @inner
@@ -287,8 +280,8 @@ def state_after(work, base, d):
 
 
 @inner
-def advance(lanes, room, most_steps):
-    """Evaluate the states at the end of the step, move the clock; returns the lanes that need attention."""
+def advance(lanes, room, options, records):
+    """Evaluate the states at the end of the step, move the clock, land where that is simple; returns the lanes that need attention."""
     work, clock, run = lanes.work, lanes.clock, lanes.run
     d = load(lanes.found, DELTA, LANES)
     turned = load(lanes.found, TURNED, LANES) <= d
@@ -311,8 +304,42 @@ def advance(lanes, room, most_steps):
     store(run, START, start)
     taken = load(run, TAKEN, LANES) + 1.0
     store(run, TAKEN, taken)
-    due = (tau >= end) | (tau >= load(run, DUE, LANES)) | (load(lanes.found, WHICH, LANES) >= 0.0)
-    return (load(run, ACTIVE, LANES) > 0.5) & (due | (~(total < HUGE)) | (taken > most_steps))
+    due = (tau >= end) | (tau >= load(run, DUE, LANES)) | (~(total < HUGE)) | (taken > options[1])
+    crosses = load(lanes.found, WHICH, LANES) >= 0.0
+    if TANGENT or records:
+        due = due | crosses
+    else:
+        land_simply(lanes, crosses & (~due), tau)
+        due = due | (load(run, MET, LANES) >= options[2]) | (load(lanes.found, WHICH, LANES) >= 0.0)
+    return (load(run, ACTIVE, LANES) > 0.5) & due
+
+
+@inner
+def land_simply(lanes, simple, tau):
+    """Land the lanes in which Newton's method found one contact, nothing else happens, and nobody records it: `land_all`, on lanes."""
+    run, found, prior = lanes.run, lanes.found, lanes.prior
+    which, rate, h = load(found, WHICH, LANES), magnitude(load(found, RATE, LANES)), load(run, STEP, LANES)
+    depth = rate * rate * h * h
+    shallow = load(run, SHALLOW, LANES)
+    for g in range(NGUARDS):
+        here = simple & (magnitude(which - g) < 0.5)
+        j = BOUNDS * GUARD_SERIES[g]
+        curvature = 2.0 * (magnitude(load(lanes.bounds, j + QUADRATIC, LANES)) + 3.0 * magnitude(load(lanes.bounds, j + CUBIC, LANES)))
+        size = load(prior, PRIOR_ROWS * g + NEW, LANES) + load(prior, PRIOR_ROWS * g + OLD, LANES)
+        shallow = shallow + select(here & (depth <= 2.0 * ROUNDING * size * curvature), splat(1.0, LANES), 0.0)
+        side = load(lanes.side, g, LANES)
+        store(lanes.side, g, select(here, -side, side))
+        store(lanes.fresh, g, select(here, 1.0, load(lanes.fresh, g, LANES)))
+        if SNAP_STATE[g] >= 0:
+            store(lanes.y, SNAP_STATE[g], select(here, load(lanes.c, SNAP_CONST[g], LANES), load(lanes.y, SNAP_STATE[g], LANES)))
+    store(run, SHALLOW, shallow)
+    met, slowest = load(run, MET, LANES), load(run, SLOWEST, LANES)
+    store(run, MET, select(simple, met + 1.0, met))
+    store(run, SLOWEST, select(simple, smaller(rate, slowest), slowest))
+    store(run, LANDED, select(simple, tau + load(lanes.clock, BASE, LANES), load(run, LANDED, LANES)))
+    store(run, BOUNCES, select(simple, 0.0, load(run, BOUNCES, LANES)))
+    store(run, STARTING, select(simple, 0.0, load(run, STARTING, LANES)))
+    store(found, WHICH, select(simple, -1.0, which))
 
 
 @inner
@@ -326,7 +353,8 @@ def step_all(lanes, batch, slow):
     store(lanes.run, STEP, h)
     undecided = refine_crossings(lanes, h, locate(lanes, h))
     open_lanes = bits(undecided)
-    for lane in range(LANES):
-        if (open_lanes >> lane) & 1:
-            decide(lanes, lane, batch, slow)
-    return open_lanes | bits(advance(lanes, room, batch.options[1]))
+    waiting = open_lanes
+    while waiting != 0:
+        decide(lanes, lowest_bit(waiting), batch, slow)
+        waiting &= waiting - 1
+    return open_lanes | bits(advance(lanes, room, batch.options, batch.rec_i.shape[0] > 0))

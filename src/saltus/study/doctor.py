@@ -46,7 +46,7 @@ def machine() -> TextTable:
     rows = [
         *versions().items(),
         ("processor", f"{processor()}, {os.cpu_count()} threads, {_usable()} usable"),
-        ("lanes", f"{lane_width()} trajectories in one instruction"),
+        ("lanes", f"{lane_width()} trajectories in one step"),
         ("cache", f"{cache.folder()}: {len(entries)} entries, {sum(entry.size_bytes for entry in entries) / 1e6:.1f} MB"),
     ]
     return TextTable("saltus here", ("", ""), tuple(rows))
