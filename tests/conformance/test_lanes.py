@@ -120,13 +120,13 @@ def test_paused_and_resumed(batch, slice_, monkeypatch):
 @pytest.mark.parametrize("spare", [1, 2, 9])
 def test_table_of_contacts_that_fills_up(batch, spare, monkeypatch):
     """A table of contacts barely larger than what a step of all lanes may need: it is emptied again and again, nothing is lost."""
-    monkeypatch.setattr("saltus.flow.engine.RECORDS", 2 * 8 * 2 + spare)
+    monkeypatch.setattr("saltus.flow.engine.RECORDS", spare)
     assert _differing(_each(_run(values=_values())), _each(batch)) == {}
 
 
 def test_all_at_once(batch, monkeypatch):
     """Tiny chunks, slices and tables on two threads."""
-    for name, value in (("CHUNK", 3), ("SLICE", 5), ("RECORDS", 40)):
+    for name, value in (("CHUNK", 3), ("SLICE", 5), ("RECORDS", 4)):
         monkeypatch.setattr(f"saltus.flow.engine.{name}", value)
     assert _differing(_each(_run(values=_values(), threads=2)), _each(batch)) == {}
 

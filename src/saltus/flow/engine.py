@@ -24,7 +24,7 @@ from saltus.system.system import System
 CHUNK = 1024
 #: Steps of the lanes between two looks at the keyboard: some ten milliseconds.
 SLICE = 50_000
-#: Contacts that a chunk's table holds before it is emptied.
+#: Contacts that a chunk's table holds before it is emptied, besides room for those of one step.
 RECORDS = 8192
 
 
@@ -204,9 +204,9 @@ def _cut(request: Request, whole: dict[str, np.ndarray], first: int, options: np
     return _Chunk(first, arrays, request.record_from is not None)
 
 
-def _open_tables(chunk: _Chunk) -> None:
+def _open_tables(chunk: _Chunk, module: ModuleType) -> None:
     """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no memory."""
-    size = RECORDS if chunk.keeps_contacts else 0
+    size = RECORDS + module.STEP_RECORDS if chunk.keeps_contacts else 0
     chunk.arrays["rec_i"] = np.zeros((size, st.RECORD_INTEGERS), np.int64)
     chunk.arrays["rec_f"] = np.zeros((size, st.RECORD_FLOATS + chunk.arrays["state"].shape[1] + 1))
 
@@ -265,7 +265,7 @@ def _run_chunks(
     def work(chunk: _Chunk) -> None:
         if not hasattr(local, "workspace"):
             local.workspace = module.workspace()
-        _open_tables(chunk)
+        _open_tables(chunk, module)
         _advance(chunk, module, local.workspace, stop)
 
     with ThreadPoolExecutor(workers) as pool:

@@ -82,7 +82,7 @@ class Taylor(Method):
         Size of the last two terms of a step relative to the leading ones [-]. The default, 2**-46, leaves 3e-15 m of error on the rig
         after five periods; 2**-52 leaves rounding only and costs a fifth more.
     lanes : int, optional
-        Trajectories moved at once: 2, 4 or 8. Default: what the processor does in one instruction. Results don't depend on it.
+        Trajectories moved at once: 2, 4, 8 or 16. Default: what suits the processor. Results don't depend on it.
     max_steps, max_events : int, optional
         Budgets of one trajectory; beyond them it stops with status ``budget_steps`` or ``budget_events``. Default: 10 000 steps per period
         and a million more; 10 million contacts.
@@ -101,8 +101,8 @@ class Taylor(Method):
     def __post_init__(self) -> None:
         _check_count("order", self.order, 6, 40)
         _check_positive("tolerance", self.tolerance)
-        if self.lanes not in (None, 2, 4, 8):
-            raise ParameterError(f"lanes must be 2, 4 or 8, not {self.lanes!r}.")
+        if self.lanes not in (None, 2, 4, 8, 16):
+            raise ParameterError(f"lanes must be 2, 4, 8 or 16, not {self.lanes!r}.")
         _check_count("max_steps", self.max_steps, 1)
         _check_count("max_events", self.max_events, 1)
 

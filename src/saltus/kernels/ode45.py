@@ -46,6 +46,8 @@ from saltus.kernels.status import (
 # and the error estimates of all steps so far, added up for each state.
 TIME, LEG, LENGTH, ERRORS = range(4)
 CARRY = ERRORS + NSTATES
+#: Records that one step may write at most.
+STEP_RECORDS = NGUARDS
 # Columns of `options`.
 RTOL, ATOL, LOCATE, MAX_STEPS, MAX_EVENTS = range(5)
 

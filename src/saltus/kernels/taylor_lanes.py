@@ -284,7 +284,7 @@ def propagate(period, origin, param, stride, state, count, phase, mode, fresh, c
         lane_memo,
     )
     slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches)
-    roomy = rec_i.shape[0] - 2 * LANES * (NGUARDS + 1)
+    roomy = rec_i.shape[0] - STEP_RECORDS
     following = 0
     busy = 0
     store(lanes.run, END, splat(1.0, LANES))
@@ -294,7 +294,7 @@ def propagate(period, origin, param, stride, state, count, phase, mode, fresh, c
     for lane in range(LANES):
         following = refill(lanes, lane, following, batch, slow)
         busy += lanes.run[ACTIVE, lane] > 0.5
-    while busy > 0 and budget > 0 and (roomy <= 0 or rec_used[0] <= roomy):
+    while busy > 0 and budget > 0 and (rec_i.shape[0] == 0 or rec_used[0] <= roomy):
         budget -= 1
         attention = step_all(lanes, batch, slow)
         while attention != 0:

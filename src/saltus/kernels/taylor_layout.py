@@ -19,6 +19,8 @@ work) and rates(y, side, c, clock, work), the right-hand side alone; PROBED says
 
 from collections import namedtuple
 
+from saltus.kernels.isolation import MOST_TOUCHES
+
 # Rows of `clock`: phase, time at phase zero, then one phase offset for each harmonic of the forcing.
 TAU, BASE, TURN = 0, 1, 2
 # Rows of `run`: the phase at which the current stretch ends, the next sample's phase, steps taken, smallest gap margin, active (0/1), the
@@ -41,6 +43,8 @@ OLD, NEW, PRIOR_ROWS = range(3)
 # Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING, then NEW for each guard.
 CARRIED = 3
 CARRY = CARRIED + NGUARDS
+#: Records that one step may write at most: contacts and touches of all lanes, in the step and at the end of the run.
+STEP_RECORDS = 2 * LANES * (NGUARDS + MOST_TOUCHES)
 #: Times within this many ulp are one event (EVENTS.md, rule 6).
 COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
