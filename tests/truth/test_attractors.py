@@ -136,15 +136,16 @@ def test_labels_do_not_depend_on_the_order_of_the_starts_or_on_threads(five):
 
 
 def test_a_weakly_damped_rig_settles_to_periodic_orbits_too():
-    """zeta = 1e-3: a residue needs 2199 periods to fall to 1e-6. Followed for 30 000 periods both starts repeat, after 5 and 3."""
+    """zeta = 1e-3: a residue needs 2199 periods to fall to 1e-6. Followed for 30 000 periods both starts repeat; after how many, rounding
+    decides in the chaos before."""
     rig = sl.models.delangre("b", damping_ratio=1e-3)
     starts = np.array([[1e-3, 0.1], [0.0, 0.0]])
-    end = sl.stroboscope(rig, starts, periods=30_000, keep=6)
-    for i, n in ((0, 5), (1, 3)):
-        assert abs(end.x.values[i, 5] - end.x.values[i, 5 - n]) < 1e-15
+    x = sl.stroboscope(rig, starts, periods=30_000, keep=65).x.values
+    repeats = np.abs(x[:, -1:] - x[:, -2::-1]) < 1e-15
+    assert repeats.any(axis=1).all()
     ds = attractors(rig, starts, periods=20_000, progress=False)
-    assert ds.attractor_type.values.tolist() == ["periodic"] * 2
-    assert ds.attractor_period.values[ds.basin.values].tolist() == [5, 3]
+    assert ds.attractor_type.values.tolist() == ["periodic"] * ds.sizes["attractor"]
+    assert ds.attractor_period.values[ds.basin.values].tolist() == (1 + repeats.argmax(axis=1)).tolist()
     assert ds.attractor_exponent.values == pytest.approx(SPIRAL / 30, rel=1e-9)
 
 

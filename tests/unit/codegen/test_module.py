@@ -104,7 +104,7 @@ def test_the_processor_is_in_the_name(key, monkeypatch):
 
 @pytest.mark.parametrize(
     ("features", "lanes"),
-    [({"avx512f": True, "avx512dq": True, "avx2": True, "fma": True}, 8), ({"avx2": True, "fma": True}, 4), ({"avx2": True}, 2), ({}, 2)],
+    [({"avx512f": True, "avx512dq": True, "avx2": True, "fma": True}, 16), ({"avx2": True, "fma": True}, 4), ({"avx2": True}, 2), ({}, 2)],
 )
 def test_lane_width_is_the_processors(monkeypatch, features, lanes):
     monkeypatch.setattr(module.llvm, "get_host_cpu_features", lambda: features)

@@ -28,6 +28,7 @@ from saltus.kernels.lanes import (
     libm_tan,
     libm_tanh,
     load,
+    lowest_bit,
     magnitude,
     nearest_integer,
     root,
@@ -38,7 +39,7 @@ from saltus.kernels.lanes import (
 )
 
 JIT = not numba.config.DISABLE_JIT
-WIDTHS = (2, 4, 8)
+WIDTHS = (2, 4, 8, 16)
 SPECIAL = [0.0, -0.0, 1.0, -1.5, math.inf, -math.inf, math.nan, 5e-324, -1e308, 2.5, 3.5, -0.5, 1e-300, 7.0, -2.0, 0.3]
 
 
@@ -200,6 +201,15 @@ def test_load_store_and_splat_touch_their_row_only():
     assert target.tolist() == [[7.0] * 4, [-1.0] * 4, [8.0, 9.0, 10.0, 11.0]]
     target[2] = 0.0
     assert source[2].tolist() == [8.0, 9.0, 10.0, 11.0]
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 6, 40, 2**15, 2**62, 2**62 + 8])
+def test_the_lowest_bit(number):
+    lowest = 0
+    while not (number >> lowest) & 1:
+        lowest += 1
+    assert lowest_bit(number) == lowest
+    assert njit(lambda value: lowest_bit(value))(number) == lowest
 
 
 def test_every_operation_is_tried_here():
