@@ -137,7 +137,8 @@ def test_labels_do_not_depend_on_the_order_of_the_starts_or_on_threads(five):
 
 def test_a_weakly_damped_rig_settles_to_periodic_orbits_too():
     """zeta = 1e-3: a residue needs 2199 periods to fall to 1e-6. Followed for 30 000 periods both starts repeat; after how many, rounding
-    decides in the chaos before."""
+    decides in the chaos before.
+    """
     rig = sl.models.delangre("b", damping_ratio=1e-3)
     starts = np.array([[1e-3, 0.1], [0.0, 0.0]])
     x = sl.stroboscope(rig, starts, periods=30_000, keep=65).x.values

@@ -195,14 +195,11 @@ def record(lanes, lane, batch, tau, g, direction, velocity, kind, before, after,
 
 @inner
 def time_error(lanes, lane, batch, g, rate, tau):
-    """Local error of a contact's time: truncation and rounding of the gap's terms over its rate, and the rounding of the clock.
-
-    Rounding counts twice: in the terms themselves, and in their sum.
-    """
+    """Local error of a contact's time: truncation and rounding of the gap's terms over its rate, and the rounding of the clock."""
     if rate == 0.0:
         return math.inf
     size = lanes.prior[PRIOR_ROWS * g + NEW, lane]
-    return (2.0 * ROUNDING + 2.0 ** batch.options[0]) * size / abs(rate) + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
+    return (ROUNDING + 2.0 ** batch.options[0]) * size / abs(rate) + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
 
 
 @inner
