@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextvars import copy_context
 from dataclasses import dataclass, field
 from types import ModuleType
 
@@ -271,7 +272,7 @@ def _run_chunks(
     with ThreadPoolExecutor(workers) as pool:
         waiting: set[Future] = set()
         try:
-            waiting |= {pool.submit(work, chunk) for chunk in chunks}
+            waiting |= {pool.submit(copy_context().run, work, chunk) for chunk in chunks}  # the caller's np.errstate holds there too
             while waiting:
                 done, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
                 for future in done:
