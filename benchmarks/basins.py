@@ -12,6 +12,7 @@ saltus and heyoka are also compared with themselves at another tolerance (the fl
     python benchmarks/basins.py                 200 x 200 cells
     python benchmarks/basins.py --cells 60      smaller (or larger)
     python benchmarks/basins.py --alone         saltus only
+    python benchmarks/basins.py --write FOLDER  keep the tables for the documentation (python -m benchmarks does that)
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from saltus.study.doctor import processor
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from benchmarks.record import Column, Record, Table
 from benchmarks.rivals import rig
 
 #: Periods that rivals let a trajectory settle, and those they look at: all but some 5 of 2000 cells follow an orbit then.
@@ -47,6 +49,12 @@ LOOK = 12
 TOLERANCE, OTHER_TOLERANCE = 1e-12, 2.0**-52
 #: Periods to settle that the cells are sorted by in the second table.
 SETTLING = (0, 50, 100, 150, 200, 300, 10_000)
+#: What is kept for the documentation.
+COLUMNS = (
+    Column("program"), Column("CPU time of the map [s]", ".1f"), Column("wall time [s]", ".1f"), Column("CPU, times saltus", ".3g"),
+    Column("same label as saltus", ".1%"), Column("cells timed", "d"),
+)  # fmt: skip
+FLOOR_COLUMNS = (Column("programs"), Column("same label", ".1%"), Column("cells", "d"))
 
 
 @dataclass(frozen=True)
@@ -131,12 +139,18 @@ def subset_of(ds: xr.Dataset, count: int, seed: int = 15) -> Subset:
 
 
 # -- rivals --------------------------------------------------------------------------------------------------------------------
-def heyoka(subset: Subset, orbits: Sequence[np.ndarray], whole: int) -> Iterator[Rival]:
+def absent(left_out: list[str], what: str) -> None:
+    """Say, and note, that a rival isn't there."""
+    left_out.append(what)
+    print(f"{what}; left out", file=sys.stderr)
+
+
+def heyoka(subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_out: list[str]) -> Iterator[Rival]:
     """heyoka at two tolerances, and with a loop that stops early; nothing if it isn't installed."""
     try:
         from benchmarks.rivals import heyoka_basins
     except ImportError:
-        print("heyoka isn't installed (pip install 'saltus[reference]'); left out", file=sys.stderr)
+        absent(left_out, "heyoka isn't installed (pip install 'saltus[reference]')")
         return
     plain, early = heyoka_basins.labels, heyoka_basins.labels_early
     for name, tolerance, labels, periods in (
@@ -149,12 +163,12 @@ def heyoka(subset: Subset, orbits: Sequence[np.ndarray], whole: int) -> Iterator
         yield Rival(name, seconds.scaled(whole / subset.cells.size), found, subset.cells.size)  # type: ignore[arg-type]
 
 
-def pynamicalsys(subset: Subset, orbits: Sequence[np.ndarray], whole: int) -> Iterator[Rival]:
+def pynamicalsys(subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_out: list[str]) -> Iterator[Rival]:
     """pynamicalsys; nothing if it isn't installed."""
     try:
         from benchmarks.rivals import pynamicalsys_basins
     except ImportError:
-        print("pynamicalsys isn't installed (pip install pynamicalsys); left out", file=sys.stderr)
+        absent(left_out, "pynamicalsys isn't installed (pip install pynamicalsys)")
         return
     program = pynamicalsys_basins.Rig()
     seconds, clusters = timed(lambda: program.clusters(subset.x, subset.v, PERIODS + KEEP))
@@ -215,21 +229,26 @@ def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> N
     print(f"Cells that change in neither: saltus and heyoka name the same attractor on {percent(same[our_own & their_own])}")
 
 
-def rows(make: Callable[..., Iterator[Rival]], subset: Subset, ds: xr.Dataset, unit: Seconds) -> list[Rival]:
+def rows(make: Callable[..., Iterator[Rival]], subset: Subset, ds: xr.Dataset, unit: Seconds, left_out: list[str]) -> list[Rival]:
     """Run and print one program's rows; no rows if it isn't installed."""
     rivals = []
-    for rival in make(subset, orbits_of(ds), ds.basin.size):
+    for rival in make(subset, orbits_of(ds), ds.basin.size, left_out):
         rivals.append(rival)
         same = equal(subset.labels, rival.labels)
         print(line(rival.name, rival.seconds, unit, percent(same), f"{rival.cells}, scaled"), flush=True)
     return rivals
 
 
-def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int) -> None:
-    """Print the rivals' rows, the floors, and what is wrong where labels differ."""
+def kept_row(name: str, seconds: Seconds, unit: Seconds, same: float | None, cells: int) -> tuple[str | float | None, ...]:
+    """One row of what is kept."""
+    return name, seconds.cpu, seconds.wall, seconds.cpu / unit.cpu, same, cells
+
+
+def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: list[str]) -> tuple[list[tuple], list[tuple]]:
+    """Print the rivals' rows, the floors, and what is wrong where labels differ; returns the rows of both tables to be kept."""
     with one_core():
-        taylor = rows(heyoka, subset, ds, unit)
-        rivals = taylor + rows(pynamicalsys, subset.first(few), ds, unit)
+        taylor = rows(heyoka, subset, ds, unit, left_out)
+        rivals = taylor + rows(pynamicalsys, subset.first(few), ds, unit, left_out)
         _, again = ours(len(ds.x), 1, method=sl.Taylor(tolerance=OTHER_TOLERANCE))
     other = sl.compare(ds, again)["basin_b"].values.ravel()
     floor = equal(ds.basin.values.ravel(), other)
@@ -240,7 +259,10 @@ def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int) -> None:
         pairs["heyoka, heyoka at 2^-52"] = equal(taylor[0].labels, taylor[1].labels)
         print(f"  heyoka {percent(pairs['heyoka, heyoka at 2^-52'])}")
         reasons(subset, other[subset.cells], *taylor[:2])
-    by_settling(subset, pairs | {f"saltus, {rival.name}": equal(subset.labels[: rival.cells], rival.labels) for rival in rivals})
+    agreeing = {rival.name: equal(subset.labels[: rival.cells], rival.labels) for rival in rivals}
+    by_settling(subset, pairs | {f"saltus, {name}": same for name, same in agreeing.items()})
+    kept = [kept_row(rival.name, rival.seconds, unit, float(agreeing[rival.name].mean()), rival.cells) for rival in rivals]
+    return kept, [(name, float(same.mean()), int(same.size)) for name, same in pairs.items()]
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -251,6 +273,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--few", type=int, default=400, help="cells that pynamicalsys labels")
     parser.add_argument("--repeats", type=int, default=3, help="runs of ours, of which the fastest counts")
     parser.add_argument("--alone", action="store_true", help="saltus only")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="keep the tables there as basins.json")
     chosen = parser.parse_args(argv)
     ours(6, 1)  # compiles
     heading(chosen.cells)
@@ -259,8 +282,18 @@ def main(argv: Sequence[str] | None = None) -> None:
     print(line("saltus, 1 thread", unit, unit, "", "all cells"), flush=True)
     seconds, _ = ours(chosen.cells, 2, repeats=chosen.repeats)
     print(line("saltus, 2 threads", seconds, unit, "", "all cells"), flush=True)
+    record = Record("basins", f"Basins of case b4 of the rig of de Langre et al. at 15 Hz, {chosen.cells} x {chosen.cells} cells; rivals on one "
+                    "pinned core, timed on a random subset and scaled to the whole map. Finding the attractors is part of saltus's time; "
+                    "rivals are given the orbits to compare with.")  # fmt: skip
+    kept = [kept_row(f"saltus, {n} thread{'s' * (n > 1)}", time_, unit, None, ds.basin.size) for n, time_ in ((1, unit), (2, seconds))]
+    floor: list[tuple] = []
     if not chosen.alone:
-        beside(ds, unit, subset_of(ds, chosen.subset), chosen.few)
+        theirs, floor = beside(ds, unit, subset_of(ds, chosen.subset), chosen.few, record.left_out)
+        kept += theirs
+    if chosen.write is not None:
+        record.tables.append(Table("A map of basins", COLUMNS, kept))
+        record.tables.append(Table("The floor: programs beside themselves at another tolerance", FLOOR_COLUMNS, floor))
+        print(f"kept in {record.write(chosen.write)}")
 
 
 if __name__ == "__main__":

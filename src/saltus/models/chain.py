@@ -20,21 +20,21 @@ def chain(**values: Any) -> System:
 
     States are the displacements ``x1``, ``x2`` [m] and velocities ``v1``, ``v2`` [m/s]; it is forced at ``frequency``.
 
-    ==========================  ========  =================================================
-    parameter                   default   meaning
-    ==========================  ========  =================================================
+    ==========================  =========  =================================================
+    parameter                   default    meaning
+    ==========================  =========  =================================================
     first_mass, second_mass     1, 0.5 kg
-    ground_stiffness            1 kN/m    spring from the ground to the first mass
-    coupling_stiffness          400 N/m   spring between the masses
-    ground_damping              4 N*s/m   damper from the ground to the first mass
-    coupling_damping            2 N*s/m   damper between the masses
-    ground_contact_stiffness    20 kN/m   contact at x1 = -ground_gap, ground_gap
+    ground_stiffness            1 kN/m     spring from the ground to the first mass
+    coupling_stiffness          400 N/m    spring between the masses
+    ground_damping              4 N*s/m    damper from the ground to the first mass
+    coupling_damping            2 N*s/m    damper between the masses
+    ground_contact_stiffness    20 kN/m    contact at x1 = -ground_gap, ground_gap
     ground_gap                  1 mm
-    coupling_contact_stiffness  10 kN/m   contact at x2 - x1 = -coupling_gap, coupling_gap
+    coupling_contact_stiffness  10 kN/m    contact at x2 - x1 = -coupling_gap, coupling_gap
     coupling_gap                0.5 mm
-    force                       2 N       amplitude, on the first mass
-    frequency                   7 Hz      of the force
-    ==========================  ========  =================================================
+    force                       2 N        amplitude, on the first mass
+    frequency                   7 Hz       of the force
+    ==========================  =========  =================================================
 
     Parameters
     ----------
