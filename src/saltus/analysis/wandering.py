@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.flow.family import Family
 from saltus.flow.maps import Map
 
 #: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its way.
@@ -99,7 +100,7 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
     usable = [i for i in range(len(start)) if np.isfinite(points[i]).all() and not _settles(points[i], scale)]
     if not usable:
         return []
-    blocks = growth_rates(map_, start[usable], scale)
+    _, blocks = growth_rates(map_, start[usable], scale)
     groups: list[list[int]] = []
     trails = [Wandering("", 0.0, 0.0, points[i], scale) for i in usable]
     for i, trail in enumerate(trails):
@@ -108,7 +109,7 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
             groups.append([i])
         else:
             home.append(i)
-    kinds = [(group, _kind(blocks[:, group])) for group in groups]
+    kinds = [(group, kind_of_growth(blocks[:, group])) for group in groups]
     return [Wandering(*kind, points[usable[group[0]]], scale) for group, kind in kinds if kind is not None]
 
 
@@ -125,7 +126,7 @@ def mismatch(trail: np.ndarray, scale: np.ndarray) -> float:
     return min(float(np.abs((trail[-last:] - trail[-last - n : -n]) / scale).max()) for n in range(1, len(trail) // 2))
 
 
-def _kind(blocks: np.ndarray) -> tuple[str, float, float] | None:
+def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
     """(kind, exponent, its standard error) from growth rates per iterate, float64[blocks, members]; None if they don't say."""
     if not np.isfinite(blocks).all():
         return None
@@ -138,8 +139,8 @@ def _kind(blocks: np.ndarray) -> tuple[str, float, float] | None:
     return ("quasi_periodic", exponent, error) if abs(second.mean()) <= max(SURE * error, FLOOR) else None
 
 
-def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Growth rates per iterate of the largest direction, block by block, float64[blocks, k], of trajectories from float64[k, D]."""
+def growth_rates(map_: Map | Family, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction, block by block, float64[blocks, k]."""
     k, size = start.shape
     direction = np.zeros((k, size, size))
     direction[:, :, 0] = scale / math.sqrt(size)
@@ -151,7 +152,7 @@ def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> np.ndarray:
             growths.append(np.log(length) / BLOCK)
             direction = np.zeros((k, size, size))
             direction[:, :, 0] = image[:, :, 0] / length[:, None]
-    return np.array(growths[ALIGNING:])
+    return state, np.array(growths[ALIGNING:])
 
 
 def _alike(one: Wandering, other: Wandering) -> bool:
