@@ -23,15 +23,15 @@ CASES = {
         responses=Responses(NO_RESPONSE, np.zeros((0, 1)), np.zeros(0)), response_of=np.full((3, 2), -3), events=None
     ),
     "sweep": lambda: responses(starts=Starts(directions=["up", "down"])),
-    "no shares": lambda: responses(responses=dataclasses.replace(SAMPLED, samples=None, attractors=dataclasses.replace(TABLE, fractions=None))),
-}  # fmt: skip
+    "no shares": lambda: responses(responses=Responses(dataclasses.replace(TABLE, fractions=None), SAMPLED.place, SAMPLED.branch)),
+}
 
 
 @pytest.mark.parametrize("make", CASES.values(), ids=CASES)
 @pytest.mark.parametrize("netcdf3", [False, True])
 def test_a_file_brings_back_every_bit(make, netcdf3, tmp_path, monkeypatch):
     if netcdf3:
-        monkeypatch.setattr("saltus.results.export._has", lambda package: False)  # noqa: ARG005
+        monkeypatch.setattr("saltus.results.export._has", lambda package: False)
     ds = make()
     back = load(save(ds, tmp_path / "responses.nc"))
     xr.testing.assert_identical(back, ds)
