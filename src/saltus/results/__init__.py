@@ -6,12 +6,16 @@ from saltus.results.export import save, to_csv, to_mat, to_netcdf
 from saltus.results.files import ResultFileError, usable_folder
 from saltus.results.load import load
 from saltus.results.provenance import attributes, content_hash, describe
+from saltus.results.responses import Events, Responses, Starts, responses_dataset
 
 __all__ = [
     "AttractorTable",
     "Contacts",
+    "Events",
     "Guards",
+    "Responses",
     "ResultFileError",
+    "Starts",
     "agreement_dataset",
     "attractors_dataset",
     "attributes",
@@ -19,6 +23,7 @@ __all__ = [
     "content_hash",
     "describe",
     "load",
+    "responses_dataset",
     "save",
     "stroboscope_dataset",
     "to_csv",
