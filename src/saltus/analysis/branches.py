@@ -18,8 +18,9 @@ from saltus.results import AttractorTable
 
 #: Farthest that an orbit moves between two values, in units of its own range, and values over which a branch may be missing.
 LINK, MISSED = 0.35, 3
-#: A leading multiplier so near the unit circle, when a branch ends at the next value, has left it there.
-CRITICAL = 0.5
+#: A branch that ends folds if its leading multiplier is real and beyond this (it moves to 1 as the root of the distance), and sheds a torus
+#: if it is complex and beyond that.
+FOLDING, TURNING = 0.5, 0.95
 #: What is farther apart than any two responses.
 _NEVER = 1e6
 
@@ -114,9 +115,9 @@ def _end(found: Found, table: AttractorTable, last: int, values: np.ndarray, num
     starts = np.flatnonzero((found.of[here] >= 0) & (found.of[here] == last))
     if len(starts) and (found.steady.kind.reshape(found.of.shape)[beyond, starts] == CHAOTIC).any():
         return [Event(value, "chaos", number)]
-    if abs(multiplier) > CRITICAL and abs(multiplier.imag) > 1e-9:
+    if abs(multiplier) > TURNING and abs(multiplier.imag) > 1e-9:
         return [Event(value, "torus", number)]
-    if multiplier.real > CRITICAL:
+    if multiplier.real > FOLDING and abs(multiplier.imag) <= 1e-9:
         return [Event(value, "fold", number)]
     return [Event(value, "end", number)]
 

@@ -31,9 +31,9 @@ def frequency_response(
 ) -> xr.Dataset:
     """Steady responses against the forcing frequency: which there are, and which start leads to which.
 
-    Every start is followed at every frequency until it has settled on an orbit that is closed by Newton's method and attracts by its Floquet
-    multipliers; what never repeats is typed by its largest Lyapunov exponent. Coexisting responses are told apart by their orbits, not by
-    their amplitudes, and followed from frequency to frequency as branches.
+    Every start is followed at every frequency until it has settled on an orbit that is closed by Newton's method and attracts by its
+    Floquet multipliers; what never repeats is typed by its largest Lyapunov exponent. Coexisting responses are told apart by their orbits,
+    not by their amplitudes, and followed from frequency to frequency as branches.
 
     Parameters
     ----------
@@ -64,11 +64,11 @@ def frequency_response(
     Returns
     -------
     Dataset
-        Dims: the frequency parameter, ``start``, ``response``, ``multiplier``, ``phase``, ``event``. On (frequency, start): ``response_of``,
-        ``rms``, ``peak``, ``period``, ``type``, ``contacts_per_period``. On response: ``response_<parameter>``, ``response_branch``,
-        ``response_type``, ``response_period``, ``response_rms``, ``response_peak``, ``response_margin``, multipliers, exponent, stroboscopic
-        points, and for random starts ``response_share`` with its 95 % Wilson interval. ``event_kind`` and ``event_branch`` tell what happens
-        to branches between two frequencies.
+        Dims: the frequency parameter, ``start``, ``response``, ``multiplier``, ``phase``, ``event``. On (frequency, start):
+        ``response_of``, ``rms``, ``peak``, ``period``, ``type``, ``contacts_per_period``. On response: ``response_<parameter>``,
+        ``response_branch``, ``response_type``, ``response_period``, ``response_rms``, ``response_peak``, ``response_margin``, multipliers,
+        exponent, stroboscopic points, and for random starts ``response_share`` with its 95 % Wilson interval. ``event_kind`` and
+        ``event_branch`` tell what happens to branches between two frequencies.
 
     Raises
     ------

@@ -82,7 +82,7 @@ def find(grid: Grid, method: Method, most: int, threads: int | None = None, prog
                         threads, progress, result)  # fmt: skip
     except KeyboardInterrupt:
         complete = False
-    return _gathered(result, grid.places, count, method.noise, complete)
+    return _gathered(result, grid.places, count, family.noise, complete)
 
 
 def _sweep(grid: Grid, family: Family, most: int, result: Steady, threads: int | None, progress: Callable[[float], None] | None) -> None:
@@ -133,7 +133,7 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
     """By kind, period, then size, coarse enough that rounding can't change it."""
     period = result.orbits.period[row]
     points = result.orbits.points[row, :period] if period else result.trail[row].mean(axis=0)[None]
-    return (result.kind[row], period, *np.round(np.sqrt(np.mean((points / result.scale[row]) ** 2, axis=0)), 7))
+    return (result.kind[row], period, *np.round(np.sqrt(np.mean((points / result.scale[row]) ** 2, axis=0)), 7).tolist())
 
 
 def table_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> AttractorTable:
@@ -143,7 +143,8 @@ def table_of(found: Found, grid: Grid, method: Method, threads: int | None = Non
     spans = np.where(period > 0, period, WANDERED)
     look = looks(family, found.start(), spans, SAMPLES)
     hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
-    shares = (hits / len(grid.starts), *wilson(hits, len(grid.starts))) if grid.drawn else None
+    low, high = wilson(hits, len(grid.starts))
+    shares = (hits / len(grid.starts), low, high) if grid.drawn else None
     return AttractorTable(
         kind=[KINDS[int(code)] for code in kind],
         period=period,
