@@ -6,16 +6,17 @@ import subprocess
 import sys
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
+ROOT = Path(__file__).resolve().parent.parent
 #: Where the page that compares finds its numbers.
-FOLDER = HERE.parent / "docs" / "comparison"
+FOLDER = "docs/comparison"
 #: One after the other: two at a time would time each other.
-BENCHMARKS = ("flow.py", "basins.py")
+BENCHMARKS = ("benchmarks/flow.py", "benchmarks/basins.py")
 
 
 def main() -> int:
     """Run each in a process of its own; returns how many failed."""
-    return sum(subprocess.run([sys.executable, HERE / name, "--write", FOLDER], check=False).returncode != 0 for name in BENCHMARKS)
+    commands = [[sys.executable, name, "--write", FOLDER] for name in BENCHMARKS]
+    return sum(subprocess.run(command, cwd=ROOT, check=False).returncode != 0 for command in commands)
 
 
 if __name__ == "__main__":

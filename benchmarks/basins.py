@@ -200,21 +200,28 @@ def heading(cells: int) -> None:
     print(f"|{'-' * 38}|----------:|----------:|---------:|------------------:|----------------|")
 
 
-def by_settling(subset: Subset, pairs: dict[str, np.ndarray]) -> None:
+def by_settling(subset: Subset, pairs: dict[str, np.ndarray]) -> Table:
     """Print the share of equal labels by our periods to settle: what differs is decided after many periods on a chaotic saddle."""
     print("\nsame label [%] by how many periods a cell takes to settle:")
     print(f"| {'periods':<42} |" + "".join(f" {f'< {high}' if high < SETTLING[-1] else 'more':>6} |" for high in SETTLING[1:]))
     print(f"|{'-' * 44}|" + "-------:|" * (len(SETTLING) - 1))
-    for name, same in pairs.items():
-        settling = subset.settling[: same.size]
-        groups = [same[(settling >= low) & (settling < high)] for low, high in itertools.pairwise(SETTLING)]
-        print(f"| {name:<42} |" + "".join(f" {100 * group.mean():6.1f} |" if group.size else f" {'':>6} |" for group in groups))
+    shares = {name: _shares(subset.settling[: same.size], same) for name, same in pairs.items()}
+    for name, row in shares.items():
+        print(f"| {name:<42} |" + "".join(f" {'' if share is None else f'{100 * share:.1f}':>6} |" for share in row))
     counts = np.histogram(subset.settling, SETTLING)[0]
     print(f"| {'cells':<42} |" + "".join(f" {count:6d} |" for count in counts))
+    columns = [Column("periods to settle"), *(Column(f"< {high}" if high < SETTLING[-1] else "more", ".0%") for high in SETTLING[1:])]
+    return Table("Same label, by how long a cell takes to settle", columns, [(name, *row) for name, row in shares.items()])
 
 
-def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> None:
-    """Print what is wrong with the cells that saltus and heyoka label differently, and how they agree on the rest."""
+def _shares(settling: np.ndarray, same: np.ndarray) -> list[float | None]:
+    """Share of equal labels in each group of cells by their periods to settle; None for an empty one."""
+    groups = [same[(settling >= low) & (settling < high)] for low, high in itertools.pairwise(SETTLING)]
+    return [float(group.mean()) if group.size else None for group in groups]
+
+
+def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> np.ndarray:
+    """Print what is wrong with the cells that saltus and heyoka label differently; returns where they agree of those that change in neither."""
     same, lost = equal(subset.labels, first.labels), first.labels < 0
     our_own, their_own = equal(subset.labels, other), equal(first.labels, second.labels)
     differs = subset.settling[~same]
@@ -227,6 +234,7 @@ def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> N
         print(f"Periods to settle where labels differ: {differs.min()} at least, median {np.median(differs):.0f}; elsewhere median"
               f" {np.median(subset.settling[same]):.0f}")  # fmt: skip
     print(f"Cells that change in neither: saltus and heyoka name the same attractor on {percent(same[our_own & their_own])}")
+    return same[our_own & their_own]
 
 
 def rows(make: Callable[..., Iterator[Rival]], subset: Subset, ds: xr.Dataset, unit: Seconds, left_out: list[str]) -> list[Rival]:
@@ -244,8 +252,8 @@ def kept_row(name: str, seconds: Seconds, unit: Seconds, same: float | None, cel
     return name, seconds.cpu, seconds.wall, seconds.cpu / unit.cpu, same, cells
 
 
-def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: list[str]) -> tuple[list[tuple], list[tuple]]:
-    """Print the rivals' rows, the floors, and what is wrong where labels differ; returns the rows of both tables to be kept."""
+def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: list[str]) -> tuple[list[tuple], list[Table]]:
+    """Print the rivals' rows, the floors, and what is wrong where labels differ; returns those rows, and the other tables to be kept."""
     with one_core():
         taylor = rows(heyoka, subset, ds, unit, left_out)
         rivals = taylor + rows(pynamicalsys, subset.first(few), ds, unit, left_out)
@@ -255,14 +263,16 @@ def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: li
     pairs = {"saltus, saltus at 2^-52": floor[subset.cells]}
     print("\nThe floor: programs beside themselves at tolerance 2^-52 name the same attractor on")
     print(f"  saltus {percent(floor)} (all cells), {percent(floor[subset.cells])} (the subset)")
+    steady = {}
     if taylor:
         pairs["heyoka, heyoka at 2^-52"] = equal(taylor[0].labels, taylor[1].labels)
         print(f"  heyoka {percent(pairs['heyoka, heyoka at 2^-52'])}")
-        reasons(subset, other[subset.cells], *taylor[:2])
+        steady = {"saltus, heyoka, where neither changes at 2^-52": reasons(subset, other[subset.cells], *taylor[:2])}
     agreeing = {rival.name: equal(subset.labels[: rival.cells], rival.labels) for rival in rivals}
-    by_settling(subset, pairs | {f"saltus, {name}": same for name, same in agreeing.items()})
     kept = [kept_row(rival.name, rival.seconds, unit, float(agreeing[rival.name].mean()), rival.cells) for rival in rivals]
-    return kept, [(name, float(same.mean()), int(same.size)) for name, same in pairs.items()]
+    floors = [(name, float(same.mean()), int(same.size)) for name, same in (pairs | steady).items() if same.size]
+    settling = by_settling(subset, pairs | {f"saltus, {name}": same for name, same in agreeing.items()})
+    return kept, [Table("The floor: programs beside themselves at another tolerance", FLOOR_COLUMNS, floors), settling]
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -286,13 +296,12 @@ def main(argv: Sequence[str] | None = None) -> None:
                     "pinned core, timed on a random subset and scaled to the whole map. Finding the attractors is part of saltus's time; "
                     "rivals are given the orbits to compare with.")  # fmt: skip
     kept = [kept_row(f"saltus, {n} thread{'s' * (n > 1)}", time_, unit, None, ds.basin.size) for n, time_ in ((1, unit), (2, seconds))]
-    floor: list[tuple] = []
+    tables: list[Table] = []
     if not chosen.alone:
-        theirs, floor = beside(ds, unit, subset_of(ds, chosen.subset), chosen.few, record.left_out)
+        theirs, tables = beside(ds, unit, subset_of(ds, chosen.subset), chosen.few, record.left_out)
         kept += theirs
     if chosen.write is not None:
-        record.tables.append(Table("A map of basins", COLUMNS, kept))
-        record.tables.append(Table("The floor: programs beside themselves at another tolerance", FLOOR_COLUMNS, floor))
+        record.tables += [Table("A map of basins", COLUMNS, kept), *tables]
         print(f"kept in {record.write(chosen.write)}")
 
 

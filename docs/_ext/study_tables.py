@@ -115,7 +115,19 @@ def markdown() -> str:
         title = f"{place} name = {toml(named[0])}" if named else place
         summary = (model.__doc__ or "").strip().split(": ", 1)[-1]
         body = [f"| {' | '.join(row)} |" for row in rows]
-        blocks.append("\n".join([f"### `{title}`", "", summary[:1].upper() + summary[1:], "", "| key | holds | default | meaning |", "|---|---|---|---|", *body]))
+        blocks.append(
+            "\n".join(
+                [
+                    f"### `{title}`",
+                    "",
+                    summary[:1].upper() + summary[1:],
+                    "",
+                    "| key | holds | default | meaning |",
+                    "|---|---|---|---|",
+                    *body,
+                ]
+            )
+        )
     return "\n\n".join(blocks) + "\n"
 
 

@@ -96,7 +96,9 @@ def test_a_notebook_stays_interactive(tmp_path):
     (tmp_path / "notebook_backend.py").write_text(
         "import matplotlib\nfrom matplotlib.backends.backend_agg import FigureCanvas, FigureManager\nmatplotlib.interactive(True)\n"
     )
-    program = "import matplotlib, matplotlib.pyplot as plt, saltus as sl\nwith sl.plot.style(): plt.figure()\nassert matplotlib.is_interactive()"
+    program = (
+        "import matplotlib, matplotlib.pyplot as plt, saltus as sl\nwith sl.plot.style(): plt.figure()\nassert matplotlib.is_interactive()"
+    )
     paths = os.pathsep.join([str(tmp_path), *sys.path])
     environment = os.environ | {"MPLBACKEND": "module://notebook_backend", "PYTHONPATH": paths}
     subprocess.run([sys.executable, "-c", program], env=environment, check=True)
