@@ -60,8 +60,7 @@ def _look(family: Family, start: np.ndarray, rows: np.ndarray, n: int, samples: 
     result.rms[rows] = np.sqrt(np.mean(motion[0] ** 2, axis=1))
     result.margin[rows] = margin(family.system, time, motion, values)
     if family.method.records_contacts:
-        crossings = outcome.counters[:, st.COUNTERS.index("events")] - outcome.counters[:, st.COUNTERS.index("grazes")]
-        result.contacts[rows] = crossings / n
+        result.contacts[rows] = outcome.counters[:, st.EVENTS] / n
 
 
 def margin(system: System, time: np.ndarray, motion: np.ndarray, values: Mapping[str, Any]) -> np.ndarray:

@@ -132,8 +132,9 @@ def mean_orbit(trail: np.ndarray, n: int, scale: np.ndarray, noise: float) -> tu
     double, less = _mean(last, 2 * n, scale)
     if scatter > SHOWING and less < 0.25 * scatter:  # two loops that lie side by side
         points = double
-    shifts = [np.abs((np.roll(points, -m, axis=0) - points) / scale).max() for m in range(1, len(points) + 1)]
-    points, scatter = _mean(last, 1 + int(np.argmax(np.array(shifts) <= noise)), scale)  # loops that its errors alone part are one
+    parts = [m for m in range(1, len(points) + 1) if len(points) % m == 0]
+    apart = [np.abs((np.roll(points, -m, axis=0) - points) / scale).max() for m in parts]
+    points, scatter = _mean(last, parts[int(np.argmax(np.array(apart) <= noise))], scale)  # loops that its errors alone part are one
     return (points, scatter) if _spacing(points, scale) >= APART * scatter else None
 
 

@@ -46,9 +46,9 @@ class Closed:
         """Which are orbits all of whose multipliers lie inside the unit circle by more than rounding, bool[k]."""
         return (self.period > 0) & (np.abs(self.multipliers[:, 0]) < 1.0 - MARGINAL)
 
-    def distance(self, state: np.ndarray, scale: np.ndarray) -> np.ndarray:
-        """How far states float64[k, D] lie from their orbits, in units of the scale float64[k, D]; inf where there is none."""
-        apart = np.abs((self.points - state[:, None]) / scale[:, None]).max(axis=2)
+    def distance(self, state: np.ndarray, scale: np.ndarray, rows: np.ndarray | list[int] | slice = slice(None)) -> np.ndarray:
+        """How far states float64[m, D] lie from the orbits of some rows (default all), in units of the scale; inf where there is none."""
+        apart = np.abs((self.points[rows] - state[:, None]) / scale[:, None]).max(axis=2)
         return np.where(np.isnan(apart), np.inf, apart).min(axis=1)
 
 

@@ -91,13 +91,19 @@ class Steady:
 
 
 def settle_each(
-    family: Family, start: np.ndarray, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None
+    family: Family,
+    start: np.ndarray,
+    most: int,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    result: Steady | None = None,
 ) -> Steady:
     """What each trajectory settles to: start float64[k, D], row i by row i of the family, followed for ``most`` iterates at the longest.
 
-    The result doesn't depend on the other trajectories, nor on threads.
+    What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't depend on the other trajectories, nor on
+    threads.
     """
-    result = Steady.empty(len(start), start.shape[1])
+    result = Steady.empty(len(start), start.shape[1]) if result is None else result
     pieces = [np.arange(first, min(first + PIECE, len(start))) for first in range(0, len(start), PIECE)]
 
     def work(piece: np.ndarray) -> Steady:

@@ -104,7 +104,7 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
     groups: list[list[int]] = []
     trails = [Wandering("", 0.0, 0.0, points[i], scale) for i in usable]
     for i, trail in enumerate(trails):
-        home = next((group for group in groups if _alike(trails[group[0]], trail)), None)
+        home = next((group for group in groups if alike(trails[group[0]], trail)), None)
         if home is None:
             groups.append([i])
         else:
@@ -155,7 +155,8 @@ def growth_rates(map_: Map | Family, start: np.ndarray, scale: np.ndarray) -> tu
     return state, np.array(growths[ALIGNING:])
 
 
-def _alike(one: Wandering, other: Wandering) -> bool:
+def alike(one: Wandering, other: Wandering) -> bool:
+    """Whether two trails visit the same boxes."""
     return min(float(other.share(one.points[None])[0]), float(one.share(other.points[None])[0])) > ALIKE
 
 
@@ -163,6 +164,6 @@ def merge(found: list[Wandering]) -> list[Wandering]:
     """Those of a list that are different: of two that visit the same boxes the first is kept."""
     kept: list[Wandering] = []
     for one in found:
-        if not any(_alike(one, other) for other in kept):
+        if not any(alike(one, other) for other in kept):
             kept.append(one)
     return kept
