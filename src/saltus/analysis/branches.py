@@ -81,7 +81,7 @@ def _continued(found: Found, grid: Grid, method: Method, threads: int | None) ->
     arrived = close(family.rows(found.place[rows] + 1), found.start()[rows], found.period[rows], scale, LONGEST)
     for i in np.flatnonzero(arrived.stable):
         for other in np.flatnonzero((found.place == found.place[rows[i]] + 1) & (found.period == arrived.period[i])):
-            if arrived.distance(found.points(int(other))[:1], scale[[i]], [i])[0] < SAME:
+            if arrived.distance(found.points(int(other))[:1], scale[[i]], np.array([i]))[0] < SAME:
                 onward[rows[i]] = other
     return onward
 
