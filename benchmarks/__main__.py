@@ -1,4 +1,4 @@
-"""All benchmarks that the documentation shows, one after the other: `python -m benchmarks`. Takes some ten minutes; leave the machine alone."""
+"""All benchmarks that the documentation shows: `python -m benchmarks`. Takes some ten minutes; leave the machine alone meanwhile."""
 
 from __future__ import annotations
 

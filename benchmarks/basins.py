@@ -221,7 +221,7 @@ def _shares(settling: np.ndarray, same: np.ndarray) -> list[float | None]:
 
 
 def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> np.ndarray:
-    """Print what is wrong with the cells that saltus and heyoka label differently; returns where they agree of those that change in neither."""
+    """Print what is wrong with the cells that saltus and heyoka label differently; returns where they agree among the steady ones."""
     same, lost = equal(subset.labels, first.labels), first.labels < 0
     our_own, their_own = equal(subset.labels, other), equal(first.labels, second.labels)
     differs = subset.settling[~same]
@@ -292,9 +292,12 @@ def main(argv: Sequence[str] | None = None) -> None:
     print(line("saltus, 1 thread", unit, unit, "", "all cells"), flush=True)
     seconds, _ = ours(chosen.cells, 2, repeats=chosen.repeats)
     print(line("saltus, 2 threads", seconds, unit, "", "all cells"), flush=True)
-    record = Record("basins", f"Basins of case b4 of the rig of de Langre et al. at 15 Hz, {chosen.cells} x {chosen.cells} cells; rivals on one "
-                    "pinned core, timed on a random subset and scaled to the whole map. Finding the attractors is part of saltus's time; "
-                    "rivals are given the orbits to compare with.")  # fmt: skip
+    record = Record(
+        "basins",
+        f"Basins of case b4 of the rig of de Langre et al. at 15 Hz, {chosen.cells} x {chosen.cells} cells; rivals on one pinned core, timed on "
+        "a random subset and scaled to the whole map. Finding the attractors is part of saltus's time; rivals are given the orbits to "
+        "compare with.",
+    )
     kept = [kept_row(f"saltus, {n} thread{'s' * (n > 1)}", time_, unit, None, ds.basin.size) for n, time_ in ((1, unit), (2, seconds))]
     tables: list[Table] = []
     if not chosen.alone:

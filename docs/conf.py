@@ -11,7 +11,7 @@ sys.path.insert(0, str(HERE / "_ext"))
 
 project = "saltus"
 author = "The saltus developers"
-copyright = author  # noqa: A001
+copyright = author
 version = release = saltus.__version__
 
 extensions = [
@@ -29,7 +29,7 @@ html_static_path = ["_static"]
 html_css_files = ["saltus.css"]
 html_copy_source = False
 html_show_sphinx = False
-# Nobody's server but the reader's own: MathJax lies beside the pages, and `offline` fails the build if a page loads anything from elsewhere.
+# No server but the reader's own: MathJax lies beside the pages, and `offline` fails the build if one loads anything from elsewhere.
 mathjax_path = "mathjax/tex-svg.js"
 pygments_style, pygments_dark_style = "friendly", "monokai"
 

@@ -1,4 +1,4 @@
-"""The pages of the documentation are programs: their code runs, their studies run, their commands run. Notebooks run when the docs are built."""
+"""The pages of the documentation are programs: their code, studies and commands run. Notebooks run when the docs are built."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The notes on decisions get their places in the sidebar; their table of contents stays a plain table for those who read it in the repository."""
+"""The notes on decisions get their places in the sidebar; in the repository their list stays a plain table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The glossary's table, made into terms that pages can link to: docs/glossary.md stays a plain table for those who read it in the repository."""
+"""The glossary's table, made into terms that pages can link to; in the repository docs/glossary.md stays a plain table."""
 
 from __future__ import annotations
 

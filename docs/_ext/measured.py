@@ -1,4 +1,4 @@
-"""The directive ``measured``: the tables that a benchmark wrote to docs/comparison/, with machine, date and command. ``{measured} flow``."""
+"""The directive ``measured``: the tables that a benchmark wrote to docs/comparison/, with machine, date and command."""
 
 from __future__ import annotations
 
