@@ -5,6 +5,7 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.grid import axis, grid_of
+from saltus.analysis.samples import _turn
 from saltus.errors import ParameterError, UnitError
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
@@ -157,3 +158,24 @@ def test_a_chaotic_response_is_typed_and_shown():
     assert ds.type.item() == "chaotic"
     assert ds.response_exponent.item() > 4 * ds.response_exponent_error.item() > 0
     assert np.isfinite(ds.sample_x.values).sum() > 100
+
+
+def test_cubics_turn_where_they_turn():
+    """Cubics with a root of the slope at a known place, from their values and slopes at both ends."""
+    rng = np.random.default_rng(3)
+    at, other, size, offset = (
+        rng.random(200),
+        rng.uniform(1.1, 4.0, 200) * rng.choice([-1, 1], 200),
+        rng.normal(size=200),
+        rng.normal(size=200),
+    )
+
+    def value(s):
+        return offset + size * (s**3 / 3 - (at + other) * s**2 / 2 + at * other * s)
+
+    def slope(s):
+        return size * (s - at) * (s - other)
+
+    found = _turn(value(0.0), value(1.0), slope(0.0), slope(1.0))
+    np.testing.assert_allclose(found, at, atol=1e-9)
+    assert _turn(np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([-1.0])).item() == 0.5  # a parabola
