@@ -294,9 +294,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     print(line("saltus, 2 threads", seconds, unit, "", "all cells"), flush=True)
     record = Record(
         "basins",
-        f"Basins of case b4 of the rig of de Langre et al. at 15 Hz, {chosen.cells} x {chosen.cells} cells; rivals on one pinned core, timed on "
-        "a random subset and scaled to the whole map. Finding the attractors is part of saltus's time; rivals are given the orbits to "
-        "compare with.",
+        f"Basins of case b4 of the rig of de Langre et al. at 15 Hz, {chosen.cells} x {chosen.cells} cells; rivals on one pinned core, "
+        "timed on a random subset and scaled to the whole map. Finding the attractors is part of saltus's time; rivals are given the "
+        "orbits to compare with.",
     )
     kept = [kept_row(f"saltus, {n} thread{'s' * (n > 1)}", time_, unit, None, ds.basin.size) for n, time_ in ((1, unit), (2, seconds))]
     tables: list[Table] = []

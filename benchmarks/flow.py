@@ -93,8 +93,8 @@ def table(count: int, folder: Path | None = None) -> None:
     """Print everyone's row, and keep them in a folder if there is one."""
     record = Record(
         "flow",
-        f"Case b4 of the rig of de Langre et al. at 15 Hz, contacts located; {count} starts, {PERIODS} periods (SciPy: 4 starts, 5 periods); "
-        "CPU time of one pinned core, smallest of three repeats; errors at 64 starts known to 30 digits.",
+        f"Case b4 of the rig of de Langre et al. at 15 Hz, contacts located; {count} starts, {PERIODS} periods (SciPy: 4 starts, "
+        "5 periods); CPU time of one pinned core, smallest of three repeats; errors at 64 starts known to 30 digits.",
     )
     print(f"{processor()}, one core; {count} starts, {PERIODS} periods; {lane_width()} lanes")
     print(f"| {'':<42} | median m  | largest m | us/period  | times     | contacts |")
