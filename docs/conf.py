@@ -47,7 +47,8 @@ nb_merge_streams = True
 # A caller's backend for files would leave the notebooks without pictures; the notebooks' own has a sharp 150 dots an inch from the style.
 os.environ.pop("MPLBACKEND", None)
 os.environ["MATPLOTLIBRC"] = str(HERE / "matplotlibrc")
-# The commands `saltus ...` of the notebooks are those of this interpreter.
+# The commands `saltus ...` of the notebooks are those of this interpreter, and their tables are as wide as those of a terminal.
+os.environ["COLUMNS"] = "118"
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
 # -- API -----------------------------------------------------------------------------------------------------------------------
