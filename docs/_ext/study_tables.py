@@ -99,6 +99,8 @@ def key_rows(model: type[Table]) -> list[tuple[str, str, str, str]]:
         if field.examples:
             text += f" Example: `{_cell(toml(field.examples[0]))}`"
         rows.append((f"`{name}`", _cell(type_text(field.annotation)), _cell(_default(field)), text.strip()))
+    if model.model_config.get("extra") == "allow":
+        rows.append(("*any parameter*", "quantity", "-", 'Its value. Example: `force = "4 N"`'))
     return rows
 
 
