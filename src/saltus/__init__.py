@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         basins,
         bifurcation_diagram,
         compare,
+        compare_methods,
         frequency_response,
         settled,
         simulate,
@@ -35,8 +36,8 @@ if TYPE_CHECKING:
 
 #: Public name: module that holds it.
 _HOMES = {
-    **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare", "frequency_response"), "saltus.analysis"),
-    **dict.fromkeys(("settled", "simulate", "stroboscope"), "saltus.analysis"),
+    **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
+    **dict.fromkeys(("compare_methods", "frequency_response", "settled", "simulate", "stroboscope"), "saltus.analysis"),
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("describe", "load", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
@@ -48,8 +49,9 @@ _MODULES = ("models", "plot")
 
 __all__ = [
     "ODE45", "Interrupted", "System", "Taylor", "abs", "atan", "attractors", "basin_fractions", "basins", "bifurcation_diagram",
-    "compare", "cos", "describe", "exp", "freeplay", "frequency_response", "load", "log", "max", "min", "models", "pi", "piecewise",
-    "plot", "save", "settled", "simulate", "sin", "sqrt", "stroboscope", "system", "tan", "tanh", "to_csv", "to_mat",
+    "compare", "compare_methods", "cos", "describe", "exp", "freeplay", "frequency_response", "load", "log", "max", "min",
+    "models", "pi", "piecewise", "plot", "save", "settled", "simulate", "sin", "sqrt", "stroboscope", "system", "tan", "tanh",
+    "to_csv", "to_mat",
 ]  # fmt: skip
 
 

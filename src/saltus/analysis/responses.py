@@ -133,7 +133,8 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
     """By kind, period, then size, coarse enough that rounding can't change it."""
     period = result.orbits.period[row]
     points = result.orbits.points[row, :period] if period else result.trail[row].mean(axis=0)[None]
-    return (result.kind[row], period, *np.round(np.sqrt(np.mean((points / result.scale[row]) ** 2, axis=0)), 7).tolist())
+    sizes = np.atleast_1d(np.round(np.sqrt(np.mean((points / result.scale[row]) ** 2, axis=0)), 7))
+    return (int(result.kind[row]), int(period), *(float(size) for size in sizes))
 
 
 def table_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> AttractorTable:

@@ -109,7 +109,8 @@ class _Builder(Builder):
         self.put_points(table.points, ("attractor", "phase"), schema.attractor_name, "at whole forcing periods")
 
 
-def _basin_meanings(attractors: int) -> dict[int, str]:
+def basin_meanings(attractors: int) -> dict[int, str]:
+    """Words for the labels of a map with so many attractors."""
     return {**schema.NO_BASIN, **{i: f"attractor_{i}" for i in range(attractors)}}
 
 
@@ -166,7 +167,7 @@ def basins_dataset(
     """
     build = _Builder(schema.BASINS, states, units, gap_unit)
     dims = build.put_axes(axes)
-    build.put_flags("basin", basin, _basin_meanings(len(attractors)), dims)
+    build.put_flags("basin", basin, basin_meanings(len(attractors)), dims)
     build.put("periods_to_settle", periods_to_settle, dims=dims)
     build.put_flags("status", status, status_meanings, dims)
     build.put("grazes_unresolved", np.minimum(grazes_unresolved, _MOST_GRAZES), dims=dims)
@@ -201,7 +202,7 @@ def attractors_dataset(
     build = _Builder(schema.ATTRACTORS, states, units, gap_unit)
     if basin is not None:
         build.put("trajectory", np.arange(len(basin)), coord=True)
-        build.put_flags("basin", basin, _basin_meanings(len(attractors)), ("trajectory",))
+        build.put_flags("basin", basin, basin_meanings(len(attractors)), ("trajectory",))
         build.put("periods_to_settle", periods_to_settle, dims=("trajectory",))
     build.put_attractors(attractors)
     return build.dataset(attrs or {})
@@ -242,8 +243,8 @@ def agreement_dataset(
     pairs = len(match["a"])
     build.put("pair", np.arange(pairs), coord=True)
     build.put_flags("agreement", agreement, schema.AGREEING, dims)
-    build.put_flags("basin_a", basin_a, _basin_meanings(pairs), dims)
-    build.put_flags("basin_b", basin_b, _basin_meanings(pairs), dims)
+    build.put_flags("basin_a", basin_a, basin_meanings(pairs), dims)
+    build.put_flags("basin_b", basin_b, basin_meanings(pairs), dims)
     for name, column in match.items():
         build.put(f"match_{name}", column)
     return build.dataset(attrs or {})

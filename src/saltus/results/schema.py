@@ -23,6 +23,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError
+from saltus.results.method_variables import METHODS_VARIABLES
 from saltus.results.response_variables import RESPONSES_VARIABLES
 from saltus.results.variable import GUARD_VARIABLES, Variable
 
@@ -30,10 +31,12 @@ from saltus.results.variable import GUARD_VARIABLES, Variable
 VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
+METHODS = "methods"
 #: The function that returns each kind.
 MAKERS = {
     TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare",
     RESPONSES: "frequency_response or bifurcation_diagram",
+    METHODS: "compare_methods",
 }  # fmt: skip
 
 # What stands in ``basin`` for a start that has no attractor.
@@ -152,6 +155,7 @@ TABLES = {
     ATTRACTORS: ATTRACTORS_VARIABLES,
     AGREEMENT: AGREEMENT_VARIABLES,
     RESPONSES: RESPONSES_VARIABLES,
+    METHODS: METHODS_VARIABLES,
 }
 
 
@@ -275,6 +279,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         ATTRACTORS: ("attractor_type",),
         AGREEMENT: ("agreement", "match_a"),
         RESPONSES: ("response_of", "response_type", "response_branch"),
+        METHODS: ("method", "agrees"),
     }[kind]
 
 
