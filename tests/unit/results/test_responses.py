@@ -123,6 +123,12 @@ def test_describe_counts():
     assert "5 of 6 starts, 1 escaped" in text
 
 
+def test_describe_a_map_without_branches():
+    text = describe(two_parameters())
+    assert "3 x 2 values, frequency from 4 to 6 Hz, gap from 0.001 to 0.002 m, 1 start at each" in text
+    assert "5 responses: 3 T, 1 3T, 1 chaotic" in text
+
+
 def test_csv_has_a_row_for_each_response(tmp_path):
     with save(responses(), tmp_path / "a.csv").open(encoding="utf-8") as file:
         header, *rows = csv.reader(line for line in file if not line.startswith("#"))

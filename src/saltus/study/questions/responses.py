@@ -40,7 +40,7 @@ FREQUENCY_RESPONSE, BIFURCATION_DIAGRAM = "frequency_response", "bifurcation_dia
 class FrequencyResponse(Named):
     """[frequency_response]: all steady responses over a range of forcing frequencies. Several: [[frequency_response]], each with a name."""
 
-    called = "frequency response"
+    called = "Frequency response"
 
     frequency: Range = Field(description="Forcing frequencies.", examples=[{"first": "2 Hz", "last": "30 Hz", "count": 281}])
     start: Starts | None = START
@@ -58,7 +58,7 @@ class FrequencyResponse(Named):
 class BifurcationDiagram(Named):
     """[bifurcation_diagram]: how all steady responses change with a parameter, or with two. Several: [[bifurcation_diagram]]."""
 
-    called = "bifurcation diagram"
+    called = "Bifurcation diagram"
 
     vary: dict[str, Range] = Field(
         description="One parameter, or two for a map of the kinds of motion.",

@@ -70,7 +70,8 @@ def _notes(ds: xr.Dataset, more: int) -> tuple[str, ...]:
     notes = [f"{ds.sizes['response']} different responses from {of.size} starts at {math.prod(of.shape[:-1])} values."]
     if more:
         notes.append(f"{more} shorter branches are in the file.")
-    notes += [f"{int((of == code).sum())} starts {word.replace('_', ' ')}." for code, word in NO_BASIN.items() if (of == code).any()]
+    unsettled = {word.replace("_", " "): int((of == code).sum()) for code, word in NO_BASIN.items()}
+    notes += [f"Starts {word}: {count}." for word, count in unsettled.items() if count]
     return tuple(notes)
 
 
