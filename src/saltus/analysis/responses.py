@@ -66,7 +66,7 @@ class Found:
 
     def start(self) -> np.ndarray:
         """A state on each, float64[m, D]."""
-        return np.array([self.points(i)[0] for i in range(len(self))]).reshape(len(self), -1)
+        return np.array([self.points(i)[0] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
 
 
 def find(grid: Grid, method: Method, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:

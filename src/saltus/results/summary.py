@@ -75,8 +75,9 @@ def _unsettled(basin: xr.DataArray) -> str:
 def _responses(ds: xr.Dataset) -> list[str]:
     """What was found: branches, kinds of motion, events; and what became of the starts."""
     kinds = [kind_text(kind, n) for kind, n in zip(ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True)]
-    branches = np.unique(ds["response_branch"].values).size
-    found = f"found    {_count(len(kinds), 'response')} on {_count(branches, 'branch')}"
+    found = f"found    {_count(len(kinds), 'response')}"
+    if len(parameters_of(ds)) == 1:
+        found += f" on {_count(np.unique(ds['response_branch'].values).size, 'branch')}"
     lines = [f"{found}: {_tally(kinds)}" if kinds else found]
     if ds.sizes.get("event"):
         lines.append(f"events   {_tally(ds['event_kind'].values.tolist())}")
