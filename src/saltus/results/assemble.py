@@ -12,7 +12,7 @@ import xarray as xr
 from saltus.errors import ParameterError
 from saltus.results import schema
 from saltus.results.provenance import content_hash, to_json
-from saltus.results.schema import Variable
+from saltus.results.variable import Variable
 
 
 # -- what the caller hands over ------------------------------------------------------------------------------------------------
@@ -75,7 +75,7 @@ class Guards:
 
 
 # -- assembly ------------------------------------------------------------------------------------------------------------------
-class _Builder:
+class Builder:
     """Collects the variables of one Dataset by the table of its kind.
 
     Every array comes with the trajectory first; for a single trajectory (``batch`` false) that axis is dropped here.
@@ -89,10 +89,6 @@ class _Builder:
         self.attrs: dict[str, Any] = {"saltus_result": kind, "schema_version": schema.VERSION, "states": " ".join(states)}
         if not batch and count != 1:
             raise ParameterError(f"a Dataset without the dim trajectory holds one trajectory, not {count}. Pass batch=True.")
-        reserved = {*self.table, "contact"}
-        clash = [name for name in states if name in reserved]
-        if clash:
-            raise ParameterError(f"the state {clash[0]!r} has the name of something else in the result. Rename the state in the system.")
         if batch:
             self.put("trajectory", np.arange(count), each=True, coord=True)
 
@@ -116,6 +112,8 @@ class _Builder:
 
     def put_state(self, name: str, variable: str, dims: tuple[str, ...], long_name: str, values: Any, each: bool = True) -> None:
         """Add a variable that holds one state."""
+        if variable == name and name in {*self.table, *(dim for spec in self.table.values() for dim in spec.dims)}:
+            raise ParameterError(f"the state {name!r} has the name of something else in the result. Rename the state in the system.")
         self.put(variable, values, each=each, spec=Variable(dims, self.units.get(name, ""), long_name))
 
     def put_guards(self, guards: Guards) -> None:
@@ -224,7 +222,7 @@ def trajectory_dataset(
     ParameterError
         If a state or a varied parameter has the name of a variable of the result.
     """
-    build = _Builder(schema.TRAJECTORY, states, units, guards, batch, len(status))
+    build = Builder(schema.TRAJECTORY, states, units, guards, batch, len(status))
     samples = _put_samples(build, np.asarray(time, dtype=float), period)
     for name in states:
         build.put_state(name, name, (samples,), name, values[name])
@@ -239,7 +237,7 @@ def trajectory_dataset(
     return build.dataset(attrs or {})
 
 
-def _put_samples(build: _Builder, time: np.ndarray, period: np.ndarray | None) -> str:
+def _put_samples(build: Builder, time: np.ndarray, period: np.ndarray | None) -> str:
     """Add the coordinates of the samples; returns the dim along which they lie."""
     shared = time.ndim == 1 or not build.batch
     samples = "time" if shared else "period"
@@ -255,7 +253,7 @@ def _along(samples: str, name: str) -> Variable:
     return Variable((samples,), spec.units, spec.long_name, spec.dtype)
 
 
-def _put_contacts(build: _Builder, states: Sequence[str], contacts: Contacts, guards: Guards) -> None:
+def _put_contacts(build: Builder, states: Sequence[str], contacts: Contacts, guards: Guards) -> None:
     """Add the table of contacts."""
     names = np.asarray(list(guards.names) or [""], dtype=np.str_)
     columns = {
@@ -314,7 +312,7 @@ def stroboscope_dataset(
     ParameterError
         If a state or a varied parameter has the name of a variable of the result.
     """
-    build = _Builder(schema.STROBOSCOPE, states, units, guards, batch, len(status))
+    build = Builder(schema.STROBOSCOPE, states, units, guards, batch, len(status))
     build.put("period", period, coord=True)
     for name in states:
         build.put_state(name, name, ("period",), name, values[name])

@@ -14,20 +14,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError
+from saltus.results import motions
+from saltus.results.variable import COUNTERS, FORCING_PERIOD, GUARDS, MINIMA, STATUS, TRAJECTORY_NUMBER, Variable
 
 #: Version of the tables below, kept in every result as ``schema_version``.
 VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT = "basins", "attractors", "agreement"
+SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
-MAKERS = {TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare"}
+MAKERS = {
+    TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare",
+    SECTION: "poincare", SPECTRUM: "spectrum", IMPACTS: "impact_statistics", ENERGY: "energy_balance",
+}  # fmt: skip
 
 # What stands in ``basin`` for a start that has no attractor.
 ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
@@ -36,48 +41,6 @@ NO_BASIN = {ESCAPED: "escaped", UNCONVERGED: "unconverged", FAILED: "failed", NO
 #: Meaning of the values of ``agreement``.
 AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
 
-
-@dataclass(frozen=True)
-class Variable:
-    """What one variable of a result is.
-
-    Attributes
-    ----------
-    dims : tuple of str
-        Dims of one trajectory.
-    units : str
-        SI unit, ``"1"`` for a plain number, ``""`` for text.
-    long_name : str
-        A few words, as on an axis.
-    dtype : str
-        ``f8``, ``i8``, ``i4``, ``i2``, ``i1`` or ``str``.
-    """
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    dtype: str = "f8"
-
-
-_STATUS = Variable((), "", "how the trajectory ended", "str")
-_COUNTERS = {
-    "events": Variable((), "1", "contacts", "i8"),
-    "grazes": Variable((), "1", "grazes", "i8"),
-    "grazes_unresolved": Variable((), "1", "grazes shallower than the local error", "i8"),
-    "steps": Variable((), "1", "accepted steps", "i8"),
-    "rejected_steps": Variable((), "1", "rejected steps", "i8"),
-    "mode_violations": Variable((), "1", "accepted steps that ended on the wrong side of a guard", "i8"),
-}
-_MINIMA = {
-    "smallest_contact_speed": Variable((), "<gap rate>", "smallest gap rate at a contact"),
-    "smallest_gap_margin": Variable((), "<gap>", "smallest distance of a turning point of the gap from a guard"),
-}
-_GUARDS = {
-    "guard": Variable(("guard",), "", "guard", "str"),
-    "guard_state": Variable(("guard",), "", "state that the guard bounds", "str"),
-    "guard_boundary": Variable(("guard",), "<gap>", "value of the state on the guard"),
-    "guard_units": Variable(("guard",), "", "unit of the gap", "str"),
-}
 
 #: Variables of what ``simulate`` returns, beside the states.
 TRAJECTORY_VARIABLES = {
@@ -94,24 +57,24 @@ TRAJECTORY_VARIABLES = {
     "contact_mode_after": Variable(("contact",), "1", "mode after the contact", "i8"),
     "contact_steps": Variable(("contact",), "1", "accepted steps from the start to the contact", "i8"),
     "contact_trajectory": Variable(("contact",), "1", "trajectory that the contact belongs to", "i8"),
-    "status": _STATUS,
-    **_COUNTERS,
-    **_MINIMA,
-    **_GUARDS,
+    "status": STATUS,
+    **COUNTERS,
+    **MINIMA,
+    **GUARDS,
     "end_time": Variable((), "s", "time at the end"),
-    "forcing_period": Variable((), "s", "forcing period"),
-    "trajectory": Variable((), "1", "trajectory", "i8"),
+    "forcing_period": FORCING_PERIOD,
+    "trajectory": TRAJECTORY_NUMBER,
 }
 
 #: Variables of what ``stroboscope`` returns, beside the states.
 STROBOSCOPE_VARIABLES = {
     "period": Variable(("period",), "1", "whole forcing periods since the start", "i8"),
-    "status": _STATUS,
-    **_COUNTERS,
-    **_MINIMA,
-    **_GUARDS,
-    "forcing_period": Variable((), "s", "forcing period"),
-    "trajectory": Variable((), "1", "trajectory", "i8"),
+    "status": STATUS,
+    **COUNTERS,
+    **MINIMA,
+    **GUARDS,
+    "forcing_period": FORCING_PERIOD,
+    "trajectory": TRAJECTORY_NUMBER,
 }
 
 #: What is known of each attractor, beside the points ``attractor_<state>``. ``<first>``: the unit of the first state.
@@ -173,6 +136,10 @@ TABLES = {
     BASINS: BASINS_VARIABLES,
     ATTRACTORS: ATTRACTORS_VARIABLES,
     AGREEMENT: AGREEMENT_VARIABLES,
+    SECTION: motions.SECTION_VARIABLES,
+    SPECTRUM: motions.SPECTRUM_VARIABLES,
+    IMPACTS: motions.IMPACTS_VARIABLES,
+    ENERGY: motions.ENERGY_VARIABLES,
 }
 
 
@@ -263,7 +230,15 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
     """Variables without which nothing can be said about a result."""
     if kind in (TRAJECTORY, STROBOSCOPE):
         return (*states_of(ds), "status")
-    return {BASINS: ("basin", "status", "attractor_type"), ATTRACTORS: ("attractor_type",), AGREEMENT: ("agreement", "match_a")}[kind]
+    return {
+        BASINS: ("basin", "status", "attractor_type"),
+        ATTRACTORS: ("attractor_type",),
+        AGREEMENT: ("agreement", "match_a"),
+        SECTION: (*states_of(ds), "crossing_time", "status"),
+        SPECTRUM: ("frequency", "window"),
+        IMPACTS: ("contact_speed", "contacts_per_second", "status"),
+        ENERGY: ("energy", "residual", "status"),
+    }[kind]
 
 
 # -- after reading a file ------------------------------------------------------------------------------------------------------
