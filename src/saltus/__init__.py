@@ -19,8 +19,18 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from saltus import models, plot
     from saltus.analysis import (
-        attractors, basin_fractions, basins, compare, energy_balance, impact_statistics, poincare, settled, simulate, spectrum, stroboscope,
-    )  # fmt: skip
+        attractors,
+        basin_fractions,
+        basins,
+        compare,
+        energy_balance,
+        impact_statistics,
+        poincare,
+        settled,
+        simulate,
+        spectrum,
+        stroboscope,
+    )
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import describe, load, save, to_csv, to_mat
     from saltus.system import System, abs, atan, cos, exp, freeplay, log, max, min, pi, piecewise, sin, sqrt, system, tan, tanh

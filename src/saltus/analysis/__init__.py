@@ -4,13 +4,11 @@ from saltus.analysis.attractors import attractors, basin_fractions
 from saltus.analysis.basins import basins
 from saltus.analysis.compare import compare
 from saltus.analysis.energy import energy_balance
-
 from saltus.analysis.impacts import impact_statistics
 from saltus.analysis.poincare import poincare
 from saltus.analysis.settled import settled
 from saltus.analysis.simulate import simulate
 from saltus.analysis.spectrum import spectrum
-
 from saltus.analysis.stroboscope import stroboscope
 
 __all__ = [

@@ -73,7 +73,7 @@ def energy_balance(
     Dataset
         Dims ``period`` (at the end of each interval; of an unforced system ``time``), and ``trajectory`` for many. ``energy`` at the end
         of the interval; ``change``, ``supplied``, ``dissipated`` in it, and ``residual`` = supplied - dissipated - change [J];
-        ``imbalance``: largest \\|residual\\| relative to the largest of these; ``status``, counters.
+        ``imbalance``: the largest residual relative to the largest of these; ``status``, counters.
 
     Raises
     ------

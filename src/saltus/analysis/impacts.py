@@ -94,8 +94,8 @@ def impact_statistics(
     method = check_method(method)
     if not method.records_contacts:
         raise ParameterError(
-            f'impact_statistics needs a method that locates contacts, and {method.name}(events="ignore") steps over them. Use sl.Taylor() or '
-            f'sl.ODE45(..., events="locate").'
+            f'impact_statistics needs a method that locates contacts, and {method.name}(events="ignore") steps over them. Use sl.Taylor() '
+            f'or sl.ODE45(..., events="locate").'
         )
     if not system.guards:
         raise ParameterError(f"{system.name} has no guard, so there is no contact to count.")
@@ -145,7 +145,8 @@ def _dataset(
 ) -> xr.Dataset:
     """Contacts and what they have in common, under their names."""
     size, guards = seen.group.size, len(system.guards)
-    cells = [(i, g, np.flatnonzero((found.trajectory == i) & (found.guard == g))) for i in range(size) for g in range(guards)]
+    ends = np.searchsorted(found.trajectory, np.arange(size + 1))
+    cells = [(i, g, ends[i] + np.flatnonzero(found.guard[ends[i] : ends[i + 1]] == g)) for i in range(size) for g in range(guards)]
     edges = _edges(bins, found.speed)
     each: dict[str, np.ndarray] = {}
 
@@ -160,8 +161,8 @@ def _dataset(
             put(name, i, g, value)
     names = np.array([guard.name for guard in system.guards], dtype=np.str_)
     columns = {
-        "contact_time": found.begin, "contact_guard": names[found.guard], "contact_speed": found.speed, "contact_exit_speed": found.exit_speed,
-        "contact_duration": found.end - found.begin, "contact_trajectory": found.trajectory,
+        "contact_time": found.begin, "contact_guard": names[found.guard], "contact_speed": found.speed,
+        "contact_exit_speed": found.exit_speed, "contact_duration": found.end - found.begin, "contact_trajectory": found.trajectory,
     }  # fmt: skip
     if found.impulse is not None:
         columns["contact_impulse"] = found.impulse
@@ -221,7 +222,8 @@ def _sizes(found: Touchdowns, rows: np.ndarray) -> dict[str, float]:
     speed, duration = found.speed[rows], (found.end - found.begin)[rows]
     duration = duration[np.isfinite(duration)]
     result = {
-        "speed_mean": _mean(speed), "speed_mean_error": _error_of_row(speed), "speed_rms": _mean(speed**2) ** 0.5, "speed_max": _largest(speed),
+        "speed_mean": _mean(speed), "speed_mean_error": _error_of_row(speed),
+        "speed_rms": _mean(speed**2) ** 0.5, "speed_max": _largest(speed),
         "duration_mean": _mean(duration), "duration_mean_error": _error_of_row(duration),
         "duration_min": -_largest(-duration), "duration_max": _largest(duration),
     }  # fmt: skip

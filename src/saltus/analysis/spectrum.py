@@ -31,8 +31,8 @@ def spectrum(
     """Amplitude spectrum of the states of a run.
 
     The amplitude of a line is that of the cosine it stands for: ``x(t) = x_0 + sum of x_k cos(2 pi f_k t + phase_k)``. Where the response
-    repeats after n forcing periods (:func:`saltus.settled` tells), a whole number of responses is taken without a window: its lines lie
-    exactly on multiples of 1/(nT), nothing leaks, and **Parseval's relation** holds to rounding::
+    repeats after n forcing periods (:func:`saltus.settled` tells), whole responses are taken without a window: the lines lie exactly on
+    multiples of 1/(nT), nothing leaks, and **Parseval's relation** holds to rounding::
 
         mean of x^2 over the samples = x_0^2 + sum of x_k^2 / 2        (the last line of an even number of samples counts in full)
 
@@ -50,7 +50,8 @@ def spectrum(
     window : {"none", "hann"}, optional
         For all trajectories; by default ``"none"`` where the response repeats, else ``"hann"``.
     last : int, optional
-        Whole forcing periods at the end to look at; by default all that were kept.
+        Whole forcing periods at the end to look at, as many of them as are whole responses; by default one response, or all periods
+        that were kept where one doesn't repeat.
 
     Returns
     -------
@@ -102,7 +103,7 @@ def spectrum(
 # -- which samples -------------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class _Stretch:
-    """Samples ``first`` to ``first + count``; their frequencies [Hz], orders, the time of the first [s]; the period of each response in T."""
+    """Samples ``first`` to ``first + count``: frequencies [Hz], orders, the time of the first [s]; the periods of the responses [T]."""
 
     first: int
     count: int
@@ -143,13 +144,15 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
             f"spectrum: the trajectories repeat after {sorted({int(n) for n in response if n})} forcing periods, so only {common} periods "
             f"hold whole responses of all, and {periods} were kept. Give more keep=, or take them one by one: run.isel(trajectory=0)."
         )
+    if last is None and response.all():
+        periods = common  # more of the same would only put empty lines between
     periods -= periods % common
     first, count = int(whole[-periods - 1]), int(whole[-1] - whole[-periods - 1])
     order = np.arange(count // 2 + 1) / periods
     own = "forcing_period" in run.variables and run["forcing_period"].ndim == 1
-    period = run["forcing_period"].values if own else schema.forcing_period(run)
+    period = run["forcing_period"].values[:, None] if own else np.float64(schema.forcing_period(run))
     begin = np.atleast_1d(run["time"].values[..., first])
-    return _Stretch(first, count, order / period[:, None] if own else order / period, order, begin, response)
+    return _Stretch(first, count, order / period, order, begin, response)
 
 
 def _free_stretch(run: xr.Dataset, last: int | None) -> _Stretch:

@@ -66,9 +66,10 @@ def find(seen: Stretch, outcome: Outcome, sides: np.ndarray, integrals: Mapping[
     who, guard = table[:, st.REC_TRAJECTORY], table[:, st.REC_GUARD]
     flips = ((table[:, st.REC_MODE_BEFORE] ^ table[:, st.REC_MODE_AFTER]) >> guard) & 1 == 1
     usable = flips & (time > seen.begin[who])
+    ends = np.searchsorted(who, np.arange(seen.group.size + 1))
     parts, spells = [], {}
     for i in range(seen.group.size):
-        mine = np.flatnonzero(usable & (who == i))
+        mine = ends[i] + np.flatnonzero(usable[ends[i] : ends[i + 1]])
         for g, side in enumerate(sides):
             rows = mine[guard[mine] == g]
             enters = table[rows, st.REC_DIRECTION] == side

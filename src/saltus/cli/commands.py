@@ -25,12 +25,16 @@ class Case(StrEnum):
 
 
 class Kind(StrEnum):
-    """Pictures of a run."""
+    """Pictures of a result."""
 
     history = "history"
     phase = "phase"
     basins = "basins"
     agreement = "agreement"
+    section = "section"
+    spectrum = "spectrum"
+    impacts = "impacts"
+    energy = "energy"
 
 
 class Progress(StrEnum):
@@ -194,12 +198,13 @@ def resume(
 def plot(
     result: Annotated[Path, typer.Argument(help="A result (.nc) that saltus wrote.")],
     kind: Annotated[
-        Kind | None, typer.Option(help="history: state against time. phase: velocity against displacement. basins, agreement: maps.")
+        Kind | None,
+        typer.Option(help="history: state against time. phase: velocity against displacement. Others: the one picture of their result."),
     ] = None,
     trajectory: Annotated[int | None, typer.Option(min=0, help="Which trajectory of a batch; by default all, at most 8.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture (.png, .pdf, .svg); default RESULT-KIND.png.")] = None,
 ) -> None:
-    """Draw a result: history and phase of a run; basins; the agreement of two maps. By default what fits the result.
+    """Draw a result: history and phase of a run; basins; the agreement of two maps; a section; a spectrum; impacts; energies.
 
     Example: `saltus plot saltus-demo/demo.nc --trajectory 2 --kind phase -o phase.pdf`
     """
@@ -223,6 +228,7 @@ def models(
 
     if name:
         screen.say(repr(published.find(name)()))
+        screen.say(f'energy      sl.models.energy("{name}"), as sl.energy_balance takes it')
     else:
         screen.show(TextTable("Models; `saltus models NAME` shows one", ("name", "what it is"), tuple(published.describe().items())))
 

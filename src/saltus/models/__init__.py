@@ -50,7 +50,7 @@ def find(name: str) -> Callable[..., System]:
 
 
 def energy(name: str) -> dict[str, Callable[..., Any]]:
-    """Energy and powers of a model, as :func:`saltus.energy_balance` takes them: ``sl.energy_balance(rig, ..., **sl.models.energy("chain"))``.
+    """Energy and powers of a model, as :func:`saltus.energy_balance` takes them: ``**sl.models.energy("chain")``.
 
     Parameters
     ----------

@@ -14,6 +14,7 @@ r"""A typical wing section with freeplay in pitch, in a quasi-steady flow.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 from saltus.system import System, freeplay, system
@@ -127,4 +128,4 @@ def _dissipated(plunge_rate, pitch_rate, *, plunge_damping, pitch_damping):
 
 
 #: Stored energy [J], power supplied and dissipated [W].
-ENERGY = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}
+ENERGY: dict[str, Callable[..., Any]] = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}

@@ -10,6 +10,7 @@ where :math:`f_i` is zero inside a symmetric clearance and a linear spring beyon
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 from saltus.system import System, cos, freeplay, pi, system
@@ -115,4 +116,4 @@ def _dissipated(v1, v2, *, ground_damping, coupling_damping):
 
 
 #: Stored energy [J], power supplied and dissipated [W].
-ENERGY = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}
+ENERGY: dict[str, Callable[..., Any]] = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}

@@ -13,6 +13,7 @@ force for the field of the magnet.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 from saltus.errors import ParameterError, nearest
@@ -120,4 +121,4 @@ def _dissipated(v, *, mass, damping_ratio, natural_frequency):
 
 
 #: Stored energy [J], power supplied and dissipated [W].
-ENERGY = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}
+ENERGY: dict[str, Callable[..., Any]] = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}

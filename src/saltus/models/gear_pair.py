@@ -12,6 +12,7 @@ in :math:`|x| < b`; below :math:`-b` their backs touch.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 from saltus.system import System, cos, freeplay, pi, sin, sqrt, system
@@ -104,4 +105,4 @@ def _dissipated(v, *, mesh_mass, damping_ratio, mesh_stiffness):
 
 
 #: Stored energy [J], power supplied and dissipated [W].
-ENERGY = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}
+ENERGY: dict[str, Callable[..., Any]] = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}

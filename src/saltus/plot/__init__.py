@@ -4,7 +4,12 @@ from saltus.plot.agreement import agreement
 from saltus.plot.basins import basins
 from saltus.plot.gallery import gallery
 from saltus.plot.history import history
+from saltus.plot.measures import energy, impacts
 from saltus.plot.phase import phase
+from saltus.plot.section import section
+from saltus.plot.spectrum import spectrum
 from saltus.plot.style import OKABE_ITO, style
 
-__all__ = ["OKABE_ITO", "agreement", "basins", "gallery", "history", "phase", "style"]
+__all__ = [
+    "OKABE_ITO", "agreement", "basins", "energy", "gallery", "history", "impacts", "phase", "section", "spectrum", "style",
+]  # fmt: skip

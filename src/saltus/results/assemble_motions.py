@@ -77,8 +77,8 @@ def motion_dataset(
             build.put_state(name, name, ("crossing",), f"{name} at the crossing", values, each=False)
         elif batch or not name.endswith("_trajectory"):
             build.put(name, values, spec=spec(name))
-    for name, values in {"status": status, **each}.items():
-        build.put(name, values, each=True, spec=spec(name))
+    for name, value in {"status": status, **each}.items():
+        build.put(name, value, each=True, spec=spec(name))
     for name, values in end.items():
         build.put_state(name, schema.end_name(name), (), f"{name} at the end", values)
     if guards is not None:

@@ -6,6 +6,11 @@ from pathlib import Path
 
 from saltus.errors import ParameterError
 
+#: The picture of each kind of result that has one of its own; runs have two.
+OWN = {name: name for name in ("basins", "agreement", "section", "spectrum", "impacts", "energy")}
+#: Those that know no trajectories.
+MAPS = ("basins", "agreement")
+
 
 def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | None) -> Path:
     """Draw a result to a picture file.
@@ -14,7 +19,7 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
     ----------
     result : Path
         A ``.nc`` file that saltus wrote.
-    kind : {"history", "phase", "basins", "agreement"}, optional
+    kind : {"history", "phase", "basins", "agreement", "section", "spectrum", "impacts", "energy"}, optional
         Which picture; by default the one that fits the result.
     trajectory : int, optional
         Which of a batch; all of them, at most 8, by default.
@@ -46,18 +51,17 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
     from saltus.results.schema import kind_of
 
     ds = load(result)
-    own = {"basins": "basins", "agreement": "agreement"}.get(kind_of(ds))
+    own = OWN.get(kind_of(ds))
     kind = kind or own or "history"
-    maps = ("basins", "agreement")
-    if (kind in maps or own is not None) and kind != own:
+    if (kind in OWN.values() or own is not None) and kind != own:
         raise ParameterError(f"{result} holds {own or 'a run'}: it can't be drawn as {kind}. Leave --kind out.")
-    if own is not None and trajectory is not None:
+    if own in MAPS and trajectory is not None:
         raise ParameterError(f"{result} holds {own}, no trajectories. Leave --trajectory out.")
     file = file or result.with_name(f"{result.stem}-{kind}.png")
     formats = FigureCanvasBase.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in formats:
         raise ParameterError(f"a picture can't be written as {file.name!r}. Known: {', '.join('.' + name for name in sorted(formats))}.")
-    axes = getattr(plot, kind)(ds, **({} if own else {"trajectory": trajectory}))
+    axes = getattr(plot, kind)(ds, **({} if own in MAPS else {"trajectory": trajectory}))
     first = axes.flat[0] if hasattr(axes, "flat") else axes
     first.figure.savefig(file)
     plt.close("all")
