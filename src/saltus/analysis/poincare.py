@@ -19,8 +19,11 @@ from saltus.flow.methods import Method, check_method
 from saltus.kernels import status as st
 from saltus.results import motion_dataset, schema
 from saltus.system.guards import equation_of
-from saltus.system.quantity import Quantity, turning_surface, with_level, with_surface
+from saltus.system.quantity import Quantity, acting_guards, turning_surface, with_level, with_surface
 from saltus.system.system import System
+
+#: Touches that are closer than this are one [forcing periods; the span if unforced]: where a gap is flat its minimum is that uncertain.
+SAME_TOUCH = 1e-9
 
 
 def poincare(
@@ -92,7 +95,7 @@ def poincare(
         )
     if direction not in (-1, 0, 1):
         raise ParameterError(f"direction must be 0, 1 or -1, not {direction!r}.")
-    crossed = _crossed(system, surface)
+    crossed = _crossed(system, surface, values or {})
     seen = stretch(crossed.system, start, values, periods, t_end, t_start, transient)
 
     def dataset(outcome: Outcome) -> xr.Dataset:
@@ -105,36 +108,42 @@ def poincare(
 
 @dataclass(frozen=True)
 class _Crossed:
-    """The system with the surface among its guards, which of them it is, and the unit of its function."""
+    """The system with the surface among its guards, which of them it is, and the unit of its function; the surface in words."""
 
     system: System
     guard: int
     unit: str
+    text: str
 
 
-def _crossed(system: System, surface: Any) -> _Crossed:
-    """What the user means by a surface."""
+def _crossed(system: System, surface: Any, values: Mapping[str, Any]) -> _Crossed:
+    """What the user means by a surface; ``values`` may hold its level."""
     if callable(surface):
-        return _last(with_surface(system, surface), "")
+        return _last(with_surface(system, surface), "", "")
     if isinstance(surface, tuple | list):
         if len(surface) != 2 or not isinstance(surface[0], str):
             raise ParameterError(f'a surface at a level is a pair of a state and a value, such as ("x", "0.3 mm"), not {surface!r}.')
-        return _last(with_level(system, surface[0], surface[1]), system.state_unit(surface[0]))
+        leveled = with_level(system, surface[0], surface[1])
+        level = leveled.guards[-1].name
+        return _last(leveled, system.units[surface[0]], "" if level in values else f"{surface[0]} = {leveled.parameter_text(level)}")
     names = [guard.name for guard in system.guards]
     if surface in names:
         owner = system.guards[names.index(surface)].state
-        return _Crossed(system, names.index(surface), system.units[owner] if owner else "")
+        number = names.index(surface)
+        return _Crossed(system, number, system.units[owner] if owner else "", equation_of(number, system.guards))
     turns = {f"{name} turns": name for name in system.states}
     if surface in turns:
-        return _last(turning_surface(system, turns[surface]), schema.rate_unit(system.units[turns[surface]]))
+        return _last(turning_surface(system, turns[surface]), schema.rate_unit(system.units[turns[surface]]), surface)
     raise ParameterError(
         f"{system.name} has no guard {surface!r}. {nearest(str(surface), (*names, *turns))} Or give a function, or a level such as "
         f'("{system.states[0]}", 0.0).'
     )
 
 
-def _last(system: System, unit: str) -> _Crossed:
-    return _Crossed(system, len(system.guards) - 1, unit)
+def _last(system: System, unit: str, text: str) -> _Crossed:
+    """The surface is the last guard; without words of its own its equation says what it is."""
+    number = len(system.guards) - 1
+    return _Crossed(system, number, unit, text or equation_of(number, system.guards))
 
 
 def _dataset(system: System, method: Method, seen: Stretch, crossed: _Crossed, direction: int, outcome: Outcome) -> xr.Dataset:
@@ -153,8 +162,7 @@ def _dataset(system: System, method: Method, seen: Stretch, crossed: _Crossed, d
         return np.bincount(who[of], minlength=seen.group.size)
 
     arguments = common(seen, system, method, outcome)
-    surface = equation_of(crossed.guard, crossed.system.guards)
-    arguments["attrs"] |= {"surface": surface, "direction": direction, "transient": _transient(seen)}
+    arguments["attrs"] |= {"surface": crossed.text, "direction": direction, "transient": _transient(seen)}
     states = {name: numbers[kept, st.RECORD_FLOATS + i] for i, name in enumerate(system.states)}
     columns = {
         "crossing_time": time[kept],
@@ -166,13 +174,25 @@ def _dataset(system: System, method: Method, seen: Stretch, crossed: _Crossed, d
         "crossing_kind": kinds[table[kept, st.REC_KIND]],
         "crossing_trajectory": rows,
     }
-    contacts = late & flips & (guard < len(system.guards))
+    contacts = late & flips & np.isin(guard, acting_guards(system))
     return motion_dataset(
         schema.SECTION,
-        **with_each(arguments, crossings=count(wanted), tangencies=count(ours & ~flips), contacts=count(contacts)),
+        **with_each(
+            arguments, crossings=count(wanted), tangencies=count(_distinct(seen, who, time, ours & ~flips)), contacts=count(contacts)
+        ),
         table={**states, **columns},
         table_units={"crossing_rate": schema.rate_unit(crossed.unit)},
     )
+
+
+def _distinct(seen: Stretch, who: np.ndarray, time: np.ndarray, touches: np.ndarray) -> np.ndarray:
+    """The touches without repeats: one in the instant of another event is seen from the step before it and from the step after it."""
+    rows = np.flatnonzero(touches)
+    again = np.zeros(len(rows), dtype=bool)
+    again[1:] = (np.diff(who[rows]) == 0) & (np.diff(time[rows]) <= SAME_TOUCH * seen.length.period[who[rows[1:]]])
+    distinct = touches.copy()
+    distinct[rows[again]] = False
+    return distinct
 
 
 def _phases(seen: Stretch, elapsed: np.ndarray, rows: np.ndarray) -> np.ndarray:
