@@ -177,14 +177,6 @@ def test_a_contact_under_way_counts_in_the_share_only():
     assert float(inside.share_in_contact[0]) == 1.0
 
 
-def test_errors_of_a_wandering_motion_are_those_of_its_blocks():
-    """Chaos of the rig's cousin: the error of the mean speed covers the difference of two halves of the run."""
-    values = {"force": 1.0, "spring": 0.2, "damping": 0.1, "boundary": 0.1, "stiffness": 50.0, "frequency": 0.25}
-    halves = sl.impact_statistics(lab, {"x": [0.0, 0.4], "v": [0.1, 0.3]}, periods=1000, transient=100, force=FORCE, values=values)
-    speed, error = halves.speed_mean.values[:, 0], halves.speed_mean_error.values[:, 0]
-    assert abs(speed[0] - speed[1]) <= 4 * math.hypot(*error)
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

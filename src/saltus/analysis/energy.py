@@ -142,7 +142,7 @@ def _dataset(
     residual = supplied - dissipated - change
     parts = {"energy": energy[:, 1:], "change": change, "supplied": supplied, "dissipated": dissipated, "residual": residual}
     forced = system.forced_at is not None
-    arguments = {**common(seen, system, method, outcome), "guards": None}
+    arguments = common(seen, system, method, outcome)
     return motion_dataset(
         schema.ENERGY,
         **with_each(arguments, **parts, imbalance=_imbalance(parts)),

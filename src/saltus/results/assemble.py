@@ -89,6 +89,10 @@ class Builder:
         self.attrs: dict[str, Any] = {"saltus_result": kind, "schema_version": schema.VERSION, "states": " ".join(states)}
         if not batch and count != 1:
             raise ParameterError(f"a Dataset without the dim trajectory holds one trajectory, not {count}. Pass batch=True.")
+        reserved = {*self.table, *(dim for spec in self.table.values() for dim in spec.dims)} if kind in schema.WITH_STATES else set()
+        clash = [name for name in states if name in reserved]
+        if clash:
+            raise ParameterError(f"the state {clash[0]!r} has the name of something else in the result. Rename the state in the system.")
         if batch:
             self.put("trajectory", np.arange(count), each=True, coord=True)
 
@@ -112,8 +116,6 @@ class Builder:
 
     def put_state(self, name: str, variable: str, dims: tuple[str, ...], long_name: str, values: Any, each: bool = True) -> None:
         """Add a variable that holds one state."""
-        if variable == name and name in {*self.table, *(dim for spec in self.table.values() for dim in spec.dims)}:
-            raise ParameterError(f"the state {name!r} has the name of something else in the result. Rename the state in the system.")
         self.put(variable, values, each=each, spec=Variable(dims, self.units.get(name, ""), long_name))
 
     def put_guards(self, guards: Guards) -> None:

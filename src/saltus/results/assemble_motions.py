@@ -18,7 +18,7 @@ def motion_dataset(
     *,
     states: Sequence[str],
     units: Mapping[str, str],
-    guards: Guards | None,
+    guards: Guards,
     status: Sequence[str],
     each: Mapping[str, np.ndarray],
     table: Mapping[str, np.ndarray],
@@ -39,8 +39,8 @@ def motion_dataset(
         ``schema.SECTION``, ``schema.IMPACTS`` or ``schema.ENERGY``.
     states, units, status, forcing_period, varied, attrs, batch
         As in :func:`saltus.results.trajectory_dataset`.
-    guards : Guards, optional
-        Those of the system; none are listed without.
+    guards : Guards
+        Those of the system; left out where the kind doesn't list them.
     each : mapping of str to array, shape (trajectory, ...)
         Variables of the table of this kind that each trajectory has.
     table : mapping of str to array, shape (row,)
@@ -63,7 +63,7 @@ def motion_dataset(
     ParameterError
         If a state or a varied parameter has the name of a variable of the result.
     """
-    build = Builder(kind, states, units, guards or Guards([], [], np.zeros(0)), batch, len(status))
+    build = Builder(kind, states, units, guards, batch, len(status))
 
     def spec(name: str) -> Variable:
         found = build.table[name]
@@ -81,7 +81,7 @@ def motion_dataset(
         build.put(name, value, each=True, spec=spec(name))
     for name, values in end.items():
         build.put_state(name, schema.end_name(name), (), f"{name} at the end", values)
-    if guards is not None:
+    if "guard" in build.table:
         build.put_guards(guards)
     build.put_forcing(forcing_period)
     build.put_varied(varied or {})

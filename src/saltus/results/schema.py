@@ -34,6 +34,9 @@ MAKERS = {
     SECTION: "poincare", SPECTRUM: "spectrum", IMPACTS: "impact_statistics", ENERGY: "energy_balance",
 }  # fmt: skip
 
+#: Kinds that hold the states under their own names.
+WITH_STATES = (TRAJECTORY, STROBOSCOPE, SECTION)
+
 # What stands in ``basin`` for a start that has no attractor.
 ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
 #: Meaning of these codes.
