@@ -25,9 +25,13 @@ if TYPE_CHECKING:
         bifurcation_diagram,
         compare,
         compare_methods,
+        energy_balance,
         frequency_response,
+        impact_statistics,
+        poincare,
         settled,
         simulate,
+        spectrum,
         stroboscope,
     )
     from saltus.flow import ODE45, Interrupted, Taylor
@@ -37,21 +41,22 @@ if TYPE_CHECKING:
 #: Public name: module that holds it.
 _HOMES = {
     **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
-    **dict.fromkeys(("compare_methods", "frequency_response", "settled", "simulate", "stroboscope"), "saltus.analysis"),
+    **dict.fromkeys(("compare_methods", "energy_balance", "frequency_response", "impact_statistics", "poincare"), "saltus.analysis"),
+    **dict.fromkeys(("settled", "simulate", "spectrum", "stroboscope"), "saltus.analysis"),
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("describe", "load", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
         ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan", "tanh"),
         "saltus.system",
     ),
-}
+}  # fmt: skip
 _MODULES = ("models", "plot")
 
 __all__ = [
     "ODE45", "Interrupted", "System", "Taylor", "abs", "atan", "attractors", "basin_fractions", "basins", "bifurcation_diagram",
-    "compare", "compare_methods", "cos", "describe", "exp", "freeplay", "frequency_response", "load", "log", "max", "min",
-    "models", "pi", "piecewise", "plot", "save", "settled", "simulate", "sin", "sqrt", "stroboscope", "system", "tan", "tanh",
-    "to_csv", "to_mat",
+    "compare", "compare_methods", "cos", "describe", "energy_balance", "exp", "freeplay", "frequency_response", "impact_statistics",
+    "load", "log", "max", "min", "models", "pi", "piecewise", "plot", "poincare", "save", "settled", "simulate", "sin", "spectrum",
+    "sqrt", "stroboscope", "system", "tan", "tanh", "to_csv", "to_mat",
 ]  # fmt: skip
 
 

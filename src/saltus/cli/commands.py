@@ -26,7 +26,7 @@ class Case(StrEnum):
 
 
 class Kind(StrEnum):
-    """Pictures."""
+    """Pictures of a result."""
 
     history = "history"
     phase = "phase"
@@ -35,6 +35,10 @@ class Kind(StrEnum):
     frequency_response = "frequency_response"
     bifurcation_diagram = "bifurcation_diagram"
     type_map = "type_map"
+    section = "section"
+    spectrum = "spectrum"
+    impacts = "impacts"
+    energy = "energy"
 
 
 class Progress(StrEnum):
@@ -190,12 +194,13 @@ def resume(
 def plot(
     result: Annotated[Path, typer.Argument(help="A result (.nc) that saltus wrote.")],
     kind: Annotated[
-        Kind | None, typer.Option(help="What to draw of a run: history (state against time) or phase (velocity against displacement).")
+        Kind | None,
+        typer.Option(help="history: state against time. phase: velocity against displacement. Others: the one picture of their result."),
     ] = None,
     trajectory: Annotated[int | None, typer.Option(min=0, help="Which trajectory of a batch; by default all, at most 8.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture (.png, .pdf, .svg); default RESULT-KIND.png.")] = None,
 ) -> None:
-    """Draw a result: history and phase of a run; basins and their agreement; responses. By default what fits the result.
+    """Draw a result: history and phase of a run; basins; responses; a section; a spectrum; impacts; energies. By default what fits.
 
     Example: `saltus plot saltus-demo/demo.nc --trajectory 2 --kind phase -o phase.pdf`
     """
@@ -219,6 +224,7 @@ def models(
 
     if name:
         screen.say(repr(published.find(name)()))
+        screen.say(f'energy      sl.models.energy("{name}"), as sl.energy_balance takes it')
     else:
         screen.show(TextTable("Models; `saltus models NAME` shows one", ("name", "what it is"), tuple(published.describe().items())))
 

@@ -1,6 +1,7 @@
 """Results: the schema of every Dataset, where it comes from, and files."""
 
 from saltus.results.assemble import Contacts, Guards, stroboscope_dataset, trajectory_dataset
+from saltus.results.assemble_motions import motion_dataset, spectrum_dataset
 from saltus.results.basins import AttractorTable, agreement_dataset, attractors_dataset, basins_dataset
 from saltus.results.export import save, to_csv, to_mat, to_netcdf
 from saltus.results.files import ResultFileError, usable_folder
@@ -25,8 +26,10 @@ __all__ = [
     "describe",
     "load",
     "methods_dataset",
+    "motion_dataset",
     "responses_dataset",
     "save",
+    "spectrum_dataset",
     "stroboscope_dataset",
     "to_csv",
     "to_mat",

@@ -23,21 +23,27 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError
+from saltus.results import motions
 from saltus.results.method_variables import METHODS_VARIABLES
 from saltus.results.response_variables import RESPONSES_VARIABLES
-from saltus.results.variable import GUARD_VARIABLES, Variable
+from saltus.results.variable import COUNTERS, FORCING_PERIOD, GUARDS, MINIMA, STATUS, TRAJECTORY_NUMBER, Variable
 
 #: Version of the tables below, kept in every result as ``schema_version``.
 VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS = "methods"
+SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
     TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare",
     RESPONSES: "frequency_response or bifurcation_diagram",
     METHODS: "compare_methods",
+    SECTION: "poincare", SPECTRUM: "spectrum", IMPACTS: "impact_statistics", ENERGY: "energy_balance",
 }  # fmt: skip
+
+#: Kinds that hold the states under their own names.
+WITH_STATES = (TRAJECTORY, STROBOSCOPE, SECTION)
 
 # What stands in ``basin`` for a start that has no attractor.
 ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
@@ -46,19 +52,6 @@ NO_BASIN = {ESCAPED: "escaped", UNCONVERGED: "unconverged", FAILED: "failed", NO
 #: Meaning of the values of ``agreement``.
 AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
 
-_STATUS = Variable((), "", "how the trajectory ended", "str")
-_COUNTERS = {
-    "events": Variable((), "1", "contacts", "i8"),
-    "grazes": Variable((), "1", "grazes", "i8"),
-    "grazes_unresolved": Variable((), "1", "grazes shallower than the local error", "i8"),
-    "steps": Variable((), "1", "accepted steps", "i8"),
-    "rejected_steps": Variable((), "1", "rejected steps", "i8"),
-    "mode_violations": Variable((), "1", "accepted steps that ended on the wrong side of a guard", "i8"),
-}
-_MINIMA = {
-    "smallest_contact_speed": Variable((), "<gap rate>", "smallest gap rate at a contact"),
-    "smallest_gap_margin": Variable((), "<gap>", "smallest distance of a turning point of the gap from a guard"),
-}
 
 #: Variables of what ``simulate`` returns, beside the states.
 TRAJECTORY_VARIABLES = {
@@ -75,24 +68,24 @@ TRAJECTORY_VARIABLES = {
     "contact_mode_after": Variable(("contact",), "1", "mode after the contact", "i8"),
     "contact_steps": Variable(("contact",), "1", "accepted steps from the start to the contact", "i8"),
     "contact_trajectory": Variable(("contact",), "1", "trajectory that the contact belongs to", "i8"),
-    "status": _STATUS,
-    **_COUNTERS,
-    **_MINIMA,
-    **GUARD_VARIABLES,
+    "status": STATUS,
+    **COUNTERS,
+    **MINIMA,
+    **GUARDS,
     "end_time": Variable((), "s", "time at the end"),
-    "forcing_period": Variable((), "s", "forcing period"),
-    "trajectory": Variable((), "1", "trajectory", "i8"),
+    "forcing_period": FORCING_PERIOD,
+    "trajectory": TRAJECTORY_NUMBER,
 }
 
 #: Variables of what ``stroboscope`` returns, beside the states.
 STROBOSCOPE_VARIABLES = {
     "period": Variable(("period",), "1", "whole forcing periods since the start", "i8"),
-    "status": _STATUS,
-    **_COUNTERS,
-    **_MINIMA,
-    **GUARD_VARIABLES,
-    "forcing_period": Variable((), "s", "forcing period"),
-    "trajectory": Variable((), "1", "trajectory", "i8"),
+    "status": STATUS,
+    **COUNTERS,
+    **MINIMA,
+    **GUARDS,
+    "forcing_period": FORCING_PERIOD,
+    "trajectory": TRAJECTORY_NUMBER,
 }
 
 #: What is known of each attractor, beside the points ``attractor_<state>``. ``<first>``: the unit of the first state.
@@ -156,6 +149,10 @@ TABLES = {
     AGREEMENT: AGREEMENT_VARIABLES,
     RESPONSES: RESPONSES_VARIABLES,
     METHODS: METHODS_VARIABLES,
+    SECTION: motions.SECTION_VARIABLES,
+    SPECTRUM: motions.SPECTRUM_VARIABLES,
+    IMPACTS: motions.IMPACTS_VARIABLES,
+    ENERGY: motions.ENERGY_VARIABLES,
 }
 
 
@@ -280,6 +277,10 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         AGREEMENT: ("agreement", "match_a"),
         RESPONSES: ("response_of", "response_type", "response_branch"),
         METHODS: ("method", "agrees"),
+        SECTION: (*states_of(ds), "crossing_time", "status"),
+        SPECTRUM: ("frequency", "window"),
+        IMPACTS: ("contact_speed", "contacts_per_second", "status"),
+        ENERGY: ("energy", "residual", "status"),
     }[kind]
 
 

@@ -1,4 +1,4 @@
-"""What results about attractors and responses say in a few lines: the part of ``describe`` that knows them."""
+"""What results that aren't runs say in a few lines: the part of ``describe`` that knows them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.results.schema import AGREEMENT, BASINS, RESPONSES, axes_of, kind_of, kind_text, parameters_of
+from saltus.results.summary_motions import WRITERS
 
 #: Attractors that get a line of their own; the others are counted.
 _LINES = 12
@@ -21,7 +22,9 @@ _TRUST = {
 
 
 def summary(ds: xr.Dataset) -> list[str]:
-    """Lines on the extent and the content of a map of basins, a list of attractors, the agreement of two maps, or responses."""
+    """Lines on the extent and the content of a result that isn't a run."""
+    if kind_of(ds) in WRITERS:
+        return WRITERS[kind_of(ds)](ds)
     if kind_of(ds) == RESPONSES:
         return [f"extent   {_span(ds, parameters_of(ds), 'values')}, {_count(ds.sizes['start'], 'start')} at each", *_responses(ds)]
     if kind_of(ds) == AGREEMENT:

@@ -17,13 +17,19 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "basins": ("basins",),
     "agreement": ("agreement",),
     "responses": ("frequency_response", "bifurcation_diagram", "type_map"),
+    "section": ("section",),
+    "spectrum": ("spectrum",),
+    "impacts": ("impacts",),
+    "energy": ("energy",),
+    "methods": ("methods",),
 }
 _WORDS = {
     "trajectory": "a run", "stroboscope": "points at whole periods", "basins": "basins", "agreement": "the agreement of two maps of basins",
-    "responses": "responses",
+    "responses": "responses", "section": "a section", "spectrum": "a spectrum", "impacts": "impacts", "energy": "energies",
+    "methods": "methods side by side",
 }  # fmt: skip
 #: Pictures that show trajectories of a batch.
-OF_TRAJECTORIES = ("history", "phase")
+OF_TRAJECTORIES = ("history", "phase", "section", "spectrum", "impacts", "energy")
 
 
 def default_kind(ds: xr.Dataset) -> str:
