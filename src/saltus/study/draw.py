@@ -17,10 +17,11 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "basins": ("basins",),
     "agreement": ("agreement",),
     "responses": ("frequency_response", "bifurcation_diagram", "type_map"),
+    "methods": ("methods",),
 }
 _WORDS = {
     "trajectory": "a run", "stroboscope": "points at whole periods", "basins": "basins", "agreement": "the agreement of two maps of basins",
-    "responses": "responses",
+    "responses": "responses", "methods": "one question by several methods",
 }  # fmt: skip
 #: Pictures that show trajectories of a batch.
 OF_TRAJECTORIES = ("history", "phase")
