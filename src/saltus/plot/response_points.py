@@ -24,7 +24,7 @@ NEEDS = ("response_of", "response_branch", "response_type", "response_period")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 #: Name and marker of what happens to a branch between two values.
 _EVENTS = {
-    "graze": ("graze", "^"), "period_doubling": ("period doubling", "D"), "fold": ("fold", ">"), "torus": ("torus", "o"),
+    "graze": ("graze", "^"), "period_doubling": ("period doubling", "D"), "fold": ("fold", ">"), "neimark_sacker": ("Neimark-Sacker", "o"),
     "chaos": ("onset of chaos", "s"), "end": ("branch ends", "|"),
 }  # fmt: skip
 #: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.

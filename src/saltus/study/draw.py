@@ -26,7 +26,7 @@ PICTURES: dict[str, tuple[str, ...]] = {
 _WORDS = {
     "trajectory": "a run", "stroboscope": "points at whole periods", "basins": "basins", "agreement": "the agreement of two maps of basins",
     "responses": "responses", "section": "a section", "spectrum": "a spectrum", "impacts": "impacts", "energy": "energies",
-    "methods": "methods side by side",
+    "methods": "one question by several methods",
 }  # fmt: skip
 #: Pictures that show trajectories of a batch.
 OF_TRAJECTORIES = ("history", "phase", "section", "spectrum", "impacts", "energy")
