@@ -6,6 +6,9 @@ state's unit, ``<gap>`` that of the guards' gap functions, ``<gap rate>`` the sa
 Dims: ``time`` (samples), ``contact`` (one table for all trajectories), ``guard``, ``trajectory``. When the trajectories of a batch have
 periods of their own, the samples share phases instead of times: the dim is then ``period``, and ``time`` has dims (trajectory, period).
 
+Exponents have the dims ``trajectory``, ``exponent`` (in descending order), ``flow_exponent`` and ``running`` (times at which running means
+are kept); ``<rate>`` is the unit that the caller asked for, such as ``bit/period``.
+
 Results about attractors have the dims ``attractor``, ``phase`` (points of an orbit, one a forcing period) and ``multiplier``. What belongs
 to one start has no dims in the table: a map adds the two states that it is drawn over, a list of starts ``trajectory``.
 """
@@ -14,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,8 +29,16 @@ from saltus.errors import ParameterError
 VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT = "basins", "attractors", "agreement"
+EXPONENTS = "exponents"
 #: The function that returns each kind.
-MAKERS = {TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare"}
+MAKERS = {
+    TRAJECTORY: "simulate",
+    STROBOSCOPE: "stroboscope",
+    BASINS: "basins",
+    ATTRACTORS: "attractors",
+    AGREEMENT: "compare",
+    EXPONENTS: "lyapunov",
+}
 
 # What stands in ``basin`` for a start that has no attractor.
 ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
@@ -57,6 +68,10 @@ class Variable:
     units: str
     long_name: str
     dtype: str = "f8"
+
+    def along(self, dim: str) -> Variable:
+        """The same variable with one more dim in front."""
+        return replace(self, dims=(dim, *self.dims))
 
 
 _STATUS = Variable((), "", "how the trajectory ended", "str")
@@ -166,6 +181,34 @@ AGREEMENT_VARIABLES = {
     "match_orbit_distance": Variable(("pair",), "1", "distance of the two orbits in units of the axis ranges"),
 }
 
+#: Variables of what ``lyapunov`` and ``wolf`` return.
+EXPONENTS_VARIABLES = {
+    "trajectory": Variable(("trajectory",), "1", "trajectory", "i8"),
+    "kind": Variable(("trajectory",), "", "kind of motion", "str"),
+    "response_period": Variable(("trajectory",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
+    "lyapunov_exponent": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent"),
+    "lyapunov_error": Variable(("trajectory", "exponent"), "<rate>", "standard error of the Lyapunov exponent"),
+    "lyapunov_low": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, lower end of the 95 % interval"),
+    "lyapunov_high": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, upper end of the 95 % interval"),
+    "flow_lyapunov_exponent": Variable(("trajectory", "flow_exponent"), "<rate>", "Lyapunov exponent of the flow, its phase included"),
+    "exponent_sum": Variable(("trajectory",), "<rate>", "sum of the Lyapunov exponents"),
+    "mean_divergence": Variable(("trajectory",), "<rate>", "mean rate at which volumes grow"),
+    "independent_batches": Variable(("trajectory",), "1", "batches that the error of the largest exponent comes from", "i8"),
+    "near_graze": Variable(("trajectory",), "1", "whether the motion grazes a boundary, or nearly so", "i1"),
+    "grazes": Variable(("trajectory",), "1", "grazes after the transient", "i8"),
+    "grazes_unresolved": Variable(("trajectory",), "1", "grazes shallower than the local error, after the transient", "i8"),
+    "smallest_gap_margin": _MINIMA["smallest_gap_margin"].along("trajectory"),
+    "block_time": Variable(("trajectory",), "s", "time of a block: the forcing period, or the time between two looks"),
+    "status": _STATUS.along("trajectory"),
+    "replacements": Variable(("trajectory",), "1", "replacements of the neighbour", "i8"),
+    "replaced_distance": Variable(("trajectory",), "1", "mean distance at replacement, as a share of the range of the motion"),
+    "replaced_angle": Variable(("trajectory",), "rad", "mean angle between old and new neighbour"),
+    "running_time": Variable(("trajectory", "running"), "s", "time since the end of the transient"),
+    "running_exponent": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far"),
+    "running_low": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, lower end of the 95 % interval"),
+    "running_high": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, upper end of the 95 % interval"),
+}
+
 #: The table of each kind of result.
 TABLES = {
     TRAJECTORY: TRAJECTORY_VARIABLES,
@@ -173,6 +216,7 @@ TABLES = {
     BASINS: BASINS_VARIABLES,
     ATTRACTORS: ATTRACTORS_VARIABLES,
     AGREEMENT: AGREEMENT_VARIABLES,
+    EXPONENTS: EXPONENTS_VARIABLES,
 }
 
 
@@ -263,7 +307,12 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
     """Variables without which nothing can be said about a result."""
     if kind in (TRAJECTORY, STROBOSCOPE):
         return (*states_of(ds), "status")
-    return {BASINS: ("basin", "status", "attractor_type"), ATTRACTORS: ("attractor_type",), AGREEMENT: ("agreement", "match_a")}[kind]
+    return {
+        BASINS: ("basin", "status", "attractor_type"),
+        ATTRACTORS: ("attractor_type",),
+        AGREEMENT: ("agreement", "match_a"),
+        EXPONENTS: ("lyapunov_exponent", "running_exponent"),
+    }[kind]
 
 
 # -- after reading a file ------------------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import AGREEMENT, BASINS, axes_of, kind_of
+from saltus.results.schema import AGREEMENT, BASINS, EXPONENTS, axes_of, kind_of, kind_text
 
 #: Attractors that get a line of their own; the others are counted.
 _LINES = 12
@@ -21,9 +21,11 @@ _TRUST = {
 
 
 def summary(ds: xr.Dataset) -> list[str]:
-    """Lines on the extent and the content of a map of basins, a list of attractors, or the agreement of two maps."""
+    """Lines on the extent and the content of a map of basins, a list of attractors, the agreement of two maps, or exponents."""
     if kind_of(ds) == AGREEMENT:
         return [f"extent   {_axes(ds)}", *_agreement(ds)]
+    if kind_of(ds) == EXPONENTS:
+        return _exponents(ds)
     lines = [f"extent   {_axes(ds)}" if kind_of(ds) == BASINS else f"extent   {_starts(ds)}"]
     lines += _attractors(ds)
     if "basin" in ds:
@@ -63,6 +65,20 @@ def _unsettled(basin: xr.DataArray) -> str:
     codes, counts = np.unique(basin.values, return_counts=True)
     others = [f"{count} {meanings[int(code)]}" for code, count in zip(codes, counts, strict=True) if code < 0]
     return ", ".join([f"{int(counts[codes >= 0].sum())} of {basin.size} starts", *others])
+
+
+def _exponents(ds: xr.Dataset) -> list[str]:
+    """A line on each trajectory: the kind of motion, and its exponents with the half-width of the 95 % interval of the largest."""
+    count, unit = ds.sizes["trajectory"], ds["lyapunov_exponent"].attrs.get("units", "")
+    lines = [f"measured {ds.attrs.get('algorithm', 'unknown')}, {count} {'trajectory' if count == 1 else 'trajectories'}"]
+    for i in range(min(count, _LINES)):
+        one = ds.isel(trajectory=i)
+        values = ", ".join(f"{value:.6g}" for value in one["lyapunov_exponent"].values)
+        width = float(one["lyapunov_high"][0] - one["lyapunov_exponent"][0])
+        graze = ", near a graze" if "near_graze" in one and int(one["near_graze"]) else ""
+        kind = kind_text(str(one["kind"].item()), int(one["response_period"]))
+        lines.append(f"  {i}: {kind}, {values} {unit}, the first +- {width:.1e}{graze}")
+    return lines + ([f"  and {count - _LINES} more"] if count > _LINES else [])
 
 
 def _agreement(ds: xr.Dataset) -> list[str]:
