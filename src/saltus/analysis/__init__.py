@@ -7,5 +7,6 @@ from saltus.analysis.lyapunov import lyapunov
 from saltus.analysis.settled import settled
 from saltus.analysis.simulate import simulate
 from saltus.analysis.stroboscope import stroboscope
+from saltus.analysis.wolf import wolf
 
-__all__ = ["attractors", "basin_fractions", "basins", "compare", "lyapunov", "settled", "simulate", "stroboscope"]
+__all__ = ["attractors", "basin_fractions", "basins", "compare", "lyapunov", "settled", "simulate", "stroboscope", "wolf"]

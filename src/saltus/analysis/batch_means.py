@@ -3,7 +3,7 @@
 Neighbours are averaged again and again; the standard error that the averages claim grows with the length of the batches until these are
 independent. Flyvbjerg & Petersen, J. Chem. Phys. 91 (1989) 461-466. The batch is the shortest of length B with B^3 > 2 n (e_B / e_1)^4, e_B
 being the error claimed at length B: Wolff, Comput. Phys. Commun. 156 (2004) 143-153; Lee, Conduit, Nemec, Lopez Rios & Drummond, Physical
-Review E 83 (2011) 066706.
+Review E 83 (2011) 066706. Growth rates are often anticorrelated, so that the error falls with B: the ratio then counts as 1.
 """
 
 from __future__ import annotations
@@ -43,13 +43,14 @@ def batch_means(values: np.ndarray, ends: np.ndarray) -> Means:
     """Means of the first ``ends`` values, int64[m], of series float64[..., n]."""
     values, ends = np.asarray(values, float), np.asarray(ends, np.int64)
     centre = values.mean(axis=-1, keepdims=True)
+    centre = np.where(np.isfinite(centre), centre, np.nan)
     centred = values - centre
     mean = centre + np.cumsum(centred, axis=-1)[..., ends - 1] / ends
     levels = max(int(np.log2(max(values.shape[-1] // LEAST, 1))), 0) + 1
     errors = np.stack([_claimed(centred, 2**level, ends) for level in range(levels)])
     size = 2.0 ** np.arange(levels).reshape(-1, *([1] * mean.ndim))
     with np.errstate(all="ignore"):
-        enough = size**3 > 2 * ends * np.nan_to_num(errors / errors[0]) ** 4
+        enough = size**3 > 2 * ends * np.maximum(np.nan_to_num(errors / errors[0]), 1.0) ** 4
     known = np.isfinite(errors)
     enough &= known
     # Where no batch is long enough the largest error claimed is taken: the true one is at least that.

@@ -72,7 +72,7 @@ class Exponents:
         self._mean[rows], self._error[rows], self._half[rows] = found.exponents, found.errors, found.half_width
         self._running[rows], self._running_half[rows] = found.running.mean, found.running.half_width
         self._volume[rows], self._batches[rows], self._kind[rows] = found.volume, found.batches, found.kinds
-        self._period[rows] = [orbit.period if orbit is not None else 0 for orbit in found.orbits]
+        self._period[rows] = [orbit.period if orbit and kind == "periodic" else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)]
         self._status[rows] = leg.status
         legs = [leg.of(i) if orbit is None else walk.of(np.array([i])).move(orbit.points[:1], orbit.period)
                 for i, orbit in enumerate(found.orbits)]  # fmt: skip

@@ -12,6 +12,7 @@ import xarray as xr
 from saltus.analysis.answers import gap_unit, provenance, shared_values
 from saltus.analysis.exponents import Exponents
 from saltus.analysis.messages import warn
+from saltus.analysis.neighbour_exponents import NeighbourExponents
 from saltus.analysis.starts import Ensemble, ensemble, whole
 from saltus.errors import ParameterError, nearest
 from saltus.flow.engine import Interrupted
@@ -60,8 +61,9 @@ def lyapunov(
     start : sequence, mapping or array
         Starts, as for :func:`saltus.simulate`; one or many. Default: all zero.
     method : {"variational", "wolf"}
-        ``"wolf"``: the largest exponent only, from the growth of the distance between neighbours on the trajectory (:func:`saltus.wolf`),
-        as much of the literature has it. It can't be negative by much: neighbours on an orbit stay neighbours.
+        ``"wolf"``: the largest exponent only, from the growth of the distance between neighbours on the trajectory, as much of the
+        literature has it (:func:`saltus.wolf`). Points are all states and the phase of the forcing, 32 in a block; a piece is one
+        block. It is the largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
     flow : Method
         How to integrate. Default :class:`saltus.Taylor`. With ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts
         aren't known.
@@ -115,7 +117,7 @@ def lyapunov(
         raise ParameterError(f"every must be a positive time, not {every!r}.")
     family = Family(system, flow, rows, block, threads)
     show, close = reporter(progress)
-    work = Exponents(family, group.start, periods, transient, block)
+    work = (Exponents if method == "variational" else NeighbourExponents)(family, group.start, periods, transient, block)
 
     def dataset() -> xr.Dataset:
         return _dataset(system, flow, group, work, unit)
@@ -144,7 +146,7 @@ def _check_words(method: Any, unit: Any, system: Any) -> None:
         raise ParameterError(f"{system.name} has no forcing period, so {unit!r} has no meaning. Take unit={unit.replace('period', 's')!r}.")
 
 
-def _dataset(system: System, flow: Method, group: Ensemble, work: Exponents, unit: str) -> xr.Dataset:
+def _dataset(system: System, flow: Method, group: Ensemble, work: Exponents | NeighbourExponents, unit: str) -> xr.Dataset:
     """Everything under its name and in its unit."""
     per_period, logarithm = UNITS[unit]
     factor = (1.0 if per_period else 1.0 / work.family.period) / logarithm

@@ -24,6 +24,8 @@ RUNNING = 200
 #: Logarithm of the growth that a deviation may make on its way round a motion that repeats or nearly so: a factor of fifty. Over n blocks
 #: an exponent below this part of it can't be told from zero.
 BOUNDED = 4.0
+#: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the rounding of the faster: three digits are left.
+LOST = 29.0
 #: What a slow approach to an orbit must at least have gained over half of the last stretch.
 GAINED = 0.5
 
@@ -77,7 +79,7 @@ def spectrum(
     Without forcing a motion that repeats has an exponent of zero along itself; that makes a difference to what it is called.
     """
     growth = grow(walk, start, count, transient, progress)
-    rates = np.take_along_axis(growth.rates, np.argsort(-growth.rates.mean(axis=1), axis=1, kind="stable")[:, None], axis=2)
+    rates = _told(np.take_along_axis(growth.rates, np.argsort(-growth.rates.mean(axis=1), axis=1, kind="stable")[:, None], axis=2))
     ends = running_ends(count)
     running = batch_means(np.swapaxes(rates, 1, 2), ends)
     exponents, errors, half_width = (part[..., -1].copy() for part in (running.mean, running.error, running.half_width))
@@ -93,6 +95,13 @@ def spectrum(
         half_width[i], batches[i] = errors[i], 0
         volume[i] = _volume(walk, i, orbit)
     return Spectrum(exponents, errors, half_width, volume, batches, orbits, kinds, ends, running, growth)
+
+
+def _told(rates: np.ndarray) -> np.ndarray:
+    """Rates float64[k, n, D] with NaN for directions that are lost in the rounding of the fastest one."""
+    with np.errstate(invalid="ignore"):
+        lost = ~((rates[:, :, :1] - rates).mean(axis=1, keepdims=True) < LOST)
+    return np.where(lost, np.nan, rates)
 
 
 def running_ends(count: int) -> np.ndarray:
