@@ -9,9 +9,12 @@ import numpy as np
 
 from saltus.analysis.batch_means import CONFIDENCE
 from saltus.analysis.growth import GOOD, STRETCH
+from saltus.analysis.orbits import Orbit
+from saltus.analysis.portrait import SAMPLES, smallest_margin
 from saltus.analysis.spectrum import Spectrum, running_ends, spectrum
-from saltus.analysis.walks import FlowWalk, Leg
+from saltus.analysis.walks import FlowWalk
 from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 from saltus.system.evaluate import evaluate
 
@@ -74,12 +77,18 @@ class Exponents:
         self._volume[rows], self._batches[rows], self._kind[rows] = found.volume, found.batches, found.kinds
         self._period[rows] = [orbit.period if orbit and kind == "periodic" else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)]
         self._status[rows] = leg.status
-        legs = [leg.of(i) if orbit is None else walk.of(np.array([i])).move(orbit.points[:1], orbit.period)
-                for i, orbit in enumerate(found.orbits)]  # fmt: skip
-        for i, (orbit, one) in enumerate(zip(found.orbits, legs, strict=True)):
-            self._grazes[rows[i]], self._unresolved[rows[i]], self._margin[rows[i]] = one.grazes[0], one.unresolved[0], one.margin[0]
-            close = orbit is not None and one.margin[0] < NEAR_GRAZE * gap_range(walk.of(np.array([i])), orbit.points[:1])
-            self._near[rows[i]] = close or one.grazes[0] > 0 or one.unresolved[0] > 0
+        self._grazes[rows], self._unresolved[rows], self._margin[rows] = leg.grazes, leg.unresolved, leg.margin
+        for i, orbit in enumerate(found.orbits):
+            if orbit is not None:
+                self._of_orbit(rows[i], walk.of(np.array([i])), orbit)
+        self._near[rows] |= (self._grazes[rows] > 0) | (self._unresolved[rows] > 0)
+
+    def _of_orbit(self, row: int, walk: FlowWalk, orbit: Orbit) -> None:
+        """Grazes and margin of the orbit alone, in place of those on the way to it."""
+        leg = walk.move(orbit.points[:1], orbit.period)
+        self._grazes[row], self._unresolved[row] = leg.grazes[0], leg.unresolved[0]
+        self._margin[row], size = margin_and_range(walk.map_of(0), orbit)
+        self._near[row] = self._margin[row] < NEAR_GRAZE * size
 
     def columns(self, factor: np.ndarray) -> dict[str, Any]:
         """The columns of the result; exponents times a factor for each trajectory, float64[k]."""
@@ -130,14 +139,13 @@ def _with_phase(exponents: np.ndarray) -> np.ndarray:
     return -np.sort(-np.concatenate([exponents, zero], axis=1), axis=1)
 
 
-def gap_range(walk: FlowWalk, start: np.ndarray) -> float:
-    """Largest range of a gap of one trajectory; zero without guards."""
-    system, (motion,) = walk.family.system, walk.look(start)
-    values = {name: column[0] for name, column in walk.family.values.items()}
-    time = np.resize(walk.family.period[0] * np.arange(walk.samples) / walk.samples, len(motion))
-    ranges, bits = [0.0], []
+def margin_and_range(map_: Stroboscope, orbit: Orbit) -> tuple[float, float]:
+    """Smallest distance by which an orbit misses or overshoots a boundary, and the largest range of a gap on it."""
+    system, motion = map_.system, map_.trajectory(orbit.points[:1], orbit.period, SAMPLES)[0]
+    states, time = motion[0].T, map_.period * np.arange(orbit.period * SAMPLES) / SAMPLES
+    named, ranges, bits = dict(zip(system.states, states, strict=True)), [0.0], []
     for guard in system.guards:
-        (gap,) = evaluate([guard.gap], t=time, states=dict(zip(system.states, motion.T, strict=True)), values=values, bits=bits)
+        (gap,) = evaluate([guard.gap], t=time, states=named, values=system.values, bits=bits)
         bits.append(np.broadcast_to(gap, time.shape) > 0)
         ranges.append(float(np.ptp(gap)))
-    return max(ranges)
+    return smallest_margin(map_, states, orbit.period, SAMPLES), max(ranges)

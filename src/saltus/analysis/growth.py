@@ -94,9 +94,10 @@ def _scale(start: np.ndarray, motion: np.ndarray) -> np.ndarray:
 
     A motion that has come to rest has the range of all that came before, as what is left of it is rounding.
     """
-    own, whole = np.ptp(motion, axis=1), np.ptp(np.concatenate([start[:, None], motion], axis=1), axis=1)
+    with np.errstate(invalid="ignore"):
+        own, whole = np.ptp(motion, axis=1), np.ptp(np.concatenate([start[:, None], motion], axis=1), axis=1)
     wide = np.where(own > AT_REST * whole, own, whole)
-    return np.where(wide > 0, wide, 1.0)
+    return np.where((wide > 0) & np.isfinite(wide), wide, 1.0)
 
 
 def carry(matrices: np.ndarray, frame: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

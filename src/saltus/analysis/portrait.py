@@ -93,11 +93,11 @@ def _of_motion(map_: Stroboscope, start: np.ndarray, periods: int, samples: int,
         itinerary=" ".join(texts) if responses == 1 else "",
         peak=float(np.abs(_extremes(motion[0])).max(initial=np.abs(motion[0]).max())),
         rms=float(np.sqrt(np.mean(motion[0] ** 2))),
-        margin=_margin(map_, motion, periods, samples),
+        margin=smallest_margin(map_, motion, periods, samples),
     )
 
 
-def _margin(map_: Stroboscope, motion: np.ndarray, periods: int, samples: int) -> float:
+def smallest_margin(map_: Stroboscope, motion: np.ndarray, periods: int, samples: int) -> float:
     """Smallest size of a gap where it turns, on either side of the boundary: how far the motion is from a graze."""
     system = map_.system
     time = map_.period * np.arange(periods * samples) / samples

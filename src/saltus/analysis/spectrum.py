@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.batch_means import Means, batch_means
-from saltus.analysis.growth import GOOD, Growth, grow
+from saltus.analysis.growth import GOOD, Growth, carry, grow
 from saltus.analysis.orbits import Orbit, polish
 from saltus.analysis.recurrence import NEAR, ROUND, SAME, recurrence
 from saltus.analysis.wandering import SURE, UNCLEAR
@@ -26,6 +26,8 @@ RUNNING = 200
 BOUNDED = 4.0
 #: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the rounding of the faster: three digits are left.
 LOST = 29.0
+#: Relative error of a multiplier beyond which it is lost, and blocks of the round trips that find it then.
+KNOWN, TRIPS = 1e-6, 256
 #: What a slow approach to an orbit must at least have gained over half of the last stretch.
 GAINED = 0.5
 
@@ -91,7 +93,7 @@ def spectrum(
             kinds.append(_kind(rates[i], errors[i], forced))
             continue
         kinds.append("periodic" if forced else "equilibrium")
-        exponents[i], errors[i] = _of_orbit(orbit, walk.map_of(i), growth.scale[i])
+        exponents[i], errors[i] = _of_orbit(walk, i, orbit, growth.scale[i])
         half_width[i], batches[i] = errors[i], 0
         volume[i] = _volume(walk, i, orbit)
     return Spectrum(exponents, errors, half_width, volume, batches, orbits, kinds, ends, running, growth)
@@ -106,14 +108,15 @@ def _told(rates: np.ndarray) -> np.ndarray:
 
 def running_ends(count: int) -> np.ndarray:
     """Blocks after which running means are kept, int64[m]."""
-    return np.unique(np.linspace(0, count, RUNNING + 1).round().astype(np.int64)[1:])
+    return np.unique(np.ceil(np.linspace(0, count, RUNNING + 1)[1:]).astype(np.int64))
 
 
 # -- orbits --------------------------------------------------------------------------------------------------------------------
 def _orbits(walk: Walk, growth: Growth) -> list[Orbit | None]:
     """The stable periodic orbit to which each trajectory has come, None for the others."""
     trail, found = growth.leg.trail, []
-    period, apart = recurrence(trail[:, -ROUND - 1 :], growth.scale)
+    with np.errstate(invalid="ignore"):  # those that ran away
+        period, apart = recurrence(trail[:, -ROUND - 1 :], growth.scale)
     for i, one in enumerate(trail):
         map_ = walk.map_of(i)
         near = max(NEAR, 4.0 * map_.noise)
@@ -131,15 +134,33 @@ def _arrives(trail: np.ndarray, orbit: Orbit, scale: np.ndarray, map_: Map, near
     return bool(late <= max(SAME, 4.0 * map_.noise) or (late <= near and late < GAINED * early))
 
 
-def _of_orbit(orbit: Orbit, map_: Map, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Exponents of an orbit per block, and what the map's own errors make of them (Bauer & Fike: times the condition of the eigenvectors)."""
+def _of_orbit(walk: Walk, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Exponents of an orbit per block, and what the map's own errors make of them (Bauer & Fike: times the condition of the eigenvectors).
+
+    Multipliers that are lost in the rounding of the largest are found as growth round the orbit, block by block.
+    """
+    noise, n = walk.map_of(i).noise, orbit.period
     monodromy = orbit.monodromy[0] * scale / scale[:, None]
-    condition = np.linalg.cond(np.linalg.eig(monodromy)[1])
+    condition = min(np.linalg.cond(np.linalg.eig(monodromy)[1]), 1.0 / noise)
     with np.errstate(divide="ignore"):
-        exponents = np.log(np.abs(orbit.multipliers)) / orbit.period
-        errors = map_.noise * min(condition, 1.0 / map_.noise) * np.linalg.norm(monodromy, 2) / np.abs(orbit.multipliers) / orbit.period
+        exponents = np.log(np.abs(orbit.multipliers)) / n
+        errors = noise * condition * np.linalg.norm(monodromy, 2) / np.abs(orbit.multipliers) / n
     order = np.argsort(-exponents, kind="stable")
-    return exponents[order], errors[order]
+    exponents, errors = exponents[order], errors[order]
+    lost = errors * n > KNOWN
+    if lost.any():
+        exponents[lost], errors[lost] = (part[lost] for part in _round_trips(walk, i, orbit, scale))
+    return exponents, errors
+
+
+def _round_trips(walk: Walk, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean growth per block over the later half of many round trips of an orbit, and how far that of its two halves lies apart."""
+    n, size = orbit.points.shape
+    blocks = walk.of(np.full(n, i)).matrices(orbit.points[:, None])[:, 0]
+    trips = max(-(-TRIPS // n), 8) // 4 * 4
+    rates, _ = carry(np.tile(blocks, (trips, 1, 1))[None], np.eye(size)[None], scale[None])
+    early, late = rates[0, trips // 2 * n :].reshape(2, -1, size).mean(axis=1)
+    return 0.5 * (early + late), np.abs(late - early) + walk.map_of(i).noise
 
 
 def _volume(walk: Walk, i: int, orbit: Orbit) -> float:

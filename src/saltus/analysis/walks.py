@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -39,10 +39,6 @@ class Leg:
     unresolved: np.ndarray
     margin: np.ndarray
 
-    def of(self, i: int) -> Leg:
-        """That of trajectory i alone."""
-        return Leg(*(getattr(self, field.name)[i : i + 1] for field in fields(self)))
-
 
 class Walk(Protocol):
     """k trajectories of D states that are followed in blocks: a forcing period, a given time, or one iterate of a map."""
@@ -68,8 +64,6 @@ class Walk(Protocol):
 
 class FlowWalk:
     """Trajectories of a flow, each with parameter values of its own; a block is a forcing period, or ``every``."""
-
-    samples = SAMPLES
 
     def __init__(self, family: Family, every: float | None = None):
         self.family, self._every = family, every
