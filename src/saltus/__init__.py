@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 
 #: Public name: module that holds it.
 _HOMES = {
-    **dict.fromkeys(("attractors", "basin_fractions", "basins", "compare", "lyapunov", "settled", "simulate", "stroboscope", "wolf"), "saltus.analysis"),
+    **dict.fromkeys(
+        ("attractors", "basin_fractions", "basins", "compare", "lyapunov", "settled", "simulate", "stroboscope", "wolf"), "saltus.analysis"
+    ),
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("describe", "load", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
@@ -36,9 +38,41 @@ _HOMES = {
 _MODULES = ("models", "plot")
 
 __all__ = [
-    "ODE45", "Interrupted", "System", "Taylor", "abs", "atan", "attractors", "basin_fractions", "basins", "compare", "cos", "describe",
-    "exp", "freeplay", "load", "log", "lyapunov", "max", "min", "models", "pi", "piecewise", "plot", "save", "settled", "simulate", "sin", "sqrt",
-    "stroboscope", "system", "tan", "tanh", "to_csv", "to_mat", "wolf",
+    "ODE45",
+    "Interrupted",
+    "System",
+    "Taylor",
+    "abs",
+    "atan",
+    "attractors",
+    "basin_fractions",
+    "basins",
+    "compare",
+    "cos",
+    "describe",
+    "exp",
+    "freeplay",
+    "load",
+    "log",
+    "lyapunov",
+    "max",
+    "min",
+    "models",
+    "pi",
+    "piecewise",
+    "plot",
+    "save",
+    "settled",
+    "simulate",
+    "sin",
+    "sqrt",
+    "stroboscope",
+    "system",
+    "tan",
+    "tanh",
+    "to_csv",
+    "to_mat",
+    "wolf",
 ]  # fmt: skip
 
 

@@ -92,6 +92,14 @@ def test_results_depend_neither_on_the_batch_nor_on_threads(chaos):
         assert alone[name].values[0].tobytes() == ds[name].values[1].tobytes(), name
 
 
+def test_groups_that_fit_in_memory_are_computed_alike(monkeypatch):
+    rig = sl.models.delangre("c").with_values(**CHAOTIC)
+    starts = np.stack([np.linspace(0, 1e-3, 5), np.zeros(5)], axis=1)
+    whole = sl.lyapunov(rig, starts, periods=100, transient=50)
+    monkeypatch.setattr("saltus.analysis.exponents.GROUP", 1024 * 6 * 2)
+    assert sl.lyapunov(rig, starts, periods=100, transient=50).identical(whole)
+
+
 def test_ode45_has_the_exponents_of_the_orbit_to_its_tolerance():
     ds = sl.lyapunov(
         sl.models.delangre("a", force=4.0, frequency=16.0), (3.344e-3, 0.4256), flow=sl.ODE45(1e-8, 1e-11), periods=500, transient=200
@@ -116,9 +124,7 @@ def test_an_orbit_that_nearly_grazes_is_flagged(share, near):
 
 # -- maps ----------------------------------------------------------------------------------------------------------------------
 def skew_tent(a):
-    return FunctionMap(
-        lambda z: np.where(z < a, z / a, (1 - z) / (1 - a)), "x", lambda z: np.where(z < a, 1 / a, -1 / (1 - a))[:, :, None]
-    )
+    return FunctionMap(lambda z: np.where(z < a, z / a, (1 - z) / (1 - a)), "x", lambda z: np.where(z < a, 1 / a, -1 / (1 - a))[:, :, None])
 
 
 @pytest.mark.parametrize("a", [0.3, 0.45])

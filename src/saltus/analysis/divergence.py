@@ -8,6 +8,7 @@ the contact over the rate before. Nothing here uses the tangent flow, so that th
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class Divergence:
         integrated = self._moves or (self._by_mode and not family.method.records_contacts)
         if integrated:
             start = np.concatenate([start, np.zeros((len(start), 1))], axis=1)
-        outcome = replace_system(family, self._extended if integrated else self._system).run(start, 1, record=0)
+        outcome = _of_system(family, self._extended if integrated else self._system).run(start, 1, record=0)
         total = outcome.state[:, -1].copy() if integrated else self._constant(family) if constant else self._dwelling(family, outcome)
         np.add.at(total, outcome.record_integers[:, st.REC_TRAJECTORY], self._jumps(family, outcome))
         return np.where(np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED)), total, np.nan)
@@ -78,7 +79,7 @@ class Divergence:
         """Logarithm of the determinant of the saltation matrix at each contact."""
         system, table = self._system, outcome.record_integers
         row, states = table[:, st.REC_TRAJECTORY], outcome.record_floats[:, st.RECORD_FLOATS : st.RECORD_FLOATS + len(system.states)]
-        here = {
+        here: dict[str, Any] = {
             "t": outcome.record_floats[:, -1],
             "states": dict(zip(system.states, states.T, strict=True)),
             "values": {name: column[row] for name, column in family.values.items()},
@@ -95,7 +96,7 @@ class Divergence:
         return logarithm
 
 
-def replace_system(family: Family, system: System) -> Family:
+def _of_system(family: Family, system: System) -> Family:
     """The same rows for a system with the same parameters."""
     every = None if system.forced_at is not None else float(family.period[0])
     return Family(system, family.method, family.parameters, every, family.threads)

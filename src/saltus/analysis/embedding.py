@@ -1,7 +1,7 @@
 """Delay embedding: the states behind one recorded quantity.
 
-Delay: the first minimum of the mutual information, Fraser & Swinney, Physical Review A 33 (1986) 1134-1140. Dimension: the least that leaves
-no false neighbours, Kennel, Brown & Abarbanel, Physical Review A 45 (1992) 3403-3411.
+Delay: the first minimum of the mutual information, Fraser & Swinney, Physical Review A 33 (1986) 1134-1140. Dimension: the least that
+leaves no false neighbours, Kennel, Brown & Abarbanel, Physical Review A 45 (1992) 3403-3411.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def first_minimum(series: np.ndarray) -> int:
 
 
 def false_neighbours(series: np.ndarray, dimension: int, delay: int, exclude: int) -> float:
-    """Share of nearest neighbours in this dimension that one more coordinate shows to be none, in [0, 1]; NaN if nothing has a neighbour."""
+    """Share of nearest neighbours in this dimension that one more coordinate shows to be none; NaN if nothing has a neighbour."""
     longer = embed(series, dimension + 1, delay)
     points = longer[:, :dimension]
     asked = np.unique(np.linspace(0, len(points) - 1, min(ASKED, len(points))).round().astype(int))

@@ -25,6 +25,8 @@ GROUP = 4_000_000
 #: nobody could tell on which side of the graze it is, and beyond it the exponents are others. A motion that never repeats
 #: comes as close as one likes to every boundary that it meets, so of such a one only the grazes themselves count.
 NEAR_GRAZE = 1e-3
+#: The two conventions of a forced system.
+FORCED = "lyapunov_exponent: of the stroboscopic map; flow_lyapunov_exponent: of the flow, with a zero for the phase of the forcing"
 
 
 class Exponents:
@@ -75,7 +77,9 @@ class Exponents:
         self._mean[rows], self._error[rows], self._half[rows] = found.exponents, found.errors, found.half_width
         self._running[rows], self._running_half[rows] = found.running.mean, found.running.half_width
         self._volume[rows], self._batches[rows], self._kind[rows] = found.volume, found.batches, found.kinds
-        self._period[rows] = [orbit.period if orbit and kind == "periodic" else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)]
+        self._period[rows] = [
+            orbit.period if orbit and kind == "periodic" else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)
+        ]
         self._status[rows] = leg.status
         self._grazes[rows], self._unresolved[rows], self._margin[rows] = leg.grazes, leg.unresolved, leg.margin
         for i, orbit in enumerate(found.orbits):
@@ -124,9 +128,7 @@ class Exponents:
         """What was asked for, as attributes."""
         return {
             "algorithm": self.algorithm,
-            "convention": "lyapunov_exponent: of the stroboscopic map; flow_lyapunov_exponent: of the flow, a zero for the phase of the forcing"
-            if self._every is None
-            else "both are the exponents of the flow",
+            "convention": FORCED if self._every is None else "both are the exponents of the flow",
             "confidence": CONFIDENCE,
             "periods": self._periods,
             "transient": self._transient,
@@ -143,7 +145,8 @@ def margin_and_range(map_: Stroboscope, orbit: Orbit) -> tuple[float, float]:
     """Smallest distance by which an orbit misses or overshoots a boundary, and the largest range of a gap on it."""
     system, motion = map_.system, map_.trajectory(orbit.points[:1], orbit.period, SAMPLES)[0]
     states, time = motion[0].T, map_.period * np.arange(orbit.period * SAMPLES) / SAMPLES
-    named, ranges, bits = dict(zip(system.states, states, strict=True)), [0.0], []
+    named, ranges = dict(zip(system.states, states, strict=True)), [0.0]
+    bits: list[np.ndarray] = []
     for guard in system.guards:
         (gap,) = evaluate([guard.gap], t=time, states=named, values=system.values, bits=bits)
         bits.append(np.broadcast_to(gap, time.shape) > 0)

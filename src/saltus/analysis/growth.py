@@ -1,9 +1,9 @@
 """How small deviations grow along trajectories, block by block and in all directions: the QR method.
 
-The derivatives of all blocks of a stretch are computed in one batch, as the states at which they begin are known from the trajectory itself.
-Then an orthogonal frame is carried through them: block by block M Q = Q' R, and the logarithms of the diagonal of R are the growth of the
-frame's axes; their means are the Lyapunov exponents. Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980) 9-20 and 21-30; Eckmann &
-Ruelle, Reviews of Modern Physics 57 (1985) 617-656, section V.
+The derivatives of all blocks of a stretch are computed in one batch, as the states at which they begin are known from the trajectory
+itself. Then an orthogonal frame is carried through them: block by block M Q = Q' R, and the logarithms of the diagonal of R are the growth
+of the frame's axes; their means are the Lyapunov exponents. Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980) 9-20 and 21-30;
+Eckmann & Ruelle, Reviews of Modern Physics 57 (1985) 617-656, section V.
 """
 
 from __future__ import annotations

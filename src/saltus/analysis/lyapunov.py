@@ -13,7 +13,7 @@ from saltus.analysis.answers import gap_unit, provenance, shared_values
 from saltus.analysis.exponents import Exponents
 from saltus.analysis.messages import warn
 from saltus.analysis.neighbour_exponents import NeighbourExponents
-from saltus.analysis.starts import Ensemble, ensemble, whole
+from saltus.analysis.starts import Ensemble, check_system, ensemble, whole
 from saltus.errors import ParameterError, nearest
 from saltus.flow.engine import Interrupted
 from saltus.flow.family import Family
@@ -107,6 +107,7 @@ def lyapunov(
     Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (2004), section 7; Flyvbjerg & Petersen, J. Chem. Phys. 91 (1989)
     461-466; Wolf, Swift, Swinney & Vastano, Physica D 16 (1985) 285-317.
     """
+    check_system(system)
     _check_words(method, unit, system)
     flow = check_method(flow)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
@@ -135,14 +136,16 @@ def lyapunov(
     return result
 
 
-def _check_words(method: Any, unit: Any, system: Any) -> None:
+def _check_words(method: Any, unit: Any, system: System) -> None:
     if isinstance(method, Method):
-        raise ParameterError(f'method says how exponents are measured: "variational" or "wolf". How to integrate is flow=sl.{method.name}(...).')
+        raise ParameterError(
+            f'method says how exponents are measured: "variational" or "wolf". How to integrate is flow=sl.{method.name}(...).'
+        )
     if method not in METHODS:
         raise ParameterError(f"there is no method {method!r}. {nearest(str(method), METHODS)}")
     if unit not in UNITS:
         raise ParameterError(f"exponents aren't given in {unit!r}. {nearest(str(unit), UNITS)}")
-    if UNITS[unit][0] and isinstance(system, System) and system.forced_at is None:
+    if UNITS[unit][0] and system.forced_at is None:
         raise ParameterError(f"{system.name} has no forcing period, so {unit!r} has no meaning. Take unit={unit.replace('period', 's')!r}.")
 
 

@@ -1,8 +1,8 @@
 """Growth of the distance between neighbours on a trajectory: the fixed evolution time program of Wolf et al.
 
 A point of the trajectory and a neighbour of it are followed for a fixed time; the logarithm of the growth of their distance is one piece.
-Then a new neighbour takes over, close to the point and in the direction in which the old one lies. Wolf, Swift, Swinney & Vastano, Physica D
-16 (1985) 285-317, section 5 and appendix B.
+Then a new neighbour takes over, close to the point and in the direction in which the old one lies. Wolf, Swift, Swinney & Vastano, Physica
+D 16 (1985) 285-317, section 5 and appendix B.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 CROWD = 20
 #: Points that are asked for it, evenly spread.
 ASKED = 200
-#: Angle that a replacement may turn by at first [rad], and how many times the largest distance is tried before the angle is doubled: Wolf's.
+#: Angle that a replacement may turn by at first [rad], and how often the largest distance grows before the angle is doubled: Wolf's.
 ANGLE, WIDENINGS = 0.3, 5
 
 

@@ -15,8 +15,8 @@ from saltus.analysis.batch_means import Means, batch_means
 from saltus.analysis.growth import GOOD, Growth, carry, grow
 from saltus.analysis.orbits import Orbit, polish
 from saltus.analysis.recurrence import NEAR, ROUND, SAME, recurrence
-from saltus.analysis.wandering import SURE, UNCLEAR
 from saltus.analysis.walks import Walk
+from saltus.analysis.wandering import SURE, UNCLEAR
 from saltus.flow.maps import Map
 
 #: Points at which running means are kept: what a picture needs.

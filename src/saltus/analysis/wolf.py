@@ -10,19 +10,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.batch_means import CONFIDENCE, LEAST, batch_means
+from saltus.analysis.batch_means import CONFIDENCE, batch_means
 from saltus.analysis.embedding import embed as embedded
 from saltus.analysis.embedding import false_neighbours, first_minimum, hardly_correlated, least_dimension
-from saltus.analysis.neighbours import Pieces, Search, crowd_distance, follow
+from saltus.analysis.neighbours import CROWD, Pieces, Search, crowd_distance, follow
+from saltus.analysis.series import LEAST_POINTS, check_length, columns_of, interval_of, samples_of
 from saltus.analysis.spectrum import BOUNDED, running_ends
 from saltus.analysis.starts import whole
 from saltus.analysis.wandering import UNCLEAR
 from saltus.errors import ParameterError, SaltusWarning, nearest
 from saltus.results import exponents_dataset
-from saltus.units import to_si
 
-#: Points from which something can be said at least.
-LEAST_POINTS = 200
 #: Default of the largest distance at most, as a share of the range: beyond it growth isn't that of small deviations. Wolf's rule.
 WIDEST = 0.1
 #: Default of the smallest distance: rounding in a clean series.
@@ -31,8 +29,6 @@ CLEANEST = 1e-6
 DELAYS = 4
 #: Share of false neighbours beyond which an embedding shows no states.
 UNFOLDED = 0.1
-#: Largest difference of sampling times from evenness, as a share of the interval.
-EVEN = 1e-3
 UNITS = {"1/s": 1.0, "bit/s": math.log(2)}
 
 
@@ -86,8 +82,8 @@ def wolf(
     """The largest Lyapunov exponent of a recorded motion, by the algorithm of Wolf et al. (1985), fixed evolution time.
 
     The distance of neighbours grows with the largest exponent until it is as large as the motion; so neighbours are replaced after a fixed
-    time by others that lie in the same direction. Clean series of some thousand points give the exponent of a strongly chaotic
-    motion to 5 to 15 %, usually from above. Negative exponents can't be seen: neighbours on an orbit stay neighbours, and give 0. Noise has
+    time by others that lie in the same direction. Besides the statistical error there is a bias of some 5 to 15 %, usually upwards,
+    which more points make smaller. Negative exponents can't be seen: neighbours on an orbit stay neighbours, and give 0. Noise has
     positive exponents too; the share of false neighbours tells it from chaos.
 
     Parameters
@@ -119,11 +115,11 @@ def wolf(
     Returns
     -------
     Dataset
-        As that of :func:`saltus.lyapunov`, with one ``trajectory`` and one ``exponent``: ``lyapunov_exponent`` with its standard error and 95 %
-        interval from the statistics of the pieces (batch means). The interval doesn't hold the bias of the method. ``kind``: ``chaotic``
-        where the interval lies above zero, ``regular`` where it is narrow and holds zero, or growth is no more than a factor of 50 in all, else ``unclear``.
-        ``replacements``, ``replaced_distance`` (mean, as a share of the range), ``replaced_angle``. What was chosen for the parameters stands
-        in the attributes, and ``false_neighbours``.
+        As that of :func:`saltus.lyapunov`, with one ``trajectory`` and one ``exponent``: ``lyapunov_exponent`` with its standard error and
+        95 % interval from the statistics of the pieces (batch means). The interval doesn't hold the bias of the method. ``kind``:
+        ``chaotic`` where the interval lies above zero, ``regular`` where it is narrow and holds zero, or growth is no more than a factor of
+        50 in all, else ``unclear``. ``replacements``, ``replaced_distance`` (mean, as a share of the range), ``replaced_angle``. What was
+        chosen for the parameters stands in the attributes, and ``false_neighbours``.
 
     Raises
     ------
@@ -137,18 +133,18 @@ def wolf(
     """
     if unit not in UNITS:
         raise ParameterError(f"the exponent isn't given in {unit!r}. {nearest(str(unit), UNITS)}")
-    columns = _columns(series, embed)
-    interval = _interval(sampling_interval, len(columns))
+    columns = columns_of(series, embed)
+    interval = interval_of(sampling_interval, len(columns))
     single = columns.shape[1] == 1 if embed is None else embed
     coarse = hardly_correlated(columns[:, 0])
-    lag = _samples(delay, interval, "delay") or (1 if coarse else first_minimum(columns[:, 0]))
-    steps = _samples(evolve, interval, "evolve") or (1 if coarse else DELAYS * lag)
-    apart = _samples(exclude, interval, "exclude", 0) if exclude is not None else max(10, steps)
+    lag = samples_of(delay, interval, "delay") or (1 if coarse else first_minimum(columns[:, 0]))
+    steps = samples_of(evolve, interval, "evolve") or (1 if coarse else DELAYS * lag)
+    apart = samples_of(exclude, interval, "exclude", 0) if exclude is not None else max(10, steps)
     size, false = columns.shape[1], math.nan
     if single:
         size = least_dimension(columns[:, 0], lag, apart) if dimension is None else whole(dimension, "dimension")
         columns, false = _unfold(columns[:, 0], size, lag, apart)
-    _check_length(len(columns), steps, apart)
+    check_length(len(columns), steps, apart)
     search = _search(columns, steps, smallest_distance, largest_distance, apart)
     found = measure(columns, interval, search)
     if not len(found.pieces.growth):
@@ -210,54 +206,6 @@ def _mean(values: np.ndarray) -> float:
 
 
 # -- arguments -----------------------------------------------------------------------------------------------------------------
-def _columns(series: Any, embed: bool | None) -> np.ndarray:
-    """The series float64[n, D], every column divided by its range."""
-    try:
-        array = np.asarray(series, float)
-    except (TypeError, ValueError):
-        raise ParameterError("the series must be an array of numbers, (samples,) or (samples, states).") from None
-    array = array[:, None] if array.ndim == 1 else array
-    if array.ndim != 2 or not array.shape[1]:
-        raise ParameterError(f"the series must have shape (samples,) or (samples, states), not {array.shape}.")
-    if embed and array.shape[1] != 1:
-        raise ParameterError(f"a delay embedding takes one quantity; this series has {array.shape[1]} columns. Choose one, or leave embed= out.")
-    _check_length(len(array), 1, 10)
-    bad = ~np.isfinite(array).all(axis=1)
-    if bad.any():
-        raise ParameterError(f"the series isn't finite at {int(bad.sum())} samples (first at {int(bad.argmax())}). Cut it there, or fill the gaps.")
-    wide = np.ptp(array, axis=0)
-    if not (wide > 0).all():
-        raise ParameterError(f"column {int((wide > 0).argmin())} of the series is constant. There is no motion to measure: leave it out.")
-    return array / wide
-
-
-def _interval(given: Any, count: int) -> float:
-    """Time between samples [s], from itself or from all times."""
-    if isinstance(given, str) or np.ndim(given) == 0:
-        interval = to_si(given, "s", "sampling_interval")
-        if not 0 < interval < math.inf:
-            raise ParameterError(f"sampling_interval must be a positive time, not {given!r}.")
-        return interval
-    times = np.asarray(given, float)
-    if times.shape != (count,):
-        raise ParameterError(f"sampling_interval is one time, or the times of all {count} samples; this has shape {times.shape}.")
-    steps, interval = np.diff(times), (times[-1] - times[0]) / (count - 1)
-    off = np.abs(steps - interval)
-    if not off.max() <= EVEN * abs(interval) or not interval > 0:
-        raise ParameterError(
-            f"the samples aren't evenly spaced: {steps.min():g} s to {steps.max():g} s between them. Neighbours must move for the same "
-            "time: resample the series to even times."
-        )
-    return float(interval)
-
-
-def _samples(value: Any, interval: float, name: str, least: int = 1) -> int:
-    """Samples from a number of them, or a time with its unit; 0 for None."""
-    if value is None:
-        return 0
-    return max(round(to_si(value, "s", name) / interval), least) if isinstance(value, str) else whole(value, name, least)
-
-
 def _unfold(series: np.ndarray, dimension: int, delay: int, exclude: int) -> tuple[np.ndarray, float]:
     """The embedded series, and the share of false neighbours in it."""
     if len(series) < dimension * delay + 2 * exclude + LEAST_POINTS:
@@ -266,12 +214,6 @@ def _unfold(series: np.ndarray, dimension: int, delay: int, exclude: int) -> tup
             "dimension= or delay=."
         )
     return embedded(series, dimension, delay), false_neighbours(series, dimension, delay, exclude)
-
-
-def _check_length(count: int, evolve: int, exclude: int) -> None:
-    least = max(LEAST_POINTS, 2 * LEAST * evolve, 2 * exclude + LEAST_POINTS)
-    if count < least:
-        raise ParameterError(f"{count} points are too few: {least} are the least here, and some thousand are needed for a chaotic motion.")
 
 
 def _search(points: np.ndarray, evolve: int, smallest: Any, largest: Any, exclude: int) -> Search:
@@ -301,7 +243,8 @@ def _warn(found: Growing, search: Search, false: float, dimension: int, by_densi
         )
     elif by_density and search.largest >= WIDEST and found.kind != "regular":
         warnings.warn(
-            f"the points lie far apart: less than 20 neighbours within {WIDEST:g} of the range. Their distances aren't small; record longer.",
+            f"the points lie far apart: less than {CROWD} neighbours within {WIDEST:g} of the range. Such distances aren't small: record "
+            "longer.",
             SaltusWarning,
             stacklevel=3,
         )

@@ -63,7 +63,7 @@ def _panel(ax: Axes, one: xr.Dataset, legend: bool) -> None:
     x = display_scale("s", float(finite.max(initial=0.0)))
     settled = int(one["response_period"]) > 0 or one["kind"].item() == "equilibrium"
     late = one.isel(running=np.flatnonzero(time >= _EARLY * finite.max(initial=0.0)))
-    shown = [late["running_exponent"].values.ravel(), one["lyapunov_low"].values, one["lyapunov_high"].values, [0.0]]
+    shown = [late["running_exponent"].values.ravel(), one["lyapunov_low"].values, one["lyapunov_high"].values, np.zeros(1)]
     draw.set_limits(ax, "y", np.concatenate(shown), margin=0.12)
     draw.set_limits(ax, "x", np.concatenate([[0.0], finite * x.factor]), margin=0.0)
     ax.axhline(0.0, color=QUIET, lw=0.7, zorder=1)
