@@ -105,7 +105,7 @@ def test_ode45_has_the_exponents_of_the_orbit_to_its_tolerance():
         sl.models.delangre("a", force=4.0, frequency=16.0), (3.344e-3, 0.4256), flow=sl.ODE45(1e-8, 1e-11), periods=500, transient=200
     )
     assert ds["kind"].item() == "periodic"
-    assert np.abs(ds["lyapunov_exponent"].values - HALF).max() < 1e-3
+    assert np.abs(ds["lyapunov_exponent"].values - HALF).max() < 1e-6
     assert (np.abs(ds["lyapunov_exponent"].values - HALF) <= ds["lyapunov_error"].values).all()
 
 
@@ -310,6 +310,14 @@ def test_ctrl_c_keeps_what_was_finished():
         sl.lyapunov(sl.models.delangre("a"), periods=100, progress=stop)
     assert caught.value.partial["status"].values.tolist() == ["not_computed"]
     assert np.isnan(caught.value.partial["lyapunov_exponent"].values).all()
+
+
+def test_without_a_transient_the_growth_from_the_start_counts():
+    """The first running mean is the growth of the unit vectors in the first period, in units of the ranges."""
+    rig = sl.models.delangre("a")
+    ds = sl.lyapunov(rig, (1e-3, 0.0), periods=64, transient=0)
+    assert ds["running_exponent"][0, :, 0].sum().item() == pytest.approx(SUM, rel=1e-12)
+    assert ds["running_time"][0, 0].item() == 1 / 15
 
 
 def test_a_trajectory_that_ends_early_says_so():

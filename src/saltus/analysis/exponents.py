@@ -20,6 +20,8 @@ from saltus.system.evaluate import evaluate
 
 #: Numbers that the tangents of one stretch of a group may hold: 32 MB, and some copies of it.
 GROUP = 4_000_000
+#: Growth rates of a group: 80 MB, and some copies of it.
+RATES = 10_000_000
 #: Share of the range of a gap below which an orbit that misses or overshoots its boundary is near a graze. Exponents belong to
 #: infinitesimal deviations. A gap is known, and a deviation seen, to a thousandth of the motion at best: of an orbit so close to a boundary
 #: nobody could tell on which side of the graze it is, and beyond it the exponents are others. A motion that never repeats
@@ -60,7 +62,7 @@ class Exponents:
     def run(self, progress: Callable[[float], None] | None = None) -> None:
         """Compute all, in groups."""
         k, size = self._start.shape
-        step = max(GROUP // (STRETCH * size * (size + 1)), 1)
+        step = max(min(GROUP // (STRETCH * size * (size + 1)), RATES // (self._periods * size)), 1)
         for first in range(0, k, step):
             rows = np.arange(first, min(first + step, k))
 
@@ -73,15 +75,15 @@ class Exponents:
 
     def _keep(self, rows: np.ndarray, walk: FlowWalk, found: Spectrum) -> None:
         """Write a group to its places."""
-        leg = found.growth.leg
+        stretch = found.growth.stretch
         self._mean[rows], self._error[rows], self._half[rows] = found.exponents, found.errors, found.half_width
         self._running[rows], self._running_half[rows] = found.running.mean, found.running.half_width
         self._volume[rows], self._batches[rows], self._kind[rows] = found.volume, found.batches, found.kinds
         self._period[rows] = [
             orbit.period if orbit and kind == "periodic" else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)
         ]
-        self._status[rows] = leg.status
-        self._grazes[rows], self._unresolved[rows], self._margin[rows] = leg.grazes, leg.unresolved, leg.margin
+        self._status[rows] = stretch.status
+        self._grazes[rows], self._unresolved[rows], self._margin[rows] = stretch.grazes, stretch.unresolved, stretch.margin
         for i, orbit in enumerate(found.orbits):
             if orbit is not None:
                 self._of_orbit(rows[i], walk.of(np.array([i])), orbit)
@@ -89,8 +91,8 @@ class Exponents:
 
     def _of_orbit(self, row: int, walk: FlowWalk, orbit: Orbit) -> None:
         """Grazes and margin of the orbit alone, in place of those on the way to it."""
-        leg = walk.move(orbit.points[:1], orbit.period)
-        self._grazes[row], self._unresolved[row] = leg.grazes[0], leg.unresolved[0]
+        stretch = walk.move(orbit.points[:1], orbit.period)
+        self._grazes[row], self._unresolved[row] = stretch.grazes[0], stretch.unresolved[0]
         self._margin[row], size = margin_and_range(walk.map_of(0), orbit)
         self._near[row] = self._margin[row] < NEAR_GRAZE * size
 

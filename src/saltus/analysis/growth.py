@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.walks import Leg, Walk
+from saltus.analysis.walks import Stretch, Walk
 from saltus.kernels import status as st
 
 #: Blocks of a stretch. A trajectory starts afresh after each, so this number is part of the result and never depends on the batch.
@@ -38,14 +38,14 @@ class Growth:
         Logarithm of the growth of volumes, found without the tangent.
     scale : float64[k, D]
         Range of each state.
-    leg : Leg
+    stretch : Stretch
         Status and grazes after the transient; the trail holds the last STRETCH blocks, or all if they are fewer.
     """
 
     rates: np.ndarray
     volume: np.ndarray
     scale: np.ndarray
-    leg: Leg
+    stretch: Stretch
 
 
 def grow(
@@ -75,18 +75,18 @@ def grow(
     frame = np.broadcast_to(np.eye(size), (k, size, size))
     if aligning:
         _, frame = carry(walk.matrices(before.trail[:, :-1]), frame, scale)
-    rates, volume, legs, state = np.full((k, count, size), np.nan), np.full((k, count), np.nan), [before], before.trail[:, -1]
+    rates, volume, stretches, state = np.full((k, count, size), np.nan), np.full((k, count), np.nan), [before], before.trail[:, -1]
     for first in range(0, count, STRETCH):
         last = min(first + STRETCH, count)
-        leg = walk.move(state, last - first)
-        blocks = leg.trail[:, :-1]
+        stretch = walk.move(state, last - first)
+        blocks = stretch.trail[:, :-1]
         rates[:, first:last], frame = carry(walk.matrices(blocks), frame, scale)
         volume[:, first:last] = walk.divergences(blocks)
-        legs.append(leg)
-        state = leg.trail[:, -1]
+        stretches.append(stretch)
+        state = stretch.trail[:, -1]
         if progress:
             progress(last / count)
-    return Growth(rates, volume, scale, _joined(legs))
+    return Growth(rates, volume, scale, _joined(stretches))
 
 
 def _scale(start: np.ndarray, motion: np.ndarray) -> np.ndarray:
@@ -111,17 +111,17 @@ def carry(matrices: np.ndarray, frame: np.ndarray, scale: np.ndarray) -> tuple[n
         return np.log(np.abs(diagonal)), frame
 
 
-def _joined(legs: list[Leg]) -> Leg:
+def _joined(stretches: list[Stretch]) -> Stretch:
     """Sums and minima after the transient, the first status that isn't a success, and the last part of the trail."""
-    after = legs[1:]
-    status = legs[0].status
-    for leg in after:
-        status = np.where(np.isin(status, GOOD), np.maximum(status, leg.status), status)
-    trail = np.concatenate([*(leg.trail[:, :-1] for leg in after[-2:]), after[-1].trail[:, -1:]], axis=1)
-    return Leg(
+    after = stretches[1:]
+    status = stretches[0].status
+    for stretch in after:
+        status = np.where(np.isin(status, GOOD), np.maximum(status, stretch.status), status)
+    trail = np.concatenate([*(stretch.trail[:, :-1] for stretch in after[-2:]), after[-1].trail[:, -1:]], axis=1)
+    return Stretch(
         trail[:, -STRETCH - 1 :],
         status,
-        np.sum([leg.grazes for leg in after], axis=0),
-        np.sum([leg.unresolved for leg in after], axis=0),
-        np.min([leg.margin for leg in after], axis=0),
+        np.sum([stretch.grazes for stretch in after], axis=0),
+        np.sum([stretch.unresolved for stretch in after], axis=0),
+        np.min([stretch.margin for stretch in after], axis=0),
     )

@@ -62,8 +62,8 @@ def lyapunov(
         Starts, as for :func:`saltus.simulate`; one or many. Default: all zero.
     method : {"variational", "wolf"}
         ``"wolf"``: the largest exponent only, from the growth of the distance between neighbours on the trajectory, as much of the
-        literature has it (:func:`saltus.wolf`). Points are all states and the phase of the forcing, 32 in a block; a piece is one
-        block. It is the largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
+        literature has it (:func:`saltus.wolf`). Points are all states and the phase of the forcing, 32 in a block; an evolution is
+        one block. It is the largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
     flow : Method
         How to integrate. Default :class:`saltus.Taylor`. With ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts
         aren't known.

@@ -1,6 +1,6 @@
 """Growth of the distance between neighbours on a trajectory: the fixed evolution time program of Wolf et al.
 
-A point of the trajectory and a neighbour of it are followed for a fixed time; the logarithm of the growth of their distance is one piece.
+A point of the trajectory and a neighbour of it are followed for a fixed time, one evolution, and the growth of their distance is noted.
 Then a new neighbour takes over, close to the point and in the direction in which the old one lies. Wolf, Swift, Swinney & Vastano, Physica
 D 16 (1985) 285-317, section 5 and appendix B.
 """
@@ -22,8 +22,8 @@ ANGLE, WIDENINGS = 0.3, 5
 
 
 @dataclass(frozen=True)
-class Pieces:
-    """The pieces of one fiducial trajectory.
+class Evolutions:
+    """The evolutions of one fiducial trajectory.
 
     Attributes
     ----------
@@ -47,11 +47,11 @@ class Search:
     Attributes
     ----------
     evolve : int
-        Samples of a piece.
+        Samples of an evolution.
     smallest, largest : float
         Distances between which a new neighbour lies, in units of the points.
     exclude : int
-        Samples around a point that are no neighbours of it: they lie on the same piece of trajectory.
+        Samples around a point that are no neighbours of it: they lie on the same stretch of it.
     """
 
     evolve: int
@@ -71,8 +71,8 @@ def crowd_distance(points: np.ndarray, smallest: float, exclude: int) -> float:
     return float(np.median(distances))
 
 
-def follow(points: np.ndarray, search: Search) -> Pieces:
-    """The pieces of the trajectory float64[n, m], from its first point on that has a neighbour; empty if none has."""
+def follow(points: np.ndarray, search: Search) -> Evolutions:
+    """The evolutions of the trajectory float64[n, m], from its first point on that has a neighbour; empty if none has."""
     return _Chase(points, search).run()
 
 
@@ -83,7 +83,7 @@ class _Chase:
         self._points, self._search = points, search
         self._tree = cKDTree(points[: len(points) - search.evolve])  # a neighbour must be able to go on
 
-    def run(self) -> Pieces:
+    def run(self) -> Evolutions:
         search, points = self._search, self._points
         rows: list[tuple[float, float, float]] = []
         neighbour, angle = None, math.nan
@@ -100,7 +100,7 @@ class _Chase:
                 continue
             rows.append((math.log(later / distance), distance, angle))
             neighbour, angle = self._replacement(there, after / later)
-        return Pieces(*np.array(rows).reshape(-1, 3).T)
+        return Evolutions(*np.array(rows).reshape(-1, 3).T)
 
     def _nearest(self, here: int) -> int | None:
         """The nearest allowed neighbour of a point."""

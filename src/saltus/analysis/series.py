@@ -71,7 +71,7 @@ def samples_of(value: Any, interval: float, name: str, least: int = 1) -> int:
 
 
 def check_length(count: int, evolve: int, exclude: int) -> None:
-    """Raise ParameterError unless the points give enough pieces, and neighbours beside those that are excluded."""
+    """Raise ParameterError unless the points give enough evolutions, and neighbours beside those that are excluded."""
     least = max(LEAST_POINTS, 2 * LEAST * evolve, 2 * exclude + LEAST_POINTS)
     if count < least:
         raise ParameterError(f"{count} points are too few: {least} are the least here, and some thousand are needed for a chaotic motion.")

@@ -26,8 +26,8 @@ RUNNING = 200
 BOUNDED = 4.0
 #: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the rounding of the faster: three digits are left.
 LOST = 29.0
-#: Relative error of a multiplier beyond which it is lost, and blocks of the round trips that find it then.
-KNOWN, TRIPS = 1e-6, 256
+#: Factor on the rounding of a monodromy matrix beyond which a multiplier is lost, and blocks of the round trips that find it then.
+AMPLIFIED, TRIPS = 1e6, 256
 #: What a slow approach to an orbit must at least have gained over half of the last stretch.
 GAINED = 0.5
 
@@ -114,13 +114,13 @@ def running_ends(count: int) -> np.ndarray:
 # -- orbits --------------------------------------------------------------------------------------------------------------------
 def _orbits(walk: Walk, growth: Growth) -> list[Orbit | None]:
     """The stable periodic orbit to which each trajectory has come, None for the others."""
-    trail, found = growth.leg.trail, []
+    trail, found = growth.stretch.trail, []
     with np.errstate(invalid="ignore"):  # those that ran away
         period, apart = recurrence(trail[:, -ROUND - 1 :], growth.scale)
     for i, one in enumerate(trail):
         map_ = walk.map_of(i)
         near = max(NEAR, 4.0 * map_.noise)
-        good = growth.leg.status[i] in GOOD and apart[i] <= near
+        good = growth.stretch.status[i] in GOOD and apart[i] <= near
         orbit = polish(map_, one[-1], int(period[i]), growth.scale[i]) if good else None
         found.append(orbit if orbit is not None and orbit.stable and _arrives(one, orbit, growth.scale[i], map_, near) else None)
     return found
@@ -142,12 +142,11 @@ def _of_orbit(walk: Walk, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.n
     noise, n = walk.map_of(i).noise, orbit.period
     monodromy = orbit.monodromy[0] * scale / scale[:, None]
     condition = min(np.linalg.cond(np.linalg.eig(monodromy)[1]), 1.0 / noise)
+    magnitudes = -np.sort(-np.abs(orbit.multipliers))
     with np.errstate(divide="ignore"):
-        exponents = np.log(np.abs(orbit.multipliers)) / n
-        errors = noise * condition * np.linalg.norm(monodromy, 2) / np.abs(orbit.multipliers) / n
-    order = np.argsort(-exponents, kind="stable")
-    exponents, errors = exponents[order], errors[order]
-    lost = errors * n > KNOWN
+        exponents, amplified = np.log(magnitudes) / n, condition * np.linalg.norm(monodromy, 2) / magnitudes
+        errors = noise * amplified / n
+    lost = amplified > AMPLIFIED
     if lost.any():
         exponents[lost], errors[lost] = (part[lost] for part in _round_trips(walk, i, orbit, scale))
     return exponents, errors

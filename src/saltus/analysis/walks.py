@@ -18,7 +18,7 @@ LOOKED, SAMPLES = 16, 32
 
 
 @dataclass(frozen=True)
-class Leg:
+class Stretch:
     """A stretch of k trajectories.
 
     Attributes
@@ -43,7 +43,7 @@ class Leg:
 class Walk(Protocol):
     """k trajectories of D states that are followed in blocks: a forcing period, a given time, or one iterate of a map."""
 
-    def move(self, start: np.ndarray, count: int, first: int = 0) -> Leg:
+    def move(self, start: np.ndarray, count: int, first: int = 0) -> Stretch:
         """``count`` blocks from float64[k, D]; the trail begins after ``first`` of them."""
 
     def look(self, start: np.ndarray) -> np.ndarray:
@@ -69,12 +69,15 @@ class FlowWalk:
         self.family, self._every = family, every
         self._divergence = Divergence(family.system)
 
-    def move(self, start: np.ndarray, count: int, first: int = 0) -> Leg:
+    def move(self, start: np.ndarray, count: int, first: int = 0) -> Stretch:
         """See :class:`Walk`."""
+        if not count:
+            nothing = np.zeros(len(start), np.int64)
+            return Stretch(start[:, None], nothing + st.OK, nothing, nothing, np.full(len(start), np.inf))
         kept = np.arange(first, count + 1, dtype=np.int64)
         outcome = self.family.run(start, count, Schedule(kept, np.zeros(len(kept))))
         grazes, unresolved = outcome.counters[:, st.GRAZES], outcome.counters[:, st.UNRESOLVED]
-        return Leg(outcome.samples, outcome.status, grazes, unresolved, outcome.minima[:, st.GAP_MARGIN])
+        return Stretch(outcome.samples, outcome.status, grazes, unresolved, outcome.minima[:, st.GAP_MARGIN])
 
     def look(self, start: np.ndarray) -> np.ndarray:
         """See :class:`Walk`."""
@@ -112,11 +115,11 @@ class MapWalk:
     def __init__(self, map_: Map):
         self._map = map_
 
-    def move(self, start: np.ndarray, count: int, first: int = 0) -> Leg:
+    def move(self, start: np.ndarray, count: int, first: int = 0) -> Stretch:
         """See :class:`Walk`."""
         travel = self._map.launch(start, count)
         trail = np.concatenate([start[:, None], travel.advance(count)], axis=1)[:, first:]
-        return Leg(trail, travel.status, 0 * travel.unresolved, travel.unresolved, np.full(len(start), np.inf))
+        return Stretch(trail, travel.status, 0 * travel.unresolved, travel.unresolved, np.full(len(start), np.inf))
 
     def look(self, start: np.ndarray) -> np.ndarray:
         """See :class:`Walk`."""

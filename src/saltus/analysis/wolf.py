@@ -13,7 +13,7 @@ import xarray as xr
 from saltus.analysis.batch_means import CONFIDENCE, batch_means
 from saltus.analysis.embedding import embed as embedded
 from saltus.analysis.embedding import false_neighbours, first_minimum, hardly_correlated, least_dimension
-from saltus.analysis.neighbours import CROWD, Pieces, Search, crowd_distance, follow
+from saltus.analysis.neighbours import CROWD, Evolutions, Search, crowd_distance, follow
 from saltus.analysis.series import LEAST_POINTS, check_length, columns_of, interval_of, samples_of
 from saltus.analysis.spectrum import BOUNDED, running_ends
 from saltus.analysis.starts import whole
@@ -25,7 +25,7 @@ from saltus.results import exponents_dataset
 WIDEST = 0.1
 #: Default of the smallest distance: rounding in a clean series.
 CLEANEST = 1e-6
-#: Delays in a piece by default: the delay is about a quarter of a turn of the motion.
+#: Delays in an evolution by default: the delay is about a quarter of a turn of the motion.
 DELAYS = 4
 #: Share of false neighbours beyond which an embedding shows no states.
 UNFOLDED = 0.1
@@ -45,9 +45,9 @@ class Growing:
     kind : str
         ``chaotic``, ``regular`` or ``unclear``.
     ends, running, running_half : float64[m]
-        Pieces after which running means are kept, and these with their half-widths.
-    pieces : Pieces
-        The pieces.
+        Evolutions after which running means are kept, and these with their half-widths.
+    evolutions : Evolutions
+        The evolutions.
     """
 
     exponent: float
@@ -58,12 +58,12 @@ class Growing:
     ends: np.ndarray
     running: np.ndarray
     running_half: np.ndarray
-    pieces: Pieces
+    evolutions: Evolutions
 
 
 _NONE = np.zeros(0)
 #: Where there is no neighbour, or no trajectory.
-NOTHING = Growing(math.nan, math.nan, math.nan, 0, "unclear", _NONE, _NONE, _NONE, Pieces(_NONE, _NONE, _NONE))
+NOTHING = Growing(math.nan, math.nan, math.nan, 0, "unclear", _NONE, _NONE, _NONE, Evolutions(_NONE, _NONE, _NONE))
 
 
 def wolf(
@@ -99,7 +99,8 @@ def wolf(
         Between coordinates: samples, or a time with its unit. Default: the first minimum of the mutual information (Fraser & Swinney 1986),
         about a quarter of a turn; 1 for a series whose neighbouring samples are hardly correlated, as those of a map.
     evolve : int or str, optional
-        Time of a piece: samples, or a time with its unit. Wolf recommends half a turn to one and a half. Default: four delays; 1 for a map.
+        Time of an evolution: samples, or a time with its unit. Wolf recommends half a turn to one and a half. Default: four delays; 1 for
+        a map.
     smallest_distance : float
         Least distance of a new neighbour, as a share of the range: the level of the noise. Default: 1e-6, for clean series.
     largest_distance : float, optional
@@ -116,7 +117,7 @@ def wolf(
     -------
     Dataset
         As that of :func:`saltus.lyapunov`, with one ``trajectory`` and one ``exponent``: ``lyapunov_exponent`` with its standard error and
-        95 % interval from the statistics of the pieces (batch means). The interval doesn't hold the bias of the method. ``kind``:
+        95 % interval from the statistics of the evolutions (batch means). The interval doesn't hold the bias of the method. ``kind``:
         ``chaotic`` where the interval lies above zero, ``regular`` where it is narrow and holds zero, or growth is no more than a factor of
         50 in all, else ``unclear``. ``replacements``, ``replaced_distance`` (mean, as a share of the range), ``replaced_angle``. What was
         chosen for the parameters stands in the attributes, and ``false_neighbours``.
@@ -147,7 +148,7 @@ def wolf(
     check_length(len(columns), steps, apart)
     search = _search(columns, steps, smallest_distance, largest_distance, apart)
     found = measure(columns, interval, search)
-    if not len(found.pieces.growth):
+    if not len(found.evolutions.growth):
         raise ParameterError(
             f"no point of the series has a neighbour between {search.smallest:g} and {WIDEST:g} of the range: the motion repeats "
             "exactly, or the points are too few. Lower smallest_distance=, or raise largest_distance=."
@@ -163,19 +164,19 @@ def wolf(
 
 def measure(points: np.ndarray, interval: float, search: Search) -> Growing:
     """Exponents from the neighbours on a trajectory float64[n, m] of so many seconds between samples."""
-    pieces = follow(points, search)
-    time, count = interval * search.evolve, len(pieces.growth)
+    evolutions = follow(points, search)
+    time, count = interval * search.evolve, len(evolutions.growth)
     if not count:
         return NOTHING
     ends = running_ends(count)
-    means = batch_means(pieces.growth / time, ends)
+    means = batch_means(evolutions.growth / time, ends)
     exponent, error, half = (float(part[-1]) for part in (means.mean, means.error, means.half_width))
     kind = "unclear"
     if abs(exponent) <= BOUNDED / (time * count) or abs(exponent) < half < UNCLEAR / time:
         kind = "regular"
     elif exponent - half > 0.0:
         kind = "chaotic"
-    return Growing(exponent, error, half, int(means.batches[-1]), kind, ends * time, means.mean, means.half_width, pieces)
+    return Growing(exponent, error, half, int(means.batches[-1]), kind, ends * time, means.mean, means.half_width, evolutions)
 
 
 def _table(found: Growing, block: float, logarithm: float, false: float) -> dict[str, Any]:
@@ -193,11 +194,11 @@ def _table(found: Growing, block: float, logarithm: float, false: float) -> dict
 
 def replaced(found: list[Growing]) -> dict[str, Any]:
     """Columns on the replacements of some trajectories."""
-    taken = [np.isfinite(one.pieces.angle) for one in found]
+    taken = [np.isfinite(one.evolutions.angle) for one in found]
     return {
         "replacements": [int(mask.sum()) for mask in taken],
-        "replaced_distance": [_mean(one.pieces.distance[mask]) for one, mask in zip(found, taken, strict=True)],
-        "replaced_angle": [_mean(one.pieces.angle[mask]) for one, mask in zip(found, taken, strict=True)],
+        "replaced_distance": [_mean(one.evolutions.distance[mask]) for one, mask in zip(found, taken, strict=True)],
+        "replaced_angle": [_mean(one.evolutions.angle[mask]) for one, mask in zip(found, taken, strict=True)],
     }
 
 

@@ -54,11 +54,11 @@ def test_neighbours_that_part_at_a_known_rate():
         x = (2 * x + 1e-14 * rng.random()) % 1.0
         angles.append(2 * math.pi * x)
     points = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    pieces = follow(points, Search(1, 1e-6, 0.01, 5))
-    assert np.abs(pieces.growth - math.log(2)).max() < 1e-3
-    assert len(pieces.growth) == 3999
-    assert 0.01 < pieces.distance.max() <= 0.05  # five times as far where nobody near is in the right direction
-    assert pieces.distance.min() >= 1e-6
+    evolutions = follow(points, Search(1, 1e-6, 0.01, 5))
+    assert np.abs(evolutions.growth - math.log(2)).max() < 1e-3
+    assert len(evolutions.growth) == 3999
+    assert 0.01 < evolutions.distance.max() <= 0.05  # five times as far where nobody near is in the right direction
+    assert evolutions.distance.min() >= 1e-6
 
 
 def test_excluded_neighbours_and_those_too_close_are_not_taken():
