@@ -198,6 +198,24 @@ def test_a_rigid_rotation_is_quasi_periodic_and_no_orbit_is_called_chaotic():
     assert (np.abs(found.exponents[:, 1] + math.log(2)) <= bound + 1e-12).all()  # the radius goes to its square root
 
 
+def test_deviations_that_grow_like_time_are_not_chaos():
+    """Turned the faster the larger the radius, without friction: a deviation grows like n, and ln(n) / n looks positive at first."""
+
+    def image(z):
+        angle = 1.0 + 30.0 * (z**2).sum(axis=1)
+        return np.stack([z[:, 0] * np.cos(angle) - z[:, 1] * np.sin(angle), z[:, 0] * np.sin(angle) + z[:, 1] * np.cos(angle)], axis=1)
+
+    def derivative(z):
+        angle = 1.0 + 30.0 * (z**2).sum(axis=1)
+        turn = np.stack([np.stack([np.cos(angle), -np.sin(angle)], axis=1), np.stack([np.sin(angle), np.cos(angle)], axis=1)], axis=1)
+        w = image(z)
+        return turn + 60.0 * np.stack([-w[:, 1], w[:, 0]], axis=1)[:, :, None] * z[:, None, :]
+
+    found = lyapunov_of(FunctionMap(image, "x y", derivative), 0.5 + 0.5 * drawn(8, 2), 300, 0)
+    assert (found.exponents[:, 0] > 0.02).all()
+    assert "chaotic" not in found.kinds
+
+
 def test_a_trajectory_that_runs_away_has_no_exponents():
     runs = FunctionMap(lambda z: 3.0 * z**3, "x", lambda z: (9.0 * z**2)[:, :, None])
     found = lyapunov_of(runs, [2.0], 200)
@@ -288,6 +306,26 @@ def test_the_sum_rule_holds_jumps_and_damping_that_acts_in_contact_only():
     off = np.abs(ds["exponent_sum"] - ds["mean_divergence"]).values
     assert off.max() < 1e-11
     assert (ds["mean_divergence"] < -0.1 - 0.01).all()  # more than the damping outside of contact
+
+
+@sl.system(states="x v", forced_at="frequency", units={"frequency": "Hz"})
+def pushed(t, x, v, *, push=0.2, damping=0.5, force=2.0, frequency=0.15):
+    """A push along the motion, whichever way it goes: the boundary is v = 0, where the acceleration jumps."""
+    return v, force * sl.cos(2 * sl.pi * frequency * t) + sl.piecewise((push, v > 0), otherwise=-push) - damping * v - x - x**3
+
+
+def test_volumes_grow_where_the_acceleration_jumps_at_zero_speed():
+    """At each contact the determinant is multiplied by the ratio of the accelerations: by far not 1 in all, and known to both sides."""
+    ds = sl.lyapunov(pushed, [(0.5, 0.0), (-1.0, 0.3)], flow=FINE, periods=200, transient=100)
+    assert np.abs(ds["exponent_sum"] - ds["mean_divergence"]).max() < 1e-7
+    assert (ds["mean_divergence"] > -0.5 + 0.02).all()  # the trace alone is minus the damping
+    stroboscope, step = Stroboscope(pushed, FINE), 1e-4
+    place = stroboscope.launch(np.array([[0.5, 0.0]]), 100).advance(100)[:, -1]
+    ends, _ = stroboscope.sequences(place + np.concatenate([step * np.eye(2), -step * np.eye(2)]), 1)
+    determinant = np.linalg.det((ends[:2] - ends[2:]) / (2 * step))
+    assert ds["kind"].values[0] == "periodic"
+    assert ds["response_period"].values[0] == 1
+    assert ds["mean_divergence"].values[0] == pytest.approx(math.log(determinant) * 0.15, abs=1e-4)
 
 
 # -- use -----------------------------------------------------------------------------------------------------------------------
