@@ -28,11 +28,13 @@ if TYPE_CHECKING:
         energy_balance,
         frequency_response,
         impact_statistics,
+        lyapunov,
         poincare,
         settled,
         simulate,
         spectrum,
         stroboscope,
+        wolf,
     )
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import describe, load, save, to_csv, to_mat
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
 _HOMES = {
     **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
     **dict.fromkeys(("compare_methods", "energy_balance", "frequency_response", "impact_statistics", "poincare"), "saltus.analysis"),
-    **dict.fromkeys(("settled", "simulate", "spectrum", "stroboscope"), "saltus.analysis"),
+    **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "wolf"), "saltus.analysis"),
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("describe", "load", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
@@ -54,9 +56,9 @@ _MODULES = ("models", "plot")
 
 __all__ = [
     "ODE45", "Interrupted", "System", "Taylor", "abs", "atan", "attractors", "basin_fractions", "basins", "bifurcation_diagram",
-    "compare", "compare_methods", "cos", "describe", "energy_balance", "exp", "freeplay", "frequency_response", "impact_statistics",
-    "load", "log", "max", "min", "models", "pi", "piecewise", "plot", "poincare", "save", "settled", "simulate", "sin", "spectrum",
-    "sqrt", "stroboscope", "system", "tan", "tanh", "to_csv", "to_mat",
+    "compare", "compare_methods", "cos", "describe", "energy_balance", "exp", "freeplay", "frequency_response",
+    "impact_statistics", "load", "log", "lyapunov", "max", "min", "models", "pi", "piecewise", "plot", "poincare", "save",
+    "settled", "simulate", "sin", "spectrum", "sqrt", "stroboscope", "system", "tan", "tanh", "to_csv", "to_mat", "wolf",
 ]  # fmt: skip
 
 

@@ -8,11 +8,13 @@ from saltus.analysis.compare_methods import compare_methods
 from saltus.analysis.energy import energy_balance
 from saltus.analysis.frequency_response import frequency_response
 from saltus.analysis.impacts import impact_statistics
+from saltus.analysis.lyapunov import lyapunov
 from saltus.analysis.poincare import poincare
 from saltus.analysis.settled import settled
 from saltus.analysis.simulate import simulate
 from saltus.analysis.spectrum import spectrum
 from saltus.analysis.stroboscope import stroboscope
+from saltus.analysis.wolf import wolf
 
 __all__ = [
     "attractors",
@@ -24,9 +26,11 @@ __all__ = [
     "energy_balance",
     "frequency_response",
     "impact_statistics",
+    "lyapunov",
     "poincare",
     "settled",
     "simulate",
     "spectrum",
     "stroboscope",
+    "wolf",
 ]

@@ -39,6 +39,8 @@ class Kind(StrEnum):
     spectrum = "spectrum"
     impacts = "impacts"
     energy = "energy"
+    exponents = "exponents"
+    methods = "methods"
 
 
 class Progress(StrEnum):

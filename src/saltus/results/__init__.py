@@ -3,6 +3,7 @@
 from saltus.results.assemble import Contacts, Guards, stroboscope_dataset, trajectory_dataset
 from saltus.results.assemble_motions import motion_dataset, spectrum_dataset
 from saltus.results.basins import AttractorTable, agreement_dataset, attractors_dataset, basins_dataset
+from saltus.results.exponents import exponents_dataset
 from saltus.results.export import save, to_csv, to_mat, to_netcdf
 from saltus.results.files import ResultFileError, usable_folder
 from saltus.results.load import load
@@ -24,6 +25,7 @@ __all__ = [
     "basins_dataset",
     "content_hash",
     "describe",
+    "exponents_dataset",
     "load",
     "methods_dataset",
     "motion_dataset",

@@ -6,6 +6,9 @@ state's unit, ``<gap>`` that of the guards' gap functions, ``<gap rate>`` the sa
 Dims: ``time`` (samples), ``contact`` (one table for all trajectories), ``guard``, ``trajectory``. When the trajectories of a batch have
 periods of their own, the samples share phases instead of times: the dim is then ``period``, and ``time`` has dims (trajectory, period).
 
+Exponents have the dims ``trajectory``, ``exponent`` (in descending order), ``flow_exponent`` and ``running`` (times at which running means
+are kept); ``<rate>`` is the unit that the caller asked for, such as ``bit/period``.
+
 Results about attractors have the dims ``attractor``, ``phase`` (points of an orbit, one a forcing period) and ``multiplier``. What belongs
 to one start has no dims in the table: a map adds the two states that it is drawn over, a list of starts ``trajectory``.
 
@@ -32,7 +35,7 @@ from saltus.results.variable import COUNTERS, FORCING_PERIOD, GUARDS, MINIMA, ST
 VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
-METHODS = "methods"
+METHODS, EXPONENTS = "methods", "exponents"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
@@ -40,6 +43,7 @@ MAKERS = {
     RESPONSES: "frequency_response or bifurcation_diagram",
     METHODS: "compare_methods",
     SECTION: "poincare", SPECTRUM: "spectrum", IMPACTS: "impact_statistics", ENERGY: "energy_balance",
+    EXPONENTS: "lyapunov",
 }  # fmt: skip
 
 #: Kinds that hold the states under their own names.
@@ -140,6 +144,34 @@ AGREEMENT_VARIABLES = {
     "match_orbit_distance": Variable(("pair",), "1", "distance of the two orbits in units of the axis ranges"),
 }
 
+#: Variables of what ``lyapunov`` and ``wolf`` return.
+EXPONENTS_VARIABLES = {
+    "trajectory": Variable(("trajectory",), "1", "trajectory", "i8"),
+    "kind": Variable(("trajectory",), "", "kind of motion", "str"),
+    "response_period": Variable(("trajectory",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
+    "lyapunov_exponent": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent"),
+    "lyapunov_error": Variable(("trajectory", "exponent"), "<rate>", "standard error of the Lyapunov exponent"),
+    "lyapunov_low": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, lower end of the 95 % interval"),
+    "lyapunov_high": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, upper end of the 95 % interval"),
+    "flow_lyapunov_exponent": Variable(("trajectory", "flow_exponent"), "<rate>", "Lyapunov exponent of the flow, its phase included"),
+    "exponent_sum": Variable(("trajectory",), "<rate>", "sum of the Lyapunov exponents"),
+    "mean_divergence": Variable(("trajectory",), "<rate>", "mean rate at which volumes grow"),
+    "independent_batches": Variable(("trajectory",), "1", "batches that the error of the largest exponent comes from", "i8"),
+    "near_graze": Variable(("trajectory",), "1", "whether the motion grazes a boundary, or nearly so", "i1"),
+    "grazes": Variable(("trajectory",), "1", "grazes after the transient", "i8"),
+    "grazes_unresolved": Variable(("trajectory",), "1", "grazes shallower than the local error, after the transient", "i8"),
+    "smallest_gap_margin": MINIMA["smallest_gap_margin"].along("trajectory"),
+    "block_time": Variable(("trajectory",), "s", "time of a block: the forcing period, or the time between two looks"),
+    "status": STATUS.along("trajectory"),
+    "replacements": Variable(("trajectory",), "1", "replacements of the neighbour", "i8"),
+    "replaced_distance": Variable(("trajectory",), "1", "mean distance at replacement, as a share of the range of the motion"),
+    "replaced_angle": Variable(("trajectory",), "rad", "mean angle between old and new neighbour"),
+    "running_time": Variable(("trajectory", "running"), "s", "time since the end of the transient"),
+    "running_exponent": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far"),
+    "running_low": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, lower end of the 95 % interval"),
+    "running_high": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, upper end of the 95 % interval"),
+}
+
 #: The table of each kind of result.
 TABLES = {
     TRAJECTORY: TRAJECTORY_VARIABLES,
@@ -153,6 +185,7 @@ TABLES = {
     SPECTRUM: motions.SPECTRUM_VARIABLES,
     IMPACTS: motions.IMPACTS_VARIABLES,
     ENERGY: motions.ENERGY_VARIABLES,
+    EXPONENTS: EXPONENTS_VARIABLES,
 }
 
 
@@ -281,6 +314,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         SPECTRUM: ("frequency", "window"),
         IMPACTS: ("contact_speed", "contacts_per_second", "status"),
         ENERGY: ("energy", "residual", "status"),
+        EXPONENTS: ("lyapunov_exponent", "running_exponent"),
     }[kind]
 
 

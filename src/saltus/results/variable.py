@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,10 @@ class Variable:
     units: str
     long_name: str
     dtype: str = "f8"
+
+    def along(self, dim: str) -> Variable:
+        """The same variable with one more dim in front."""
+        return replace(self, dims=(dim, *self.dims))
 
 
 #: Of each trajectory.

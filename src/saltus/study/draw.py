@@ -22,14 +22,15 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "impacts": ("impacts",),
     "energy": ("energy",),
     "methods": ("methods",),
+    "exponents": ("exponents",),
 }
 _WORDS = {
     "trajectory": "a run", "stroboscope": "points at whole periods", "basins": "basins", "agreement": "the agreement of two maps of basins",
     "responses": "responses", "section": "a section", "spectrum": "a spectrum", "impacts": "impacts", "energy": "energies",
-    "methods": "one question by several methods",
+    "methods": "one question by several methods", "exponents": "exponents",
 }  # fmt: skip
 #: Pictures that show trajectories of a batch.
-OF_TRAJECTORIES = ("history", "phase", "section", "spectrum", "impacts", "energy")
+OF_TRAJECTORIES = ("history", "phase", "section", "spectrum", "impacts", "energy", "exponents")
 
 
 def default_kind(ds: xr.Dataset) -> str:

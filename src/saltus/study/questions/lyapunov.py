@@ -74,7 +74,7 @@ class Exponents(OneDataset):
         """Call the analysis."""
         from saltus import analysis
 
-        return analysis.lyapunov(self.system, flow=self.method, threads=threads, progress=progress, **self.arguments)  # type: ignore[attr-defined]
+        return analysis.lyapunov(self.system, flow=self.method, threads=threads, progress=progress, **self.arguments)
 
     def tables(self, ds: xr.Dataset) -> list[TextTable]:
         """A row for each motion."""
