@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from conformance.systems import lab
+from conformance.systems import lab, pair
 from saltus.errors import ParameterError
 from saltus.models import MODELS, energy
 from saltus.system.derivatives import differentiate, time_derivative
@@ -163,6 +163,23 @@ def test_impulse_is_the_change_of_momentum_less_the_other_forces():
     assert found.contact_impulse.values[ended] == pytest.approx((others - momentum)[ended], rel=1e-11)
 
 
+def test_statistics_without_forcing():
+    """The same bounces of one of two masses that don't feel each other; the other one rests far from its stop."""
+    speed, duration, cycle, _ = bounce()
+    values = {"lift": 9.81, "stop1": 0.0, "stiffness1": 4e3, "stop2": 1e6, "gap": 1e7}
+    t_end = 50.5 * cycle  # from the top of a flight to the bottom of a bounce: 50 contacts and a half, the first of which is transient
+    found = sl.impact_statistics(pair, (-0.2, 0.0, 0.0, 0.0), t_end=t_end, transient=cycle, values=values)
+    one = found.sel(guard="stop1")
+    assert int(one.contacts) == 50
+    assert float(one.contacts_per_second) == pytest.approx(50 / (49.5 * cycle), rel=1e-13)
+    assert float(one.share_in_contact) == pytest.approx(49.5 * duration / (49.5 * cycle), rel=1e-10)
+    assert float(one.speed_mean) == pytest.approx(speed, rel=1e-11)
+    assert int(found.contacts.sel(guard="stop2")) == 0
+    assert np.isnan(float(found.speed_mean.sel(guard="stop2")))
+    assert "contacts_per_period" not in found
+    assert "impulse_mean" not in found
+
+
 def test_a_contact_under_way_counts_in_the_share_only():
     _, duration, cycle, _ = bounce()
     fall = (cycle - duration) / 2
@@ -175,6 +192,13 @@ def test_a_contact_under_way_counts_in_the_share_only():
     inside = sl.impact_statistics(lab, (0.01, 0.0), t_end=1e-3, values=FALL | {"frequency": 0.01}, force=FORCE)
     assert inside.sizes["contact"] == 0
     assert float(inside.share_in_contact[0]) == 1.0
+    w, sag = (
+        math.sqrt(FALL["stiffness"]),
+        FALL["lift"] / FALL["stiffness"],
+    )  # from rest at 4 sag: x = sag (1 + 3 cos wt) leaves at cos = -1/3
+    leaving = sl.impact_statistics(lab, (4 * sag, 0.0), t_end=0.05, values=FALL | {"frequency": 0.01}, force=FORCE)
+    assert leaving.sizes["contact"] == 0
+    assert float(leaving.share_in_contact[0]) == pytest.approx(math.acos(-1 / 3) / w / 0.05, rel=1e-12)
 
 
 @pytest.mark.parametrize(

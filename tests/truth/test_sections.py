@@ -94,6 +94,7 @@ def test_a_section_among_contacts_is_what_dense_samples_show():
         assert (found.crossing_time.values >= plain.time.values[change]).all()
         assert (found.crossing_time.values <= plain.time.values[change + 1]).all()
         assert int(found.contacts) == int(plain.events) > 60
+        assert int(found.tangencies) == 0
         assert abs(float(found.end_x - plain.end_x)) < 1e-13
 
 

@@ -14,6 +14,8 @@ from saltus.errors import ParameterError
 
 #: m = 1, c = 0.3, k = 4, force 0.7 N at 0.5 Hz, a constant lift of 0.2 N; no contact.
 LINEAR = {"spring": 4.0, "damping": 0.3, "force": 0.7, "frequency": 0.5, "lift": 0.2, "boundary": 50.0}
+#: Settles to 5T; with a softer stop it doesn't repeat.
+SUBHARMONIC = {"spring": 0.2, "damping": 0.1, "force": 0.8, "boundary": 0.3, "stiffness": 100.0, "frequency": 0.3}
 STOP = {"spring": 1.0, "damping": 0.1, "force": 0.8, "boundary": 0.3, "stiffness": 40.0, "frequency": 0.2}
 
 
@@ -53,6 +55,9 @@ def test_the_phase_doesnt_depend_on_where_the_samples_begin():
     run = sl.simulate(lab, start, periods=8, keep=5, values=LINEAR)
     for part in (run, run.isel(time=slice(137, None))):
         assert sl.spectrum(part).x_phase.values[1] == pytest.approx(cmath.phase(line), abs=1e-12)
+    turned = line * cmath.exp(1j * math.pi * 0.3)  # the state of the same motion at t = 0.3 s
+    later = sl.simulate(lab, (0.05 + turned.real, (1j * math.pi * turned).real), periods=8, t_start=0.3, values=LINEAR)
+    assert sl.spectrum(later).x_phase.values[1] == pytest.approx(cmath.phase(line), abs=1e-12)
 
 
 def test_a_hann_window_keeps_the_height_of_a_line():
@@ -88,6 +93,20 @@ def test_lines_of_a_response_lie_on_multiples_of_its_own_frequency(contacting):
     whole = many.order.values * n == np.round(many.order.values * n)
     assert many.x_amplitude.values[~whole].max() < 1e-7 * many.x_amplitude.values.max()
     assert many.x_amplitude.values[whole] == pytest.approx(found.x_amplitude.values, abs=1e-7)
+
+
+def test_only_whole_responses_are_taken_and_what_doesnt_repeat_gets_a_window():
+    run = sl.simulate(
+        lab, (0.0, 0.0), periods=500, keep=24, samples=64, time_errors="local", values=SUBHARMONIC | {"stiffness": [100.0, 40.0]}
+    )
+    found = sl.spectrum(run, "x", last=24)
+    assert found.response_period.values.tolist() == [5, 0]
+    assert found.window.values.tolist() == ["none", "hann"]
+    assert found.order.values[1] == pytest.approx(1 / 20, rel=1e-15)  # of 24 periods 20 are whole responses
+    between = np.arange(found.sizes["frequency"]) % 4 != 0
+    lines = found.x_amplitude.values
+    assert lines[0, between].max() < 1e-6 * lines[0].max()
+    assert lines[1, between].max() > 1e-3 * lines[1].max()
 
 
 def test_a_system_without_forcing():
