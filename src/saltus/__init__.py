@@ -18,14 +18,26 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from saltus import models, plot
-    from saltus.analysis import attractors, basin_fractions, basins, compare, settled, simulate, stroboscope
+    from saltus.analysis import (
+        attractors,
+        basin_fractions,
+        basins,
+        bifurcation_diagram,
+        compare,
+        compare_methods,
+        frequency_response,
+        settled,
+        simulate,
+        stroboscope,
+    )
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import describe, load, save, to_csv, to_mat
     from saltus.system import System, abs, atan, cos, exp, freeplay, log, max, min, pi, piecewise, sin, sqrt, system, tan, tanh
 
 #: Public name: module that holds it.
 _HOMES = {
-    **dict.fromkeys(("attractors", "basin_fractions", "basins", "compare", "settled", "simulate", "stroboscope"), "saltus.analysis"),
+    **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
+    **dict.fromkeys(("compare_methods", "frequency_response", "settled", "simulate", "stroboscope"), "saltus.analysis"),
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("describe", "load", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
@@ -36,9 +48,10 @@ _HOMES = {
 _MODULES = ("models", "plot")
 
 __all__ = [
-    "ODE45", "Interrupted", "System", "Taylor", "abs", "atan", "attractors", "basin_fractions", "basins", "compare", "cos", "describe",
-    "exp", "freeplay", "load", "log", "max", "min", "models", "pi", "piecewise", "plot", "save", "settled", "simulate", "sin", "sqrt",
-    "stroboscope", "system", "tan", "tanh", "to_csv", "to_mat",
+    "ODE45", "Interrupted", "System", "Taylor", "abs", "atan", "attractors", "basin_fractions", "basins", "bifurcation_diagram",
+    "compare", "compare_methods", "cos", "describe", "exp", "freeplay", "frequency_response", "load", "log", "max", "min",
+    "models", "pi", "piecewise", "plot", "save", "settled", "simulate", "sin", "sqrt", "stroboscope", "system", "tan", "tanh",
+    "to_csv", "to_mat",
 ]  # fmt: skip
 
 

@@ -2,9 +2,23 @@
 
 from saltus.analysis.attractors import attractors, basin_fractions
 from saltus.analysis.basins import basins
+from saltus.analysis.bifurcation_diagram import bifurcation_diagram
 from saltus.analysis.compare import compare
+from saltus.analysis.compare_methods import compare_methods
+from saltus.analysis.frequency_response import frequency_response
 from saltus.analysis.settled import settled
 from saltus.analysis.simulate import simulate
 from saltus.analysis.stroboscope import stroboscope
 
-__all__ = ["attractors", "basin_fractions", "basins", "compare", "settled", "simulate", "stroboscope"]
+__all__ = [
+    "attractors",
+    "basin_fractions",
+    "basins",
+    "bifurcation_diagram",
+    "compare",
+    "compare_methods",
+    "frequency_response",
+    "settled",
+    "simulate",
+    "stroboscope",
+]

@@ -107,16 +107,35 @@ def _followed(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit 
     damping is weak. What a run settles on is its attractor.
     """
     returns = max(-(-FOLLOWED // n), 2 * LAST)
-    last = map_.launch(start[None], returns * n + 1).advance(returns * n + 1)[0, :-1][-LAST * n :]
+    mean = mean_orbit(map_.launch(start[None], returns * n + 1).advance(returns * n + 1)[0, :-1], n, scale, map_.noise)
+    return None if mean is None else _orbit(map_, *mean)
+
+
+def mean_orbit(trail: np.ndarray, n: int, scale: np.ndarray, noise: float) -> tuple[np.ndarray, float] | None:
+    """The orbit that the end of a trail of an inexact map lies on, and how far the trail lies from it; None if it lies on none.
+
+    Parameters
+    ----------
+    trail : float64[m, D]
+        States one iterate apart, at least 16 n of them.
+    n : int
+        Iterates after which they nearly recur.
+    scale : float64[D]
+        Range of each state.
+    noise : float
+        Errors of the map, in units of the scale.
+    """
+    last = trail[-LAST * n :]
     points, scatter = _mean(last, n, scale)
-    if not scatter <= JITTER * map_.noise:
+    if not scatter <= JITTER * noise:
         return None
     double, less = _mean(last, 2 * n, scale)
     if scatter > SHOWING and less < 0.25 * scatter:  # two loops that lie side by side
         points = double
-    shifts = [np.abs((np.roll(points, -m, axis=0) - points) / scale).max() for m in range(1, len(points) + 1)]
-    points, scatter = _mean(last, 1 + int(np.argmax(np.array(shifts) <= map_.noise)), scale)  # loops that its errors alone part are one
-    return _orbit(map_, points, scatter) if _spacing(points, scale) >= APART * scatter else None
+    parts = [m for m in range(1, len(points) + 1) if len(points) % m == 0]
+    apart = [np.abs((np.roll(points, -m, axis=0) - points) / scale).max() for m in parts]
+    points, scatter = _mean(last, parts[int(np.argmax(np.array(apart) <= noise))], scale)  # loops that its errors alone part are one
+    return (points, scatter) if _spacing(points, scale) >= APART * scatter else None
 
 
 def _spacing(points: np.ndarray, scale: np.ndarray) -> float:

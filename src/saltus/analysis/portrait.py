@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.analysis.looks import largest, margin
 from saltus.analysis.orbits import Orbit
 from saltus.analysis.recurrence import Found
 from saltus.analysis.wandering import Wandering
 from saltus.flow.maps import Map, Stroboscope
 from saltus.kernels import status as st
 from saltus.results import AttractorTable
-from saltus.system.evaluate import evaluate
 
 #: Samples per period for peaks, rms and margins; extremes lie on a parabola through three of them.
 SAMPLES = 1000
@@ -91,30 +91,7 @@ def _of_motion(map_: Stroboscope, start: np.ndarray, periods: int, samples: int,
     return _Looks(
         contacts=len(crossings) / responses if map_.method.records_contacts else math.nan,
         itinerary=" ".join(texts) if responses == 1 else "",
-        peak=float(np.abs(_extremes(motion[0])).max(initial=np.abs(motion[0]).max())),
+        peak=float(largest(motion[0])),
         rms=float(np.sqrt(np.mean(motion[0] ** 2))),
-        margin=_margin(map_, motion, periods, samples),
+        margin=float(margin(map_.system, map_.period * np.arange(periods * samples) / samples, motion, map_.system.values)),
     )
-
-
-def _margin(map_: Stroboscope, motion: np.ndarray, periods: int, samples: int) -> float:
-    """Smallest size of a gap where it turns, on either side of the boundary: how far the motion is from a graze."""
-    system = map_.system
-    time = map_.period * np.arange(periods * samples) / samples
-    states = dict(zip(system.states, motion, strict=True))
-    margins = [math.inf]
-    bits: list[np.ndarray] = []
-    for guard in system.guards:
-        (gap,) = evaluate([guard.gap], t=time, states=states, values=system.values, bits=bits)
-        bits.append(np.broadcast_to(gap, time.shape) > 0)
-        margins.append(float(np.abs(_extremes(np.broadcast_to(gap, time.shape))).min(initial=math.inf)))
-    return min(margins)
-
-
-def _extremes(values: np.ndarray) -> np.ndarray:
-    """Values at the local extremes of a periodic signal, each from the parabola through three samples."""
-    before, after = np.roll(values, 1), np.roll(values, -1)
-    turning = (values - before) * (after - values) <= 0
-    bend = before - 2 * values + after
-    shift = np.where(turning & (bend != 0), 0.5 * (before - after) / np.where(bend == 0, 1.0, bend), 0.0)
-    return (values - 0.25 * (before - after) * shift)[turning]

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.flow.family import Family
 from saltus.flow.maps import Map
 
 #: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its way.
@@ -99,16 +100,16 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
     usable = [i for i in range(len(start)) if np.isfinite(points[i]).all() and not _settles(points[i], scale)]
     if not usable:
         return []
-    blocks = growth_rates(map_, start[usable], scale)
+    _, blocks = growth_rates(map_, start[usable], scale)
     groups: list[list[int]] = []
     trails = [Wandering("", 0.0, 0.0, points[i], scale) for i in usable]
     for i, trail in enumerate(trails):
-        home = next((group for group in groups if _alike(trails[group[0]], trail)), None)
+        home = next((group for group in groups if alike(trails[group[0]], trail)), None)
         if home is None:
             groups.append([i])
         else:
             home.append(i)
-    kinds = [(group, _kind(blocks[:, group])) for group in groups]
+    kinds = [(group, kind_of_growth(blocks[:, group])) for group in groups]
     return [Wandering(*kind, points[usable[group[0]]], scale) for group, kind in kinds if kind is not None]
 
 
@@ -125,7 +126,7 @@ def mismatch(trail: np.ndarray, scale: np.ndarray) -> float:
     return min(float(np.abs((trail[-last:] - trail[-last - n : -n]) / scale).max()) for n in range(1, len(trail) // 2))
 
 
-def _kind(blocks: np.ndarray) -> tuple[str, float, float] | None:
+def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
     """(kind, exponent, its standard error) from growth rates per iterate, float64[blocks, members]; None if they don't say."""
     if not np.isfinite(blocks).all():
         return None
@@ -138,8 +139,8 @@ def _kind(blocks: np.ndarray) -> tuple[str, float, float] | None:
     return ("quasi_periodic", exponent, error) if abs(second.mean()) <= max(SURE * error, FLOOR) else None
 
 
-def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Growth rates per iterate of the largest direction, block by block, float64[blocks, k], of trajectories from float64[k, D]."""
+def growth_rates(map_: Map | Family, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction, block by block, float64[blocks, k]."""
     k, size = start.shape
     direction = np.zeros((k, size, size))
     direction[:, :, 0] = scale / math.sqrt(size)
@@ -151,10 +152,11 @@ def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> np.ndarray:
             growths.append(np.log(length) / BLOCK)
             direction = np.zeros((k, size, size))
             direction[:, :, 0] = image[:, :, 0] / length[:, None]
-    return np.array(growths[ALIGNING:])
+    return state, np.array(growths[ALIGNING:])
 
 
-def _alike(one: Wandering, other: Wandering) -> bool:
+def alike(one: Wandering, other: Wandering) -> bool:
+    """Whether two trails visit the same boxes."""
     return min(float(other.share(one.points[None])[0]), float(one.share(other.points[None])[0])) > ALIKE
 
 
@@ -162,6 +164,6 @@ def merge(found: list[Wandering]) -> list[Wandering]:
     """Those of a list that are different: of two that visit the same boxes the first is kept."""
     kept: list[Wandering] = []
     for one in found:
-        if not any(_alike(one, other) for other in kept):
+        if not any(alike(one, other) for other in kept):
             kept.append(one)
     return kept

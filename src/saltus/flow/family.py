@@ -15,9 +15,17 @@ from saltus.kernels import status as st
 from saltus.system.system import System
 from saltus.system.tangent import tangent_system
 
+#: A method tells its noise in units of a box of starts, some ten times the range of a motion in it. Measured for ode45 at (1e-4, 1e-7) on
+#: the rig's responses: its returns scatter by 0.05 to 2 % of their range with location, by 0.3 to 4 % without.
+MOTION = 10.0
+#: Noise up to which a method is exact but for rounding.
+EXACT = 1e-9
+
 
 class Family:
     """The stroboscopic map of a system at each of k rows of parameter values. Row i of all arrays belongs to row i of the values.
+
+    ``noise`` is the mismatch of a closed orbit, in units of the range of the motion on it, that the method's own errors explain.
 
     Parameters
     ----------
@@ -37,7 +45,8 @@ class Family:
         if (every is None) == (system.forced_at is None):
             told = "has no forcing period: give every=, the time between two looks" if every is None else "is forced: leave every= out"
             raise ParameterError(f"{system.name} {told}.")
-        self.system, self.method, self.threads, self.noise = system, method, threads, method.noise
+        self.system, self.method, self.threads = system, method, threads
+        self.noise = method.noise * (MOTION if method.noise > EXACT else 1.0)
         self.parameters, self._every = np.ascontiguousarray(parameters, float), every
         self.states = system.states
         period = np.full(len(self), every) if every is not None else system.period(self.values)

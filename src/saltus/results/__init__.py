@@ -5,13 +5,18 @@ from saltus.results.basins import AttractorTable, agreement_dataset, attractors_
 from saltus.results.export import save, to_csv, to_mat, to_netcdf
 from saltus.results.files import ResultFileError, usable_folder
 from saltus.results.load import load
+from saltus.results.methods import methods_dataset
 from saltus.results.provenance import attributes, content_hash, describe
+from saltus.results.responses import Events, Responses, Starts, responses_dataset
 
 __all__ = [
     "AttractorTable",
     "Contacts",
+    "Events",
     "Guards",
+    "Responses",
     "ResultFileError",
+    "Starts",
     "agreement_dataset",
     "attractors_dataset",
     "attributes",
@@ -19,6 +24,8 @@ __all__ = [
     "content_hash",
     "describe",
     "load",
+    "methods_dataset",
+    "responses_dataset",
     "save",
     "stroboscope_dataset",
     "to_csv",

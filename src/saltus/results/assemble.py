@@ -12,7 +12,7 @@ import xarray as xr
 from saltus.errors import ParameterError
 from saltus.results import schema
 from saltus.results.provenance import content_hash, to_json
-from saltus.results.schema import Variable
+from saltus.results.variable import Variable
 
 
 # -- what the caller hands over ------------------------------------------------------------------------------------------------

@@ -11,8 +11,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results import schema
-from saltus.results.provenance import content_hash, to_json
-from saltus.results.schema import Variable
+from saltus.results.builder import Builder
 
 #: The largest count that ``grazes_unresolved`` holds; more are kept as this.
 _MOST_GRAZES = np.iinfo(np.int16).max
@@ -63,30 +62,15 @@ class AttractorTable:
     def __len__(self) -> int:
         return len(self.kind)
 
+    def multiplier_parts(self, size: int) -> tuple[np.ndarray, np.ndarray]:
+        """Real and imaginary parts, shape (m, D) each; ``size``: D, where there are no attractors to tell it."""
+        both = np.asarray(self.multipliers, dtype=complex).reshape(len(self), -1 if len(self) else size)
+        return both.real, np.where(np.isnan(both), np.nan, both.imag)  # a plain NaN has the imaginary part 0
+
 
 # -- assembly ------------------------------------------------------------------------------------------------------------------
-class _Builder:
-    """Collects the variables of one Dataset by the table of its kind."""
-
-    def __init__(self, kind: str, states: Sequence[str], units: Mapping[str, str], gap_unit: str = "") -> None:
-        self.kind, self.states, self.units, self.gap_unit = kind, tuple(states), units, gap_unit
-        self.table = schema.TABLES[kind]
-        self.data: dict[str, Any] = {}
-        self.coords: dict[str, Any] = {}
-
-    def put(self, name: str, values: Any, *, dims: tuple[str, ...] = (), coord: bool = False, **attrs: Any) -> None:
-        """Add a variable of the table; ``dims`` are those that the table leaves open."""
-        spec = self.table[name]
-        array = np.asarray(values, dtype={"str": np.str_}.get(spec.dtype, spec.dtype))
-        if array.dtype.kind == "i" and not np.array_equal(array, values):
-            raise ParameterError(f"{name} holds {np.max(np.abs(values))}, which {array.dtype} can't. Split the work into smaller parts.")
-        labels = {"units": self._unit(spec), "long_name": spec.long_name, **attrs}
-        (self.coords if coord else self.data)[name] = xr.Variable((*dims, *spec.dims), array, labels)
-
-    def put_flags(self, name: str, values: Any, meanings: Mapping[int, str], dims: tuple[str, ...]) -> None:
-        """Add a variable of codes, with their meanings as the CF conventions write them."""
-        codes = np.array(sorted(meanings), dtype=self.table[name].dtype)
-        self.put(name, values, dims=dims, flag_values=codes, flag_meanings=" ".join(meanings[int(code)] for code in codes))
+class _Builder(Builder):
+    """A builder that knows the parts that these results share."""
 
     def put_axes(self, axes: Mapping[str, np.ndarray]) -> tuple[str, str]:
         """Add the two states that a map is drawn over; returns their names."""
@@ -102,7 +86,7 @@ class _Builder:
 
     def put_attractors(self, table: AttractorTable) -> None:
         """Add what is known of each attractor."""
-        multipliers = np.asarray(table.multipliers, dtype=complex).reshape(len(table), -1 if len(table) else len(self.states))
+        real, imag = table.multiplier_parts(len(self.states))
         columns = {
             "attractor_type": list(table.kind),
             "attractor_period": table.period,
@@ -111,8 +95,8 @@ class _Builder:
             "attractor_peak": table.peak,
             "attractor_rms": table.rms,
             "attractor_margin": table.margin,
-            "attractor_multiplier_real": multipliers.real,
-            "attractor_multiplier_imag": np.where(np.isnan(multipliers), np.nan, multipliers.imag),  # a plain NaN has the imaginary part 0
+            "attractor_multiplier_real": real,
+            "attractor_multiplier_imag": imag,
             "attractor_exponent": table.exponent,
             "attractor_exponent_error": table.exponent_error,
         }
@@ -122,32 +106,11 @@ class _Builder:
         if table.fractions is not None:
             for end, column in zip(("", "_low", "_high"), table.fractions, strict=True):
                 self.put(f"attractor_fraction{end}", column)
-        self._put_points(table)
-
-    def _put_points(self, table: AttractorTable) -> None:
-        """Add the stroboscopic points, padded with NaN to the longest orbit; at least one, as netCDF-3 has room for one empty dim only."""
-        longest = max((len(points) for points in table.points), default=0) or 1
-        padded = np.full((len(table), longest, len(self.states)), np.nan)
-        for row, points in zip(padded, table.points, strict=True):
-            row[: len(points)] = points
-        for i, name in enumerate(self.states):
-            attrs = {"units": self.units.get(name, ""), "long_name": f"{name} at whole forcing periods"}
-            self.data[schema.attractor_name(name)] = xr.Variable(("attractor", "phase"), padded[:, :, i], attrs)
-
-    def _unit(self, spec: Variable) -> str:
-        """The unit of the table, with what follows the system filled in."""
-        return {"<first>": self.units.get(self.states[0], ""), "<gap>": self.gap_unit}.get(spec.units, spec.units)
-
-    def dataset(self, attrs: Mapping[str, Any]) -> xr.Dataset:
-        """The Dataset, with the hash of its numbers."""
-        plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
-        own = {"saltus_result": self.kind, "schema_version": schema.VERSION, "states": " ".join(self.states)}
-        ds = xr.Dataset(self.data, self.coords, {**plain, **own})
-        ds.attrs["result_hash"] = content_hash(ds)
-        return ds
+        self.put_points(table.points, ("attractor", "phase"), schema.attractor_name, "at whole forcing periods")
 
 
-def _basin_meanings(attractors: int) -> dict[int, str]:
+def basin_meanings(attractors: int) -> dict[int, str]:
+    """Words for the labels of a map with so many attractors."""
     return {**schema.NO_BASIN, **{i: f"attractor_{i}" for i in range(attractors)}}
 
 
@@ -204,7 +167,7 @@ def basins_dataset(
     """
     build = _Builder(schema.BASINS, states, units, gap_unit)
     dims = build.put_axes(axes)
-    build.put_flags("basin", basin, _basin_meanings(len(attractors)), dims)
+    build.put_flags("basin", basin, basin_meanings(len(attractors)), dims)
     build.put("periods_to_settle", periods_to_settle, dims=dims)
     build.put_flags("status", status, status_meanings, dims)
     build.put("grazes_unresolved", np.minimum(grazes_unresolved, _MOST_GRAZES), dims=dims)
@@ -239,7 +202,7 @@ def attractors_dataset(
     build = _Builder(schema.ATTRACTORS, states, units, gap_unit)
     if basin is not None:
         build.put("trajectory", np.arange(len(basin)), coord=True)
-        build.put_flags("basin", basin, _basin_meanings(len(attractors)), ("trajectory",))
+        build.put_flags("basin", basin, basin_meanings(len(attractors)), ("trajectory",))
         build.put("periods_to_settle", periods_to_settle, dims=("trajectory",))
     build.put_attractors(attractors)
     return build.dataset(attrs or {})
@@ -280,8 +243,8 @@ def agreement_dataset(
     pairs = len(match["a"])
     build.put("pair", np.arange(pairs), coord=True)
     build.put_flags("agreement", agreement, schema.AGREEING, dims)
-    build.put_flags("basin_a", basin_a, _basin_meanings(pairs), dims)
-    build.put_flags("basin_b", basin_b, _basin_meanings(pairs), dims)
+    build.put_flags("basin_a", basin_a, basin_meanings(pairs), dims)
+    build.put_flags("basin_b", basin_b, basin_meanings(pairs), dims)
     for name, column in match.items():
         build.put(f"match_{name}", column)
     return build.dataset(attrs or {})

@@ -134,7 +134,7 @@ def describe(ds: xr.Dataset) -> str:
     Parameters
     ----------
     ds : Dataset
-        What ``simulate``, ``stroboscope``, ``basins``, ``attractors`` or ``compare`` returned, or :func:`~saltus.results.load`.
+        What any function of saltus returned, or :func:`~saltus.results.load`.
 
     Returns
     -------

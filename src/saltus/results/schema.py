@@ -8,26 +8,36 @@ periods of their own, the samples share phases instead of times: the dim is then
 
 Results about attractors have the dims ``attractor``, ``phase`` (points of an orbit, one a forcing period) and ``multiplier``. What belongs
 to one start has no dims in the table: a map adds the two states that it is drawn over, a list of starts ``trajectory``.
+
+Results about steady responses over one or two parameters have these parameters as dims, ``start``, ``response`` (all of them, at all
+values), ``multiplier``, ``phase``, ``sample`` (sampled values of a bifurcation diagram) and ``event``.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError
+from saltus.results.method_variables import METHODS_VARIABLES
+from saltus.results.response_variables import RESPONSES_VARIABLES
+from saltus.results.variable import Variable
 
 #: Version of the tables below, kept in every result as ``schema_version``.
 VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
-BASINS, ATTRACTORS, AGREEMENT = "basins", "attractors", "agreement"
+BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
+METHODS = "methods"
 #: The function that returns each kind.
-MAKERS = {TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare"}
+MAKERS = {
+    TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare",
+    RESPONSES: "frequency_response or bifurcation_diagram",
+    METHODS: "compare_methods",
+}  # fmt: skip
 
 # What stands in ``basin`` for a start that has no attractor.
 ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
@@ -35,29 +45,6 @@ ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
 NO_BASIN = {ESCAPED: "escaped", UNCONVERGED: "unconverged", FAILED: "failed", NOT_COMPUTED: "not_computed"}
 #: Meaning of the values of ``agreement``.
 AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
-
-
-@dataclass(frozen=True)
-class Variable:
-    """What one variable of a result is.
-
-    Attributes
-    ----------
-    dims : tuple of str
-        Dims of one trajectory.
-    units : str
-        SI unit, ``"1"`` for a plain number, ``""`` for text.
-    long_name : str
-        A few words, as on an axis.
-    dtype : str
-        ``f8``, ``i8``, ``i4``, ``i2``, ``i1`` or ``str``.
-    """
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    dtype: str = "f8"
-
 
 _STATUS = Variable((), "", "how the trajectory ended", "str")
 _COUNTERS = {
@@ -173,6 +160,8 @@ TABLES = {
     BASINS: BASINS_VARIABLES,
     ATTRACTORS: ATTRACTORS_VARIABLES,
     AGREEMENT: AGREEMENT_VARIABLES,
+    RESPONSES: RESPONSES_VARIABLES,
+    METHODS: METHODS_VARIABLES,
 }
 
 
@@ -187,6 +176,29 @@ def attractor_name(state: str) -> str:
     """Name of the variable that holds the points of the attractors: ``attractor_x``; ``attractor_state_type`` where the name is taken."""
     name = f"attractor_{state}"
     return f"attractor_state_{state}" if name in ATTRACTOR_VARIABLES else name
+
+
+def response_name(name: str) -> str:
+    """Name of the variable that holds a parameter, or the points of a state, of each response: ``response_frequency``, ``response_x``.
+
+    ``response_own_peak`` where the name is taken.
+    """
+    return f"response_own_{name}" if f"response_{name}" in RESPONSES_VARIABLES else f"response_{name}"
+
+
+def event_name(parameter: str) -> str:
+    """Name of the variable that holds the parameter at the events: ``event_frequency``; ``event_own_kind`` where the name is taken."""
+    return f"event_own_{parameter}" if f"event_{parameter}" in RESPONSES_VARIABLES else f"event_{parameter}"
+
+
+def sample_name(state: str) -> str:
+    """Name of the variable that holds the sampled values of a state: ``sample_x``."""
+    return f"sample_{state}"
+
+
+def start_name(state: str) -> str:
+    """Name of the coordinate that holds a state at the starts: ``start_x``; ``start_own_direction`` where the name is taken."""
+    return f"start_own_{state}" if f"start_{state}" in RESPONSES_VARIABLES else f"start_{state}"
 
 
 def end_name(state: str) -> str:
@@ -228,6 +240,11 @@ def axes_of(ds: xr.Dataset) -> tuple[str, str]:
     return str(a), str(b)
 
 
+def parameters_of(ds: xr.Dataset) -> tuple[str, ...]:
+    """The one or two parameters over which responses were computed, in the order of the axes."""
+    return tuple(str(dim) for dim in ds["response_of"].dims if dim != "start")
+
+
 def sample_dim(ds: xr.Dataset) -> str:
     """The dim along which the states are sampled: ``time``, or ``period`` where only the phases are shared."""
     return "time" if "time" in ds.dims else "period"
@@ -263,7 +280,13 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
     """Variables without which nothing can be said about a result."""
     if kind in (TRAJECTORY, STROBOSCOPE):
         return (*states_of(ds), "status")
-    return {BASINS: ("basin", "status", "attractor_type"), ATTRACTORS: ("attractor_type",), AGREEMENT: ("agreement", "match_a")}[kind]
+    return {
+        BASINS: ("basin", "status", "attractor_type"),
+        ATTRACTORS: ("attractor_type",),
+        AGREEMENT: ("agreement", "match_a"),
+        RESPONSES: ("response_of", "response_type", "response_branch"),
+        METHODS: ("method", "agrees"),
+    }[kind]
 
 
 # -- after reading a file ------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""What results about attractors say in a few lines: the part of ``describe`` that knows them."""
+"""What results about attractors and responses say in a few lines: the part of ``describe`` that knows them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import AGREEMENT, BASINS, axes_of, kind_of
+from saltus.results.schema import AGREEMENT, BASINS, RESPONSES, axes_of, kind_of, kind_text, parameters_of
 
 #: Attractors that get a line of their own; the others are counted.
 _LINES = 12
@@ -21,7 +21,9 @@ _TRUST = {
 
 
 def summary(ds: xr.Dataset) -> list[str]:
-    """Lines on the extent and the content of a map of basins, a list of attractors, or the agreement of two maps."""
+    """Lines on the extent and the content of a map of basins, a list of attractors, the agreement of two maps, or responses."""
+    if kind_of(ds) == RESPONSES:
+        return [f"extent   {_span(ds, parameters_of(ds), 'values')}, {_count(ds.sizes['start'], 'start')} at each", *_responses(ds)]
     if kind_of(ds) == AGREEMENT:
         return [f"extent   {_axes(ds)}", *_agreement(ds)]
     lines = [f"extent   {_axes(ds)}" if kind_of(ds) == BASINS else f"extent   {_starts(ds)}"]
@@ -33,11 +35,16 @@ def summary(ds: xr.Dataset) -> list[str]:
 
 
 def _axes(ds: xr.Dataset) -> str:
+    return _span(ds, axes_of(ds), "starts")
+
+
+def _span(ds: xr.Dataset, names: tuple[str, ...], what: str) -> str:
+    """How many there are along each coordinate, and from where to where they reach."""
     parts = []
-    for name in axes_of(ds):
+    for name in names:
         values, unit = ds[name].values, ds[name].attrs.get("units", "")
         parts.append(f"{name} from {values.min():g} to {values.max():g} {unit}".rstrip() if values.size else f"{name} empty")
-    return f"{' x '.join(str(ds.sizes[name]) for name in axes_of(ds))} starts, {', '.join(parts)}"
+    return f"{' x '.join(str(ds.sizes[name]) for name in names)} {what}, {', '.join(parts)}"
 
 
 def _starts(ds: xr.Dataset) -> str:
@@ -47,7 +54,7 @@ def _starts(ds: xr.Dataset) -> str:
 def _attractors(ds: xr.Dataset) -> list[str]:
     count = ds.sizes["attractor"]
     unit = ds["attractor_peak"].attrs.get("units", "")
-    lines = [f"found    {count} {'attractor' if count == 1 else 'attractors'}"]
+    lines = [f"found    {_count(count, 'attractor')}"]
     for i in range(min(count, _LINES)):
         one = ds.isel(attractor=i)
         period = int(one["attractor_period"])
@@ -63,6 +70,29 @@ def _unsettled(basin: xr.DataArray) -> str:
     codes, counts = np.unique(basin.values, return_counts=True)
     others = [f"{count} {meanings[int(code)]}" for code, count in zip(codes, counts, strict=True) if code < 0]
     return ", ".join([f"{int(counts[codes >= 0].sum())} of {basin.size} starts", *others])
+
+
+def _responses(ds: xr.Dataset) -> list[str]:
+    """What was found: branches, kinds of motion, events; and what became of the starts."""
+    kinds = [kind_text(kind, n) for kind, n in zip(ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True)]
+    branches = np.unique(ds["response_branch"].values).size
+    found = f"found    {_count(len(kinds), 'response')} on {_count(branches, 'branch')}"
+    lines = [f"{found}: {_tally(kinds)}" if kinds else found]
+    if ds.sizes.get("event"):
+        lines.append(f"events   {_tally(ds['event_kind'].values.tolist())}")
+    return [*lines, f"settled  {_unsettled(ds['response_of'])}"]
+
+
+def _tally(words: list[str]) -> str:
+    """``212 T, 31 3T``, the most frequent first."""
+    found = sorted(set(words), key=lambda word: (-words.count(word), word))
+    more = f" and {len(found) - _LINES} other kinds" if len(found) > _LINES else ""
+    return ", ".join(f"{words.count(word)} {word}" for word in found[:_LINES]).replace("_", " ") + more
+
+
+def _count(number: int, word: str) -> str:
+    """``1 branch``, ``2 branches``."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}{'es' if word.endswith('ch') else 's'}"
 
 
 def _agreement(ds: xr.Dataset) -> list[str]:

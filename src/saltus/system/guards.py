@@ -51,11 +51,36 @@ def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, .
     TraceError
         If a comparison doesn't depend on a state, or compares equal things.
     """
-    field = tuple(field)
-    finder = _Finder()
-    for relation in relations(field):
+    return join_guards(field, ())
+
+
+def join_guards(roots: Iterable[Expr], known: Sequence[Guard]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
+    """As :func:`find_guards`, for expressions that join a system: its guards stay as they are, and what is new follows them.
+
+    Raises
+    ------
+    TraceError
+        As :func:`find_guards`.
+    """
+    roots = tuple(roots)
+    finder = _Finder(known)
+    for relation in relations(roots):
         finder.add(relation)
-    return _used_only(tuple(finder.rewrite(root) for root in field), finder.guards)
+    return _used_only(tuple(finder.rewrite(root) for root in roots), finder.guards, len(known))
+
+
+def surface_guard(gap: Expr, name: str) -> Guard:
+    """The guard of a surface: its gap is the expression as it stands, sign and scale included; conditions in it hold bits.
+
+    Raises
+    ------
+    TraceError
+        If the expression doesn't depend on a state.
+    """
+    canonical = Canonical()
+    _check_moves(gap, canonical.kinds(canonical.polynomial(gap)))
+    level, positive = _guard(gap, canonical)
+    return replace(level if positive and canonical.level_of(gap)[1] == 1.0 else Guard("", gap), name=name)
 
 
 def relations(roots: Sequence[Expr]) -> Iterator[Relation]:
@@ -77,10 +102,10 @@ def relations(roots: Sequence[Expr]) -> Iterator[Relation]:
 class _Finder:
     """Collects guards and knows what became of every relation."""
 
-    def __init__(self) -> None:
-        self.guards: list[Guard] = []
-        self._polynomials: list[Polynomial] = []
+    def __init__(self, known: Sequence[Guard] = ()) -> None:
+        self.guards: list[Guard] = list(known)
         self._canonical = Canonical()
+        self._polynomials: list[Polynomial] = [self._canonical.polynomial(guard.gap) for guard in known]
         self._outcome: dict[Relation, Condition | bool] = {}
         self._rewritten: dict[Expr, Expr] = {}
 
@@ -213,16 +238,16 @@ def _negated(a: Expr) -> Expr:
 
 
 # -- numbering and names -------------------------------------------------------------------------------------------------------
-def _used_only(field: tuple[Expr, ...], guards: Sequence[Guard]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """Leave out guards on which nothing depends, renumber and name the rest."""
-    used = bits_in(field)
+def _used_only(field: tuple[Expr, ...], guards: Sequence[Guard], known: int) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
+    """Leave out guards on which nothing depends, renumber and name the rest; the first ``known`` stay as they are."""
+    used = bits_in(field) | set(range(known))
     for number in reversed(range(len(guards))):
         if number in used:
             used |= bits_in([guards[number].gap])
     new = {old: number for number, old in enumerate(sorted(used))}
     field = tuple(_renumbered(root, new) for root in field)
-    kept = [replace(guards[old], gap=_renumbered(guards[old].gap, new)) for old in new]
-    return field, tuple(_with_names(kept))
+    kept = [guards[old] if old < known else replace(guards[old], gap=_renumbered(guards[old].gap, new)) for old in new]
+    return field, tuple(_with_names(kept, known))
 
 
 def bits_in(roots: Sequence[Expr]) -> set[int]:
@@ -268,17 +293,17 @@ def equation_of(number: int, guards: Sequence[Guard]) -> str:
     return Writer(guards[: number + 1], limit=100).side(number).replace(" > ", " = ", 1)
 
 
-def _with_names(guards: Sequence[Guard]) -> list[Guard]:
-    """Guards named after their only parameter; after the boundary's equation if that isn't unique."""
-    single = []
+def _with_names(guards: Sequence[Guard], known: int) -> list[Guard]:
+    """Guards named after their only parameter; after the boundary's equation if that isn't unique. The first ``known`` keep their names."""
+    single: list[str | None] = []
     for guard in guards:
         where = guard.gap if guard.boundary is None else guard.boundary
         names = {node.payload for node in ex.walk(where) if node.op == "param"}
         single.append(names.pop() if len(names) == 1 else None)
     count = Counter(single)
-    taken: set[str] = set()
-    named = []
-    for number, (guard, name) in enumerate(zip(guards, single, strict=True)):
+    named = list(guards[:known])
+    taken = {guard.name for guard in named}
+    for number, (guard, name) in list(enumerate(zip(guards, single, strict=True)))[known:]:
         if name is None or count[name] > 1:
             name = equation_of(number, guards)
         while name in taken:

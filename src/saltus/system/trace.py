@@ -173,11 +173,11 @@ def _traced(function: Callable[..., Any], states: tuple[str, ...], parameters: t
         returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
         derivatives = _as_derivatives(returned, states)
     except Exception as error:
-        raise TraceError(_explained(error, function, title)) from error
+        raise TraceError(explained(error, function, title)) from error
     try:
         return find_guards(derivatives)
     except TraceError as error:
-        raise TraceError(f"{title} ({_place(function)}): {error}") from error
+        raise TraceError(f"{title} ({place(function)}): {error}") from error
 
 
 def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
@@ -198,7 +198,7 @@ def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
     return derivatives
 
 
-def _explained(error: Exception, function: Callable[..., Any], title: str) -> str:
+def explained(error: Exception, function: Callable[..., Any], title: str) -> str:
     """The message for an error inside the user's function: where, what, and what to write instead."""
     code = getattr(inspect.unwrap(function), "__code__", None)
     own_file = code.co_filename if code else ""
@@ -207,7 +207,7 @@ def _explained(error: Exception, function: Callable[..., Any], title: str) -> st
         for frame in traceback.extract_tb(error.__traceback__)
         if frame.filename == own_file or not frame.filename.startswith((_HERE, *_LIBRARIES))
     ]
-    where = _place(function)
+    where = place(function)
     if frames:
         where = f"{frames[-1].filename}, line {frames[-1].lineno}"
         where += f": {frames[-1].line}" if frames[-1].line else ""
@@ -216,6 +216,7 @@ def _explained(error: Exception, function: Callable[..., Any], title: str) -> st
     return f"{title} ({where}) can't be traced: {type(error).__name__}: {error}. {_HOW_TO}"
 
 
-def _place(function: Callable[..., Any]) -> str:
+def place(function: Callable[..., Any]) -> str:
+    """File and line of a function."""
     code = getattr(inspect.unwrap(function), "__code__", None)
     return f"{code.co_filename}, line {code.co_firstlineno}" if code else "unknown place"

@@ -15,7 +15,7 @@ GOLDEN = math.pi * (math.sqrt(5) - 1)
 
 def largest_exponents(map_, start, scale):
     """Exponents [per iterate] and their standard errors."""
-    blocks = growth_rates(map_, start, scale)
+    _, blocks = growth_rates(map_, start, scale)
     return blocks.mean(axis=0), blocks.std(axis=0, ddof=1) / np.sqrt(len(blocks))
 
 

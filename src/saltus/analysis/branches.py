@@ -1,0 +1,135 @@
+"""Branches: the same response followed from one value of a parameter to the next, and what happens to it on the way.
+
+Two responses at neighbouring values belong to one branch if their orbits are near each other, point by point at the best phase shift: by
+identity, never by amplitude, which crossing branches share. Names of bifurcations: di Bernardo, Budd, Champneys & Kowalczyk,
+Piecewise-smooth Dynamical Systems (2008), chapter 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from saltus.analysis.responses import Found
+from saltus.analysis.steady import CHAOTIC, PERIODIC
+from saltus.results import AttractorTable
+
+#: Farthest that an orbit moves between two values, in units of its own range, and values over which a branch may be missing.
+LINK, MISSED = 0.35, 3
+#: A branch that ends folds if its leading multiplier is real and beyond this (it moves to 1 as the root of the distance), and sheds a torus
+#: if it is complex and beyond that.
+FOLDING, TURNING = 0.5, 0.95
+#: What is farther apart than any two responses.
+_NEVER = 1e6
+
+
+@dataclass(frozen=True)
+class Event:
+    """What happens to a branch between two values.
+
+    Attributes
+    ----------
+    value : float
+        Middle of the two values [SI].
+    kind : str
+        ``graze`` (contacts come or go), ``period_doubling``, ``fold``, ``torus``, ``chaos`` (its starts are chaotic beyond), or ``end`` (it
+        isn't found any more).
+    branch : int
+        Its number.
+    """
+
+    value: float
+    kind: str
+    branch: int
+
+
+def follow(found: Found, values: np.ndarray) -> np.ndarray:
+    """Branch of every response of a grid with one axis, int64[m]; numbered in the order in which they begin."""
+    branch = np.full(len(found), -1, np.int64)
+    heads: list[tuple[int, int]] = []  # response that a branch ends with so far, and its place
+    for place in range(len(values)):
+        here = np.flatnonzero(found.place == place)
+        tails = [i for i, (_, at) in enumerate(heads) if place - at <= MISSED]
+        for tail, response in _matches(found, [heads[i][0] for i in tails], here):
+            branch[response] = tails[tail]
+            heads[tails[tail]] = (int(response), place)
+        for response in here[branch[here] < 0]:
+            branch[response] = len(heads)
+            heads.append((int(response), place))
+    return branch
+
+
+def _matches(found: Found, before: list[int], here: np.ndarray) -> list[tuple[int, int]]:
+    """Pairs (index into before, response) of responses that are one, each used once, the nearest first."""
+    cost = np.array([[_distance(found, a, int(b)) for b in here] for a in before]).reshape(len(before), len(here))
+    rows, columns = linear_sum_assignment(np.minimum(cost, _NEVER))
+    return [(int(i), int(here[j])) for i, j in zip(rows, columns, strict=True) if cost[i, j] < LINK]
+
+
+def _distance(found: Found, a: int, b: int) -> float:
+    """Distance of two responses at different values, in units of the motion's range; inf if they differ in kind or period."""
+    if found.kind[a] != found.kind[b] or found.period[a] != found.period[b]:
+        return np.inf
+    scale = np.maximum(found.steady.scale[found.row[a]], found.steady.scale[found.row[b]])
+    p, q = found.points(a) / scale, found.points(b) / scale
+    if found.kind[a] != PERIODIC:  # a strange set: where it lies and how wide
+        return float(max(np.abs(p.mean(axis=0) - q.mean(axis=0)).max(), np.abs(p.std(axis=0) - q.std(axis=0)).max()))
+    shifts = (np.arange(len(q))[:, None] + np.arange(len(q))) % len(q)
+    return float(np.abs(p[None] - q[shifts]).max(axis=(1, 2)).min())
+
+
+def events(found: Found, table: AttractorTable, branch: np.ndarray, values: np.ndarray) -> list[Event]:
+    """What happens to the branches of :func:`follow`, in the order of the values."""
+    result = []
+    for number in range(branch.max(initial=-1) + 1):
+        members = np.flatnonzero(branch == number)
+        result += _grazes(found, table, members, values, number)
+        result += _end(found, table, int(members[-1]), values, number, +1)
+        result += _end(found, table, int(members[0]), values, number, -1)
+    return sorted(result, key=lambda event: (event.value, event.branch, event.kind))
+
+
+def _grazes(found: Found, table: AttractorTable, members: np.ndarray, values: np.ndarray, number: int) -> list[Event]:
+    """Where the number of contacts changes along a periodic branch."""
+    if found.kind[members[0]] != PERIODIC:
+        return []
+    contacts, place = np.asarray(table.contacts)[members], found.place[members]
+    jumps = np.flatnonzero(np.abs(np.diff(contacts)) > 0.5)
+    return [Event(_middle(values, place[i], place[i + 1]), "graze", number) for i in jumps]
+
+
+def _end(found: Found, table: AttractorTable, last: int, values: np.ndarray, number: int, way: int) -> list[Event]:
+    """Why a branch ends upwards (way 1) or begins (way -1); nothing at the edge of the grid, or where a chaotic one turns regular."""
+    here, beyond = int(found.place[last]), int(found.place[last]) + way
+    if not 0 <= beyond < len(values) or found.kind[last] != PERIODIC or (found.of[beyond] == -4).all():
+        return []
+    value, multiplier = _middle(values, here, beyond), complex(np.asarray(table.multipliers)[last, 0])
+    neighbours = np.flatnonzero(found.place == beyond)
+    doubled = [j for j in neighbours if found.period[j] == 2 * found.period[last] and _covers(found, int(j), last)]
+    if any(found.period[last] == 2 * found.period[j] and _covers(found, last, int(j)) for j in neighbours):
+        return []  # the same doubling, told by the branch of half the period
+    if doubled and multiplier.real < 0:
+        return [Event(value, "period_doubling", number)]
+    starts = np.flatnonzero((found.of[here] >= 0) & (found.of[here] == last))
+    if len(starts) and (found.steady.kind.reshape(found.of.shape)[beyond, starts] == CHAOTIC).any():
+        return [Event(value, "chaos", number)]
+    if abs(multiplier) > TURNING and abs(multiplier.imag) > 1e-9:
+        return [Event(value, "torus", number)]
+    if multiplier.real > FOLDING and abs(multiplier.imag) <= 1e-9:
+        return [Event(value, "fold", number)]
+    return [Event(value, "end", number)]
+
+
+def _covers(found: Found, longer: int, shorter: int) -> bool:
+    """Whether every point of an orbit of period 2n lies near one of an orbit of period n."""
+    scale = found.steady.scale[found.row[shorter]]
+    apart = np.abs((found.points(longer)[:, None] - found.points(shorter)[None]) / scale).max(axis=2).min(axis=1)
+    return bool(apart.max() < LINK)
+
+
+def _middle(values: np.ndarray, a: int, b: int) -> float:
+    """Between two values: geometric where the axis spans decades."""
+    low, high = float(values[a]), float(values[b])
+    return float(np.sqrt(low * high)) if values[0] > 0 and values[-1] / values[0] > 100 else 0.5 * (low + high)

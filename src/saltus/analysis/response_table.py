@@ -1,0 +1,72 @@
+"""From a grid to the Dataset of its responses: what `frequency_response` and `bifurcation_diagram` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis import branches
+from saltus.analysis.answers import gap_unit, provenance
+from saltus.analysis.grid import Grid
+from saltus.analysis.responses import Found, find, table_of
+from saltus.analysis.samples import sampled
+from saltus.analysis.starts import whole
+from saltus.flow.engine import Interrupted
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporter
+from saltus.results import Events, Responses, Starts, responses_dataset
+
+
+def respond(
+    grid: Grid,
+    method: Method | None,
+    periods: int,
+    threads: int | None,
+    progress: bool | Callable[[float], None] | None,
+    sample: str = "",
+) -> xr.Dataset:
+    """The Dataset of a grid's responses. Raises Interrupted, with the Dataset of what is known, on Ctrl-C."""
+    method, periods = check_method(method), whole(periods, "periods")
+    show, close = reporter(progress)
+    try:
+        found = find(grid, method, periods, threads, show)
+    finally:
+        close()
+    result = _dataset(grid, method, periods, found, threads, sample)
+    if not found.complete:
+        stopped = Interrupted()
+        stopped.partial = result
+        raise stopped
+    return result
+
+
+def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: int | None, sample: str) -> xr.Dataset:
+    table = table_of(found, grid, method, threads)
+    branch, happened = np.full(len(found), -1, np.int64), []
+    if len(grid.axes) == 1:
+        (values,) = grid.axes.values()
+        branch = branches.follow(found, values)
+        happened = branches.events(found, table, branch, values)
+    (name, *_) = grid.axes
+    system = grid.system
+    fixed = {key: value for key, value in system.values.items() if key not in grid.axes}
+    return responses_dataset(
+        states=system.states,
+        units=system.units,
+        axes=grid.axes,
+        starts=Starts({key: grid.starts[:, i] for i, key in enumerate(system.states)}, grid.sweeps),
+        response_of=found.of.reshape(*grid.shape, len(grid.starts)),
+        responses=Responses(
+            table, np.stack(np.unravel_index(found.place, grid.shape), axis=1), branch,
+            sampled(sample, grid, method, found, threads) if sample else None,
+        ),
+        events=Events(
+            {name: np.array([event.value for event in happened])}, [event.kind for event in happened],
+            np.array([event.branch for event in happened], np.int64),
+        ) if len(grid.axes) == 1 else None,
+        sample=sample,
+        gap_unit=gap_unit(system),
+        attrs=provenance(system, method, fixed, grid.axes) | {"periods": periods, "random_starts": int(grid.drawn)},
+    )  # fmt: skip

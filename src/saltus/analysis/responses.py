@@ -1,0 +1,162 @@
+"""All steady responses over a grid of parameter values: settle every start at every value, tell which lead to the same response."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from saltus.analysis.grid import Grid
+from saltus.analysis.looks import looks
+from saltus.analysis.recurrence import SAME
+from saltus.analysis.steady import CHAOTIC, PERIODIC, QUASI_PERIODIC, Steady, settle_each
+from saltus.analysis.uncertainty import wilson
+from saltus.analysis.wandering import Wandering, alike
+from saltus.flow.family import Family
+from saltus.flow.methods import Method
+from saltus.results import AttractorTable
+
+#: Words for the kinds of motion.
+KINDS = {PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic"}
+#: Samples of a period from which peaks and margins are taken, and periods of a motion that never repeats.
+SAMPLES, WANDERED = 256, 64
+
+
+@dataclass
+class Found:
+    """The responses of a grid, m of them, in the order of their places, at each place by period and size.
+
+    Attributes
+    ----------
+    steady : Steady
+        What every trajectory settled to: row place * s + start.
+    row : int64[m]
+        A trajectory that settled to the response.
+    place : int64[m]
+        Where on the grid it is.
+    of : int64[places, s]
+        Response of every trajectory, or a code below zero.
+    """
+
+    steady: Steady
+    row: np.ndarray
+    place: np.ndarray
+    of: np.ndarray
+    complete: bool = True
+    table: AttractorTable | None = field(default=None, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @property
+    def kind(self) -> np.ndarray:
+        """Kind of each response, int64[m]."""
+        return self.steady.kind[self.row]
+
+    @property
+    def period(self) -> np.ndarray:
+        """n of its nT, 0 if it doesn't repeat, int64[m]."""
+        return self.steady.orbits.period[self.row]
+
+    def points(self, response: int) -> np.ndarray:
+        """Its stroboscopic points, float64[n, D]."""
+        row = int(self.row[response])
+        return self.steady.trail[row] if row in self.steady.trail else self.steady.orbits.points[row, : self.steady.orbits.period[row]]
+
+    def start(self) -> np.ndarray:
+        """A state on each, float64[m, D]."""
+        return np.array([self.points(i)[0] for i in range(len(self))]).reshape(len(self), -1)
+
+
+def find(grid: Grid, method: Method, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
+    """The responses of a grid; on Ctrl-C those that are known, with ``complete`` False."""
+    family, count = grid.family(method, threads), len(grid.starts)
+    result = Steady.empty(grid.places * count, grid.starts.shape[1])
+    complete = True
+    try:
+        if grid.sweeps:
+            _sweep(grid, family, most, result, threads, progress)
+        else:
+            settle_each(family.rows(np.repeat(np.arange(grid.places), count)), np.tile(grid.starts, (grid.places, 1)), most,
+                        threads, progress, result)  # fmt: skip
+    except KeyboardInterrupt:
+        complete = False
+    return _gathered(result, grid.places, count, family.noise, complete)
+
+
+def _sweep(grid: Grid, family: Family, most: int, result: Steady, threads: int | None, progress: Callable[[float], None] | None) -> None:
+    """Each start along the axis: where it stands at one value is where it starts at the next."""
+    count = len(grid.starts)
+    for k in range(grid.places):
+        for way in dict.fromkeys(grid.sweeps):
+            who = np.array([i for i, sweep in enumerate(grid.sweeps) if sweep == way])
+            place, before = (k, k - 1) if way == "up" else (grid.places - 1 - k, grid.places - k)
+            start = result.end[before * count + who] if k else grid.starts[who]
+            rows = place * count + who
+            result.put(rows, settle_each(family.rows(np.full(len(who), place)), np.where(np.isfinite(start), start, 0.0), most, threads))
+        if progress:
+            progress((k + 1) / grid.places)
+
+
+def _gathered(result: Steady, places: int, count: int, noise: float, complete: bool) -> Found:
+    """Which trajectories at a value settled to the same response."""
+    of = result.kind.copy()
+    rows: list[int] = []
+    for place in range(places):
+        here = [row for row in range(place * count, (place + 1) * count) if result.kind[row] >= 0]
+        groups: list[list[int]] = []
+        for row in here:
+            home = next((group for group in groups if _same(result, group[0], row, max(SAME, 4.0 * noise))), None)
+            if home is None:
+                groups.append([row])
+            else:
+                home.append(row)
+        for group in sorted(groups, key=lambda group: _order(result, group[0])):
+            of[group] = len(rows)
+            rows.append(group[0])
+    chosen = np.array(rows, np.int64)
+    return Found(result, chosen, chosen // count, of.reshape(places, count), complete)
+
+
+def _same(result: Steady, a: int, b: int, tolerance: float) -> bool:
+    """Whether two trajectories at one value settled to the same response."""
+    if result.kind[a] != result.kind[b] or result.orbits.period[a] != result.orbits.period[b]:
+        return False
+    if result.kind[a] == PERIODIC:
+        return bool(result.orbits.distance(result.orbits.points[[b], 0], result.scale[[a]], [a])[0] < tolerance)
+    first, second = (Wandering("", 0.0, 0.0, result.trail[row], result.scale[a]) for row in (a, b))
+    return alike(first, second)
+
+
+def _order(result: Steady, row: int) -> tuple[float, ...]:
+    """By kind, period, then size, coarse enough that rounding can't change it."""
+    period = result.orbits.period[row]
+    points = result.orbits.points[row, :period] if period else result.trail[row].mean(axis=0)[None]
+    sizes = np.atleast_1d(np.round(np.sqrt(np.mean((points / result.scale[row]) ** 2, axis=0)), 7))
+    return (int(result.kind[row]), int(period), *(float(size) for size in sizes))
+
+
+def table_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> AttractorTable:
+    """What is known of each response."""
+    family = grid.family(method, threads).rows(found.place)
+    period, kind, s = found.period, found.kind, found.steady
+    spans = np.where(period > 0, period, WANDERED)
+    look = looks(family, found.start(), spans, SAMPLES)
+    hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
+    low, high = wilson(hits, len(grid.starts))
+    shares = (hits / len(grid.starts), low, high) if grid.drawn else None
+    return AttractorTable(
+        kind=[KINDS[int(code)] for code in kind],
+        period=period,
+        contacts=look.contacts * np.maximum(period, 1),
+        itinerary=[""] * len(found),
+        peak=look.peak,
+        rms=look.rms,
+        margin=look.margin,
+        multipliers=s.orbits.multipliers[found.row],
+        exponent=s.exponent[found.row] / family.period,
+        exponent_error=s.exponent_error[found.row] / family.period,
+        points=[found.points(i)[:span] for i, span in enumerate(spans)],
+        fractions=shares,
+    )

@@ -1,0 +1,201 @@
+"""What many trajectories settle to, each with parameter values of its own: the engine of frequency responses and bifurcation diagrams.
+
+A basin map asks one system of a great many starts, and capture by known attractors answers. Here every trajectory may have an attractor of
+its own: each is followed until it nearly recurs, Newton's method closes the orbit, its multipliers say that it attracts, and the
+trajectory must lie beside it. What never recurs is typed by its largest Lyapunov exponent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from saltus.analysis.orbits import ROUNDING
+from saltus.analysis.polish import Closed, close
+from saltus.analysis.recurrence import LONGEST, ROUND, recurrence
+from saltus.analysis.wandering import growth_rates, kind_of_growth
+from saltus.flow.engine import Schedule
+from saltus.flow.family import Family
+from saltus.flow.threads import on_threads
+from saltus.kernels import status as st
+
+#: Kinds of motion, and why there may be none.
+PERIODIC, QUASI_PERIODIC, CHAOTIC = 0, 1, 2
+ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
+#: States a period apart that agree so well, in units of the range of the motion, are on their way to an orbit: 1e-5 leaves the slowest
+#: transient of the rig in a few rounds, and doesn't take a neighbour for the orbit. Later, slow ones are let in from farther away.
+NEAR, NEAR_AT_LAST = 1e-5, 1e-3
+#: An orbit is that of a trajectory that lies so many times closer than its recurrence: 1/(1 - multiplier) is the ratio of the two.
+BESIDE = 30.0
+#: Trajectories that one thread follows at a time.
+PIECE = 512
+#: Periods and looks a period from which the range of a motion is taken.
+RANGED, LOOKS = 4, 32
+#: Points of a motion that never repeats that are kept.
+TRAIL = 1024
+
+
+@dataclass
+class Steady:
+    """What k trajectories settle to.
+
+    Attributes
+    ----------
+    kind : int64[k]
+        ``PERIODIC``, ``QUASI_PERIODIC``, ``CHAOTIC``, or a code below zero.
+    orbits : Closed
+        The orbits of the periodic ones, verified; elsewhere nothing.
+    exponent, exponent_error : float64[k]
+        Largest Lyapunov exponent and its standard error [per iterate].
+    settled : int64[k]
+        Iterates after which it was known; -1 if it isn't.
+    scale : float64[k, D]
+        Range of each state in the motion.
+    trail : dict of int to float64[TRAIL, D]
+        Points of those that never repeat.
+    end : float64[k, D]
+        Where the trajectory stood last.
+    """
+
+    kind: np.ndarray
+    orbits: Closed
+    exponent: np.ndarray
+    exponent_error: np.ndarray
+    settled: np.ndarray
+    scale: np.ndarray
+    trail: dict[int, np.ndarray]
+    end: np.ndarray
+
+    @classmethod
+    def empty(cls, count: int, size: int) -> Steady:
+        """Nothing computed yet."""
+        nothing = np.full(count, np.nan)
+        return cls(
+            np.full(count, NOT_COMPUTED, np.int64), Closed.none(count, LONGEST, size), nothing.copy(), nothing.copy(),
+            np.full(count, -1, np.int64), np.ones((count, size)), {}, np.full((count, size), np.nan),
+        )  # fmt: skip
+
+    def put(self, where: np.ndarray, other: Steady) -> None:
+        """Write another's results to the rows int64[m]."""
+        for name in ("kind", "exponent", "exponent_error", "settled", "scale", "end"):
+            getattr(self, name)[where] = getattr(other, name)
+        self.put_orbits(where, other.orbits)
+        self.trail.update({int(where[i]): trail for i, trail in other.trail.items()})
+
+    def put_orbits(self, where: np.ndarray, orbits: Closed) -> None:
+        """Write orbits to the rows int64[m]."""
+        for field in fields(Closed):
+            getattr(self.orbits, field.name)[where] = getattr(orbits, field.name)
+
+
+def settle_each(
+    family: Family,
+    start: np.ndarray,
+    most: int,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    result: Steady | None = None,
+) -> Steady:
+    """What each trajectory settles to: start float64[k, D], row i by row i of the family, followed for ``most`` iterates at the longest.
+
+    What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't depend on the other trajectories, nor on
+    threads.
+    """
+    result = Steady.empty(len(start), start.shape[1]) if result is None else result
+    pieces = [np.arange(first, min(first + PIECE, len(start))) for first in range(0, len(start), PIECE)]
+
+    def work(piece: np.ndarray) -> Steady:
+        part = family.rows(piece)
+        part.threads = 1
+        return _settle(part, start[piece], most)
+
+    on_threads(work, pieces, result.put, threads, progress)
+    return result
+
+
+def _settle(family: Family, start: np.ndarray, most: int) -> Steady:
+    """One piece, on one thread."""
+    result = Steady.empty(*start.shape)
+    who = _follow(family, start, np.arange(len(start)), most, result, NEAR)
+    if len(who):
+        result.scale[who] = motion_range(family.rows(who), result.end[who])
+        who = _follow(family, result.end, who, ROUND, result, NEAR_AT_LAST)
+    if len(who):
+        who = _wander(family, result.end, who, result)
+    if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
+        who = _follow(family, result.end, who, most, result, NEAR_AT_LAST)
+        result.kind[who] = UNCONVERGED
+    return result
+
+
+def _follow(family: Family, start: np.ndarray, who: np.ndarray, most: int, result: Steady, near: float) -> np.ndarray:
+    """Follow trajectories until they settle on an orbit; writes what is known, returns those that haven't."""
+    flight = family.rows(who).launch(start[who], most + ROUND)
+    threshold = max(near, family.noise)
+    while len(who) and flight.age < most:
+        points = flight.advance(ROUND)
+        going = flight.going
+        result.end[who] = flight.state
+        ended = who[~going]
+        result.kind[ended] = np.where(flight.status[~going] == st.NONFINITE, ESCAPED, FAILED)
+        stay = going.copy()
+        if going.any():
+            rows = np.flatnonzero(going)
+            if flight.age == ROUND:
+                result.scale[who[rows]] = motion_range(family.rows(who[rows]), flight.state[rows])
+            stay[rows[_settled(family, points[rows], who[rows], threshold, result)]] = False
+            result.settled[who[going & ~stay]] = flight.age
+        flight.keep(stay)
+        who = who[stay]
+    return who
+
+
+def _settled(family: Family, points: np.ndarray, who: np.ndarray, threshold: float, result: Steady) -> np.ndarray:
+    """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes the orbits."""
+    scale = result.scale[who]
+    period, apart = recurrence(points, scale)
+    done = np.zeros(len(who), bool)
+    ready = np.flatnonzero(apart < threshold)
+    if not len(ready):
+        return done
+    orbits = close(family.rows(who[ready]), points[ready, -1], period[ready], scale[ready], LONGEST)
+    tolerance = BESIDE * np.maximum(apart[ready], family.noise)
+    right = orbits.stable & (orbits.distance(points[ready, -1], scale[ready]) <= tolerance)
+    done[ready[right]] = True
+    chosen = who[ready[right]]
+    result.put_orbits(chosen, Closed(orbits.period[right], orbits.points[right], orbits.multipliers[right]))
+    result.kind[chosen], result.exponent_error[chosen] = PERIODIC, 0.0
+    with np.errstate(divide="ignore"):
+        result.exponent[chosen] = np.log(np.abs(orbits.multipliers[right, 0])) / orbits.period[right]
+    return done
+
+
+def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) -> np.ndarray:
+    """Type the trajectories that don't recur by their exponents; writes what is known, returns those that stay unclear."""
+    maps = family.rows(who)
+    state, blocks = growth_rates(maps, start[who], result.scale[who])
+    flight = maps.launch(state, TRAIL)
+    trail = flight.advance(TRAIL)
+    recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < max(NEAR_AT_LAST, family.noise)  # on an orbit by now
+    result.end[who] = flight.state
+    unclear = np.ones(len(who), bool)
+    for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2)) & ~recurs):
+        kind = kind_of_growth(blocks[:, [i]])
+        if kind is not None:
+            unclear[i], row = False, who[i]
+            result.kind[row] = CHAOTIC if kind[0] == "chaotic" else QUASI_PERIODIC
+            result.exponent[row], result.exponent_error[row] = kind[1:]
+            result.trail[int(row)], result.settled[row] = trail[i], -1
+    return who[unclear]
+
+
+def motion_range(family: Family, state: np.ndarray) -> np.ndarray:
+    """Range of each state in the motion from states float64[k, D] on, float64[k, D]; its size where it rests, 1 where that is 0."""
+    index = np.arange(RANGED * LOOKS)
+    samples = family.run(state, RANGED, Schedule(index // LOOKS, (index % LOOKS) / LOOKS)).samples
+    with np.errstate(all="ignore"):
+        lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
+    scale = np.where(lengths > ROUNDING * sizes, lengths, sizes)
+    return np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)

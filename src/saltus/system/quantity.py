@@ -1,0 +1,245 @@
+"""Quantities: functions of time, states and parameters that a user adds to a system - a surface to cross, a power to integrate.
+
+A quantity is traced as an equation is. Comparisons in it that mean a guard of the system read that guard's side; others become guards of
+their own, behind those of the system. With it the flow needs nothing new: a surface is one more guard, an integral one more state, and both
+come with the flow's own precision.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from saltus.errors import ParameterError, TraceError, nearest
+from saltus.system.expression import TIME, Expr, as_expr, parameter, state, sub
+from saltus.system.guards import Guard, join_guards, surface_guard
+from saltus.system.system import System
+from saltus.system.trace import explained, place
+from saltus.units import check_declared, to_si
+
+#: A function of (t, states, parameters), each argument by its name.
+Quantity = Callable[..., Any]
+
+
+def quantity(system: System, function: Quantity, what: str = "a quantity") -> tuple[Expr, tuple[Guard, ...]]:
+    """Trace a function of time, states and parameters of a system.
+
+    Parameters
+    ----------
+    system : System
+        Whose states and parameters the arguments are.
+    function : callable
+        Its arguments are found by name: ``t`` (the time), states, parameters, as many as it needs, in any order; ``**rest`` takes all other
+        parameters. So the signature of the equation itself will do. Default values aren't used. It returns one number.
+    what : str
+        What the function is, for messages: ``"the surface"``.
+
+    Returns
+    -------
+    Expr, tuple of Guard
+        The expression, with bits in its conditions; the guards that these number: those of the system, then new ones.
+
+    Raises
+    ------
+    TraceError
+        If an argument is neither time, state nor parameter, or the function can't be traced.
+    """
+    if not callable(function) or isinstance(function, System):
+        names = ", ".join(("t", *_own_states(system)))
+        raise TraceError(
+            f"{what} must be a function such as `lambda {names}: ...`, not {function!r}. Parameters are further arguments, by name."
+        )
+    title = f"{what} of {system.name}"
+    positional, named = _arguments(system, function, title)
+    try:
+        returned = function(*positional, **named)
+        if returned is None:
+            raise TraceError("it returns nothing. End it with: return ...")
+        expression = as_expr(returned)
+    except Exception as error:
+        raise TraceError(explained(error, function, title)) from error
+    try:
+        (root,), guards = join_guards([expression], system.guards)
+    except TraceError as error:
+        raise TraceError(f"{title} ({place(function)}): {error}") from error
+    return root, guards
+
+
+def _own_states(system: System) -> tuple[str, ...]:
+    """The states that a user knows: those of a tangent system aren't named in functions."""
+    return (system.tangent_of or system).states
+
+
+def _arguments(system: System, function: Quantity, title: str) -> tuple[list[Expr], dict[str, Expr]]:
+    """Symbols for the arguments of a function, by their names."""
+    states = _own_states(system)
+    known = {"t": TIME, **{name: parameter(name) for name in system.values}, **{name: state(name) for name in states}}
+    arguments = list(inspect.signature(function).parameters.values())
+    plain = [a.name for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
+    if tuple(plain[1:]) == states:
+        known[plain[0]] = TIME  # written as an equation, whatever the time is called there
+    positional: list[Expr] = []
+    named: dict[str, Expr] = {}
+    for argument in arguments:
+        if argument.kind == argument.VAR_KEYWORD:
+            rest = set(system.values) - {a.name for a in arguments}
+            named.update((name, known[name]) for name in system.values if name in rest)
+        elif argument.kind == argument.VAR_POSITIONAL or argument.name not in known:
+            raise TraceError(
+                f"{title} ({place(function)}) asks for {argument.name!r}, which is neither t nor a state or parameter of {system.name}. "
+                f"{nearest(argument.name, known)} Constants of its own belong in its body."
+            )
+        elif argument.kind == argument.KEYWORD_ONLY:
+            named[argument.name] = known[argument.name]
+        else:
+            positional.append(known[argument.name])
+    return positional, named
+
+
+# -- surfaces ------------------------------------------------------------------------------------------------------------------
+def with_surface(system: System, surface: Quantity | str, name: str = "surface") -> System:
+    """The system with one more guard, on whose side nothing depends: the flow locates its crossings as it locates contacts.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    surface : callable or str
+        The motion is on the surface where this function of (t, states, parameters) is zero (see :func:`quantity`); or the name of a state,
+        for the surface on which that state is zero.
+    name : str
+        Name of the guard; it gets primes if the system has one of that name.
+
+    Returns
+    -------
+    System
+        The new guard is the last: ``len(guards) - 1``. Its gap is the function as it stands, so direction +1 is where the function rises.
+        Guards that the function needs for its own conditions stand before it.
+
+    Raises
+    ------
+    TraceError
+        If the function can't be traced, depends on no state, or doesn't repeat with the forcing.
+    ParameterError
+        If there is no such state.
+    """
+    if isinstance(surface, str):
+        system.state_unit(surface)
+        return _with_guard(system, state(surface), system.guards, name)
+    gap, guards = quantity(system, surface, "the surface")
+    return _with_guard(system, gap, guards, name)
+
+
+def with_level(system: System, name: str, level: float | str) -> System:
+    """The system with a surface at a level of one state. The level is a new parameter, so another one recompiles nothing.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    name : str
+        A state.
+    level : float or str
+        Its value on the surface: a number in SI, or text with a unit. It becomes the parameter ``surface_level``.
+
+    Returns
+    -------
+    System
+        The last guard is the surface: ``gap = state - surface_level``.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If there is no such state, or the level isn't a finite number in its unit.
+    """
+    unit, key = system.state_unit(name), _free("surface_level", system)
+    value = to_si(level, unit, f"the level of {name}")
+    extended = replace(system, values={**system.values, key: value}, units={**system.units, key: unit})
+    return _with_guard(extended, sub(state(name), parameter(key)), system.guards, key)
+
+
+def turning_surface(system: System, name: str) -> System:
+    """The system with a surface on which a state turns: its rate is zero, from + to - (direction -1) at a maximum.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    name : str
+        A state.
+
+    Returns
+    -------
+    System
+        The last guard is the surface; its gap is the rate of the state.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such state.
+    TraceError
+        If the rate depends on no state, so that the state turns at given times.
+    """
+    system.state_unit(name)
+    return _with_guard(system, system.field[system.states.index(name)], system.guards, f"{name} turns")
+
+
+def _with_guard(system: System, gap: Expr, guards: tuple[Guard, ...], name: str) -> System:
+    taken = {guard.name for guard in guards}
+    while name in taken:
+        name += "'"
+    return replace(system, guards=(*guards, surface_guard(gap, name)))
+
+
+# -- integrals -----------------------------------------------------------------------------------------------------------------
+def with_integrals(system: System, integrands: Mapping[str, Quantity], units: Mapping[str, str] | None = None) -> System:
+    """The system with more states, each the integral of a function along the motion; they start where they are put, as a rule at zero.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    integrands : mapping of str to callable
+        By the name of the new state, what is integrated: a function of (t, states, parameters), see :func:`quantity`. It can't use the
+        other integrals.
+    units : mapping of str to str, optional
+        Coherent SI unit of each integral.
+
+    Returns
+    -------
+    System
+        The new states are the last, in this order. Guards that the functions need for conditions of their own are appended.
+
+    Raises
+    ------
+    TraceError
+        If a function can't be traced, or doesn't repeat with the forcing.
+    ParameterError, UnitError
+        If a name is taken or can't be a name, or a unit isn't coherent.
+    """
+    rates: list[Expr] = []
+    new_units = {name: check_declared(unit, name) for name, unit in (units or {}).items()}
+    extended = system
+    for name, function in integrands.items():
+        if not name.isidentifier() or name in system.units or name == "t":
+            raise ParameterError(f"an integral of {system.name} can't be called {name!r}: use letters, digits and _, and no name it has.")
+        rate, guards = quantity(extended, function, f"the integrand {name!r}")
+        extended = replace(extended, guards=guards)
+        rates.append(rate)
+    return replace(
+        extended,
+        states=(*system.states, *integrands),
+        field=(*system.field, *rates),
+        units={**system.units, **{name: new_units.get(name, "") for name in integrands}},
+    )
+
+
+def _free(name: str, system: System) -> str:
+    """A name that the system doesn't use yet: the name, or with a number behind it."""
+    number, free = 1, name
+    while free in system.units:
+        number += 1
+        free = f"{name}_{number}"
+    return free
