@@ -1,0 +1,1 @@
+"""The pictures of this paper, in the order of the report."""
