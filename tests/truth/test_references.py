@@ -213,15 +213,17 @@ def test_the_bound_can_fail(rigs):
 
 @pytest.mark.parametrize("method", [sl.Taylor(), FINE], ids=["default", "fine"])
 def test_every_contact_is_there_and_its_time_is_as_exact_as_it_says(rigs, method):
-    table, values, _ = rigs
+    table, values, sensitivity = rigs
     run = simulate(table, values, method)
     assert np.bincount(run.contact_trajectory.values, minlength=len(table)).tolist() == column(table, "contacts").astype(int).tolist()
     exact = [text for row in table for text in row["contact_times_s"].split()]
     error, claimed = errors(run.contact_time.values, exact), run.contact_time_error.values
     assert np.max(error) < 1e-13
-    slow = np.abs(run.contact_velocity.values) < 0.01  # there the errors of the steps before count, which a local error doesn't hold
-    assert np.max((error / claimed)[~slow]) <= 1
-    assert np.max((error / claimed)[slow], initial=0.0) <= 2
+    speed = np.abs(run.contact_velocity.values)
+    carried = rounding(run, sensitivity, method.tolerance)[run.contact_trajectory.values, 0] / speed  # by what the steps before left
+    slow = speed < 0.01  # only there is it more than a claim from two runs, which round alike, shows
+    assert np.all(error[~slow] <= claimed[~slow])
+    assert np.all(error[slow] <= claimed[slow] + carried[slow])
     assert np.median(claimed / np.maximum(error, np.spacing(run.contact_time.values))) < 100
 
 

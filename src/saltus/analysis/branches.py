@@ -1,7 +1,8 @@
 """Branches: the same response followed from one value of a parameter to the next, and what happens to it on the way.
 
-Two responses at neighbouring values belong to one branch if their orbits are near each other, point by point at the best phase shift: by
-identity, never by amplitude, which crossing branches share. Names of bifurcations: di Bernardo, Budd, Champneys & Kowalczyk,
+Two responses at neighbouring values belong to one branch if Newton's method, started on the one, arrives at the other (natural parameter
+continuation), or if their orbits are near each other, point by point at the best phase shift: by identity, never by amplitude, which
+crossing branches share. Names of bifurcations: di Bernardo, Budd, Champneys & Kowalczyk,
 Piecewise-smooth Dynamical Systems (2008), chapter 2.
 """
 
@@ -12,12 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from saltus.analysis.grid import Grid
+from saltus.analysis.polish import close
+from saltus.analysis.recurrence import LONGEST, SAME
 from saltus.analysis.responses import Found
 from saltus.analysis.steady import CHAOTIC, PERIODIC
+from saltus.flow.family import EXACT
+from saltus.flow.methods import Method
 from saltus.results import AttractorTable
 
-#: Farthest that an orbit moves between two values, in units of its own range, and values over which a branch may be missing.
-LINK, MISSED = 0.35, 3
+#: Farthest that an orbit moves between two values, in units of its own range; twice and more as far only if Newton's method went with it.
+LINK, FARTHEST = 0.35, 1.0
+#: Values over which a branch may be missing.
+MISSED = 3
 #: A branch that ends folds if its leading multiplier is real and beyond this (it moves to 1 as the root of the distance), and sheds a torus
 #: if it is complex and beyond that.
 FOLDING, TURNING = 0.5, 0.95
@@ -45,14 +53,15 @@ class Event:
     branch: int
 
 
-def follow(found: Found, values: np.ndarray) -> np.ndarray:
+def follow(found: Found, grid: Grid, method: Method, threads: int | None = None) -> np.ndarray:
     """Branch of every response of a grid with one axis, int64[m]; numbered in the order in which they begin."""
+    onward = _continued(found, grid, method, threads)
     branch = np.full(len(found), -1, np.int64)
     heads: list[tuple[int, int]] = []  # response that a branch ends with so far, and its place
-    for place in range(len(values)):
+    for place in range(grid.places):
         here = np.flatnonzero(found.place == place)
         tails = [i for i, (_, at) in enumerate(heads) if place - at <= MISSED]
-        for tail, response in _matches(found, [heads[i][0] for i in tails], here):
+        for tail, response in _matches(found, [heads[i][0] for i in tails], here, onward):
             branch[response] = tails[tail]
             heads[tails[tail]] = (int(response), place)
         for response in here[branch[here] < 0]:
@@ -61,9 +70,27 @@ def follow(found: Found, values: np.ndarray) -> np.ndarray:
     return branch
 
 
-def _matches(found: Found, before: list[int], here: np.ndarray) -> list[tuple[int, int]]:
+def _continued(found: Found, grid: Grid, method: Method, threads: int | None) -> np.ndarray:
+    """The response at the next value at which Newton's method arrives from each, int64[m]; -1 where at none."""
+    onward = np.full(len(found), -1, np.int64)
+    rows = np.flatnonzero((found.kind == PERIODIC) & (found.place < grid.places - 1))
+    family = grid.family(method, threads)
+    if not len(rows) or family.noise > EXACT:
+        return onward
+    scale = found.steady.scale[found.row[rows]]
+    arrived = close(family.rows(found.place[rows] + 1), found.start()[rows], found.period[rows], scale, LONGEST)
+    for i in np.flatnonzero(arrived.stable):
+        for other in np.flatnonzero((found.place == found.place[rows[i]] + 1) & (found.period == arrived.period[i])):
+            if arrived.distance(found.points(int(other))[:1], scale[[i]], np.array([i]))[0] < SAME:
+                onward[rows[i]] = other
+    return onward
+
+
+def _matches(found: Found, before: list[int], here: np.ndarray, onward: np.ndarray) -> list[tuple[int, int]]:
     """Pairs (index into before, response) of responses that are one, each used once, the nearest first."""
     cost = np.array([[_distance(found, a, int(b)) for b in here] for a in before]).reshape(len(before), len(here))
+    led = onward[np.array(before, np.int64)][:, None] == here[None]
+    cost = np.where(led & (cost < FARTHEST), cost * LINK / FARTHEST, cost)
     rows, columns = linear_sum_assignment(np.minimum(cost, _NEVER))
     return [(int(i), int(here[j])) for i, j in zip(rows, columns, strict=True) if cost[i, j] < LINK]
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.orbits import AMPLIFIED, FOLLOWED, LAST, MARGINAL, ROUNDING, mean_orbit
-from saltus.flow.family import Family
+from saltus.analysis.orbits import AMPLIFIED, FOLLOWED, LAST, MARGINAL, mean_orbit
+from saltus.flow.family import EXACT, Family
 
 #: Newton steps: quadratic convergence from 1e-5 needs three.
 MOST_STEPS = 12
@@ -71,7 +71,7 @@ def close(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, l
     result = Closed.none(len(start), longest, start.shape[1])
     if not len(start):
         return result
-    if family.noise > ROUNDING:
+    if family.noise > EXACT:
         return _followed(family, start, n, scale, result)
     x, found = _newton(family, start, n, scale)
     rows = np.flatnonzero(found)

@@ -47,7 +47,7 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
     branch, happened = np.full(len(found), -1, np.int64), []
     if len(grid.axes) == 1:
         (values,) = grid.axes.values()
-        branch = branches.follow(found, values)
+        branch = branches.follow(found, grid, method, threads)
         happened = branches.events(found, table, branch, values)
     (name, *_) = grid.axes
     system = grid.system

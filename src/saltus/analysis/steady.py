@@ -12,12 +12,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from saltus.analysis.orbits import ROUNDING
 from saltus.analysis.polish import Closed, close
 from saltus.analysis.recurrence import LONGEST, ROUND, recurrence
 from saltus.analysis.wandering import growth_rates, kind_of_growth
 from saltus.flow.engine import Schedule
-from saltus.flow.family import Family
+from saltus.flow.family import EXACT, Family
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 
@@ -197,5 +196,5 @@ def motion_range(family: Family, state: np.ndarray) -> np.ndarray:
     samples = family.run(state, RANGED, Schedule(index // LOOKS, (index % LOOKS) / LOOKS)).samples
     with np.errstate(all="ignore"):
         lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
-    scale = np.where(lengths > ROUNDING * sizes, lengths, sizes)
+    scale = np.where(lengths > EXACT * sizes, lengths, sizes)
     return np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)

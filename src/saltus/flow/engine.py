@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextvars import copy_context
 from dataclasses import dataclass, field
 from types import ModuleType
 
@@ -16,7 +14,7 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
-from saltus.flow.threads import usable_processors
+from saltus.flow.threads import on_threads, usable_processors
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.system.system import System
@@ -145,7 +143,7 @@ def run(
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     options = method.numbers(periods)
     chunks = [_cut(request, whole, first, options) for first in range(0, len(request.start), CHUNK)]
-    workers = min(threads or usable_processors(), max(len(chunks), 1))
+    workers = threads or usable_processors()
     stop = threading.Event()
     try:
         _run_chunks(chunks, module, stop, progress, workers)
@@ -269,17 +267,5 @@ def _run_chunks(
         _open_tables(chunk, module)
         _advance(chunk, module, local.workspace, stop)
 
-    with ThreadPoolExecutor(workers) as pool:
-        waiting: set[Future] = set()
-        try:
-            waiting |= {pool.submit(copy_context().run, work, chunk) for chunk in chunks}  # the caller's np.errstate holds there too
-            while waiting:
-                done, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
-                for future in done:
-                    future.result()
-                if progress:
-                    progress(_share_done(chunks))
-        except BaseException:
-            stop.set()
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
+    show = None if progress is None else lambda _: progress(_share_done(chunks))
+    on_threads(work, chunks, lambda *_: None, workers, show, stop)

@@ -18,7 +18,7 @@ from saltus.system.tangent import tangent_system
 #: A method tells its noise in units of a box of starts, some ten times the range of a motion in it. Measured for ode45 at (1e-4, 1e-7) on
 #: the rig's responses: its returns scatter by 0.05 to 2 % of their range with location, by 0.3 to 4 % without.
 MOTION = 10.0
-#: Noise up to which a method is exact but for rounding.
+#: Noise up to which a method is exact but for rounding; Newton's method is for the maps of such methods.
 EXACT = 1e-9
 
 

@@ -6,6 +6,7 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextvars import copy_context
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -23,12 +24,14 @@ def on_threads(
     done: Callable[[Item, Result], None],
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
+    stop: threading.Event | None = None,
 ) -> None:
     """Call ``work(item)`` for every item, and ``done(item, result)`` from this thread as each is ready, in any order.
 
-    Raises whatever a piece raises. On that, and on Ctrl-C, pieces under way are waited for and the rest is left.
+    Raises whatever a piece raises. On that, and on Ctrl-C, ``stop`` is set, pieces under way are waited for and the rest is left. The
+    caller's context holds in the threads too, such as its settings of NumPy.
     """
-    stop = threading.Event()
+    stop = stop or threading.Event()
 
     def one(item: Item) -> tuple[Item, Result] | None:
         return None if stop.is_set() else (item, work(item))
@@ -36,9 +39,9 @@ def on_threads(
     with ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool:
         waiting: set[Future] = set()
         try:
-            waiting |= {pool.submit(one, item) for item in items}
+            waiting |= {pool.submit(copy_context().run, one, item) for item in items}
             while waiting:
-                ready, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+                ready, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
                 for future in ready:
                     done(*future.result())
                 if progress:

@@ -17,7 +17,10 @@ from saltus.plot.style import Scale, display_scale
 from saltus.results.schema import kind_of, kind_text
 
 #: Kinds of Dataset, and what returns them.
-SOURCES = {"basins": "sl.basins", "attractors": "sl.attractors or sl.basin_fractions", "agreement": "sl.compare"}
+SOURCES = {
+    "basins": "sl.basins", "attractors": "sl.attractors or sl.basin_fractions", "agreement": "sl.compare",
+    "responses": "sl.frequency_response or sl.bifurcation_diagram",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ UNSETTLED = {
 #: What draws other kinds of results.
 _BETTER = {
     "basins": "plot.basins", "agreement": "plot.agreement", "trajectory": "plot.history or plot.phase", "stroboscope": "plot.phase",
+    "responses": "plot.frequency_response, plot.bifurcation_diagram or plot.type_map",
 }  # fmt: skip
 
 

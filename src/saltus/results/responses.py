@@ -8,8 +8,11 @@ An analysis that knows its responses calls::
         response_of=response_of,                                                       # int (n, s) or (n1, n2, s); -1 to -4: none
         responses=Responses(attractors=table, place=place, branch=branch),             # m of them; place: int (m, 1) or (m, 2)
         events=Events({"frequency": f}, kind, branch),                                 # may be left out
+        guards=Guards(names, states, boundaries),                                      # may be left out; pictures show the gaps
         gap_unit=gap_unit(system), attrs=provenance(...) | {...},
     )
+
+A bifurcation diagram adds ``Responses(samples=[(n, D), ...])`` and ``sample="turning_points"``.
 
 ``rms``, ``peak``, ``type``, ``period`` and ``contacts_per_period`` of every (value, start) follow from ``response_of``.
 """
@@ -25,6 +28,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results import schema
+from saltus.results.assemble import Guards
 from saltus.results.basins import AttractorTable
 from saltus.results.builder import Builder
 
@@ -108,6 +112,7 @@ def responses_dataset(
     response_of: np.ndarray,
     responses: Responses,
     events: Events | None = None,
+    guards: Guards | None = None,
     sample: str = "",
     gap_unit: str = "",
     attrs: Mapping[str, Any] | None = None,
@@ -130,6 +135,8 @@ def responses_dataset(
         The responses, in the order of their numbers.
     events : Events, optional
         What happens to the branches.
+    guards : Guards, optional
+        The guards; boundaries of the shape (guard,), or (guard, n) and (guard, n1, n2) where a parameter of the axes moves them.
     sample : str
         What ``responses.samples`` holds: a key of :data:`SAMPLES`. Kept as the attribute ``sample``.
     gap_unit : str
@@ -140,8 +147,8 @@ def responses_dataset(
     Returns
     -------
     Dataset
-        Dims: the parameters, ``start``, ``response``, ``multiplier``, ``phase``, ``event``, and ``sample`` if there are samples.
-        The dim ``event`` has no entries where nothing happens.
+        Dims: the parameters, ``start``, ``response``, ``multiplier``, ``phase``, ``event`` (no entries where nothing happens);
+        ``guard`` and ``sample`` if there are guards and samples.
 
     Raises
     ------
@@ -163,6 +170,8 @@ def responses_dataset(
         build.put_points(responses.samples, ("response", "sample"), schema.sample_name, SAMPLES[sample])
     if len(responses.attractors):  # without responses nothing can happen to them, and netCDF-3 has room for one empty dim only
         build.put_events(events or Events({name: np.zeros(0) for name in axes}, [], np.zeros(0, np.int64)))
+    if guards is not None and len(guards.names):
+        build.put_guards(guards, dims)
     return build.dataset({**(attrs or {}), **({"sample": sample} if sample else {})})
 
 
@@ -228,6 +237,15 @@ class _Builder(Builder):
         self.put("event_branch", events.branch)
         for name, values in events.values.items():
             self.data[schema.event_name(name)] = xr.Variable(("event",), np.asarray(values, dtype=float), self._labels(name))
+
+    def put_guards(self, guards: Guards, dims: tuple[str, ...]) -> None:
+        """Add the guards; boundaries have the dims of the parameters where these move them."""
+        self.put("guard", list(guards.names), coord=True)
+        self.put("guard_state", [state or "" for state in guards.states])
+        self.put("guard_units", [self.units.get(state, "") if state else "" for state in guards.states])
+        labels = {"units": self.gap_unit, "long_name": self.table["guard_boundary"].long_name}
+        boundaries = np.asarray(guards.boundaries, dtype=float)
+        self.data["guard_boundary"] = xr.Variable(("guard", *dims)[: boundaries.ndim], boundaries, labels)
 
 
 def _per_period(table: AttractorTable) -> np.ndarray:

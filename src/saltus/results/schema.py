@@ -25,7 +25,7 @@ import xarray as xr
 from saltus.errors import ParameterError
 from saltus.results.method_variables import METHODS_VARIABLES
 from saltus.results.response_variables import RESPONSES_VARIABLES
-from saltus.results.variable import Variable
+from saltus.results.variable import GUARD_VARIABLES, Variable
 
 #: Version of the tables below, kept in every result as ``schema_version``.
 VERSION = 1
@@ -59,12 +59,6 @@ _MINIMA = {
     "smallest_contact_speed": Variable((), "<gap rate>", "smallest gap rate at a contact"),
     "smallest_gap_margin": Variable((), "<gap>", "smallest distance of a turning point of the gap from a guard"),
 }
-_GUARDS = {
-    "guard": Variable(("guard",), "", "guard", "str"),
-    "guard_state": Variable(("guard",), "", "state that the guard bounds", "str"),
-    "guard_boundary": Variable(("guard",), "<gap>", "value of the state on the guard"),
-    "guard_units": Variable(("guard",), "", "unit of the gap", "str"),
-}
 
 #: Variables of what ``simulate`` returns, beside the states.
 TRAJECTORY_VARIABLES = {
@@ -84,7 +78,7 @@ TRAJECTORY_VARIABLES = {
     "status": _STATUS,
     **_COUNTERS,
     **_MINIMA,
-    **_GUARDS,
+    **GUARD_VARIABLES,
     "end_time": Variable((), "s", "time at the end"),
     "forcing_period": Variable((), "s", "forcing period"),
     "trajectory": Variable((), "1", "trajectory", "i8"),
@@ -96,7 +90,7 @@ STROBOSCOPE_VARIABLES = {
     "status": _STATUS,
     **_COUNTERS,
     **_MINIMA,
-    **_GUARDS,
+    **GUARD_VARIABLES,
     "forcing_period": Variable((), "s", "forcing period"),
     "trajectory": Variable((), "1", "trajectory", "i8"),
 }

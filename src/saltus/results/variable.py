@@ -1,4 +1,4 @@
-"""One line of the tables of the schema."""
+"""One line of the tables of the schema, and the lines that several tables share."""
 
 from __future__ import annotations
 
@@ -25,3 +25,12 @@ class Variable:
     units: str
     long_name: str
     dtype: str = "f8"
+
+
+#: The guards of a system, in every kind of result that has them.
+GUARD_VARIABLES = {
+    "guard": Variable(("guard",), "", "guard", "str"),
+    "guard_state": Variable(("guard",), "", "state that the guard bounds", "str"),
+    "guard_boundary": Variable(("guard",), "<gap>", "value of the state on the guard"),
+    "guard_units": Variable(("guard",), "", "unit of the gap", "str"),
+}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.results import AttractorTable, Events, Responses, Starts, responses_dataset
+from saltus.results import AttractorTable, Events, Guards, Responses, Starts, responses_dataset
 
 from .conftest import PROVENANCE, UNITS
 
@@ -27,7 +27,8 @@ def responses(**changes):
         "states": ("x", "v"), "units": UNITS, "axes": {"frequency": FREQUENCY},
         "starts": Starts({"x": np.array([0.0, 1e-3]), "v": np.zeros(2)}), "response_of": RESPONSE_OF,
         "responses": Responses(TABLE, np.array([[0], [0], [1], [2], [2]]), np.array([0, 1, 0, 0, 2])),
-        "events": Events({"frequency": np.array([5.5])}, ["graze"], np.array([0])), "gap_unit": "m", "attrs": PROVENANCE,
+        "events": Events({"frequency": np.array([5.5])}, ["graze"], np.array([0])),
+        "guards": Guards(("stop",), ("x",), np.array([1e-3])), "gap_unit": "m", "attrs": PROVENANCE,
     }  # fmt: skip
     return responses_dataset(**{**arguments, **changes})
 

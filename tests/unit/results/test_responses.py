@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from saltus.errors import ParameterError
-from saltus.results import Responses, Starts, content_hash, describe, load, save, schema, to_csv
+from saltus.results import Guards, Responses, Starts, content_hash, describe, load, save, schema, to_csv
 
 from .responses_data import NO_RESPONSE, RESPONSE_OF, TABLE, responses, two_parameters
 
@@ -16,6 +16,8 @@ SAMPLED = Responses(
 )
 CASES = {
     "frequency response": responses,
+    "no guards": lambda: responses(guards=None),
+    "a gap that varies": lambda: responses(guards=Guards(("stop",), ("x",), np.array([[1e-3, 2e-3, 3e-3]]))),
     "two parameters": two_parameters,
     "samples": lambda: responses(responses=SAMPLED, sample="turning_points"),
     "no events": lambda: responses(events=None),

@@ -1,0 +1,143 @@
+"""Frequency response: how large the steady responses are, branch by branch."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Literal, get_args
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from saltus.errors import ParameterError, UnitError
+from saltus.plot import axes as draw
+from saltus.plot import kinds
+from saltus.plot import response_points as points
+from saltus.plot.style import OKABE_ITO, Scale
+from saltus.results.measured import read_measured
+from saltus.results.schema import states_of
+from saltus.units import to_si
+
+_CALLER = "plot.frequency_response"
+Quantity = Literal["rms", "peak"]
+_LABELS = {"rms": "steady rms of {}", "peak": "peak |{}|"}
+Measured = str | os.PathLike[str] | xr.Dataset | None
+
+
+def frequency_response(
+    ds: points.Source,
+    *,
+    quantity: Quantity = "rms",
+    measured: Measured = None,
+    events: bool = True,
+    legend: bool = True,
+    ax: Any = None,
+) -> Axes:
+    """Size of every steady response against the frequency (or any other parameter): a colour for each period, branches as lines.
+
+    Parameters
+    ----------
+    ds : Dataset, or mapping of str to Dataset
+        What ``sl.frequency_response`` returned; a part of it, such as ``ds.sel(frequency=slice(14, 17))``, is drawn alone. Several by name
+        are drawn over each other, a colour and a marker for each: ``{"exact": a, "ode45": b}``.
+    quantity : {"rms", "peak"}
+        Root mean square, or largest magnitude, of the first state.
+    measured : path or Dataset, optional
+        Measured points to draw with it: a CSV with the columns ``frequency [Hz]`` and ``amplitude [mm]``, any units, or a Dataset with
+        these two variables and their attribute ``units``.
+    events : bool
+        Whether to mark grazes, period doublings and folds on the axis.
+    legend : bool
+        Whether to name the colours, beside the picture.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` holds no responses over one parameter, or an argument doesn't fit it.
+    ResultFileError
+        If the measured points can't be read.
+    """
+    if quantity not in get_args(Quantity):
+        raise ParameterError(f"{_CALLER}: quantity={quantity!r}. Known: {', '.join(get_args(Quantity))}.")
+    variable = f"response_{quantity}"
+    datasets = points.shown(ds, _CALLER, [variable])
+    marks = None if measured is None else _measured(measured, datasets[0], variable)
+    with draw.panels(ax, 1, (6.3, 3.4), _CALLER) as (panel,):
+        across, up = points.parameter_axis(panel, datasets), points.state_scale([one.ds[variable] for one in datasets])
+        named: dict[str, Any] = {}
+        for one in datasets:
+            named |= (_compare if one.name else _kinds)(panel, one, one.ds[variable].values * up.factor, across)
+        if marks is not None:
+            _draw_measured(panel, marks[datasets[0].axis].values * across.factor, marks["amplitude"].values * up.factor)
+        panel.set_ylim(bottom=0)
+        panel.set_ylabel(up.label(_LABELS[quantity].format(states_of(datasets[0].ds)[0])))
+        if events:
+            points.draw_events(panel, datasets, across)
+        if legend:
+            points.legend(panel, named)
+    return panel
+
+
+def _size(count: int) -> float:
+    """Markers small enough not to hide the branches that they lie on."""
+    return 3.0 if count <= 300 else 2.2 if count <= 3000 else 1.5
+
+
+def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[str, Any]:
+    """A colour for each kind of motion: lines along branches, dots at every response."""
+    of = kinds.of(one.ds)
+    for code in sorted(np.unique(of).tolist(), key=lambda code: (code != kinds.CHAOTIC, code)):  # chaos lies under the others
+        color, mine = kinds.color(code), of == code
+        if code < kinds.QUASI_PERIODIC:
+            line = points.branch_lines(one, y, mine)
+            ax.plot(line[0] * across.factor, line[1], color=color, lw=0.8, zorder=2, gid=f"branches {code}")
+        size = _size(mine.sum()) * (0.7 if code == kinds.CHAOTIC else 1.0)
+        draw.draw_points(
+            ax, one.values[mine] * across.factor, y[mine], marker="o", ms=size, mfc=color, mec="none", zorder=3, gid=f"kind {code}"
+        )
+    return points.kind_handles(one, of)
+
+
+def _compare(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[str, Any]:
+    """One colour and marker for a Dataset among several; the first is drawn largest, so that none hides another."""
+    color, marker = points.dataset_color(one), points.MARKERS[one.look]
+    size = _size(y.size) * (1.9 if one.look == 0 else 1.0)
+    draw.draw_points(
+        ax, one.values * across.factor, y, marker=marker, ms=size, mfc="none" if one.look == 0 else color, mec=color,
+        mew=0.6 if one.look == 0 else 0.0, zorder=3, gid=f"dataset {one.name}",
+    )  # fmt: skip
+    return {one.name: points.dot(color, marker, hollow=one.look == 0)}
+
+
+# -- measured points -----------------------------------------------------------------------------------------------------------
+def _measured(measured: Measured, one: points.Shown, variable: str) -> xr.Dataset:
+    """Measured points in SI."""
+    units = {one.axis: one.ds[one.axis].attrs.get("units", ""), "amplitude": one.ds[variable].attrs.get("units", "")}
+    if not isinstance(measured, xr.Dataset):
+        return read_measured(measured, one.axis, *units.values())  # type: ignore[arg-type]
+    lacking = [name for name in units if name not in measured.variables]
+    if lacking:
+        raise ParameterError(f"{_CALLER}: measured has no {lacking[0]!r}. It needs {' and '.join(units)}, each with the attribute units.")
+    return xr.Dataset({name: ("point", _in_si(measured[name], unit)) for name, unit in units.items()})
+
+
+def _draw_measured(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
+    """Open circles above all that was computed."""
+    look = {"ms": 4.5, "mfc": "none", "mec": OKABE_ITO["black"], "mew": 0.9}
+    draw.draw_points(ax, x, y, marker="o", zorder=4, label="measured", gid="measured", **look)
+
+
+def _in_si(values: xr.DataArray, unit: str) -> np.ndarray:
+    given = values.attrs.get("units", "")
+    if not given and unit not in ("", "1"):
+        raise ParameterError(f"{_CALLER}: measured {values.name} has no attribute units. Write it, such as units='{unit}'.")
+    try:
+        return np.array([to_si(f"{float(value)!r} {given}", unit, str(values.name)) for value in np.ravel(values.values)])
+    except UnitError as error:
+        raise ParameterError(f"{_CALLER}: {error}") from None

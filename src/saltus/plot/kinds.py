@@ -1,0 +1,47 @@
+"""Kinds of motion as colours: the same kind has the same colour in every picture, whatever else is in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from saltus.plot.palette import hues, shades
+from saltus.results.schema import period_text
+
+#: Periods with a hue of their own; longer ones share the next. More hues than these can't be told apart as small dots.
+OWN_HUES = 8
+#: Codes of the kinds: the period itself up to :data:`OWN_HUES`, then these.
+LONG, QUASI_PERIODIC, CHAOTIC = OWN_HUES + 1, OWN_HUES + 2, OWN_HUES + 3
+#: Motion that never repeats is grey, so that no period is taken for it.
+_GREYS = {QUASI_PERIODIC: (0.70, 0.70, 0.70), CHAOTIC: (0.20, 0.20, 0.20)}
+#: The shade of a hue that small dots and thin lines have on white, among so many; the hue itself is for areas.
+_DOT, _SHADES = 4, 7
+
+
+def codes(kind: Sequence[str] | np.ndarray, period: Sequence[int] | np.ndarray) -> np.ndarray:
+    """Code of each motion, by its kind (``periodic``, ``quasi_periodic``, ``chaotic``) and its period in forcing periods."""
+    period, kind = np.asarray(period, dtype=np.int64), np.asarray(kind, dtype=np.str_)
+    return np.where(period > 0, np.minimum(period, LONG), np.where(kind == "quasi_periodic", QUASI_PERIODIC, CHAOTIC))
+
+
+def color(code: int, dots: bool = True) -> np.ndarray:
+    """The colour of a kind, sRGB in 0 to 1: darker for dots and lines than for areas."""
+    if code in _GREYS:
+        return np.array(_GREYS[code])
+    hue = hues(LONG)[code - 1]
+    return np.asarray(shades(hue[None], _SHADES)[0, _DOT if dots else _SHADES // 2])
+
+
+def label(code: int, periods: np.ndarray) -> str:
+    """A kind in a legend; ``periods`` are those that occur, to name the long ones."""
+    if code == LONG:
+        long = np.unique(periods[periods > OWN_HUES]).tolist()
+        return ", ".join(map(period_text, long)) if len(long) <= 3 else f"{period_text(long[0])} to {period_text(long[-1])}"
+    return {QUASI_PERIODIC: "quasi-periodic", CHAOTIC: "chaotic"}.get(code) or period_text(code)
+
+
+def of(ds: xr.Dataset) -> np.ndarray:
+    """Code of each response of a Dataset."""
+    return codes(ds["response_type"].values, ds["response_period"].values)

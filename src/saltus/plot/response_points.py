@@ -1,0 +1,210 @@
+"""What all pictures of responses share: one or several Datasets, which of their responses are shown, axes, events, legends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from saltus.errors import ParameterError
+from saltus.plot import kinds, maps
+from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
+from saltus.results.schema import event_name, parameters_of, response_name
+
+#: What a picture of responses takes: a Dataset, or several by their names.
+Source = xr.Dataset | Mapping[str, xr.Dataset]
+#: Variables without which no response can be drawn.
+NEEDS = ("response_of", "response_branch", "response_type", "response_period")
+#: Markers of Datasets that are drawn over each other.
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+#: Name and marker of what happens to a branch between two values.
+_EVENTS = {
+    "graze": ("graze", "^"), "period_doubling": ("period doubling", "D"), "fold": ("fold", ">"), "neimark_sacker": ("torus", "o"),
+    "chaos": ("onset of chaos", "s"),
+}  # fmt: skip
+#: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
+_EVEN = 1e-6
+#: A legend of more entries is set smaller, to stay beside its picture.
+_LONG_LEGEND = 14
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The responses of one Dataset that are drawn.
+
+    Attributes
+    ----------
+    ds : Dataset
+        With these responses only.
+    axis : str
+        The parameter that they are drawn over.
+    place : array of int, shape (response,)
+        Index of the response's value among the values of that parameter.
+    name : str
+        What the Dataset is called where several are drawn; else empty.
+    look : int
+        Its number among them.
+    """
+
+    ds: xr.Dataset
+    axis: str
+    place: np.ndarray
+    name: str = ""
+    look: int = 0
+
+    @property
+    def values(self) -> np.ndarray:
+        """Value of the parameter at each response [SI]."""
+        return np.asarray(self.ds[response_name(self.axis)].values, dtype=float)
+
+
+# -- which responses -----------------------------------------------------------------------------------------------------------
+def shown(source: Any, caller: str, needs: Sequence[str]) -> list[Shown]:
+    """The Datasets to draw, each with the responses that are left in it.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, one is of another kind, has two parameters, or they aren't over the same parameter.
+    """
+    several = isinstance(source, Mapping) and not isinstance(source, xr.Dataset)
+    named = dict(source) if several else {"": source}
+    if not named:
+        raise ParameterError(f"{caller}: there is nothing to draw. Give a Dataset, or several by name: {{'exact': a, 'ode45': b}}.")
+    if len(named) > len(MARKERS):
+        raise ParameterError(f"{caller} tells {len(MARKERS)} Datasets apart, not {len(named)}. Draw them in several pictures.")
+    found = [_of(ds, str(name), i, caller, needs) for i, (name, ds) in enumerate(named.items())]
+    if len({one.axis for one in found}) > 1:
+        raise ParameterError(
+            f"{caller}: these are over {', '.join(sorted({one.axis for one in found}))}. Draw each in a picture of its own."
+        )
+    return found
+
+
+def _of(ds: Any, name: str, look: int, caller: str, needs: Sequence[str]) -> Shown:
+    maps.check(ds, caller, ["responses"], [*NEEDS, *needs])
+    axes = parameters_of(ds)
+    if len(axes) != 1:
+        told = f"{' and '.join(axes)}: choose one value, such as ds.isel({axes[-1]}=0), or draw plot.type_map" if axes else "no parameter"
+        raise ParameterError(f"{caller} draws responses over one parameter; this Dataset has {told}.")
+    left = select(ds)
+    values = ds[axes[0]].values
+    order = np.argsort(values, kind="stable")
+    place = np.searchsorted(values[order], left[response_name(axes[0])].values)
+    return Shown(left, axes[0], place, name, look)
+
+
+def select(ds: xr.Dataset) -> xr.Dataset:
+    """The Dataset with the responses at the values and starts that are left in it: what remains after ``ds.sel(frequency=...)``.
+
+    Responses that no start leads to at any value (found by following a branch) stay.
+    """
+    keep = np.isin(np.arange(ds.sizes["response"]) if "response" not in ds.coords else ds["response"].values, ds["response_of"].values)
+    if "response_share" in ds:
+        keep |= ds["response_share"].values == 0
+    for coord in map(str, ds.coords):
+        own = response_name(coord)
+        if own in ds and ds[own].dims == ("response",):
+            keep &= np.isin(ds[own].values, ds[coord].values)
+    return ds.isel(response=np.flatnonzero(keep))
+
+
+# -- curves --------------------------------------------------------------------------------------------------------------------
+def branch_lines(one: Shown, y: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Curves through the responses of ``mask``, neighbours on a branch joined, NaN between the pieces; shape (n,) each."""
+    index = np.flatnonzero(mask)
+    branch, place = one.ds["response_branch"].values[index], one.place[index]
+    order = np.lexsort((place, branch))
+    index, branch, place = index[order], branch[order], place[order]
+    breaks = np.flatnonzero((np.diff(branch) != 0) | (np.diff(place) > 1)) + 1
+    return np.insert(one.values[index], breaks, np.nan), np.insert(y[index], breaks, np.nan)
+
+
+# -- axes ----------------------------------------------------------------------------------------------------------------------
+def is_log(values: np.ndarray) -> bool:
+    """Whether a grid is even in its logarithms rather than in its values."""
+    values = np.sort(np.asarray(values, dtype=float))
+    if values.size < 3 or values[0] <= 0:
+        return False
+    steps, ratios = np.diff(values), np.diff(np.log(values))
+    return bool(np.ptp(ratios) <= _EVEN * ratios.max() and np.ptp(steps) > _EVEN * steps.max())
+
+
+def parameter_scale(values: np.ndarray, unit: str, log: bool) -> Scale:
+    """Display unit of a parameter; over a logarithmic axis, which shows many sizes at once, the SI unit itself."""
+    return Scale(1.0, unit) if log else display_scale(unit, float(np.abs(values).max(initial=0.0)))
+
+
+def parameter_axis(ax: Axes, datasets: Sequence[Shown]) -> Scale:
+    """Name, limits and scale of the horizontal axis; returns its display unit."""
+    name = datasets[0].axis
+    grids = [np.asarray(one.ds[name].values, dtype=float) for one in datasets]
+    values, log = np.concatenate(grids), all(is_log(grid) for grid in grids)
+    scale = parameter_scale(values, datasets[0].ds[name].attrs.get("units", ""), log)
+    if log:
+        ax.set_xscale("log")
+    if np.ptp(values) > 0:
+        low, high = float(values.min() * scale.factor), float(values.max() * scale.factor)
+        before = ax.dataLim.intervalx  # an Axes that was drawn into keeps what it showed
+        if np.isfinite(before).all() and before[0] < before[1]:
+            low, high = min(low, float(before[0])), max(high, float(before[1]))
+        ax.set_xlim(low, high)
+    ax.set_xlabel(scale.label(name.replace("_", " ")))
+    return scale
+
+
+def state_scale(arrays: Sequence[xr.DataArray]) -> Scale:
+    """Display unit of a variable, over all Datasets."""
+    largest = max((float(np.nanmax(np.abs(one.values), initial=0.0)) for one in arrays), default=0.0)
+    return display_scale(arrays[0].attrs.get("units", ""), largest)
+
+
+# -- colours and legend --------------------------------------------------------------------------------------------------------
+def dataset_color(one: Shown) -> str:
+    """The colour of a Dataset where several are drawn."""
+    return CYCLE[one.look % len(CYCLE)]
+
+
+def kind_handles(one: Shown, of: np.ndarray) -> dict[str, Line2D]:
+    """The kinds that occur, in the order of the legend, with their colours."""
+    periods = one.ds["response_period"].values
+    return {kinds.label(code, periods): dot(kinds.color(code)) for code in np.unique(of).tolist()}
+
+
+def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
+    """Marks on the axis where something happens to a branch; each kind is named once."""
+    for one in datasets:
+        name = event_name(one.axis)
+        if name not in one.ds or not one.ds.sizes.get("event"):
+            continue
+        words, values = one.ds["event_kind"].values, one.ds[name].values * scale.factor
+        low, high = ax.get_xlim()
+        for word in dict.fromkeys(words.tolist()):
+            text, marker = _EVENTS.get(word, (word.replace("_", " "), "|"))
+            here = values[(words == word) & (values >= low) & (values <= high)]
+            edge = dataset_color(one) if one.name else QUIET
+            ax.plot(
+                here, np.zeros(here.size), transform=ax.get_xaxis_transform(), ls="none", marker=marker, ms=4.5, mfc="white", mec=edge,
+                mew=0.8, clip_on=False, zorder=5, label=text, gid=f"event {word}",
+            )  # fmt: skip
+
+
+def legend(ax: Axes, named: Mapping[str, Any], left: float = 1.02) -> None:
+    """Name the colours, then the marks on the axis, beside the picture; ``left``: how far, in widths of the Axes."""
+    known = dict(named)
+    for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):
+        known.setdefault(text, handle)
+    if known:
+        small = len(known) > _LONG_LEGEND
+        ax.legend(list(known.values()), list(known), loc="upper left", bbox_to_anchor=(left, 1), fontsize=6.5 if small else 8,
+                  labelspacing=0.35 if small else 0.5)  # fmt: skip
+
+
+def dot(color: Any, marker: str = "o", hollow: bool = False) -> Line2D:
+    """A handle of a legend."""
+    return Line2D([], [], ls="none", marker=marker, ms=4.5, mfc="none" if hollow else color, mec=color, mew=0.8 if hollow else 0.0)

@@ -1,0 +1,96 @@
+"""Measured points from a file: two columns, each with its unit in the header."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from saltus.errors import UnitError, nearest
+from saltus.results.files import ResultFileError
+from saltus.units import to_si
+
+#: ``frequency [Hz]``
+_HEADER = re.compile(r"\s*(?P<name>.*?)\s*\[(?P<unit>[^]]*)\]\s*")
+
+
+def read_measured(path: str | os.PathLike[str], axis: str, axis_unit: str, amplitude_unit: str) -> xr.Dataset:
+    """Points that somebody measured, in SI.
+
+    Parameters
+    ----------
+    path : str or path
+        A CSV file with a column of ``axis`` and one called ``amplitude``, in any order, units in the header: ``frequency [Hz], amplitude
+        [mm]``. Other columns are passed over, lines that begin with # are comments.
+    axis : str
+        What the points are measured over, such as ``frequency``.
+    axis_unit, amplitude_unit : str
+        SI units; those of the file are converted.
+
+    Returns
+    -------
+    Dataset
+        Dim ``point``: ``axis`` and ``amplitude``.
+
+    Raises
+    ------
+    ResultFileError
+        If the file can't be read, lacks a column or a unit, or holds something that isn't a number.
+    """
+    path = Path(path)
+    units = {axis: axis_unit, "amplitude": amplitude_unit}
+    rows = _rows(path)
+    header = next(rows, None)
+    if header is None:
+        raise ResultFileError(f"{path} is empty. Its first line names the columns: {_wanted(units)}.")
+    place = {name: _column(path, header[1], name, unit, units) for name, unit in units.items()}
+    points = np.array([[_number(path, line, row, *place[name]) for name in units] for line, row in rows]).reshape(-1, 2)
+    return xr.Dataset({name: ("point", points[:, i], {"units": unit}) for i, (name, unit) in enumerate(units.items())})
+
+
+def _wanted(units: dict[str, str]) -> str:
+    return ", ".join(f"{name} [{'mm' if unit == 'm' else unit}]" for name, unit in units.items())
+
+
+def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Number and cells of each line that isn't empty or a comment."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            for line, cells in enumerate(csv.reader(file), 1):
+                if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
+                    yield line, cells
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ResultFileError(f"{path} can't be read: {getattr(error, 'strerror', None) or error}.") from None
+
+
+def _column(path: Path, header: list[str], name: str, unit: str, units: dict[str, str]) -> tuple[int, str, str, str]:
+    """Where a column is, its name, the unit it is in, and the one it is wanted in."""
+    found: dict[str, tuple[int, str]] = {}
+    for i, text in enumerate(header):
+        match = _HEADER.fullmatch(text)
+        found[match["name"] if match else text.strip()] = (i, match["unit"].strip() if match else "")
+    if name not in found:
+        raise ResultFileError(f"{path} has no column {name!r}. {nearest(name, found)} The first line must be like {_wanted(units)}.")
+    index, given = found[name]
+    if not given and unit not in ("", "1"):
+        raise ResultFileError(f"{path}: the column {name!r} has no unit. Write it in the header: {_wanted(units)}.")
+    return index, name, given, unit
+
+
+def _number(path: Path, line: int, row: list[str], index: int, name: str, given: str, unit: str) -> float:
+    text = row[index].strip() if index < len(row) else ""
+    try:
+        value = float(text)
+    except ValueError:
+        raise ResultFileError(f"{path}, line {line}: {text!r} in the column {name!r} is no number.") from None
+    if not given:
+        return value
+    try:
+        return to_si(f"{value!r} {given}", unit, name)
+    except UnitError as error:
+        raise ResultFileError(f"{path}: {error}") from None

@@ -1,0 +1,227 @@
+"""Steady responses against truth: the linear oscillator, published orbits, plain runs, mirror twins, bisected bifurcations."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.analysis.polish import close
+from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
+
+ORBITS = {row["name"]: row for row in csv.DictReader((Path(__file__).parents[1] / "reference" / "orbits.csv").open())}
+#: Exponent of a spiral: half of the rate -2 zeta omega_n at which areas shrink [1/s].
+SPIRAL = -0.942477796076938
+
+
+def rig_of(name):
+    row = ORBITS[name]
+    return sl.models.delangre(
+        "c", force=float(row["p_N"]), frequency=float(row["f_Hz"]), contact_stiffness=float(row["Kc_N_per_m"]),
+        lower_gap=float(row["j1_m"]), upper_gap=float(row["j2_m"]),
+    )  # fmt: skip
+
+
+def start_of(name):
+    return np.array([float(ORBITS[name]["x0_m"]), float(ORBITS[name]["v0_m_per_s"])])
+
+
+def points(ds, response):
+    n = max(int(ds.response_period[response]), 1)
+    return np.stack([ds[f"response_{name}"].values[response, :n] for name in ds.attrs["states"].split()], axis=1)
+
+
+@pytest.fixture(scope="module")
+def linear():
+    """The rig without contact and without cubic spring, from three starts."""
+    rig = sl.models.delangre("c", force="4 N", contact_stiffness=0.0, cubic=0.0)
+    return sl.frequency_response(rig, ("3 Hz", "25 Hz", 89), start={"x": [0.0, 1e-3, -2e-3], "v": 0.0})
+
+
+def amplitude(frequency):
+    """Of the linear rig in steady state [m]."""
+    w, wn = 2 * math.pi * frequency, 10 * math.pi
+    return 4 * np.abs(1 - 18 / w**2) / 3 / np.hypot(wn**2 - w**2, 2 * 0.03 * wn * w)
+
+
+# -- closed form ---------------------------------------------------------------------------------------------------------------
+def test_the_linear_oscillator_has_its_closed_form_response(linear):
+    exact = amplitude(linear.response_frequency.values)
+    np.testing.assert_allclose(linear.response_rms, exact / math.sqrt(2), rtol=1e-12)  # whole periods: rms of a sine is exact
+    np.testing.assert_allclose(linear.response_peak, exact, rtol=1e-8)  # a parabola through three of 256 samples: (2 pi/256)^4 / 64
+    np.testing.assert_allclose(linear.response_exponent, SPIRAL, rtol=1e-12)
+
+
+def test_the_linear_oscillator_has_one_branch(linear):
+    assert (linear.type == "periodic").all()
+    assert (linear.period == 1).all()
+    assert (linear.response_of.values == np.arange(89)[:, None]).all()
+    assert (linear.response_branch == 0).all()
+    assert set(linear.event_kind.values.tolist()) <= {"graze"}  # the boundaries that it crosses do nothing, and no branch ends
+
+
+def test_turning_points_of_the_linear_oscillator_are_its_amplitudes():
+    rig = sl.models.delangre("c", force="4 N", contact_stiffness=0.0, cubic=0.0)
+    ds = sl.bifurcation_diagram(rig, {"frequency": ("6 Hz", "20 Hz", 5)}, start=(1e-3, 0.0))
+    exact = amplitude(ds.response_frequency.values)
+    turns = np.sort(ds.sample_x.values[:, :2], axis=1)
+    np.testing.assert_allclose(turns, np.stack([-exact, exact], axis=1), rtol=1e-11)
+    assert ds.sizes["sample"] == 2
+
+
+# -- orbits of the rig -----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", list(ORBITS))
+def test_published_orbits_are_found(name):
+    """From a start beside each; orbits of two independent integrators to 15 digits."""
+    rig, start, row = rig_of(name), start_of(name), ORBITS[name]
+    ds = sl.bifurcation_diagram(rig, {"frequency": np.array([float(row["f_Hz"])])}, start=tuple(start * (1 + 1e-4)), sample="contacts")
+    assert ds.period.item() == int(row["period_in_T"])
+    found = points(ds, 0)
+    assert np.abs((found - start) / np.abs(found).max(axis=0)).max(axis=1).min() < 1e-12
+    assert ds.contacts_per_period.item() * ds.period.item() == pytest.approx(int(row["contact_events_per_period"]))
+    assert ds.rms.item() == pytest.approx(float(row["rms_m"]), rel=1e-5)
+    assert ds.peak.item() == pytest.approx(max(float(row["xmax_m"]), -float(row["xmin_m"])), rel=1e-5)  # a contact's kink is near
+    assert ds.response_exponent.item() == pytest.approx(SPIRAL, rel=1e-10)
+    assert np.isfinite(ds.sample_x.values).sum() == int(row["contact_events_per_period"])
+
+
+def test_many_orbits_are_closed_as_one_is():
+    """The batch against the single Newton method, at parameter values of their own."""
+    rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    starts = np.array([start_of(name) for name in ("B4_15_high", "B4_15_P3", "B4_15_P4")])
+    values = np.tile(np.array(list(rig.values.values())), (3, 1))
+    orbits = close(Family(rig, sl.Taylor(), values), starts * 1.0001, np.array([2, 3, 8]), np.tile([1e-3, 0.1], (3, 1)), 64)
+    assert orbits.period.tolist() == [1, 3, 4]  # the smallest period is found
+    assert orbits.stable.all()
+    for i, name in enumerate(("B4_15_high", "B4_15_P3", "B4_15_P4")):
+        known = np.array(
+            [complex(text.strip("()").replace(" ", "").replace("j", "") + "j") for text in ORBITS[name]["floquet_multipliers"].split(";")]
+        )
+        np.testing.assert_allclose(np.sort_complex(orbits.multipliers[i]), np.sort_complex(known), atol=1e-12)
+        assert orbits.distance(starts, np.tile([1e-3, 0.1], (3, 1)))[i] < 1e-11
+
+
+def test_what_starts_settle_to_is_what_plain_runs_settle_to():
+    rig = sl.models.delangre("b", force="4 N")
+    frequency, x = (grid.ravel() for grid in np.meshgrid([9.0, 15.0, 16.5, 18.0], [-1e-3, 0.2e-3, 1e-3, 5e-3], indexing="ij"))
+    ds = sl.frequency_response(rig, np.array([9.0, 15.0, 16.5, 18.0]), start={"x": [-1e-3, 0.2e-3, 1e-3, 5e-3], "v": 0.0})
+    plain = sl.stroboscope(rig, {"x": x, "v": 0.0}, 3000, 2, values={"frequency": frequency})
+    ends = np.stack([plain.x.values[:, -1], plain.v.values[:, -1]], axis=1)
+    for end, response in zip(ends, ds.response_of.values.ravel(), strict=True):
+        orbit = points(ds, response)
+        assert np.abs((orbit - end) / np.abs(orbit).max(axis=0)).max(axis=1).min() < 1e-7
+
+
+# -- branches ------------------------------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def symmetric():
+    """Case a at 15.5 Hz has two mirror images of one response, of equal amplitude."""
+    x, v = np.meshgrid(np.linspace(-5e-3, 5e-3, 9), np.linspace(-0.5, 0.5, 5))
+    rig = sl.models.delangre("a", force="4 N")
+    return sl.frequency_response(rig, ("15.2 Hz", "15.8 Hz", 4), start={"x": x.ravel(), "v": v.ravel()})
+
+
+def test_mirror_twins_are_two_responses_on_two_branches(symmetric):
+    branches = []
+    for value in symmetric.frequency.values:
+        twins = np.flatnonzero((symmetric.response_frequency == value) & (symmetric.response_period == 2))
+        assert len(twins) == 2
+        assert symmetric.response_rms.values[twins[0]] == pytest.approx(symmetric.response_rms.values[twins[1]], rel=1e-9)
+        assert len(set(symmetric.response_branch.values[twins].tolist())) == 2
+        mirrored = -points(symmetric, twins[1])  # half a period later, which a 2T orbit's points don't show
+        assert np.abs(points(symmetric, twins[0]) - mirrored).max() > 1e-5
+        branches.append(set(symmetric.response_branch.values[twins].tolist()))
+    assert branches == branches[:1] * 4  # both are followed from value to value
+
+
+def test_sweeps_up_and_down_stay_on_different_branches():
+    rig = sl.models.delangre("b", force="4 N")
+    up, down = (sl.frequency_response(rig, ("11 Hz", "19 Hz", 17), start=f"sweep_{way}") for way in ("up", "down"))
+    at = float(np.flatnonzero(up.frequency.values == 15.0)[0])
+    assert up.peak.values[int(at), 0] > 5 * down.peak.values[int(at), 0]
+    assert up.peak.values[0, 0] == pytest.approx(down.peak.values[0, 0], rel=1e-9)
+    assert up.peak.values[-1, 0] == pytest.approx(down.peak.values[-1, 0], rel=1e-9)
+    assert (np.diff(up.peak.values[:, 0]) > 0).sum() > (np.diff(down.peak.values[:, 0]) > 0).sum()
+
+
+def doubling_by_bisection(low, high):
+    """Stiffness at which the multiplier of the 17 Hz response passes -1: the root of det(M + I)."""
+
+    def gap(stiffness):
+        rig = sl.models.delangre("c", force="4 N", frequency="17 Hz", contact_stiffness=stiffness)
+        from saltus.analysis.orbits import polish
+
+        orbit = polish(Stroboscope(rig, sl.Taylor()), start_of("C4_17_K7694"), 1, np.array([1e-3, 0.1]))
+        return np.linalg.det(orbit.monodromy[0] + np.eye(2))
+
+    side = gap(low) > 0
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if (gap(middle) > 0) == side else (low, middle)
+    return low
+
+
+def test_the_period_doubling_is_where_a_multiplier_passes_minus_one():
+    rig = sl.models.delangre("c", force="4 N", frequency="17 Hz")
+    ds = sl.bifurcation_diagram(rig, {"contact_stiffness": ("7.6 kN/m", "8.8 kN/m", 13)}, start=(0.32e-3, 0.0), sample="stroboscope")
+    assert ds.event_kind.values.tolist() == ["period_doubling"]
+    assert abs(ds.event_contact_stiffness.item() - doubling_by_bisection(7.6e3, 8.8e3)) < 50.0 + 1e-6  # half a step of the grid
+    assert np.unique(ds.period).tolist() == [1, 2]
+
+
+def test_a_graze_is_where_the_margin_vanishes():
+    rig = sl.models.delangre("c", force="1.5 N", frequency="4 Hz")
+    ds = sl.frequency_response(rig, ("3.4 Hz", "3.9 Hz", 26), follow=True)
+    grazes = np.flatnonzero(ds.event_kind == "graze")
+    assert len(grazes) >= 1
+    for event in grazes:
+        near = np.abs(ds.response_frequency.values - ds.event_frequency.values[event]).argsort()[:2]
+        far = np.abs(ds.response_frequency.values - ds.event_frequency.values[event]).argsort()[4:]
+        assert ds.response_margin.values[near].min() < ds.response_margin.values[far].min()
+        contacts = ds.response_contacts.values[near]
+        assert contacts[0] != contacts[1]
+
+
+# -- methods -------------------------------------------------------------------------------------------------------------------
+def test_turning_points_of_ode45_come_to_the_exact_ones_as_its_tolerance_shrinks():
+    rig = sl.models.delangre("c", force="4 N", frequency="17 Hz")
+    stiffness = {"contact_stiffness": np.array([7e3, 2e4])}
+    exact = sl.bifurcation_diagram(rig, stiffness, start=(0.32e-3, 0.0))
+    errors = []
+    for rtol in (1e-6, 1e-8, 1e-10):
+        ds = sl.bifurcation_diagram(rig, stiffness, start=(0.32e-3, 0.0), method=sl.ODE45(rtol, rtol * 1e-3))
+        assert ds.period.values.tolist() == exact.period.values.tolist()
+        errors.append(np.nanmax(np.abs(np.sort(ds.sample_x.values) - np.sort(exact.sample_x.values))) / np.nanmax(exact.sample_x.values))
+    assert errors[0] > 10 * errors[1] > 10 * errors[2]
+    assert errors[2] < 1e-7  # what the cubics between 400 samples a period leave
+
+
+def test_a_method_compared_with_itself_differs_by_nothing_and_with_a_coarser_one_by_its_error():
+    rig = sl.models.delangre("c", force="4 N", frequency="5 Hz")
+    methods = [sl.ODE45(1e-4, 1e-7), sl.ODE45(1e-6, 1e-9)]
+    vary = {"contact_stiffness": ("1e3 N/m", "1e4 N/m", 9, "log")}
+    ds = sl.compare_methods(rig, "bifurcation_diagram", methods, vary=vary, start=(0.32e-3, 0.0), sample="stroboscope")
+    assert ds.method.values.tolist() == ["Taylor", "ode45 located (0.0001, 1e-07)", "ode45 located (1e-06, 1e-09)"]
+    assert (ds.agrees[0] == 1).all()
+    assert (ds.known[0] == 1).all()
+    assert not ds.step_error[0].any()
+    assert not ds.orbit_distance[0].any()
+    assert 20 < np.median(ds.step_error[1] / ds.step_error[2]) < 500  # a hundred times the tolerance, a hundred times the error
+    assert (ds.step_error[2] > 0).all()
+    assert (ds.steps_per_period[2] > ds.steps_per_period[1]).all()
+    assert (ds.method_cpu_seconds > 0).all()
+
+
+def test_one_period_errors_are_those_of_plain_runs():
+    rig = sl.models.delangre("c", force="4 N", frequency="5 Hz", contact_stiffness=2e4)
+    method = sl.ODE45(1e-4, 1e-7, events="ignore")
+    ds = sl.compare_methods(rig, sl.bifurcation_diagram, [method], vary={"contact_stiffness": np.array([2e4])}, start=(0.32e-3, 0.0))
+    run = sl.bifurcation_diagram(rig, {"contact_stiffness": np.array([2e4])}, start=(0.32e-3, 0.0), sample="stroboscope")
+    start = points(run, 0)
+    ends = [sl.simulate(rig, start, periods=1, method=one, samples=200) for one in (method, sl.Taylor())]
+    ranges = [np.ptp(ends[1][name].values) for name in ("x", "v")]
+    errors = [np.abs(ends[0][f"end_{name}"] - ends[1][f"end_{name}"]).item() / size for name, size in zip(("x", "v"), ranges, strict=True)]
+    assert ds.step_error.values[1, 0] == pytest.approx(max(errors), rel=0.02)  # the range is taken from 32 looks a period

@@ -1,0 +1,294 @@
+"""Pictures of steady responses: every response in its place and colour, whatever part of a Dataset is drawn."""
+
+import io
+import time
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.colors import same_color, to_rgb
+
+from saltus.errors import ParameterError
+from saltus.plot import bifurcation_diagram, frequency_response, kinds, palette, response_points, type_map
+from saltus.results import Guards, ResultFileError
+
+from .responses_data import cascade, kinds_map, resonance, responses
+
+
+def texts(ax):
+    return [one.get_text() for one in ax.get_legend().get_texts()]
+
+
+def layer(ax, gid):
+    """x and y of what is drawn under a name."""
+    (line,) = [one for one in ax.lines if one.get_gid() == gid]
+    return np.asarray(line.get_xdata(), dtype=float), np.asarray(line.get_ydata(), dtype=float)
+
+
+def all_points(ax, start="kind"):
+    lines = [one for one in ax.lines if str(one.get_gid()).startswith(start)]
+    return np.sort_complex(np.concatenate([one.get_xdata() + 1j * one.get_ydata() for one in lines]))
+
+
+@pytest.fixture(scope="module")
+def peak():
+    return resonance()
+
+
+@pytest.fixture(scope="module")
+def diagram():
+    return cascade(200, keep=40)
+
+
+# -- kinds ---------------------------------------------------------------------------------------------------------------------
+def test_a_kind_has_one_colour_whatever_else_is_there():
+    assert kinds.codes(["periodic", "periodic", "chaotic", "quasi_periodic", "periodic"], [1, 3, 0, 0, 24]).tolist() == [
+        1, 3, kinds.CHAOTIC, kinds.QUASI_PERIODIC, kinds.LONG]  # fmt: skip
+    a, b = frequency_response(resonance()), bifurcation_diagram(cascade(200, keep=40))
+    for code in ("kind 1", "kind 3", f"kind {kinds.CHAOTIC}"):
+        first, second = (next(one for one in ax.lines if one.get_gid() == code).get_markerfacecolor() for ax in (a, b))
+        assert same_color(first, second)
+
+
+@pytest.mark.parametrize("dots", [True, False])
+def test_kinds_are_far_apart(dots):
+    lab = palette.oklab(np.array([kinds.color(code, dots) for code in range(1, kinds.CHAOTIC + 1)]))
+    far = np.linalg.norm(lab[:, None] - lab[None], axis=-1)[~np.eye(len(lab), dtype=bool)]
+    assert far.min() > 0.06  # one just noticeable difference is about 0.02
+
+
+def test_long_periods_are_named():
+    periods = np.array([1, 24, 36])
+    assert kinds.label(kinds.LONG, periods) == "24T, 36T"
+    assert kinds.label(kinds.LONG, np.arange(40)) == f"{kinds.OWN_HUES + 1}T to 39T"
+    assert [kinds.label(code, periods) for code in (1, 2, kinds.QUASI_PERIODIC, kinds.CHAOTIC)] == ["T", "2T", "quasi-periodic", "chaotic"]
+
+
+# -- frequency response --------------------------------------------------------------------------------------------------------
+def test_every_response_is_drawn_once(peak):
+    ax = frequency_response(peak)
+    expected = np.sort_complex(peak["response_frequency"].values + 1e3j * peak["response_rms"].values)
+    assert np.allclose(all_points(ax), expected)
+    assert texts(ax) == ["T", "3T", "24T", "chaotic", "fold", "graze", "onset of chaos"]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency [Hz]", "steady rms of x [mm]")
+    assert ax.get_ylim()[0] == 0
+
+
+def test_lines_join_neighbours_on_a_branch_only(peak):
+    x, y = layer(frequency_response(peak), "branches 1")
+    pieces = np.split(y, np.flatnonzero(np.isnan(x)))
+    steps = [np.nanmax(np.abs(np.diff(piece)), initial=0) for piece in pieces]
+    assert len(pieces) == 3  # below the chaotic band, above it, and the upper branch
+    assert max(steps) < 0.3  # [mm]; the branches lie 0.4 mm apart
+
+
+def test_peaks_instead(peak):
+    ax = frequency_response(peak, quantity="peak")
+    assert np.allclose(all_points(ax).imag.max(), 1e3 * peak["response_peak"].values.max())
+    assert ax.get_ylabel() == "peak |x| [mm]"
+
+
+@pytest.mark.parametrize("part", [{"frequency": slice(14, 17)}, {"frequency": [16.0, 20.0]}])
+def test_a_part_is_drawn_alone(peak, part):
+    ax = frequency_response(peak.sel(part))
+    left = peak.sel(part)["frequency"].values
+    assert np.isin(all_points(ax).real, left).all()
+    assert all_points(ax).size == np.isin(peak["response_frequency"].values, left).sum()
+
+
+def test_one_start_is_drawn_alone(peak):
+    ax = frequency_response(peak.isel(start=[0]))
+    assert all_points(ax).size == (peak["response_of"].values[:, 0] >= 0).sum()
+
+
+def test_a_response_that_no_start_leads_to_stays(peak):
+    share = np.where(peak["response_period"].values == 24, 0.0, 0.5)
+    ds = peak.assign(response_share=("response", share)).isel(start=[0])
+    ds["response_of"] = ds["response_of"].where(~np.isin(ds["response_of"], np.flatnonzero(share == 0)), -2)
+    assert "24T" in texts(frequency_response(ds))
+
+
+def test_several_are_drawn_over_each_other(peak):
+    ax = frequency_response({"exact": peak, "ode45": resonance(shift=0.5)})
+    assert texts(ax)[:2] == ["exact", "ode45"]
+    assert layer(ax, "dataset exact")[0].size == peak.sizes["response"]
+    first, second = (next(one for one in ax.lines if one.get_gid() == f"dataset {name}") for name in ("exact", "ode45"))
+    assert first.get_marker() != second.get_marker()
+    assert not same_color(first.get_markeredgecolor(), second.get_markeredgecolor())
+
+
+def test_events_are_marked_on_the_axis(peak):
+    ax = frequency_response(peak)
+    assert layer(ax, "event fold")[0].tolist() == [15.0, 19.0]
+    assert not [one for one in frequency_response(peak, events=False).lines if str(one.get_gid()).startswith("event")]
+    assert layer(frequency_response(peak.sel(frequency=slice(14, 17))), "event fold")[0].tolist() == [15.0]
+
+
+# -- measured points -----------------------------------------------------------------------------------------------------------
+def test_measured_points_from_a_file_are_converted(peak, tmp_path):
+    file = tmp_path / "points.csv"
+    file.write_text("# from the shaker\namplitude [um], note, frequency [rad/s]\n1500,a,100\n2000,b,120\n\n", encoding="utf-8")
+    x, y = layer(frequency_response(peak, measured=file), "measured")
+    assert np.allclose(x, np.array([100, 120]) / (2 * np.pi))
+    assert np.allclose(y, [1.5, 2.0])
+
+
+def test_measured_points_from_a_dataset(peak):
+    points = xr.Dataset({"frequency": ("i", [16.0], {"units": "Hz"}), "amplitude": ("i", [1.7], {"units": "mm"})})
+    ax = frequency_response(peak, measured=points)
+    assert [float(one[0]) for one in layer(ax, "measured")] == pytest.approx([16.0, 1.7])
+    assert "measured" in texts(ax)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty. Its first line names the columns: frequency"),
+        ("frequency,amplitude [mm]\n1,2\n", r"'frequency' has no unit.*frequency \[Hz\], amplitude \[mm\]"),
+        ("freqency [Hz],amplitude [mm]\n1,2\n", "no column 'frequency'.*freqency"),
+        ("frequency [Hz],amplitude [mm]\n1,two\n", "line 2: 'two' in the column 'amplitude' is no number"),
+        ("frequency [Hz],amplitude [mm]\n1\n", "line 2: '' in the column 'amplitude' is no number"),
+        ("frequency [Hz],amplitude [kg]\n1,2\n", "points.csv.*kg"),
+    ],
+)
+def test_measured_files_are_refused_with_a_reason(peak, tmp_path, text, message):
+    (tmp_path / "points.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(ResultFileError, match=message):
+        frequency_response(peak, measured=tmp_path / "points.csv")
+
+
+def test_a_measured_file_that_is_not_there(peak, tmp_path):
+    with pytest.raises(OSError, match=r"nowhere\.csv can't be read"):
+        frequency_response(peak, measured=tmp_path / "nowhere.csv")
+
+
+def test_measured_datasets_need_units(peak):
+    points = xr.Dataset({"frequency": ("i", [16.0]), "amplitude": ("i", [1.7], {"units": "mm"})})
+    with pytest.raises(ParameterError, match="frequency has no attribute units"):
+        frequency_response(peak, measured=points)
+    with pytest.raises(ParameterError, match="has no 'amplitude'"):
+        frequency_response(peak, measured=points[["frequency"]])
+
+
+# -- bifurcation diagram -------------------------------------------------------------------------------------------------------
+def test_every_sample_is_drawn(diagram):
+    ax = bifurcation_diagram(diagram)
+    there = np.isfinite(diagram["sample_x"].values)
+    x = np.broadcast_to(diagram["response_contact_stiffness"].values[:, None], there.shape)[there]
+    assert np.allclose(all_points(ax), np.sort_complex(x + 1e3j * diagram["sample_x"].values[there]))
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("contact stiffness [N/m]", "x at rest [mm]")
+
+
+def test_the_axis_is_logarithmic_as_the_grid_is(diagram):
+    assert bifurcation_diagram(diagram).get_xscale() == "log"
+    assert bifurcation_diagram(resonance()).get_xscale() == "linear"
+
+
+@pytest.mark.parametrize(
+    ("values", "log"),
+    [(np.geomspace(1, 1e6, 50), True), (np.geomspace(1, 2, 9), True), (np.linspace(1, 1e6, 50), False), (np.array([1.0, 10.0]), False),
+     (np.linspace(-1, 1, 5), False), (np.geomspace(1, 1e6, 50)[[0, 3, 4, 20]], False)],
+)  # fmt: skip
+def test_grids_even_in_their_logarithms(values, log):
+    assert response_points.is_log(values) is log
+
+
+def test_without_samples_whole_periods_are_drawn():
+    ax = bifurcation_diagram(resonance())
+    assert ax.get_ylabel() == "x at whole periods [mm]"
+    assert layer(ax, "kind 3")[0].size % 3 == 0
+
+
+def test_gaps_are_dashed_and_named(diagram):
+    ax = bifurcation_diagram(diagram)
+    assert [one.get_text() for one in ax.texts] == ["lower gap\n\N{MINUS SIGN}0.2 mm", "upper gap\n0.4 mm"]
+
+
+def test_a_gap_that_the_parameter_moves_is_a_curve():
+    values = np.linspace(1e-3, 2e-3, 5)
+    rows = [(i, 0, "periodic", 1, 1e-3, [0.5e-3]) for i in range(5)]
+    x, y = layer(bifurcation_diagram(responses(values, rows, axis="gap", guards=Guards(("stop",), ("x",), values[None]))), "gap")
+    assert np.allclose(x, y)
+    assert np.allclose(y, 1e3 * values)
+
+
+def test_the_other_state(diagram):
+    assert bifurcation_diagram(diagram, state="v").get_ylabel() == "v at rest [m/s]"
+    with pytest.raises(ParameterError, match="no state 'vv'"):
+        bifurcation_diagram(diagram, state="vv")
+
+
+def test_thousands_of_responses_are_quick_and_small_in_vector_files():
+    ds = cascade(3000, keep=100)
+    begin = time.perf_counter()
+    ax = bifurcation_diagram(ds)
+    file = io.BytesIO()
+    ax.figure.savefig(file, format="pdf")
+    assert time.perf_counter() - begin < 5
+    assert file.tell() < 2e6
+
+
+# -- map -----------------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("log", [True, False])
+def test_every_cell_has_the_colour_of_its_kind(log):
+    ds = kinds_map(log=log)
+    ax = type_map(ds)
+    image = (ax.collections[0] if log else ax.images[0]).get_array()
+    cells = np.asarray(image).reshape(30, 40, -1)[..., :3].swapaxes(0, 1) / 255
+    for i, j in ((20, 10), (35, 25), (10, 3)):
+        code = int(kinds.codes([ds["type"].values[i, j, 0]], [ds["period"].values[i, j, 0]])[0])
+        assert np.allclose(cells[i, j], kinds.color(code, dots=False), atol=1 / 255)
+    assert np.allclose(cells[0, 0], to_rgb("white"))
+    assert ax.get_yscale() == ("log" if log else "linear")
+    assert ax.get_title(loc="left") == "x = 0.32 mm, v = 0 m/s"
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency [Hz]", "contact stiffness [N/m]" if log else "contact stiffness [MN/m]")
+
+
+def test_shares_add_up():
+    shares = [float(text.split(", ")[-1].strip("<> %")) for text in texts(type_map(kinds_map()))]
+    assert sum(shares) == pytest.approx(100, abs=1)
+    assert "escaped, 0.8 %" in texts(type_map(kinds_map()))
+
+
+# -- what is refused -----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("draw", [frequency_response, bifurcation_diagram])
+def test_two_parameters_want_a_choice(draw):
+    with pytest.raises(ParameterError, match=r"frequency and contact_stiffness: choose one value, such as ds.isel\(contact_stiffness=0\)"):
+        draw(kinds_map())
+    ax = draw(kinds_map().isel(contact_stiffness=12))
+    assert all_points(ax).size == 40
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: type_map(resonance()), "two parameters, this Dataset has frequency"),
+        (lambda: type_map(kinds_map(), start=3), "no start 3"),
+        (lambda: frequency_response({}), "nothing to draw"),
+        (lambda: frequency_response({str(i): resonance(5) for i in range(9)}), "8 Datasets apart, not 9"),
+        (lambda: frequency_response({"a": resonance(5), "b": cascade(5, keep=5)}), "over contact_stiffness, frequency"),
+        (lambda: frequency_response(resonance(5), quantity="mean"), "Known: rms, peak"),
+        (lambda: frequency_response(resonance(5).drop_vars("response_rms")), "misses response_rms"),
+        (lambda: frequency_response(xr.Dataset()), "saltus_result"),
+        (lambda: bifurcation_diagram(3), "not a int"),
+    ],
+)
+def test_what_does_not_fit_is_refused(call, message):
+    with pytest.raises(ParameterError, match=message):
+        call()
+
+
+def test_nothing_found_is_an_empty_picture():
+    ax = frequency_response(responses(np.array([1.0, 2.0, 3.0]), []))
+    assert not all_points_or_none(ax)
+    bifurcation_diagram(responses(np.array([1.0, 2.0, 3.0]), []))
+
+
+def all_points_or_none(ax):
+    return [one for one in ax.lines if str(one.get_gid()).startswith("kind")]
+
+
+def test_axes_of_the_caller_are_used(peak):
+    _, ax = plt.subplots()
+    assert frequency_response(peak, ax=ax) is ax
