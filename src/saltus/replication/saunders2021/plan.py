@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from saltus.replication.job import Job
-from saltus.replication.saunders2021 import compute
+from saltus.replication.saunders2021 import compute, compute_responses
 from saltus.study.read import read
 from saltus.study.spec import Study
 
@@ -25,6 +26,11 @@ SCOUTS = 1024, 256
 FOLLOWED, KEPT = 320, 64
 #: Half-width of the bunch of starts around each start of Fig. 5 [m]: less than an experiment can set. Starts in it: full, quick.
 NANOMETRE, BUNCH = 1e-9, (101, 21)
+#: Values of a frequency response and of a bifurcation diagram in a quick run, starts taken of those in the study file (every so manieth),
+#: periods that a start is followed at most; the full run has those of the study file.
+QUICK_FREQUENCIES, QUICK_STIFFNESSES, QUICK_EVERY, QUICK_PERIODS = 57, 181, 4, 400
+#: Frequencies in a quick run for ode45 at the tight tolerances, which is slow.
+QUICK_TIGHT = 8
 #: A basin smaller than this share of the starts is looked at on its own.
 RARE = 0.01
 
@@ -32,7 +38,8 @@ RARE = 0.01
 def jobs(folder: Path, quick: bool) -> list[Job]:
     """All jobs, each after those that it needs."""
     plan = _Plan(folder, quick)
-    return [*plan.fig2(), *plan.fig4(), *plan.fig5(), *plan.maps("fig6"), *plan.fig8(), *plan.fig11(), *plan.fig13()]
+    early = [*plan.fig2(), *plan.fig3(), *plan.fig4(), *plan.fig5(), *plan.maps("fig6")]
+    return [*early, *plan.fig7(), *plan.fig8(), *plan.fig11(), *plan.fig13()]
 
 
 def map_name(figure: str, name: str) -> str:
@@ -83,6 +90,42 @@ class _Plan:
             self._job("fig5/halved", compute.halved, study, "fig5/attractors", method=TAYLOR),
             self._job("fig5/beside", compute.beside, study, method=TAYLOR, distance=NANOMETRE, count=count, keep=97),
         ]
+
+    def fig3(self) -> list[Job]:
+        """Six frequency responses, exact and, at fewer frequencies, by ode45."""
+        return self._responses("fig3")
+
+    def fig7(self) -> list[Job]:
+        """Three frequency responses and three bifurcation diagrams, each in three ways, and these ways side by side."""
+        made = self._responses("fig7")
+        for panel in "abcdef":
+            three = [job for job in made if job.name.startswith(f"fig7/{panel}, ")]
+            settings = {**{key: value for key, value in three[0].settings.items() if key != "method"}, "methods": [ON, OFF]}
+            made.append(Job(f"fig7/{panel}, compared", settings, compute_responses.compared, tuple(job.name for job in three)))
+        return made
+
+    def _responses(self, name: str) -> list[Job]:
+        """A job for each [[frequency_response]] and [[bifurcation_diagram]] of a study file."""
+        text = tomllib.loads((self.folder / f"{name}.toml").read_text(encoding="utf-8"))
+        made = []
+        for question in ("frequency_response", "bifurcation_diagram"):
+            for table in text.get(question, []):
+                asked = {key: value for key, value in table.items() if key not in ("name", "method", "measured")}
+                settings = {
+                    "question": question, "system": text["system"], "method": table.get("method", TAYLOR),
+                    "table": self._smaller(asked, question, table.get("method", TAYLOR) == TIGHT) if self.quick else asked,
+                }  # fmt: skip
+                made.append(Job(f"{name}/{table['name']}", settings, compute_responses.responses))
+        return made
+
+    def _smaller(self, table: dict[str, Any], question: str, tight: bool) -> dict[str, Any]:
+        """A table of a quick run."""
+        if question == "bifurcation_diagram":
+            vary = {name: {**given, "count": QUICK_STIFFNESSES} for name, given in table["vary"].items()}
+            return {**table, "vary": vary, "periods": QUICK_PERIODS}
+        start = {name: value[::QUICK_EVERY] if isinstance(value, list) else value for name, value in table["start"].items()}
+        frequency = {**table["frequency"], "count": QUICK_TIGHT if tight else QUICK_FREQUENCIES}
+        return {**table, "frequency": frequency, "start": start, "periods": QUICK_PERIODS}
 
     def maps(self, name: str) -> list[Job]:
         """A job for each basin map of a study file."""
