@@ -13,9 +13,9 @@ from saltus.analysis.uncertainty import (
     smallest_basin,
     uncertain_share,
     uncertainty_exponent,
-    wilson,
 )
 from saltus.errors import ParameterError
+from saltus.results.intervals import wilson
 
 
 def split(n: int, place: int) -> np.ndarray:

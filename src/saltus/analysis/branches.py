@@ -42,8 +42,8 @@ class Event:
     value : float
         Middle of the two values [SI].
     kind : str
-        ``graze`` (contacts come or go), ``period_doubling``, ``fold``, ``torus``, ``chaos`` (its starts are chaotic beyond), or ``end`` (it
-        isn't found any more).
+        ``graze`` (contacts come or go), ``period_doubling``, ``fold``, ``neimark_sacker`` (a torus is born), ``chaos`` (its starts are
+        chaotic beyond), or ``end`` (it isn't found any more).
     branch : int
         Its number.
     """
@@ -143,7 +143,7 @@ def _end(found: Found, table: AttractorTable, last: int, values: np.ndarray, num
     if len(starts) and (found.steady.kind.reshape(found.of.shape)[beyond, starts] == CHAOTIC).any():
         return [Event(value, "chaos", number)]
     if abs(multiplier) > TURNING and abs(multiplier.imag) > 1e-9:
-        return [Event(value, "torus", number)]
+        return [Event(value, "neimark_sacker", number)]
     if multiplier.real > FOLDING and abs(multiplier.imag) <= 1e-9:
         return [Event(value, "fold", number)]
     return [Event(value, "end", number)]

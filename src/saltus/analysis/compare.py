@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import linear_sum_assignment
 
-from saltus.analysis.uncertainty import wilson
 from saltus.errors import ParameterError
 from saltus.results.basins import agreement_dataset
+from saltus.results.intervals import wilson
 from saltus.results.schema import BASINS, attractor_name, axes_of, check, states_of
 
 #: Largest distance of two orbits that count as one, in units of the axis ranges: far above what methods differ by on one attractor,

@@ -16,11 +16,11 @@ from saltus.analysis.compare import compare
 from saltus.analysis.frequency_response import frequency_response
 from saltus.analysis.method_errors import cell_agreement, one_period_errors, orbit_distances
 from saltus.analysis.starts import check_system
-from saltus.analysis.uncertainty import wilson
 from saltus.errors import ParameterError
 from saltus.flow.family import Family
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
 from saltus.results import methods_dataset
+from saltus.results.intervals import wilson
 from saltus.system.system import System
 
 #: The question of Saunders et al. (2021): ode45 as it comes, with and without event location.
@@ -93,15 +93,14 @@ def compare_methods(
         results.append(ds)
         costs.append(cost)
     parts = _of_basins(results) if name == "basins" else _of_responses(system, everything, results, arguments.get("threads"))
-    agreeing, settled = (np.array([int((part == code).sum()) for part in parts["agrees"]]) for code in (1, 0))
-    settled = agreeing + settled
-    ends = np.array([wilson(int(a), int(b)) for a, b in zip(agreeing, settled, strict=True)], float)
-    shares = np.divide(agreeing, settled, out=np.full(len(settled), np.nan), where=settled > 0)
+    agreeing, differing = (np.array([int((part == code).sum()) for part in parts["agrees"]], float) for code in (1, 0))
+    settled = np.where(agreeing + differing > 0, agreeing + differing, np.nan)
+    low, high = wilson(agreeing, settled)
     return methods_dataset(
         base=results[0],
         labels=[method_label(method) for method in everything],
-        columns={"method_cpu_seconds": np.array(costs), "method_agreement": shares, "method_agreement_low": ends[:, 0],
-                 "method_agreement_high": ends[:, 1]},
+        columns={"method_cpu_seconds": np.array(costs), "method_agreement": agreeing / settled, "method_agreement_low": low,
+                 "method_agreement_high": high},
         fields=parts,
         attrs=provenance(system, everything[0], system.values) | {"analysis": name},
     )  # fmt: skip

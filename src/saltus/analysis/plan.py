@@ -25,6 +25,7 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.results import basins_dataset
+from saltus.results.intervals import wilson
 from saltus.results.provenance import to_json
 from saltus.system.system import System
 from saltus.units import to_si
@@ -156,7 +157,7 @@ class BasinPlan:
         exact = Stroboscope(self.system, self.method.companion(), self.every, 1)
         again = settle(exact, self.starts(chosen), found, 2 * self.periods)
         flips = int(np.count_nonzero(again.label != result.label[chosen]))
-        low, high = uncertainty.wilson(flips, len(chosen))
+        low, high = wilson(flips, len(chosen))
         return {"flip_rate": flips / len(chosen), "flip_rate_low": float(low), "flip_rate_high": float(high), "flip_checked": len(chosen)}
 
 

@@ -11,11 +11,11 @@ from saltus.analysis.grid import Grid
 from saltus.analysis.looks import looks
 from saltus.analysis.recurrence import SAME
 from saltus.analysis.steady import CHAOTIC, PERIODIC, QUASI_PERIODIC, Steady, settle_each
-from saltus.analysis.uncertainty import wilson
 from saltus.analysis.wandering import Wandering, alike
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
 from saltus.results import AttractorTable
+from saltus.results.intervals import wilson
 
 #: Words for the kinds of motion.
 KINDS = {PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic"}

@@ -11,10 +11,9 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError
+from saltus.results.intervals import wilson
 from saltus.results.schema import BASINS, NOT_COMPUTED, check
 
-#: Two-sided 95 % quantile of the normal distribution.
-QUANTILE_95 = 1.959963984540054
 #: -ln(0.05): a share p stays unseen in N random cells with probability (1-p)^N < 5 % if p > 3/N.
 RULE_OF_THREE = 3.0
 #: Cells along the side of a box; Daza et al. use 5 in all of their figures.
@@ -26,20 +25,6 @@ FEWEST_DISTANCES = 3
 
 
 # -- shares --------------------------------------------------------------------------------------------------------------------
-def wilson(count: np.ndarray | int, cells: int) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the 95 % score interval of a share ``count / cells``; NaN for no cells.
-
-    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209. Unlike the textbook interval it stays within 0 and 1 and has a width at 0 and at 1.
-    """
-    count = np.asarray(count, dtype=float)
-    if cells == 0:
-        return np.full(count.shape, np.nan), np.full(count.shape, np.nan)
-    share, z2 = count / cells, QUANTILE_95**2
-    centre = (share + z2 / (2 * cells)) / (1 + z2 / cells)
-    half = QUANTILE_95 / (1 + z2 / cells) * np.sqrt(share * (1 - share) / cells + z2 / (4 * cells**2))
-    return np.where(count == 0, 0.0, centre - half), np.where(count == cells, 1.0, centre + half)
-
-
 def fractions(labels: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Share of the starts that lead to each attractor, with a 95 % interval.
 

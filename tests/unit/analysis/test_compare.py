@@ -5,9 +5,10 @@ import pytest
 import xarray as xr
 
 from saltus.analysis.compare import compare
-from saltus.analysis.uncertainty import fractions, wilson
+from saltus.analysis.uncertainty import fractions
 from saltus.errors import ParameterError
 from saltus.results import AttractorTable, basins_dataset, describe, load, save
+from saltus.results.intervals import wilson
 
 X, V = np.linspace(-5e-3, 5e-3, 4), np.linspace(-1.0, 1.0, 3)
 #: Two orbits of period 1 and 2 and a chaotic motion: type, points, peak.
