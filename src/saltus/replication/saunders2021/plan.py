@@ -38,7 +38,7 @@ RARE = 0.01
 def jobs(folder: Path, quick: bool) -> list[Job]:
     """All jobs, each after those that it needs."""
     plan = _Plan(folder, quick)
-    early = [*plan.fig2(), *plan.fig3(), *plan.fig4(), *plan.fig5(), *plan.maps("fig6")]
+    early = [*plan.fig2(), *plan.fig3(), *plan.fig4(), *plan.fig5(), *plan.fig6()]
     return [*early, *plan.fig7(), *plan.fig8(), *plan.fig11(), *plan.fig13()]
 
 
@@ -138,6 +138,15 @@ class _Plan:
             alone = {**table, "basins": {**basins, "axes": axes, "map": [{key: one[key] for key in one if key != "compare"}]}}
             made.append(Job(map_name(name, one["name"]), {"study": alone, "scouts": SCOUTS[self.quick]}, compute.mapped))
         return made
+
+    def fig6(self) -> list[Job]:
+        """Basins at the four frequencies, and at the one that the text names in place of the last."""
+        made = self.maps("fig6")
+        last = next(job for job in made if job.name == "fig6/16 Hz, exact")
+        study = dict(last.settings["study"])
+        (one,) = study["basins"]["map"]
+        study["basins"] = {**study["basins"], "map": [{**one, "name": "16.5 Hz, exact", "values": {"frequency": "16.5 Hz"}}]}
+        return [*made, Job("fig6/16.5 Hz, exact", {**last.settings, "study": study}, compute.mapped)]
 
     def _motions(self, name: str, prefix: str, values: dict[str, str]) -> list[Job]:
         """A motion on each attractor of three maps: exact, ode45 located, not located."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -51,7 +52,7 @@ def grid(data: Data, figure: str, settings: Sequence[str]) -> Figure:
         one = _common(found)
         for ax, look in zip(row, COLUMNS, strict=True):
             _panel(ax, found[look.label], one, look)
-        row[0].set_ylabel(f"{setting.replace(' per ', '/')}\n\n{row[0].get_ylabel()}")
+        row[0].set_ylabel(f"{setting.replace(' per ', '/')}\n{row[0].get_ylabel()}")
         _legend(row[2], one, found[EXACT.label])
     for ax in panels[:-1].flat:
         ax.set_xlabel("")
@@ -90,10 +91,9 @@ def _panel(ax: Axes, ds: xr.Dataset, row: _Row, look: Look) -> None:
     pair = maps.plane(ds, "basin", "replication")
     scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
     maps.draw_cells(ax, ds, pair, scales, paint(row.cells[look.label], colors))
-    boundaries = (0.0, 0.4 if "'b'" in str(ds.attrs.get("case", "")) else np.nan)
-    for place in boundaries:
-        if np.isfinite(place):
-            ax.axvline(place, color="#222222", lw=0.5, ls=(0, (4, 3)), alpha=0.5)
+    values = json.loads(ds.attrs["parameters"])
+    for place in (-values["lower_gap"], values["upper_gap"]):
+        ax.axvline(place * scales[0].factor, color="#222222", lw=0.6, ls=(0, (4, 3)), alpha=0.6)
     share = row.agreement.get(look.label)
     ax.set_title(look.label if share is None else f"{look.label}: {maps.share_text(share)} as exact", fontsize=8)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,9 +14,11 @@ from matplotlib.figure import Figure
 from saltus import analysis
 from saltus.plot import maps
 from saltus.plot.style import display_scale
-from saltus.replication.saunders2021.pictures.looks import EXACT, LOOKS, OFF, ON, Data, lag, periods_of, strobe
+from saltus.replication.saunders2021.pictures.looks import EXACT, LOOKS, OFF, ON, Data, Look, lag, periods_of, strobe
 from saltus.results.schema import kind_text
 
+#: What stands in place of the deviations where there are none: ode45 lacks the attractor, or the exact map does.
+_ABSENT = ("ode45 doesn't find it", "no exact attractor to compare with")
 #: Forcing periods shown in time: at least these.
 SHOWN = 4
 
@@ -65,7 +68,6 @@ def attractors(data: Data, figure: str, setting: str) -> Figure:
 def _row(row: np.ndarray, data: Data, figure: str, setting: str, trio: Trio) -> None:
     n = max(trio.period, 1)
     reference = None
-    largest = {"x": 0.0, "v": 0.0}
     for look in LOOKS:
         number = trio.number[look.end]
         if number < 0:
@@ -75,8 +77,6 @@ def _row(row: np.ndarray, data: Data, figure: str, setting: str, trio: Trio) -> 
         reference = points if reference is None else reference
         shift = lag(reference, points, n) if trio.period else 0
         _curves(row, run, number, n, shift, look)
-        for i, name in enumerate("xv"):
-            largest[name] = max(largest[name], float(np.abs(points[:, i]).max()))
     _deviations(row[2], data, figure, setting, trio)
     run = data[f"{figure}/{setting}, {EXACT.end}, motions"]
     for boundary in run["guard_boundary"].values:
@@ -87,26 +87,26 @@ def _row(row: np.ndarray, data: Data, figure: str, setting: str, trio: Trio) -> 
     row[1].set(xlabel="x [mm]", ylabel="v [mm/s]")
 
 
-def _curves(row: np.ndarray, run: xr.Dataset, number: int, n: int, shift: int, look: object) -> None:
+def _curves(row: np.ndarray, run: xr.Dataset, number: int, n: int, shift: int, look: Look) -> None:
     """Time history and phase portrait of one motion over its last periods."""
     one, period = periods_of(run, number)
     last = max(n, SHOWN)
     begin = round(period[0]) + shift
     inside = (period >= begin - 1e-6) & (period <= begin + last + 1e-6)
-    line = {"color": look.color, "lw": look.width, "ls": look.dashes}  # type: ignore[attr-defined]
-    row[0].plot(period[inside] - begin, one["x"].values[inside] * 1e3, label=look.label, **line)  # type: ignore[attr-defined]
+    line: dict[str, Any] = {"color": look.color, "lw": look.width, "ls": look.dashes}
+    row[0].plot(period[inside] - begin, one["x"].values[inside] * 1e3, label=look.label, **line)
     cycle = (period >= begin - 1e-6) & (period <= begin + n + 1e-6)
     row[1].plot(one["x"].values[cycle] * 1e3, one["v"].values[cycle] * 1e3, **line)
     points = strobe(run, number)
     size = 6.5 if look is EXACT else 3.0
-    row[1].plot(points[:, 0] * 1e3, points[:, 1] * 1e3, "o", ms=size, mfc=look.color, mec="white", mew=0.3, zorder=4)  # type: ignore[attr-defined]
+    row[1].plot(points[:, 0] * 1e3, points[:, 1] * 1e3, "o", ms=size, mfc=look.color, mec="white", mew=0.3, zorder=4)
 
 
 def _deviations(ax: Axes, data: Data, figure: str, setting: str, trio: Trio) -> None:
     """States at whole periods, less the nearest exact one."""
     clouds = deviations(data, figure, setting, trio)
     if not clouds:
-        ax.text(0.5, 0.5, "no exact attractor to compare", ha="center", va="center", transform=ax.transAxes, fontsize=7, color="#555555")
+        ax.text(0.5, 0.5, _ABSENT[trio.number[EXACT.end] < 0], ha="center", va="center", transform=ax.transAxes, fontsize=7, color="#555555")
         ax.set_axis_off()
         return
     every = np.concatenate(list(clouds.values()))
@@ -116,12 +116,8 @@ def _deviations(ax: Axes, data: Data, figure: str, setting: str, trio: Trio) -> 
             cloud = clouds[look.end]
             ax.plot(cloud[:, 0] * scales[0].factor, cloud[:, 1] * scales[1].factor, "o", ms=2.2, mfc=look.color, mec="none", alpha=0.75)
     ax.plot(0, 0, "+", color="#333333", ms=9, mew=1.2)
-    ax.set_xlabel(f"Δx [{_micro(scales[0].unit)}]")
+    ax.set_xlabel(f"Δx [{scales[0].unit}]")
     ax.set_ylabel(f"Δv [{scales[1].unit}]")
-
-
-def _micro(unit: str) -> str:
-    return unit
 
 
 def deviations(data: Data, figure: str, setting: str, trio: Trio) -> dict[str, np.ndarray]:

@@ -7,7 +7,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from saltus import plot
 from saltus.replication.papers import folder_of
@@ -31,8 +33,10 @@ def six_cases(data: Data) -> Figure:
                 label="ode45 (1e-12, 1e-12), located")  # fmt: skip
         ax.set_title(f"case {case[0]}, {case[1:]} N")
         ax.set_yscale("log")
+        sizes = 1e3 * data[f"fig3/{case}, exact"]["response_rms"].values
+        ax.set_ylim(0.7 * sizes.min(), 1.5 * sizes.max())
         ax.set_ylabel("rms of x [mm]")
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        _plain_numbers(ax)
         ax.set_xlabel("")
     for ax in grid[-1]:
         ax.set_xlabel("frequency [Hz]")
@@ -40,9 +44,14 @@ def six_cases(data: Data) -> Figure:
     return figure
 
 
-def _legend_of_kinds(figure: Figure, data: Data) -> None:
-    from matplotlib.lines import Line2D
+def _plain_numbers(ax: Axes) -> None:
+    """0.1, 0.3, 1 in place of powers of ten along a logarithmic axis."""
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
+
+def _legend_of_kinds(figure: Figure, data: Data) -> None:
     from saltus.plot import kinds
 
     codes, periods = set(), []
@@ -65,7 +74,7 @@ def three_stiffnesses(data: Data) -> Figure:
             frequency = np.broadcast_to(ds["frequency"].values[:, None], ds["rms"].shape)
             ax.plot(frequency.ravel(), 1e3 * ds["rms"].values.ravel(), "o", ms=size, mfc=color, mec="none", label=label, rasterized=True)
         ax.set(title=f"({panel})  Kc = {stiffness}", xlabel="frequency [Hz]", yscale="log")
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        _plain_numbers(ax)
     axes[0].set_ylabel("rms of x [mm]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, markerscale=1.5)
     return figure
@@ -107,9 +116,9 @@ def differences(data: Data) -> Figure:
         for number, look in ((1, ON), (2, OFF)):
             _shares(ax, ds, number, look.color, look.label)
         _chaos(ax, ds)
-        ax.set(ylim=(-0.03, 1.03), ylabel="share of Kc")
+        ax.set(ylim=(-0.03, 1.03), ylabel="other than exact")
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.0f} %"))
-        ax.set_title(f"{frequency}: not the exact response (lines, 95 % bands); of these, never settled (dotted); exact response chaotic (grey)")
+        ax.set_title(f"{frequency}")
     for panel, style in zip(PANELS, ("-", (0, (4, 2)), (0, (1, 1.2))), strict=True):
         ds = data[f"fig7/{panel}, compared"]
         for number, look in ((1, ON), (2, OFF)):
@@ -118,7 +127,8 @@ def differences(data: Data) -> Figure:
     axes[3].set(yscale="log", xscale="log", xlabel="contact stiffness Kc [N/m]", ylabel="error after one period")
     axes[3].set_title("Error of one forcing period begun on the exact response, in units of the motion's range (median)")
     axes[3].legend(ncols=3, fontsize=7, loc="upper left")
-    axes[0].legend(loc="upper left")
+    extra = [Line2D([], [], color="#555555", ls=(0, (1, 1.5)), label="of these: never settles"), Patch(fc="#BBBBBB", alpha=0.6, label="exact: chaotic")]
+    axes[0].legend(handles=[*axes[0].get_legend_handles_labels()[0], *extra], loc="upper left", ncols=2)
     return figure
 
 
