@@ -5,8 +5,8 @@ a judge that applies it to the data. Nothing here knows a result in advance.
 """
 
 from saltus.replication.job import Job
-from saltus.replication.papers import Paper, Picture, find, folder_of, names
-from saltus.replication.run import Progress, Replication, reproduce
+from saltus.replication.papers import Numbers, Paper, Picture, find, folder_of, names
+from saltus.replication.run import Progress, Replication, reproduce, verdict_table
 from saltus.replication.verdict import Check, Claim, Finding
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "Claim",
     "Finding",
     "Job",
+    "Numbers",
     "Paper",
     "Picture",
     "Progress",
@@ -22,4 +23,5 @@ __all__ = [
     "folder_of",
     "names",
     "reproduce",
+    "verdict_table",
 ]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from saltus.replication.job import Job
     from saltus.replication.verdict import Claim
+    from saltus.study.table import TextTable
 
 #: Name of each paper: what it is. Its module is saltus.replication.NAME.
 _PAPERS = {
@@ -50,6 +51,28 @@ class Picture:
 
 
 @dataclass(frozen=True)
+class Numbers:
+    """A table of the report.
+
+    Attributes
+    ----------
+    figure : str
+        Number of the paper's figure that it stands with.
+    name : str
+        Its own name, also that of its file.
+    needs : tuple of str
+        Names of the jobs that it is made from.
+    make : callable
+        From Datasets by name to a table.
+    """
+
+    figure: str
+    name: str
+    needs: tuple[str, ...]
+    make: Callable[[Mapping[str, xr.Dataset]], TextTable]
+
+
+@dataclass(frozen=True)
 class Paper:
     """A paper and how it is reproduced.
 
@@ -67,6 +90,8 @@ class Paper:
         In the order of the report.
     claims : tuple of Claim
         In the order of the report.
+    tables : tuple of Numbers
+        In the order of the report.
     """
 
     name: str
@@ -77,6 +102,7 @@ class Paper:
     jobs: Callable[[Path, bool], list[Job]]
     pictures: tuple[Picture, ...]
     claims: tuple[Claim, ...]
+    tables: tuple[Numbers, ...] = ()
 
 
 def names() -> dict[str, str]:

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 from saltus.errors import ParameterError, nearest
 from saltus.flow.threads import usable_processors
 from saltus.replication.job import Job, Shelf
-from saltus.replication.papers import Paper, Picture, folder_of
-from saltus.replication.verdict import Claim, Finding
+from saltus.replication.papers import Numbers, Paper, Picture, folder_of
+from saltus.replication.verdict import VERDICTS, Claim, Finding
 from saltus.results.files import replacing
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from saltus.study.table import TextTable
 
 #: Dots per inch of the pictures: sharp on a phone, and the report stays small enough to mail.
 DPI = 130
@@ -63,6 +65,8 @@ class Replication:
         In the order of the report.
     pictures : list of (Picture, Path)
         In the order of the report.
+    tables : list of (Numbers, TextTable)
+        In the order of the report.
     quick : bool
         Whether sizes were small.
     figures : tuple of str
@@ -83,6 +87,7 @@ class Replication:
     data: dict[str, xr.Dataset] = field(default_factory=dict)
     findings: list[tuple[Claim, Finding]] = field(default_factory=list)
     pictures: list[tuple[Picture, Path]] = field(default_factory=list)
+    tables: list[tuple[Numbers, TextTable]] = field(default_factory=list)
     seconds: float = 0.0
 
 
@@ -137,9 +142,22 @@ def reproduce(
             count = sum(claim.figure == figure for claim in paper.claims)
             say(f"figure {figure} done: {paper.figures[figure]}; {count} {'claim' if count == 1 else 'claims'}")
     result.findings = [(claim, claim.judge(result.data)) for claim in paper.claims if claim.figure in chosen]
+    result.tables = [(one, one.make(result.data)) for one in paper.tables if one.figure in chosen]
+    for one, table in result.tables:
+        table.write_csv(out / PICTURES / f"{one.name}.csv")
     result.seconds = time.perf_counter() - begin
     write_page(result)
     return result
+
+
+def verdict_table(result: Replication) -> TextTable:
+    """A row for each claim: figure, claim, verdict."""
+    from saltus.study.table import TextTable
+
+    rows = tuple((claim.figure, claim.id, claim.says, finding.verdict) for claim, finding in result.findings)
+    counts = [(one, sum(finding.verdict == one for _, finding in result.findings)) for one in VERDICTS]
+    note = ", ".join(f"{count} {one}" for one, count in counts if count)
+    return TextTable(f"Claims of {result.paper.name}", ("fig.", "claim", "what the paper says", "verdict"), rows, (f"{note}.",))
 
 
 def _chosen(paper: Paper, figures: Sequence[str]) -> tuple[str, ...]:
@@ -151,7 +169,7 @@ def _chosen(paper: Paper, figures: Sequence[str]) -> tuple[str, ...]:
 
 def wanted_by(paper: Paper, figure: str) -> set[str]:
     """Names of the jobs that a figure's pictures and claims ask for."""
-    asking = [one.needs for one in (*paper.pictures, *paper.claims) if one.figure == figure]
+    asking = [one.needs for one in (*paper.pictures, *paper.claims, *paper.tables) if one.figure == figure]
     return {name for needs in asking for name in needs}
 
 

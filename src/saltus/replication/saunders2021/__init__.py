@@ -4,6 +4,7 @@ from saltus.replication.papers import Paper
 from saltus.replication.saunders2021.claims import CLAIMS
 from saltus.replication.saunders2021.pictures import PICTURES
 from saltus.replication.saunders2021.plan import jobs
+from saltus.replication.saunders2021.tables import TABLES
 
 FIGURES = {
     "2": "event location, and Table 2", "3": "frequency responses of six cases", "4": "two responses at 17 Hz", "5": "four starts at 15 Hz",
@@ -25,4 +26,5 @@ PAPER = Paper(
     jobs=jobs,
     pictures=PICTURES,
     claims=CLAIMS,
+    tables=TABLES,
 )
