@@ -12,6 +12,7 @@ saltus and heyoka are also compared with themselves at another tolerance (the fl
     python benchmarks/basins.py                 200 x 200 cells
     python benchmarks/basins.py --cells 60      smaller (or larger)
     python benchmarks/basins.py --alone         saltus only
+    python benchmarks/basins.py --write FOLDER  keep the tables for the documentation (python -m benchmarks does that)
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from saltus.study.doctor import processor
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from benchmarks.record import Column, Record, Table
 from benchmarks.rivals import rig
 
 #: Periods that rivals let a trajectory settle, and those they look at: all but some 5 of 2000 cells follow an orbit then.
@@ -47,6 +49,12 @@ LOOK = 12
 TOLERANCE, OTHER_TOLERANCE = 1e-12, 2.0**-52
 #: Periods to settle that the cells are sorted by in the second table.
 SETTLING = (0, 50, 100, 150, 200, 300, 10_000)
+#: What is kept for the documentation.
+COLUMNS = (
+    Column("program"), Column("CPU time of the map [s]", ".1f"), Column("wall time [s]", ".1f"), Column("CPU, times saltus", ".3g"),
+    Column("same label as saltus", ".1%"), Column("cells timed", "d"),
+)  # fmt: skip
+FLOOR_COLUMNS = (Column("programs"), Column("same label", ".1%"), Column("cells", "d"))
 
 
 @dataclass(frozen=True)
@@ -131,12 +139,18 @@ def subset_of(ds: xr.Dataset, count: int, seed: int = 15) -> Subset:
 
 
 # -- rivals --------------------------------------------------------------------------------------------------------------------
-def heyoka(subset: Subset, orbits: Sequence[np.ndarray], whole: int) -> Iterator[Rival]:
+def absent(left_out: list[str], what: str) -> None:
+    """Say, and note, that a rival isn't there."""
+    left_out.append(what)
+    print(f"{what}; left out", file=sys.stderr)
+
+
+def heyoka(subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_out: list[str]) -> Iterator[Rival]:
     """heyoka at two tolerances, and with a loop that stops early; nothing if it isn't installed."""
     try:
         from benchmarks.rivals import heyoka_basins
     except ImportError:
-        print("heyoka isn't installed (pip install 'saltus[reference]'); left out", file=sys.stderr)
+        absent(left_out, "heyoka isn't installed (pip install 'saltus[reference]')")
         return
     plain, early = heyoka_basins.labels, heyoka_basins.labels_early
     for name, tolerance, labels, periods in (
@@ -149,12 +163,12 @@ def heyoka(subset: Subset, orbits: Sequence[np.ndarray], whole: int) -> Iterator
         yield Rival(name, seconds.scaled(whole / subset.cells.size), found, subset.cells.size)  # type: ignore[arg-type]
 
 
-def pynamicalsys(subset: Subset, orbits: Sequence[np.ndarray], whole: int) -> Iterator[Rival]:
+def pynamicalsys(subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_out: list[str]) -> Iterator[Rival]:
     """pynamicalsys; nothing if it isn't installed."""
     try:
         from benchmarks.rivals import pynamicalsys_basins
     except ImportError:
-        print("pynamicalsys isn't installed (pip install pynamicalsys); left out", file=sys.stderr)
+        absent(left_out, "pynamicalsys isn't installed (pip install pynamicalsys)")
         return
     program = pynamicalsys_basins.Rig()
     seconds, clusters = timed(lambda: program.clusters(subset.x, subset.v, PERIODS + KEEP))
@@ -186,21 +200,28 @@ def heading(cells: int) -> None:
     print(f"|{'-' * 38}|----------:|----------:|---------:|------------------:|----------------|")
 
 
-def by_settling(subset: Subset, pairs: dict[str, np.ndarray]) -> None:
+def by_settling(subset: Subset, pairs: dict[str, np.ndarray]) -> Table:
     """Print the share of equal labels by our periods to settle: what differs is decided after many periods on a chaotic saddle."""
     print("\nsame label [%] by how many periods a cell takes to settle:")
     print(f"| {'periods':<42} |" + "".join(f" {f'< {high}' if high < SETTLING[-1] else 'more':>6} |" for high in SETTLING[1:]))
     print(f"|{'-' * 44}|" + "-------:|" * (len(SETTLING) - 1))
-    for name, same in pairs.items():
-        settling = subset.settling[: same.size]
-        groups = [same[(settling >= low) & (settling < high)] for low, high in itertools.pairwise(SETTLING)]
-        print(f"| {name:<42} |" + "".join(f" {100 * group.mean():6.1f} |" if group.size else f" {'':>6} |" for group in groups))
+    shares = {name: _shares(subset.settling[: same.size], same) for name, same in pairs.items()}
+    for name, row in shares.items():
+        print(f"| {name:<42} |" + "".join(f" {'' if share is None else f'{100 * share:.1f}':>6} |" for share in row))
     counts = np.histogram(subset.settling, SETTLING)[0]
     print(f"| {'cells':<42} |" + "".join(f" {count:6d} |" for count in counts))
+    columns = [Column("periods to settle"), *(Column(f"< {high}" if high < SETTLING[-1] else "more", ".0%") for high in SETTLING[1:])]
+    return Table("Same label, by how long a cell takes to settle", columns, [(name, *row) for name, row in shares.items()])
 
 
-def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> None:
-    """Print what is wrong with the cells that saltus and heyoka label differently, and how they agree on the rest."""
+def _shares(settling: np.ndarray, same: np.ndarray) -> list[float | None]:
+    """Share of equal labels in each group of cells by their periods to settle; None for an empty one."""
+    groups = [same[(settling >= low) & (settling < high)] for low, high in itertools.pairwise(SETTLING)]
+    return [float(group.mean()) if group.size else None for group in groups]
+
+
+def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> np.ndarray:
+    """Print what is wrong with the cells that saltus and heyoka label differently; returns where they agree among the steady ones."""
     same, lost = equal(subset.labels, first.labels), first.labels < 0
     our_own, their_own = equal(subset.labels, other), equal(first.labels, second.labels)
     differs = subset.settling[~same]
@@ -213,34 +234,45 @@ def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> N
         print(f"Periods to settle where labels differ: {differs.min()} at least, median {np.median(differs):.0f}; elsewhere median"
               f" {np.median(subset.settling[same]):.0f}")  # fmt: skip
     print(f"Cells that change in neither: saltus and heyoka name the same attractor on {percent(same[our_own & their_own])}")
+    return same[our_own & their_own]
 
 
-def rows(make: Callable[..., Iterator[Rival]], subset: Subset, ds: xr.Dataset, unit: Seconds) -> list[Rival]:
+def rows(make: Callable[..., Iterator[Rival]], subset: Subset, ds: xr.Dataset, unit: Seconds, left_out: list[str]) -> list[Rival]:
     """Run and print one program's rows; no rows if it isn't installed."""
     rivals = []
-    for rival in make(subset, orbits_of(ds), ds.basin.size):
+    for rival in make(subset, orbits_of(ds), ds.basin.size, left_out):
         rivals.append(rival)
         same = equal(subset.labels, rival.labels)
         print(line(rival.name, rival.seconds, unit, percent(same), f"{rival.cells}, scaled"), flush=True)
     return rivals
 
 
-def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int) -> None:
-    """Print the rivals' rows, the floors, and what is wrong where labels differ."""
+def kept_row(name: str, seconds: Seconds, unit: Seconds, same: float | None, cells: int) -> tuple[str | float | None, ...]:
+    """One row of what is kept."""
+    return name, seconds.cpu, seconds.wall, seconds.cpu / unit.cpu, same, cells
+
+
+def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: list[str]) -> tuple[list[tuple], list[Table]]:
+    """Print the rivals' rows, the floors, and what is wrong where labels differ; returns those rows, and the other tables to be kept."""
     with one_core():
-        taylor = rows(heyoka, subset, ds, unit)
-        rivals = taylor + rows(pynamicalsys, subset.first(few), ds, unit)
+        taylor = rows(heyoka, subset, ds, unit, left_out)
+        rivals = taylor + rows(pynamicalsys, subset.first(few), ds, unit, left_out)
         _, again = ours(len(ds.x), 1, method=sl.Taylor(tolerance=OTHER_TOLERANCE))
     other = sl.compare(ds, again)["basin_b"].values.ravel()
     floor = equal(ds.basin.values.ravel(), other)
     pairs = {"saltus, saltus at 2^-52": floor[subset.cells]}
     print("\nThe floor: programs beside themselves at tolerance 2^-52 name the same attractor on")
     print(f"  saltus {percent(floor)} (all cells), {percent(floor[subset.cells])} (the subset)")
+    steady = {}
     if taylor:
         pairs["heyoka, heyoka at 2^-52"] = equal(taylor[0].labels, taylor[1].labels)
         print(f"  heyoka {percent(pairs['heyoka, heyoka at 2^-52'])}")
-        reasons(subset, other[subset.cells], *taylor[:2])
-    by_settling(subset, pairs | {f"saltus, {rival.name}": equal(subset.labels[: rival.cells], rival.labels) for rival in rivals})
+        steady = {"saltus, heyoka, where neither changes at 2^-52": reasons(subset, other[subset.cells], *taylor[:2])}
+    agreeing = {rival.name: equal(subset.labels[: rival.cells], rival.labels) for rival in rivals}
+    kept = [kept_row(rival.name, rival.seconds, unit, float(agreeing[rival.name].mean()), rival.cells) for rival in rivals]
+    floors = [(name, float(same.mean()), int(same.size)) for name, same in (pairs | steady).items() if same.size]
+    settling = by_settling(subset, pairs | {f"saltus, {name}": same for name, same in agreeing.items()})
+    return kept, [Table("The floor: programs beside themselves at another tolerance", FLOOR_COLUMNS, floors), settling]
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -251,6 +283,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--few", type=int, default=400, help="cells that pynamicalsys labels")
     parser.add_argument("--repeats", type=int, default=3, help="runs of ours, of which the fastest counts")
     parser.add_argument("--alone", action="store_true", help="saltus only")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="keep the tables there as basins.json")
     chosen = parser.parse_args(argv)
     ours(6, 1)  # compiles
     heading(chosen.cells)
@@ -259,8 +292,20 @@ def main(argv: Sequence[str] | None = None) -> None:
     print(line("saltus, 1 thread", unit, unit, "", "all cells"), flush=True)
     seconds, _ = ours(chosen.cells, 2, repeats=chosen.repeats)
     print(line("saltus, 2 threads", seconds, unit, "", "all cells"), flush=True)
+    record = Record(
+        "basins",
+        f"Basins of case b4 of the rig of de Langre et al. at 15 Hz, {chosen.cells} x {chosen.cells} cells; rivals on one pinned core, "
+        "timed on a random subset and scaled to the whole map. Finding the attractors is part of saltus's time; rivals are given the "
+        "orbits to compare with.",
+    )
+    kept = [kept_row(f"saltus, {n} thread{'s' * (n > 1)}", time_, unit, None, ds.basin.size) for n, time_ in ((1, unit), (2, seconds))]
+    tables: list[Table] = []
     if not chosen.alone:
-        beside(ds, unit, subset_of(ds, chosen.subset), chosen.few)
+        theirs, tables = beside(ds, unit, subset_of(ds, chosen.subset), chosen.few, record.left_out)
+        kept += theirs
+    if chosen.write is not None:
+        record.tables += [Table("A map of basins", COLUMNS, kept), *tables]
+        print(f"kept in {record.write(chosen.write)}")
 
 
 if __name__ == "__main__":

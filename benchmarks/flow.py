@@ -7,6 +7,7 @@ after 5 periods from the 64 grid starts of tests/reference/rig_b4_15hz_5periods.
     python benchmarks/flow.py                 the table of the README
     python benchmarks/flow.py --orders        cost and error by order and tolerance of the series
     python benchmarks/flow.py --memory        memory of a stroboscope run from 1e6 starts
+    python benchmarks/flow.py --write FOLDER  keep the table for the documentation (python -m benchmarks does that)
 """
 
 from __future__ import annotations
@@ -27,9 +28,15 @@ from saltus.study.doctor import processor
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
+from benchmarks.record import Column, Record, Table  # noqa: E402
 from benchmarks.rivals import rig  # noqa: E402
 
 PERIODS = 100
+#: What is kept for the documentation.
+COLUMNS = (
+    Column("program"), Column("median error after 5 periods [m]", ".1e"), Column("largest error [m]", ".1e"),
+    Column("CPU time of a forcing period [µs]", ".3g"), Column("times saltus", ".3g"), Column("contacts a period", ".3f"),
+)  # fmt: skip
 
 
 def reference() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -58,8 +65,8 @@ def line(name: str, us: float, errors: np.ndarray, contacts: float, fastest: flo
     return f"| {name:<42} | {np.median(errors):9.1e} | {errors.max():9.1e} | {us:10.3f} | {us / fastest:9.1f} | {contacts:8.3f} |"
 
 
-def rows(count: int) -> Iterator[tuple[str, float, np.ndarray, float]]:
-    """(name, microseconds per period, errors, contacts per period) of everyone."""
+def rows(count: int, left_out: list[str]) -> Iterator[tuple[str, float, np.ndarray, float]]:
+    """(name, microseconds per period, errors, contacts per period) of everyone; who isn't there is noted in ``left_out``."""
     x, v = rig.starts(count)
     for method in (sl.Taylor(), sl.Taylor(tolerance=2.0**-52), sl.ODE45(1e-4, 1e-7), sl.ODE45(1e-4, 1e-7, events="ignore")):
         title = f"saltus {method.name} " + (
@@ -70,7 +77,8 @@ def rows(count: int) -> Iterator[tuple[str, float, np.ndarray, float]]:
     try:
         from benchmarks.rivals import heyoka_flow
     except ImportError:
-        print("heyoka isn't installed (pip install 'saltus[reference]'); left out", file=sys.stderr)
+        left_out.append("heyoka isn't installed (pip install 'saltus[reference]')")
+        print(f"{left_out[-1]}; left out", file=sys.stderr)
     else:
         timed = heyoka_flow.measure(x, v, periods=PERIODS, tolerance=1e-12)
         exactness = heyoka_flow.measure(x0, v0, periods=5, tolerance=1e-12)
@@ -81,15 +89,24 @@ def rows(count: int) -> Iterator[tuple[str, float, np.ndarray, float]]:
     yield "scipy DOP853, 1e-12 (4 starts, 5 periods)", few.us_per_period, np.abs(few.end[:, 0] - exact[:4]), few.contacts_per_period
 
 
-def table(count: int) -> None:
-    """Print everyone's row."""
+def table(count: int, folder: Path | None = None) -> None:
+    """Print everyone's row, and keep them in a folder if there is one."""
+    record = Record(
+        "flow",
+        f"Case b4 of the rig of de Langre et al. at 15 Hz, contacts located; {count} starts, {PERIODS} periods (SciPy: 4 starts, "
+        "5 periods); CPU time of one pinned core, smallest of three repeats; errors at 64 starts known to 30 digits.",
+    )
     print(f"{processor()}, one core; {count} starts, {PERIODS} periods; {lane_width()} lanes")
     print(f"| {'':<42} | median m  | largest m | us/period  | times     | contacts |")
     print(f"|{'-' * 44}|----------:|----------:|-----------:|----------:|---------:|")
-    fastest = None
-    for name, us, errors, contacts in rows(count):
+    fastest, kept = None, []
+    for name, us, errors, contacts in rows(count, record.left_out):
         fastest = fastest or us
         print(line(name, us, errors, contacts, fastest), flush=True)
+        kept.append((name, float(np.median(errors)), float(errors.max()), us, us / fastest, contacts))
+    if folder is not None:
+        record.tables.append(Table("One trajectory, one forcing period", COLUMNS, kept))
+        print(f"kept in {record.write(folder)}")
 
 
 def orders(count: int) -> None:
@@ -119,9 +136,10 @@ if __name__ == "__main__":
     parser.add_argument("--starts", type=int, default=2048, help="number of starts (a multiple of 8)")
     parser.add_argument("--orders", action="store_true", help="cost and error by order and tolerance")
     parser.add_argument("--memory", action="store_true", help="memory of a run from 1e6 starts")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="keep the table there as flow.json")
     chosen = parser.parse_args()
     if chosen.memory:
         memory()
     else:
         rig.pin()
-        (orders if chosen.orders else table)(chosen.starts)
+        orders(chosen.starts) if chosen.orders else table(chosen.starts, chosen.write)

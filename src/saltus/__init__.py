@@ -25,10 +25,16 @@ if TYPE_CHECKING:
         bifurcation_diagram,
         compare,
         compare_methods,
+        energy_balance,
         frequency_response,
+        impact_statistics,
+        lyapunov,
+        poincare,
         settled,
         simulate,
+        spectrum,
         stroboscope,
+        wolf,
     )
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import describe, load, save, to_csv, to_mat
@@ -37,21 +43,22 @@ if TYPE_CHECKING:
 #: Public name: module that holds it.
 _HOMES = {
     **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
-    **dict.fromkeys(("compare_methods", "frequency_response", "settled", "simulate", "stroboscope"), "saltus.analysis"),
+    **dict.fromkeys(("compare_methods", "energy_balance", "frequency_response", "impact_statistics", "poincare"), "saltus.analysis"),
+    **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "wolf"), "saltus.analysis"),
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("describe", "load", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
         ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan", "tanh"),
         "saltus.system",
     ),
-}
+}  # fmt: skip
 _MODULES = ("models", "plot")
 
 __all__ = [
     "ODE45", "Interrupted", "System", "Taylor", "abs", "atan", "attractors", "basin_fractions", "basins", "bifurcation_diagram",
-    "compare", "compare_methods", "cos", "describe", "exp", "freeplay", "frequency_response", "load", "log", "max", "min",
-    "models", "pi", "piecewise", "plot", "save", "settled", "simulate", "sin", "sqrt", "stroboscope", "system", "tan", "tanh",
-    "to_csv", "to_mat",
+    "compare", "compare_methods", "cos", "describe", "energy_balance", "exp", "freeplay", "frequency_response",
+    "impact_statistics", "load", "log", "lyapunov", "max", "min", "models", "pi", "piecewise", "plot", "poincare", "save",
+    "settled", "simulate", "sin", "spectrum", "sqrt", "stroboscope", "system", "tan", "tanh", "to_csv", "to_mat", "wolf",
 ]  # fmt: skip
 
 

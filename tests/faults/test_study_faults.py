@@ -28,9 +28,10 @@ from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.store import Store
 from saltus.study import maps
-from saltus.study.maps import Resources, compute, finish, jobs_of, open_store
-from saltus.study.maps_table import attractor_table
+from saltus.study.maps import compute, finish, jobs_of, open_store
+from saltus.study.questions.basins_table import attractor_table
 from saltus.study.read import parse
+from saltus.study.running import Resources
 from small_study import small_study
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and fork are POSIX")
@@ -41,7 +42,7 @@ CHUNKS = 27
 #: there is one to be killed in. With `serve` it loads everything once and forks a child for each line, which starts within milliseconds.
 COMMAND = """
 import json, os, signal, sys, time
-import saltus.analysis.plan, saltus.plot, saltus.study.maps, saltus.study.maps_run, saltus.study.read
+import saltus.analysis.plan, saltus.plot, saltus.study.maps, saltus.study.read, saltus.study.run
 from saltus.cli import main
 from saltus.results.store import Store
 

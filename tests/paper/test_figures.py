@@ -15,9 +15,10 @@ from saltus.analysis import plan
 from saltus.analysis.basins import label_all
 from saltus.analysis.settling import Settling
 from saltus.study import maps
-from saltus.study.maps import Resources, jobs_of
-from saltus.study.maps_run import run_maps
+from saltus.study.maps import jobs_of
 from saltus.study.read import parse, read
+from saltus.study.run import run_study
+from saltus.study.running import Resources
 
 FOLDER = Path(__file__).parents[2] / "replications" / "saunders2021"
 FIGURES = sorted(path.stem for path in FOLDER.glob("fig*.toml"))
@@ -121,7 +122,7 @@ def test_fig_8_has_a_third_attractor_after_the_grazing():
 def test_fig_6b_runs_as_a_study(tmp_path):
     """The whole way, once, from the file as it stands but for its grid."""
     text = tiny("fig6b")
-    outcome = run_maps(parse(text), text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False)
+    outcome = run_study(parse(text), text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False)
     (table,) = outcome.tables
     assert [row[1] for row in table.rows] == ["T", "3T", "4T", "5T", "24T"]
 
@@ -133,7 +134,7 @@ def test_the_maps_of_one_value_run(name, tmp_path, monkeypatch):
     monkeypatch.setattr("saltus.analysis.recurrence.TRAIL", 256)
     text = "[[basins.map]]".join(tiny(name).replace("[basins]", "[basins]\nperiods = 16").split("[[basins.map]]")[:4])
     jobs = jobs_of(parse(text))
-    outcome = run_maps(parse(text), text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False)
+    outcome = run_study(parse(text), text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False)
     assert outcome.waiting == []
     assert {file.name for file in outcome.files if file.suffix == ".nc"} == {f"{job.slug}.nc" for job in jobs} | {
         f"{job.slug}-agreement.nc" for job in jobs if job.compare

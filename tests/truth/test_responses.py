@@ -225,3 +225,13 @@ def test_one_period_errors_are_those_of_plain_runs():
     ranges = [np.ptp(ends[1][name].values) for name in ("x", "v")]
     errors = [np.abs(ends[0][f"end_{name}"] - ends[1][f"end_{name}"]).item() / size for name, size in zip(("x", "v"), ranges, strict=True)]
     assert ds.step_error.values[1, 0] == pytest.approx(max(errors), rel=0.02)  # the range is taken from 32 looks a period
+
+
+def test_ode45_at_the_tightest_tolerance_finds_the_same_responses():
+    """AbsTol 1e-12 is 1e-8 of a motion of 0.1 mm: its noise, not RelTol's."""
+    rig = sl.models.delangre("b", force="4 N")
+    start = {"x": [0.2e-3, -1e-3, 4e-3], "v": 0.0}
+    exact, ode45 = (sl.frequency_response(rig, np.array([9.0, 20.0]), start, method=m) for m in (sl.Taylor(), sl.ODE45(1e-12, 1e-12)))
+    assert (ode45.type == "periodic").all()
+    np.testing.assert_array_equal(ode45.period, exact.period)
+    np.testing.assert_allclose(ode45.rms, exact.rms, rtol=1e-6)

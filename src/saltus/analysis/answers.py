@@ -26,13 +26,17 @@ def shared_values(system: System, group: Ensemble) -> dict[str, float]:
 
 def guards(system: System, group: Ensemble) -> Guards:
     """The guards with their boundaries, one for each trajectory where a varied parameter moves them."""
-    values: Mapping[str, Any] = {**shared_values(system, group), **group.varied}
+    return guards_over(system, {**shared_values(system, group), **group.varied}, (group.size,))
+
+
+def guards_over(system: System, values: Mapping[str, Any], shape: tuple[int, ...]) -> Guards:
+    """The guards with their boundaries; of this shape where a parameter that is given as an array moves one of them."""
     places = []
     for guard in system.guards:
         place = np.nan if guard.boundary is None else evaluate([guard.boundary], values=values)[0]
-        places.append(np.broadcast_to(place, group.size if np.ndim(place) else ()))
+        places.append(np.broadcast_to(place, shape if np.ndim(place) else ()))
     if any(np.ndim(place) for place in places):
-        places = [np.broadcast_to(place, group.size) for place in places]
+        places = [np.broadcast_to(place, shape) for place in places]
     return Guards([g.name for g in system.guards], [g.state for g in system.guards], np.array(places, float))
 
 

@@ -18,7 +18,6 @@ from saltus.analysis.polish import close
 from saltus.analysis.recurrence import LONGEST, SAME
 from saltus.analysis.responses import Found
 from saltus.analysis.steady import CHAOTIC, PERIODIC
-from saltus.flow.family import EXACT
 from saltus.flow.methods import Method
 from saltus.results import AttractorTable
 
@@ -75,7 +74,7 @@ def _continued(found: Found, grid: Grid, method: Method, threads: int | None) ->
     onward = np.full(len(found), -1, np.int64)
     rows = np.flatnonzero((found.kind == PERIODIC) & (found.place < grid.places - 1))
     family = grid.family(method, threads)
-    if not len(rows) or family.noise > EXACT:
+    if not len(rows) or not family.exact:
         return onward
     scale = found.steady.scale[found.row[rows]]
     arrived = close(family.rows(found.place[rows] + 1), found.start()[rows], found.period[rows], scale, LONGEST)

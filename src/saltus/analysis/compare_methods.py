@@ -14,7 +14,7 @@ from saltus.analysis.basins import basins
 from saltus.analysis.bifurcation_diagram import bifurcation_diagram
 from saltus.analysis.compare import compare
 from saltus.analysis.frequency_response import frequency_response
-from saltus.analysis.method_errors import cell_agreement, one_period_errors, orbit_distances
+from saltus.analysis.method_errors import cell_agreement, one_period_errors, orbit_distances, response_noise
 from saltus.analysis.starts import check_system
 from saltus.errors import ParameterError
 from saltus.flow.family import Family
@@ -133,7 +133,7 @@ def _of_responses(system: System, methods: list[Method], results: list[xr.Datase
     for method, ds in zip(methods, results, strict=True):
         for name in ("rms", "peak", "period", "type"):
             fields[name].append(ds[name].values)
-        noise = Family(system, method, np.array([list(system.values.values())])).noise
+        noise = response_noise(system, method, exact)
         distance, nearest = orbit_distances(exact, ds)
         fields["orbit_distance"].append(distance)
         fields["agrees"].append(cell_agreement(exact, ds, distance, noise))

@@ -66,11 +66,18 @@ def _apart(a: xr.Dataset, first: np.ndarray, i: int, b: xr.Dataset, second: np.n
     return min(float(np.abs((p - np.roll(q, m, axis=0)) / scale).max()) for m in range(n))
 
 
-def cell_agreement(exact: xr.Dataset, other: xr.Dataset, distance: np.ndarray, noise: float) -> np.ndarray:
+def response_noise(system: System, method: Method, exact: xr.Dataset) -> np.ndarray:
+    """Noise of a method in units of the exact response of each start, float64[places..., s]; 0 where there is none."""
+    peaks = exact["response_peak"].values[:, None]
+    noise = Family(system, method, np.tile(list(system.values.values()), (len(peaks), 1))).noise(peaks)
+    return np.append(noise, 0.0)[exact["response_of"].values.clip(-1)]
+
+
+def cell_agreement(exact: xr.Dataset, other: xr.Dataset, distance: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """1 where two methods give one response, 0 where they don't, -1 where one of them gives none, int8."""
     settled = (exact["response_of"].values >= 0) & (other["response_of"].values >= 0)
     aperiodic = (exact["type"].values == other["type"].values) & (other["period"].values == 0)
-    same = (distance <= max(SAME_NOISE * noise, SAME_AT_LEAST)) | (aperiodic & np.isfinite(distance))
+    same = (distance <= np.maximum(SAME_NOISE * noise, SAME_AT_LEAST)) | (aperiodic & np.isfinite(distance))
     return np.where(settled, same.astype(np.int8), np.int8(-1)).astype(np.int8)
 
 

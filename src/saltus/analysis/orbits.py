@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.flow.family import EXACT
 from saltus.flow.maps import Map
 
 #: Newton steps: quadratic convergence needs a handful.
@@ -19,6 +18,8 @@ MOST_STEPS = 30
 MARGINAL = 1e-7
 #: Mismatch up to which a stiff orbit may amplify rounding.
 AMPLIFIED = 1e-9
+#: Noise up to which a map is exact but for rounding; Newton's method is for such maps.
+EXACT = 1e-9
 #: Iterates after which a trajectory of an inexact map has settled, and returns whose mean is taken then.
 FOLLOWED, LAST = 400, 8
 #: Scatter of the returns to one place, in units of the map's noise, that its errors may make; places lie so many scatters apart.

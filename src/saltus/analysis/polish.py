@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.orbits import AMPLIFIED, FOLLOWED, LAST, MARGINAL, mean_orbit
-from saltus.flow.family import EXACT, Family
+from saltus.flow.family import Family
 
 #: Newton steps: quadratic convergence from 1e-5 needs three.
 MOST_STEPS = 12
@@ -71,14 +71,14 @@ def close(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, l
     result = Closed.none(len(start), longest, start.shape[1])
     if not len(start):
         return result
-    if family.noise > EXACT:
+    if not family.exact:
         return _followed(family, start, n, scale, result)
     x, found = _newton(family, start, n, scale)
     rows = np.flatnonzero(found)
     if not len(rows):
         return result
     points = family.rows(rows).launch(x[rows], longest).advance(int(n[rows].max()))
-    period = _smallest_period(points, x[rows], n[rows], scale[rows], family.noise)
+    period = _smallest_period(points, x[rows], n[rows], scale[rows], family.noise(scale[rows]))
     orbits = np.concatenate([x[rows][:, None], points], axis=1)
     return _completed(family, rows, period, [orbit[:m] for orbit, m in zip(orbits, period, strict=True)], result)
 
@@ -106,7 +106,7 @@ def _newton(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray)
     return x, found
 
 
-def _smallest_period(points: np.ndarray, x: np.ndarray, n: np.ndarray, scale: np.ndarray, noise: float) -> np.ndarray:
+def _smallest_period(points: np.ndarray, x: np.ndarray, n: np.ndarray, scale: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """The smallest divisor of n after which each orbit closes as well as after n, int64[k]; 0 where it doesn't close after n."""
     distance = np.abs((points - x[:, None]) / scale[:, None]).max(axis=2)
     last = distance[np.arange(len(n)), n - 1]
@@ -121,7 +121,8 @@ def _followed(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarra
     """The orbits that trajectories of inexact maps settle on: means of their last returns (see orbits.py)."""
     longest = result.points.shape[1]
     last = family.launch(start, 2 * FOLLOWED + longest).advance(max(FOLLOWED, 2 * LAST * int(n.max())))
-    means = [mean_orbit(trail, int(m), one, family.noise) for trail, m, one in zip(last, n, scale, strict=True)]
+    noise = family.noise(scale)
+    means = [mean_orbit(trail, int(m), one, float(mine)) for trail, m, one, mine in zip(last, n, scale, noise, strict=True)]
     rows = np.array([i for i, mean in enumerate(means) if mean is not None and len(mean[0]) <= longest], np.int64)
     if not len(rows):
         return result

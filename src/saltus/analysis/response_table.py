@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import branches
-from saltus.analysis.answers import gap_unit, provenance
+from saltus.analysis.answers import gap_unit, guards_over, provenance
 from saltus.analysis.grid import Grid
 from saltus.analysis.responses import Found, find, table_of
 from saltus.analysis.samples import sampled
@@ -52,6 +52,7 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
     (name, *_) = grid.axes
     system = grid.system
     fixed = {key: value for key, value in system.values.items() if key not in grid.axes}
+    varied = dict(zip(grid.axes, np.meshgrid(*grid.axes.values(), indexing="ij"), strict=True))
     return responses_dataset(
         states=system.states,
         units=system.units,
@@ -66,6 +67,7 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
             {name: np.array([event.value for event in happened])}, [event.kind for event in happened],
             np.array([event.branch for event in happened], np.int64),
         ) if len(grid.axes) == 1 else None,
+        guards=guards_over(system, fixed | varied, grid.shape),
         sample=sample,
         gap_unit=gap_unit(system),
         attrs=provenance(system, method, fixed, grid.axes) | {"periods": periods, "random_starts": int(grid.drawn)},

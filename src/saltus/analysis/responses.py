@@ -66,7 +66,7 @@ class Found:
 
     def start(self) -> np.ndarray:
         """A state on each, float64[m, D]."""
-        return np.array([self.points(i)[0] for i in range(len(self))]).reshape(len(self), -1)
+        return np.array([self.points(i)[0] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
 
 
 def find(grid: Grid, method: Method, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
@@ -82,7 +82,7 @@ def find(grid: Grid, method: Method, most: int, threads: int | None = None, prog
                         threads, progress, result)  # fmt: skip
     except KeyboardInterrupt:
         complete = False
-    return _gathered(result, grid.places, count, family.noise, complete)
+    return _gathered(result, grid.places, count, 4.0 * family.noise(result.scale), complete)
 
 
 def _sweep(grid: Grid, family: Family, most: int, result: Steady, threads: int | None, progress: Callable[[float], None] | None) -> None:
@@ -99,7 +99,7 @@ def _sweep(grid: Grid, family: Family, most: int, result: Steady, threads: int |
             progress((k + 1) / grid.places)
 
 
-def _gathered(result: Steady, places: int, count: int, noise: float, complete: bool) -> Found:
+def _gathered(result: Steady, places: int, count: int, tolerance: np.ndarray, complete: bool) -> Found:
     """Which trajectories at a value settled to the same response."""
     of = result.kind.copy()
     rows: list[int] = []
@@ -107,7 +107,7 @@ def _gathered(result: Steady, places: int, count: int, noise: float, complete: b
         here = [row for row in range(place * count, (place + 1) * count) if result.kind[row] >= 0]
         groups: list[list[int]] = []
         for row in here:
-            home = next((group for group in groups if _same(result, group[0], row, max(SAME, 4.0 * noise))), None)
+            home = next((group for group in groups if _same(result, group[0], row, max(SAME, tolerance[row]))), None)
             if home is None:
                 groups.append([row])
             else:

@@ -16,7 +16,7 @@ from saltus.analysis.polish import Closed, close
 from saltus.analysis.recurrence import LONGEST, ROUND, recurrence
 from saltus.analysis.wandering import growth_rates, kind_of_growth
 from saltus.flow.engine import Schedule
-from saltus.flow.family import EXACT, Family
+from saltus.flow.family import Family
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 
@@ -32,6 +32,8 @@ BESIDE = 30.0
 PIECE = 512
 #: Periods and looks a period from which the range of a motion is taken.
 RANGED, LOOKS = 4, 32
+#: A state whose range is so small a part of its size rests.
+RESTS = 1e-9
 #: Points of a motion that never repeats that are kept.
 TRAIL = 1024
 
@@ -132,7 +134,6 @@ def _settle(family: Family, start: np.ndarray, most: int) -> Steady:
 def _follow(family: Family, start: np.ndarray, who: np.ndarray, most: int, result: Steady, near: float) -> np.ndarray:
     """Follow trajectories until they settle on an orbit; writes what is known, returns those that haven't."""
     flight = family.rows(who).launch(start[who], most + ROUND)
-    threshold = max(near, family.noise)
     while len(who) and flight.age < most:
         points = flight.advance(ROUND)
         going = flight.going
@@ -144,23 +145,24 @@ def _follow(family: Family, start: np.ndarray, who: np.ndarray, most: int, resul
             rows = np.flatnonzero(going)
             if flight.age == ROUND:
                 result.scale[who[rows]] = motion_range(family.rows(who[rows]), flight.state[rows])
-            stay[rows[_settled(family, points[rows], who[rows], threshold, result)]] = False
+            stay[rows[_settled(family, points[rows], who[rows], near, result)]] = False
             result.settled[who[going & ~stay]] = flight.age
         flight.keep(stay)
         who = who[stay]
     return who
 
 
-def _settled(family: Family, points: np.ndarray, who: np.ndarray, threshold: float, result: Steady) -> np.ndarray:
+def _settled(family: Family, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
     """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes the orbits."""
     scale = result.scale[who]
     period, apart = recurrence(points, scale)
     done = np.zeros(len(who), bool)
-    ready = np.flatnonzero(apart < threshold)
+    noise = family.rows(who).noise(scale)
+    ready = np.flatnonzero(apart < np.maximum(near, noise))
     if not len(ready):
         return done
     orbits = close(family.rows(who[ready]), points[ready, -1], period[ready], scale[ready], LONGEST)
-    tolerance = BESIDE * np.maximum(apart[ready], family.noise)
+    tolerance = BESIDE * np.maximum(apart[ready], noise[ready])
     right = orbits.stable & (orbits.distance(points[ready, -1], scale[ready]) <= tolerance)
     done[ready[right]] = True
     chosen = who[ready[right]]
@@ -177,7 +179,7 @@ def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) 
     state, blocks = growth_rates(maps, start[who], result.scale[who])
     flight = maps.launch(state, TRAIL)
     trail = flight.advance(TRAIL)
-    recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < max(NEAR_AT_LAST, family.noise)  # on an orbit by now
+    recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR_AT_LAST, maps.noise(result.scale[who]))  # by now
     result.end[who] = flight.state
     unclear = np.ones(len(who), bool)
     for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2)) & ~recurs):
@@ -196,5 +198,5 @@ def motion_range(family: Family, state: np.ndarray) -> np.ndarray:
     samples = family.run(state, RANGED, Schedule(index // LOOKS, (index % LOOKS) / LOOKS)).samples
     with np.errstate(all="ignore"):
         lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
-    scale = np.where(lengths > EXACT * sizes, lengths, sizes)
+    scale = np.where(lengths > RESTS * sizes, lengths, sizes)
     return np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)

@@ -12,6 +12,7 @@ from saltus.cli.app import app
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
+    from saltus.study.running import Resources
     from saltus.study.spec import Study
     from saltus.system import System
 
@@ -25,12 +26,21 @@ class Case(StrEnum):
 
 
 class Kind(StrEnum):
-    """Pictures of a run."""
+    """Pictures of a result."""
 
     history = "history"
     phase = "phase"
     basins = "basins"
     agreement = "agreement"
+    frequency_response = "frequency_response"
+    bifurcation_diagram = "bifurcation_diagram"
+    type_map = "type_map"
+    section = "section"
+    spectrum = "spectrum"
+    impacts = "impacts"
+    energy = "energy"
+    exponents = "exponents"
+    methods = "methods"
 
 
 class Progress(StrEnum):
@@ -41,6 +51,7 @@ class Progress(StrEnum):
     none = "none"
 
 
+Only = Annotated[list[str] | None, typer.Option(help="Answer this question only, by its table or its name; may be given again.")]
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads; by default one for each usable core.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Basins: processes of a dask cluster on this machine, in place of threads.")]
 Scheduler = Annotated[str, typer.Option(help="Basins: a dask scheduler, tcp://HOST:PORT, or local.")]
@@ -84,64 +95,54 @@ def run(
     study: Annotated[Path, typer.Argument(help="The study file (TOML).")],
     system: Annotated[str, typer.Option(help="A system of your own: FILE.py:NAME. Runs that file.")] = "",
     out: Annotated[Path | None, typer.Option(help="Folder for results; default saltus-runs/STUDY.")] = None,
+    only: Only = None,
     threads: Threads = None,
     workers: Workers = None,
     scheduler: Scheduler = "",
     shard: Shard = "",
     progress: ProgressKind = Progress.bar,
 ) -> None:
-    """Run a study file: print its tables, keep its data.
+    """Run a study file: answer its questions, print their tables, keep data and pictures.
 
-    A study names a model of saltus and its values; it never runs code. A system of your own is given here, by you. A study of basins is
-    kept chunk by chunk as it is computed: stopped at any moment, by anything, it goes on where it was when it is run again.
+    A study names a model of saltus and its values; it never runs code. A system of your own is given here, by you. What is computed is
+    kept: stopped at any moment, by anything, a study goes on where it was when it is run again. An answer that is there isn't computed
+    twice, unless what it depends on changed.
 
     Example: `saltus run replications/saunders2021/table2.toml`
 
-    Example: `saltus run my_study.toml --system my_rig.py:rig`
+    Example: `saltus run examples/two_masses/study.toml --system examples/two_masses/two_masses.py:rig`
+
+    Example: `saltus run my_study.toml --only frequency_response`
 
     Example: `saltus run replications/saunders2021/fig6b.toml --workers 2`
     """
-    from saltus.cli import screen
     from saltus.results import usable_folder
     from saltus.study.own_system import own_system
     from saltus.study.read import read
-    from saltus.study.run import run_study
 
     spec, text = read(study)
     own = own_system(system) if system else None
     folder = usable_folder(out or Path("saltus-runs") / study.stem)
-    if spec.basins is not None:
-        _run_maps(spec, text, folder, own, threads, workers, scheduler, shard, progress)
-        return
-    if workers or scheduler or shard or progress is not Progress.bar:
-        raise StudyError(
-            "--workers, --scheduler, --shard and --progress are for studies of basins; this one has [simulate]. Leave them out."
-        )
-    with screen.working() as show:
-        outcome = run_study(spec, text, study.parent, own, threads, show)
-    screen.show(outcome.table)
-    screen.files(outcome.write(folder))
+    _run(spec, text, folder, study.parent, own, only or [], _resources(spec, threads, workers, scheduler, shard), progress)
 
 
-def _run_maps(
-    spec: Study,
-    text: str,
-    folder: Path,
-    own: System | None,
-    threads: int | None,
-    workers: int | None,
-    scheduler: str,
-    shard: str,
-    progress: Progress,
+def _resources(spec: Study, threads: int | None, workers: int | None, scheduler: str, shard: str) -> Resources:
+    from saltus.study.running import Resources, shard_of
+
+    if spec.basins is None and (workers or scheduler or shard):
+        raise StudyError("--workers, --scheduler and --shard are for studies of basins; this one has no [basins]. Leave them out.")
+    return Resources(threads, workers, scheduler or None, shard_of(shard) if shard else None)
+
+
+def _run(
+    spec: Study, text: str, folder: Path, beside: Path, own: System | None, only: list[str], resources: Resources, progress: Progress
 ) -> None:
     from saltus.cli import screen
-    from saltus.study.maps import Resources, shard_of
-    from saltus.study.maps_run import run_maps
+    from saltus.study.run import run_study
 
-    resources = Resources(threads, workers, scheduler or None, shard_of(shard) if shard else None)
     try:
         with screen.reporting(progress.value) as (report, say):
-            outcome = run_maps(spec, text, folder, own, resources, report, say)
+            outcome = run_study(spec, text, folder, own, resources, report, say, beside=beside, only=only)
     except KeyboardInterrupt:
         screen.fail(f"stopped; what is computed is kept. Go on with: saltus resume {folder}")
         raise
@@ -154,52 +155,54 @@ def _run_maps(
 
 @app.command()
 def status(
-    store: Annotated[Path, typer.Argument(help="The output folder of a study of basins, or one of its stores.")],
+    store: Annotated[Path, typer.Argument(help="The output folder of a study, or one of its stores of basins.")],
 ) -> None:
-    """Show how far the maps of a study are, on this machine and any other that works on the same folder.
+    """Show which questions of a study are answered, and how far its maps are, on this machine and any other that works on the folder.
 
     Example: `saltus status saltus-runs/fig6b`
     """
     from saltus.cli import screen
-    from saltus.study.maps_run import status_table, statuses
+    from saltus.study.status import status_tables
 
-    screen.show(status_table(statuses(store)))
+    for table in status_tables(store):
+        screen.show(table)
 
 
 @app.command()
 def resume(
-    store: Annotated[Path, typer.Argument(help="The output folder of a study of basins.")],
+    store: Annotated[Path, typer.Argument(help="The output folder of a study.")],
     system: Annotated[str, typer.Option(help="The system of your own that it was run with: FILE.py:NAME.")] = "",
+    only: Only = None,
     threads: Threads = None,
     workers: Workers = None,
     scheduler: Scheduler = "",
     shard: Shard = "",
     progress: ProgressKind = Progress.bar,
 ) -> None:
-    """Go on with a study of basins that was stopped: only what is missing or damaged is computed.
+    """Go on with a study that was stopped: only what is missing or damaged is computed.
 
     Example: `saltus resume saltus-runs/fig6b`
     """
-    from saltus.study.maps_run import copy_of
+    from saltus.study.copies import INPUTS, copy_of
     from saltus.study.own_system import own_system
     from saltus.study.read import read
 
     spec, text = read(copy_of(store))
-    if spec.basins is None:
-        raise StudyError(f"{store} holds a study without [basins]: there is nothing to resume. Run it again with `saltus run`.")
-    _run_maps(spec, text, store, own_system(system) if system else None, threads, workers, scheduler, shard, progress)
+    own = own_system(system) if system else None
+    _run(spec, text, store, store / INPUTS, own, only or [], _resources(spec, threads, workers, scheduler, shard), progress)
 
 
 @app.command()
 def plot(
     result: Annotated[Path, typer.Argument(help="A result (.nc) that saltus wrote.")],
     kind: Annotated[
-        Kind | None, typer.Option(help="history: state against time. phase: velocity against displacement. basins, agreement: maps.")
+        Kind | None,
+        typer.Option(help="history: state against time. phase: velocity against displacement. Others: the one picture of their result."),
     ] = None,
     trajectory: Annotated[int | None, typer.Option(min=0, help="Which trajectory of a batch; by default all, at most 8.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture (.png, .pdf, .svg); default RESULT-KIND.png.")] = None,
 ) -> None:
-    """Draw a result: history and phase of a run; basins; the agreement of two maps. By default what fits the result.
+    """Draw a result: history and phase of a run; basins; responses; a section; a spectrum; impacts; energies. By default what fits.
 
     Example: `saltus plot saltus-demo/demo.nc --trajectory 2 --kind phase -o phase.pdf`
     """
@@ -260,6 +263,7 @@ def models(
 
     if name:
         screen.say(repr(published.find(name)()))
+        screen.say(f'energy      sl.models.energy("{name}"), as sl.energy_balance takes it')
     else:
         screen.show(TextTable("Models; `saltus models NAME` shows one", ("name", "what it is"), tuple(published.describe().items())))
 

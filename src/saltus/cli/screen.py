@@ -17,7 +17,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from saltus.replication import Progress
-    from saltus.study.maps import Report
+    from saltus.study.running import Report
     from saltus.study.table import TextTable
 
 #: Columns assumed where the output isn't a terminal: a table in a log file isn't cut.
@@ -77,13 +77,13 @@ def working() -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[str], None]]]:
-    """Show how far maps are; yields what to call with a report, and with a sentence.
+    """Show how far questions are; yields what to call with a report, and with a sentence.
 
     ``kind`` "bar" shows a line that changes, "json" prints a JSON object a line to standard error, "none" nothing.
     """
     begin, shown = time.perf_counter(), [0.0]
     if kind == "bar":
-        with console(stderr=True).status("looking for attractors ...") as status:
+        with console(stderr=True).status("compiling the equations, if they are new here (about 20 s) ...") as status:
             yield lambda report: status.update(_progress_text(report)), say
         say(f"computed in {time.perf_counter() - begin:.1f} s")
         return
@@ -93,7 +93,7 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
         if kind == "json" and (now - shown[0] > 1.0 or report.last):
             shown[0] = now
             left = report.seconds_left
-            told = {"map": report.name, "done": report.done, "total": report.total, "seconds": report.seconds, "seconds_left": left}
+            told = {"question": report.name, "done": report.done, "total": report.total, "seconds": report.seconds, "seconds_left": left}
             print(json.dumps(told), file=sys.stderr, flush=True)  # noqa: T201
 
     yield report_json, say if kind != "json" else lambda _: None
@@ -118,6 +118,8 @@ def replicating() -> Iterator[Callable[[Progress], None]]:
 
 def _progress_text(report: Report) -> str:
     left = report.seconds_left
+    if report.what == "%":
+        return escape(f"{report.name}: {report.done} %{f', {left:.0f} s left' if left is not None else ''}")
     rate = f", {report.computed / report.seconds:.1f} chunks a second, {left:.0f} s left" if left is not None and report.seconds > 0 else ""
     return escape(f"{report.name}: {report.done} of {report.total} chunks{rate}")
 

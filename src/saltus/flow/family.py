@@ -16,16 +16,14 @@ from saltus.system.system import System
 from saltus.system.tangent import tangent_system
 
 #: A method tells its noise in units of a box of starts, some ten times the range of a motion in it. Measured for ode45 at (1e-4, 1e-7) on
-#: the rig's responses: its returns scatter by 0.05 to 2 % of their range with location, by 0.3 to 4 % without.
-MOTION = 10.0
-#: Noise up to which a method is exact but for rounding; Newton's method is for the maps of such methods.
-EXACT = 1e-9
+#: the rig's responses: its returns scatter by 0.05 to 2 % of their range with location, by 0.3 to 4 % without. More than this share of the
+#: range is no noise.
+MOTION, MOST_NOISE = 10.0, 0.03
 
 
 class Family:
     """The stroboscopic map of a system at each of k rows of parameter values. Row i of all arrays belongs to row i of the values.
 
-    ``noise`` is the mismatch of a closed orbit, in units of the range of the motion on it, that the method's own errors explain.
 
     Parameters
     ----------
@@ -46,7 +44,6 @@ class Family:
             told = "has no forcing period: give every=, the time between two looks" if every is None else "is forced: leave every= out"
             raise ParameterError(f"{system.name} {told}.")
         self.system, self.method, self.threads = system, method, threads
-        self.noise = method.noise * (MOTION if method.noise > EXACT else 1.0)
         self.parameters, self._every = np.ascontiguousarray(parameters, float), every
         self.states = system.states
         period = np.full(len(self), every) if every is not None else system.period(self.values)
@@ -59,6 +56,15 @@ class Family:
     def values(self) -> Mapping[str, np.ndarray]:
         """Parameter values by name, float64[k] each."""
         return dict(zip(self.system.values, self.parameters.T, strict=True))
+
+    @property
+    def exact(self) -> bool:
+        """Whether the maps are exact but for rounding, and the same wherever a trajectory is restarted."""
+        return self.method.exact
+
+    def noise(self, scale: np.ndarray) -> np.ndarray:
+        """Mismatch of closed orbits, float64[m], in units of their ranges float64[m, D], that the method's own errors explain."""
+        return np.minimum(MOTION * self.method.noise_of(scale), MOST_NOISE)
 
     def rows(self, which: np.ndarray) -> Family:
         """The family of some of the rows: int64[m], with repeats if wanted, or bool[k]."""

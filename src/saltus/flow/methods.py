@@ -64,6 +64,15 @@ class Method:
         """Mismatch of a periodic orbit, relative to the range of the states, that this method's own errors explain."""
         raise NotImplementedError
 
+    @property
+    def exact(self) -> bool:
+        """Whether its errors are rounding, so that Newton's method closes its orbits."""
+        return False
+
+    def noise_of(self, scale: np.ndarray) -> np.ndarray:
+        """The noise, float64[k], where the states of k motions have the ranges float64[k, D]."""
+        return np.full(len(scale), self.noise)
+
     def companion(self) -> Method:
         """A more exact method: how far its contact times lie from this one's is the error estimate of this one's."""
         raise NotImplementedError
@@ -118,6 +127,11 @@ class Taylor(Method):
     def noise(self) -> float:
         """Truncation and rounding over some periods."""
         return max(100.0 * self.tolerance, 1e-12)
+
+    @property
+    def exact(self) -> bool:
+        """Yes."""
+        return True
 
     def companion(self) -> Taylor:
         """The same series with steps a fifth shorter: other truncation, other rounding, the same compiled kernel."""
@@ -177,6 +191,10 @@ class ODE45(Method):
     def noise(self) -> float:
         """ode45's errors over some periods: its map isn't even continuous where step counts change, and contacts stepped over cost more."""
         return min((5.0 if self.events == "locate" else 20.0) * self.rtol, 0.01)
+
+    def noise_of(self, scale: np.ndarray) -> np.ndarray:
+        """The same, where AbsTol is what limits the error of a small state too."""
+        return self.noise * np.maximum(1.0, self.atol / (self.rtol * scale)).max(axis=1)
 
     def companion(self) -> Taylor:
         """The Taylor flow: exact, beside ode45."""

@@ -7,11 +7,16 @@ Every entry of :data:`MODELS` is a function that takes parameter values by name 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from saltus.errors import ParameterError, nearest
+from saltus.models.aeroelastic import ENERGY as _AEROELASTIC_ENERGY
 from saltus.models.aeroelastic import aeroelastic
+from saltus.models.chain import ENERGY as _CHAIN_ENERGY
 from saltus.models.chain import chain
+from saltus.models.delangre import ENERGY as _DELANGRE_ENERGY
 from saltus.models.delangre import delangre
+from saltus.models.gear_pair import ENERGY as _GEAR_PAIR_ENERGY
 from saltus.models.gear_pair import gear_pair
 from saltus.system import System
 
@@ -21,6 +26,13 @@ MODELS: dict[str, Callable[..., System]] = {
     "chain": chain,
     "gear_pair": gear_pair,
     "aeroelastic": aeroelastic,
+}
+
+_ENERGIES: dict[str, dict[str, Callable[..., Any]]] = {
+    "delangre": _DELANGRE_ENERGY,
+    "chain": _CHAIN_ENERGY,
+    "gear_pair": _GEAR_PAIR_ENERGY,
+    "aeroelastic": _AEROELASTIC_ENERGY,
 }
 
 
@@ -37,9 +49,31 @@ def find(name: str) -> Callable[..., System]:
     return MODELS[name]
 
 
+def energy(name: str) -> dict[str, Callable[..., Any]]:
+    """Energy and powers of a model, as :func:`saltus.energy_balance` takes them: ``**sl.models.energy("chain")``.
+
+    Parameters
+    ----------
+    name : str
+        The model.
+
+    Returns
+    -------
+    dict
+        ``energy`` [J] (stored), ``supplied`` and ``dissipated`` [W]: functions of (t, states, parameters).
+
+    Raises
+    ------
+    ParameterError
+        If there is no such model.
+    """
+    find(name)
+    return dict(_ENERGIES[name])
+
+
 def describe() -> dict[str, str]:
     """One line about every model, by name."""
     return {name: (model.__doc__ or "").strip().splitlines()[0] for name, model in MODELS.items()}
 
 
-__all__ = ["MODELS", "aeroelastic", "chain", "delangre", "describe", "find", "gear_pair"]
+__all__ = ["MODELS", "aeroelastic", "chain", "delangre", "describe", "energy", "find", "gear_pair"]

@@ -14,6 +14,7 @@ r"""A typical wing section with freeplay in pitch, in a quasi-steady flow.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 from saltus.system import System, freeplay, system
@@ -102,3 +103,29 @@ def _section() -> System:
         )
 
     return section
+
+
+# -- energy --------------------------------------------------------------------------------------------------------------------
+def _stored(
+    plunge, pitch, plunge_rate, pitch_rate, *, mass, inertia, imbalance, half_chord, plunge_stiffness, pitch_stiffness, pitch_gap,
+):  # fmt: skip
+    """Of the section and its two springs, per unit span."""
+    kinetic = mass * plunge_rate**2 / 2 + mass * imbalance * half_chord * plunge_rate * pitch_rate + inertia * pitch_rate**2 / 2
+    twist = freeplay(pitch, stiffness=1.0, gap=pitch_gap)
+    return kinetic + plunge_stiffness * plunge**2 / 2 + pitch_stiffness * twist**2 / 2
+
+
+def _supplied(pitch, plunge_rate, pitch_rate, *, airspeed, half_chord, elastic_axis, air_density, lift_slope):
+    """By the flow, per unit span; negative while it damps."""
+    incidence = pitch + plunge_rate / airspeed + (0.5 - elastic_axis) * half_chord * pitch_rate / airspeed
+    lift = air_density * airspeed**2 * half_chord * lift_slope * incidence
+    return (0.5 + elastic_axis) * half_chord * lift * pitch_rate - lift * plunge_rate
+
+
+def _dissipated(plunge_rate, pitch_rate, *, plunge_damping, pitch_damping):
+    """In the dampers of the mount, per unit span."""
+    return plunge_damping * plunge_rate**2 + pitch_damping * pitch_rate**2
+
+
+#: Stored energy [J], power supplied and dissipated [W].
+ENERGY: dict[str, Callable[..., Any]] = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}

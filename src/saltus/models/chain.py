@@ -10,6 +10,7 @@ where :math:`f_i` is zero inside a symmetric clearance and a linear spring beyon
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 from saltus.system import System, cos, freeplay, pi, system
@@ -20,21 +21,21 @@ def chain(**values: Any) -> System:
 
     States are the displacements ``x1``, ``x2`` [m] and velocities ``v1``, ``v2`` [m/s]; it is forced at ``frequency``.
 
-    ==========================  ========  =================================================
-    parameter                   default   meaning
-    ==========================  ========  =================================================
+    ==========================  =========  =================================================
+    parameter                   default    meaning
+    ==========================  =========  =================================================
     first_mass, second_mass     1, 0.5 kg
-    ground_stiffness            1 kN/m    spring from the ground to the first mass
-    coupling_stiffness          400 N/m   spring between the masses
-    ground_damping              4 N*s/m   damper from the ground to the first mass
-    coupling_damping            2 N*s/m   damper between the masses
-    ground_contact_stiffness    20 kN/m   contact at x1 = -ground_gap, ground_gap
+    ground_stiffness            1 kN/m     spring from the ground to the first mass
+    coupling_stiffness          400 N/m    spring between the masses
+    ground_damping              4 N*s/m    damper from the ground to the first mass
+    coupling_damping            2 N*s/m    damper between the masses
+    ground_contact_stiffness    20 kN/m    contact at x1 = -ground_gap, ground_gap
     ground_gap                  1 mm
-    coupling_contact_stiffness  10 kN/m   contact at x2 - x1 = -coupling_gap, coupling_gap
+    coupling_contact_stiffness  10 kN/m    contact at x2 - x1 = -coupling_gap, coupling_gap
     coupling_gap                0.5 mm
-    force                       2 N       amplitude, on the first mass
-    frequency                   7 Hz      of the force
-    ==========================  ========  =================================================
+    force                       2 N        amplitude, on the first mass
+    frequency                   7 Hz       of the force
+    ==========================  =========  =================================================
 
     Parameters
     ----------
@@ -89,3 +90,30 @@ def _chain() -> System:
         return v1, v2, (drive - ground + coupling) / first_mass, -coupling / second_mass
 
     return rig
+
+
+# -- energy --------------------------------------------------------------------------------------------------------------------
+def _stored(
+    x1, x2, v1, v2, *, first_mass, second_mass, ground_stiffness, coupling_stiffness, ground_contact_stiffness, ground_gap,
+    coupling_contact_stiffness, coupling_gap,
+):  # fmt: skip
+    """Of the masses, the springs and the contacts."""
+    stretch = x2 - x1
+    springs = ground_stiffness * x1**2 + coupling_stiffness * stretch**2
+    ground = ground_contact_stiffness * freeplay(x1, stiffness=1.0, gap=ground_gap) ** 2
+    coupling = coupling_contact_stiffness * freeplay(stretch, stiffness=1.0, gap=coupling_gap) ** 2
+    return (first_mass * v1**2 + second_mass * v2**2 + springs + ground + coupling) / 2
+
+
+def _supplied(t, v1, *, force, frequency):
+    """By the force on the first mass."""
+    return force * cos(2 * pi * frequency * t) * v1
+
+
+def _dissipated(v1, v2, *, ground_damping, coupling_damping):
+    """In the two dampers."""
+    return ground_damping * v1**2 + coupling_damping * (v2 - v1) ** 2
+
+
+#: Stored energy [J], power supplied and dissipated [W].
+ENERGY: dict[str, Callable[..., Any]] = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}

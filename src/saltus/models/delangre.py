@@ -13,6 +13,7 @@ force for the field of the magnet.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 from saltus.errors import ParameterError, nearest
@@ -98,3 +99,26 @@ def _rig() -> System:
         return v, restoring + force * (1 - 18 / w**2) * cos(w * t) / mass
 
     return rig
+
+
+# -- energy --------------------------------------------------------------------------------------------------------------------
+def _stored(x, v, *, mass, natural_frequency, cubic, contact_stiffness, lower_gap, upper_gap):
+    """Of the block, the beams and the contact springs."""
+    beyond = piecewise((x + lower_gap, x < -lower_gap), (x - upper_gap, x > upper_gap), otherwise=0)
+    beams = mass * (2 * pi * natural_frequency) ** 2 * x**2 / 2 + cubic * x**4 / 4
+    return mass * v**2 / 2 + beams + contact_stiffness * beyond**2 / 2
+
+
+def _supplied(t, v, *, force, frequency):
+    """By the magnet."""
+    w = 2 * pi * frequency
+    return force * (1 - 18 / w**2) * cos(w * t) * v
+
+
+def _dissipated(v, *, mass, damping_ratio, natural_frequency):
+    """In the modal damping."""
+    return 2 * damping_ratio * (2 * pi * natural_frequency) * mass * v**2
+
+
+#: Stored energy [J], power supplied and dissipated [W].
+ENERGY: dict[str, Callable[..., Any]] = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}

@@ -12,9 +12,10 @@ in :math:`|x| < b`; below :math:`-b` their backs touch.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
-from saltus.system import System, cos, freeplay, pi, sqrt, system
+from saltus.system import System, cos, freeplay, pi, sin, sqrt, system
 
 
 def gear_pair(**values: Any) -> System:
@@ -82,3 +83,26 @@ def _gear_pair() -> System:
         return v, (mean_force + alternating_force * wave - damper - mesh) / mesh_mass
 
     return gears
+
+
+# -- energy --------------------------------------------------------------------------------------------------------------------
+def _stored(t, x, v, *, mesh_mass, mesh_stiffness, stiffness_variation, gap, mesh_frequency):
+    """Of the gears and the teeth as stiff as they are at this time."""
+    stiffness = mesh_stiffness * (1 + stiffness_variation * cos(2 * pi * mesh_frequency * t))
+    return mesh_mass * v**2 / 2 + stiffness * freeplay(x, stiffness=1.0, gap=gap) ** 2 / 2
+
+
+def _supplied(t, x, v, *, mesh_stiffness, stiffness_variation, gap, mean_force, alternating_force, mesh_frequency):
+    """By the two forces, and by whatever stiffens the teeth while they are bent."""
+    w = 2 * pi * mesh_frequency
+    stiffening = -mesh_stiffness * stiffness_variation * w * sin(w * t)
+    return (mean_force + alternating_force * cos(w * t)) * v + stiffening * freeplay(x, stiffness=1.0, gap=gap) ** 2 / 2
+
+
+def _dissipated(v, *, mesh_mass, damping_ratio, mesh_stiffness):
+    """In the damping of the mesh."""
+    return 2 * damping_ratio * sqrt(mesh_stiffness * mesh_mass) * v**2
+
+
+#: Stored energy [J], power supplied and dissipated [W].
+ENERGY: dict[str, Callable[..., Any]] = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}

@@ -3,15 +3,19 @@
 from saltus.plot.agreement import agreement
 from saltus.plot.basins import basins
 from saltus.plot.bifurcation import bifurcation_diagram
+from saltus.plot.exponents import exponents
 from saltus.plot.frequency_response import frequency_response
 from saltus.plot.gallery import gallery
 from saltus.plot.history import history
+from saltus.plot.measures import energy, impacts
 from saltus.plot.methods import methods
 from saltus.plot.phase import phase
+from saltus.plot.section import section
+from saltus.plot.spectrum import spectrum
 from saltus.plot.style import OKABE_ITO, style
 from saltus.plot.type_map import type_map
 
 __all__ = [
-    "OKABE_ITO", "agreement", "basins", "bifurcation_diagram", "frequency_response", "gallery", "history", "methods", "phase", "style",
-    "type_map",
+    "OKABE_ITO", "agreement", "basins", "bifurcation_diagram", "energy", "exponents", "frequency_response", "gallery", "history",
+    "impacts", "methods", "phase", "section", "spectrum", "style", "type_map",
 ]  # fmt: skip

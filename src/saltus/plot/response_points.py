@@ -24,8 +24,8 @@ NEEDS = ("response_of", "response_branch", "response_type", "response_period")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 #: Name and marker of what happens to a branch between two values.
 _EVENTS = {
-    "graze": ("graze", "^"), "period_doubling": ("period doubling", "D"), "fold": ("fold", ">"), "neimark_sacker": ("torus", "o"),
-    "chaos": ("onset of chaos", "s"),
+    "graze": ("graze", "^"), "period_doubling": ("period doubling", "D"), "fold": ("fold", ">"), "neimark_sacker": ("Neimark-Sacker", "o"),
+    "chaos": ("onset of chaos", "s"), "end": ("branch ends", "|"),
 }  # fmt: skip
 #: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
 _EVEN = 1e-6

@@ -39,6 +39,7 @@ def style() -> Iterator[None]:
 
     The functions of this package use it themselves when they make the figure.
     """
+    plt.draw_if_interactive()  # loads the backend, which may switch interaction on: inside the context that would be undone at its end
     with plt.style.context(_STYLE_FILE):
         yield
 

@@ -1,7 +1,9 @@
 """Results: the schema of every Dataset, where it comes from, and files."""
 
 from saltus.results.assemble import Contacts, Guards, stroboscope_dataset, trajectory_dataset
+from saltus.results.assemble_motions import motion_dataset, spectrum_dataset
 from saltus.results.basins import AttractorTable, agreement_dataset, attractors_dataset, basins_dataset
+from saltus.results.exponents import exponents_dataset
 from saltus.results.export import save, to_csv, to_mat, to_netcdf
 from saltus.results.files import ResultFileError, usable_folder
 from saltus.results.load import load
@@ -23,10 +25,13 @@ __all__ = [
     "basins_dataset",
     "content_hash",
     "describe",
+    "exponents_dataset",
     "load",
     "methods_dataset",
+    "motion_dataset",
     "responses_dataset",
     "save",
+    "spectrum_dataset",
     "stroboscope_dataset",
     "to_csv",
     "to_mat",

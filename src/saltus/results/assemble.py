@@ -75,7 +75,7 @@ class Guards:
 
 
 # -- assembly ------------------------------------------------------------------------------------------------------------------
-class _Builder:
+class Builder:
     """Collects the variables of one Dataset by the table of its kind.
 
     Every array comes with the trajectory first; for a single trajectory (``batch`` false) that axis is dropped here.
@@ -89,7 +89,7 @@ class _Builder:
         self.attrs: dict[str, Any] = {"saltus_result": kind, "schema_version": schema.VERSION, "states": " ".join(states)}
         if not batch and count != 1:
             raise ParameterError(f"a Dataset without the dim trajectory holds one trajectory, not {count}. Pass batch=True.")
-        reserved = {*self.table, "contact"}
+        reserved = {*self.table, *(dim for spec in self.table.values() for dim in spec.dims)} if kind in schema.WITH_STATES else set()
         clash = [name for name in states if name in reserved]
         if clash:
             raise ParameterError(f"the state {clash[0]!r} has the name of something else in the result. Rename the state in the system.")
@@ -224,7 +224,7 @@ def trajectory_dataset(
     ParameterError
         If a state or a varied parameter has the name of a variable of the result.
     """
-    build = _Builder(schema.TRAJECTORY, states, units, guards, batch, len(status))
+    build = Builder(schema.TRAJECTORY, states, units, guards, batch, len(status))
     samples = _put_samples(build, np.asarray(time, dtype=float), period)
     for name in states:
         build.put_state(name, name, (samples,), name, values[name])
@@ -239,7 +239,7 @@ def trajectory_dataset(
     return build.dataset(attrs or {})
 
 
-def _put_samples(build: _Builder, time: np.ndarray, period: np.ndarray | None) -> str:
+def _put_samples(build: Builder, time: np.ndarray, period: np.ndarray | None) -> str:
     """Add the coordinates of the samples; returns the dim along which they lie."""
     shared = time.ndim == 1 or not build.batch
     samples = "time" if shared else "period"
@@ -255,7 +255,7 @@ def _along(samples: str, name: str) -> Variable:
     return Variable((samples,), spec.units, spec.long_name, spec.dtype)
 
 
-def _put_contacts(build: _Builder, states: Sequence[str], contacts: Contacts, guards: Guards) -> None:
+def _put_contacts(build: Builder, states: Sequence[str], contacts: Contacts, guards: Guards) -> None:
     """Add the table of contacts."""
     names = np.asarray(list(guards.names) or [""], dtype=np.str_)
     columns = {
@@ -314,7 +314,7 @@ def stroboscope_dataset(
     ParameterError
         If a state or a varied parameter has the name of a variable of the result.
     """
-    build = _Builder(schema.STROBOSCOPE, states, units, guards, batch, len(status))
+    build = Builder(schema.STROBOSCOPE, states, units, guards, batch, len(status))
     build.put("period", period, coord=True)
     for name in states:
         build.put_state(name, name, ("period",), name, values[name])

@@ -16,7 +16,7 @@ from saltus.errors import ParameterError, nearest
 from saltus.results import tables
 from saltus.results.files import replacing
 from saltus.results.provenance import describe, file_hash
-from saltus.results.schema import TABLES, check
+from saltus.results.schema import RESPONSES, STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
 
 Target = str | os.PathLike[str]
 
@@ -87,17 +87,19 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
     for a batch ``run_trajectories.csv`` a row for each trajectory. The header row has units (``x [m]``). Lines that start with ``#`` say
     where the result comes from; ``pandas.read_csv(path, comment="#")`` skips them.
 
+    Of responses the file holds a row for each response, and ``NAME_events.csv`` one for each thing that happens to a branch.
+
     Parameters
     ----------
     ds : Dataset
-        What ``simulate`` or ``stroboscope`` returned.
+        What ``simulate``, ``stroboscope``, ``frequency_response`` or ``bifurcation_diagram`` returned.
     path : str or path
-        The file of samples; the others get their names from it.
+        The file of samples, or of responses; the others get their names from it.
 
     Returns
     -------
     Path
-        The file of samples.
+        The file.
 
     Raises
     ------
@@ -106,11 +108,15 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
     ResultFileError
         If a file can't be written. None is left half-written.
     """
-    check(ds, caller="to_csv")
+    check(ds, caller="to_csv", kinds=(TRAJECTORY, STROBOSCOPE, RESPONSES))
     path = Path(path)
-    side = {"contacts": tables.contacts(ds), "trajectories": tables.trajectories(ds) if "trajectory" in ds.dims else {}}
+    if kind_of(ds) == RESPONSES:
+        main, side = tables.responses(ds), {"events": tables.events(ds)}
+    else:
+        main = tables.samples(ds)
+        side = {"contacts": tables.contacts(ds), "trajectories": tables.trajectories(ds) if "trajectory" in ds.dims else {}}
     sheets = {path.with_name(f"{path.stem}_{name}{path.suffix}"): table for name, table in side.items() if table}
-    sheets[path] = tables.samples(ds)
+    sheets[path] = main
     with replacing(*sheets) as parts:
         for part, table in zip(parts, sheets.values(), strict=True):
             _write_table(part, table, ds)

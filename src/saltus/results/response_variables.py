@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from saltus.results.variable import GUARD_VARIABLES, Variable
+from saltus.results.variable import GUARDS, Variable
 
 _RESPONSE = ("response",)
 _MULTIPLIER = ("response", "multiplier")
@@ -35,5 +35,5 @@ RESPONSES_VARIABLES = {
     "event": Variable(("event",), "1", "event", "i8"),
     "event_kind": Variable(("event",), "", "what happens to the branch between two values", "str"),
     "event_branch": Variable(("event",), "1", "branch to which it happens", "i8"),
-    **GUARD_VARIABLES,
+    **GUARDS,
 }

@@ -6,6 +6,9 @@ state's unit, ``<gap>`` that of the guards' gap functions, ``<gap rate>`` the sa
 Dims: ``time`` (samples), ``contact`` (one table for all trajectories), ``guard``, ``trajectory``. When the trajectories of a batch have
 periods of their own, the samples share phases instead of times: the dim is then ``period``, and ``time`` has dims (trajectory, period).
 
+Exponents have the dims ``trajectory``, ``exponent`` (in descending order), ``flow_exponent`` and ``running`` (times at which running means
+are kept); ``<rate>`` is the unit that the caller asked for, such as ``bit/period``.
+
 Results about attractors have the dims ``attractor``, ``phase`` (points of an orbit, one a forcing period) and ``multiplier``. What belongs
 to one start has no dims in the table: a map adds the two states that it is drawn over, a list of starts ``trajectory``.
 
@@ -23,21 +26,28 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError
+from saltus.results import motions
 from saltus.results.method_variables import METHODS_VARIABLES
 from saltus.results.response_variables import RESPONSES_VARIABLES
-from saltus.results.variable import GUARD_VARIABLES, Variable
+from saltus.results.variable import COUNTERS, FORCING_PERIOD, GUARDS, MINIMA, STATUS, TRAJECTORY_NUMBER, Variable
 
 #: Version of the tables below, kept in every result as ``schema_version``.
 VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
-METHODS = "methods"
+METHODS, EXPONENTS = "methods", "exponents"
+SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
     TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare",
     RESPONSES: "frequency_response or bifurcation_diagram",
     METHODS: "compare_methods",
+    SECTION: "poincare", SPECTRUM: "spectrum", IMPACTS: "impact_statistics", ENERGY: "energy_balance",
+    EXPONENTS: "lyapunov",
 }  # fmt: skip
+
+#: Kinds that hold the states under their own names.
+WITH_STATES = (TRAJECTORY, STROBOSCOPE, SECTION)
 
 # What stands in ``basin`` for a start that has no attractor.
 ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
@@ -46,19 +56,6 @@ NO_BASIN = {ESCAPED: "escaped", UNCONVERGED: "unconverged", FAILED: "failed", NO
 #: Meaning of the values of ``agreement``.
 AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
 
-_STATUS = Variable((), "", "how the trajectory ended", "str")
-_COUNTERS = {
-    "events": Variable((), "1", "contacts", "i8"),
-    "grazes": Variable((), "1", "grazes", "i8"),
-    "grazes_unresolved": Variable((), "1", "grazes shallower than the local error", "i8"),
-    "steps": Variable((), "1", "accepted steps", "i8"),
-    "rejected_steps": Variable((), "1", "rejected steps", "i8"),
-    "mode_violations": Variable((), "1", "accepted steps that ended on the wrong side of a guard", "i8"),
-}
-_MINIMA = {
-    "smallest_contact_speed": Variable((), "<gap rate>", "smallest gap rate at a contact"),
-    "smallest_gap_margin": Variable((), "<gap>", "smallest distance of a turning point of the gap from a guard"),
-}
 
 #: Variables of what ``simulate`` returns, beside the states.
 TRAJECTORY_VARIABLES = {
@@ -75,24 +72,24 @@ TRAJECTORY_VARIABLES = {
     "contact_mode_after": Variable(("contact",), "1", "mode after the contact", "i8"),
     "contact_steps": Variable(("contact",), "1", "accepted steps from the start to the contact", "i8"),
     "contact_trajectory": Variable(("contact",), "1", "trajectory that the contact belongs to", "i8"),
-    "status": _STATUS,
-    **_COUNTERS,
-    **_MINIMA,
-    **GUARD_VARIABLES,
+    "status": STATUS,
+    **COUNTERS,
+    **MINIMA,
+    **GUARDS,
     "end_time": Variable((), "s", "time at the end"),
-    "forcing_period": Variable((), "s", "forcing period"),
-    "trajectory": Variable((), "1", "trajectory", "i8"),
+    "forcing_period": FORCING_PERIOD,
+    "trajectory": TRAJECTORY_NUMBER,
 }
 
 #: Variables of what ``stroboscope`` returns, beside the states.
 STROBOSCOPE_VARIABLES = {
     "period": Variable(("period",), "1", "whole forcing periods since the start", "i8"),
-    "status": _STATUS,
-    **_COUNTERS,
-    **_MINIMA,
-    **GUARD_VARIABLES,
-    "forcing_period": Variable((), "s", "forcing period"),
-    "trajectory": Variable((), "1", "trajectory", "i8"),
+    "status": STATUS,
+    **COUNTERS,
+    **MINIMA,
+    **GUARDS,
+    "forcing_period": FORCING_PERIOD,
+    "trajectory": TRAJECTORY_NUMBER,
 }
 
 #: What is known of each attractor, beside the points ``attractor_<state>``. ``<first>``: the unit of the first state.
@@ -147,6 +144,34 @@ AGREEMENT_VARIABLES = {
     "match_orbit_distance": Variable(("pair",), "1", "distance of the two orbits in units of the axis ranges"),
 }
 
+#: Variables of what ``lyapunov`` and ``wolf`` return.
+EXPONENTS_VARIABLES = {
+    "trajectory": Variable(("trajectory",), "1", "trajectory", "i8"),
+    "kind": Variable(("trajectory",), "", "kind of motion", "str"),
+    "response_period": Variable(("trajectory",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
+    "lyapunov_exponent": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent"),
+    "lyapunov_error": Variable(("trajectory", "exponent"), "<rate>", "standard error of the Lyapunov exponent"),
+    "lyapunov_low": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, lower end of the 95 % interval"),
+    "lyapunov_high": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, upper end of the 95 % interval"),
+    "flow_lyapunov_exponent": Variable(("trajectory", "flow_exponent"), "<rate>", "Lyapunov exponent of the flow, its phase included"),
+    "exponent_sum": Variable(("trajectory",), "<rate>", "sum of the Lyapunov exponents"),
+    "mean_divergence": Variable(("trajectory",), "<rate>", "mean rate at which volumes grow"),
+    "independent_batches": Variable(("trajectory",), "1", "batches that the error of the largest exponent comes from", "i8"),
+    "near_graze": Variable(("trajectory",), "1", "whether the motion grazes a boundary, or nearly so", "i1"),
+    "grazes": Variable(("trajectory",), "1", "grazes after the transient", "i8"),
+    "grazes_unresolved": Variable(("trajectory",), "1", "grazes shallower than the local error, after the transient", "i8"),
+    "smallest_gap_margin": MINIMA["smallest_gap_margin"].along("trajectory"),
+    "block_time": Variable(("trajectory",), "s", "time of a block: the forcing period, or the time between two looks"),
+    "status": STATUS.along("trajectory"),
+    "replacements": Variable(("trajectory",), "1", "replacements of the neighbour", "i8"),
+    "replaced_distance": Variable(("trajectory",), "1", "mean distance at replacement, as a share of the range of the motion"),
+    "replaced_angle": Variable(("trajectory",), "rad", "mean angle between old and new neighbour"),
+    "running_time": Variable(("trajectory", "running"), "s", "time since the end of the transient"),
+    "running_exponent": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far"),
+    "running_low": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, lower end of the 95 % interval"),
+    "running_high": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, upper end of the 95 % interval"),
+}
+
 #: The table of each kind of result.
 TABLES = {
     TRAJECTORY: TRAJECTORY_VARIABLES,
@@ -156,6 +181,11 @@ TABLES = {
     AGREEMENT: AGREEMENT_VARIABLES,
     RESPONSES: RESPONSES_VARIABLES,
     METHODS: METHODS_VARIABLES,
+    SECTION: motions.SECTION_VARIABLES,
+    SPECTRUM: motions.SPECTRUM_VARIABLES,
+    IMPACTS: motions.IMPACTS_VARIABLES,
+    ENERGY: motions.ENERGY_VARIABLES,
+    EXPONENTS: EXPONENTS_VARIABLES,
 }
 
 
@@ -280,6 +310,11 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         AGREEMENT: ("agreement", "match_a"),
         RESPONSES: ("response_of", "response_type", "response_branch"),
         METHODS: ("method", "agrees"),
+        SECTION: (*states_of(ds), "crossing_time", "status"),
+        SPECTRUM: ("frequency", "window"),
+        IMPACTS: ("contact_speed", "contacts_per_second", "status"),
+        ENERGY: ("energy", "residual", "status"),
+        EXPONENTS: ("lyapunov_exponent", "running_exponent"),
     }[kind]
 
 

@@ -1,4 +1,4 @@
-"""What results about attractors and responses say in a few lines: the part of ``describe`` that knows them."""
+"""What results that aren't runs say in a few lines: the part of ``describe`` that knows them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import AGREEMENT, BASINS, RESPONSES, axes_of, kind_of, kind_text, parameters_of
+from saltus.results.schema import AGREEMENT, BASINS, EXPONENTS, RESPONSES, axes_of, kind_of, kind_text, parameters_of
+from saltus.results.summary_motions import WRITERS
 
 #: Attractors that get a line of their own; the others are counted.
 _LINES = 12
@@ -21,11 +22,15 @@ _TRUST = {
 
 
 def summary(ds: xr.Dataset) -> list[str]:
-    """Lines on the extent and the content of a map of basins, a list of attractors, the agreement of two maps, or responses."""
+    """Lines on the extent and the content of a result that isn't a run."""
+    if kind_of(ds) in WRITERS:
+        return WRITERS[kind_of(ds)](ds)
     if kind_of(ds) == RESPONSES:
         return [f"extent   {_span(ds, parameters_of(ds), 'values')}, {_count(ds.sizes['start'], 'start')} at each", *_responses(ds)]
     if kind_of(ds) == AGREEMENT:
         return [f"extent   {_axes(ds)}", *_agreement(ds)]
+    if kind_of(ds) == EXPONENTS:
+        return _exponents(ds)
     lines = [f"extent   {_axes(ds)}" if kind_of(ds) == BASINS else f"extent   {_starts(ds)}"]
     lines += _attractors(ds)
     if "basin" in ds:
@@ -75,8 +80,9 @@ def _unsettled(basin: xr.DataArray) -> str:
 def _responses(ds: xr.Dataset) -> list[str]:
     """What was found: branches, kinds of motion, events; and what became of the starts."""
     kinds = [kind_text(kind, n) for kind, n in zip(ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True)]
-    branches = np.unique(ds["response_branch"].values).size
-    found = f"found    {_count(len(kinds), 'response')} on {_count(branches, 'branch')}"
+    found = f"found    {_count(len(kinds), 'response')}"
+    if len(parameters_of(ds)) == 1:
+        found += f" on {_count(np.unique(ds['response_branch'].values).size, 'branch')}"
     lines = [f"{found}: {_tally(kinds)}" if kinds else found]
     if ds.sizes.get("event"):
         lines.append(f"events   {_tally(ds['event_kind'].values.tolist())}")
@@ -93,6 +99,20 @@ def _tally(words: list[str]) -> str:
 def _count(number: int, word: str) -> str:
     """``1 branch``, ``2 branches``."""
     return f"{number} {word}" if number == 1 else f"{number} {word}{'es' if word.endswith('ch') else 's'}"
+
+
+def _exponents(ds: xr.Dataset) -> list[str]:
+    """A line on each trajectory: the kind of motion, and its exponents with the half-width of the 95 % interval of the largest."""
+    count, unit = ds.sizes["trajectory"], ds["lyapunov_exponent"].attrs.get("units", "")
+    lines = [f"measured {ds.attrs.get('algorithm', 'unknown')}, {count} {'trajectory' if count == 1 else 'trajectories'}"]
+    for i in range(min(count, _LINES)):
+        one = ds.isel(trajectory=i)
+        values = ", ".join(f"{value:.6g}" for value in one["lyapunov_exponent"].values)
+        width = float(one["lyapunov_high"][0] - one["lyapunov_exponent"][0])
+        graze = ", near a graze" if "near_graze" in one and int(one["near_graze"]) else ""
+        kind = kind_text(str(one["kind"].item()), int(one["response_period"]))
+        lines.append(f"  {i}: {kind}, {values} {unit}, the first +- {width:.1e}{graze}")
+    return lines + ([f"  and {count - _LINES} more"] if count > _LINES else [])
 
 
 def _agreement(ds: xr.Dataset) -> list[str]:

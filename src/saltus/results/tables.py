@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import sample_dim, states_of
+from saltus.results.schema import parameters_of, response_name, sample_dim, states_of
 
 Table = dict[str, np.ndarray]
 
@@ -33,6 +33,20 @@ def trajectories(ds: xr.Dataset) -> Table:
     names = [str(name) for name in ds.variables if ds[name].dims == ("trajectory",)]
     names.sort(key=lambda name: name != "trajectory")
     return {_header(ds, name): ds[name].values for name in names}
+
+
+def responses(ds: xr.Dataset) -> Table:
+    """One row a response: its parameters, branch, kind, size, stability. The prefix ``response_`` is dropped."""
+    names = [str(name) for name in ds.variables if ds[name].dims == ("response",)]
+    first = ["response", *(response_name(name) for name in parameters_of(ds))]
+    names.sort(key=lambda name: first.index(name) if name in first else len(first))
+    return {_header(ds, name).removeprefix("response_"): ds[name].values for name in names}
+
+
+def events(ds: xr.Dataset) -> Table:
+    """One row for what happens to a branch. The prefix ``event_`` is dropped; empty for a result without events."""
+    names = [str(name) for name in ds.variables if ds[name].dims == ("event",)] if ds.sizes.get("event") else []
+    return {_header(ds, name).removeprefix("event_"): ds[name].values for name in names}
 
 
 def scalars(ds: xr.Dataset) -> dict[str, object]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from saltus.analysis.settled import LAST, settled
 from saltus.results.schema import period_text
-from saltus.study.report import response_texts
+from saltus.study.questions.simulate_table import response_texts
 from saltus.study.table import TextTable
 from saltus.units import from_si
 

@@ -3,8 +3,45 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from saltus.errors import ParameterError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: The functions of saltus.plot that draw each kind of result, the usual one first. A new kind needs a line here and in `_WORDS`.
+PICTURES: dict[str, tuple[str, ...]] = {
+    "trajectory": ("history", "phase"),
+    "stroboscope": ("phase",),
+    "basins": ("basins",),
+    "agreement": ("agreement",),
+    "responses": ("frequency_response", "bifurcation_diagram", "type_map"),
+    "section": ("section",),
+    "spectrum": ("spectrum",),
+    "impacts": ("impacts",),
+    "energy": ("energy",),
+    "methods": ("methods",),
+    "exponents": ("exponents",),
+}
+_WORDS = {
+    "trajectory": "a run", "stroboscope": "points at whole periods", "basins": "basins", "agreement": "the agreement of two maps of basins",
+    "responses": "responses", "section": "a section", "spectrum": "a spectrum", "impacts": "impacts", "energy": "energies",
+    "methods": "one question by several methods", "exponents": "exponents",
+}  # fmt: skip
+#: Pictures that show trajectories of a batch.
+OF_TRAJECTORIES = ("history", "phase", "section", "spectrum", "impacts", "energy", "exponents")
+
+
+def default_kind(ds: xr.Dataset) -> str:
+    """The picture that fits a result; ``""`` if there is none."""
+    from saltus.results.schema import kind_of, parameters_of
+
+    if kind_of(ds) == "responses":
+        if len(parameters_of(ds)) == 2:
+            return "type_map"
+        return "bifurcation_diagram" if "sample" in ds.dims else "frequency_response"
+    return next(iter(PICTURES.get(kind_of(ds), ())), "")
 
 
 def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | None) -> Path:
@@ -14,8 +51,8 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
     ----------
     result : Path
         A ``.nc`` file that saltus wrote.
-    kind : {"history", "phase", "basins", "agreement"}, optional
-        Which picture; by default the one that fits the result.
+    kind : str, optional
+        Which picture, a value of :data:`PICTURES`; by default the one that fits the result.
     trajectory : int, optional
         Which of a batch; all of them, at most 8, by default.
     file : Path, optional
@@ -46,18 +83,19 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
     from saltus.results.schema import kind_of
 
     ds = load(result)
-    own = {"basins": "basins", "agreement": "agreement"}.get(kind_of(ds))
-    kind = kind or own or "history"
-    maps = ("basins", "agreement")
-    if (kind in maps or own is not None) and kind != own:
-        raise ParameterError(f"{result} holds {own or 'a run'}: it can't be drawn as {kind}. Leave --kind out.")
-    if own is not None and trajectory is not None:
-        raise ParameterError(f"{result} holds {own}, no trajectories. Leave --trajectory out.")
+    possible = PICTURES.get(kind_of(ds), ())
+    if not possible:
+        raise ParameterError(f"{result} holds {kind_of(ds)}, for which there is no picture yet.")
+    kind = kind or default_kind(ds)
+    if kind not in possible:
+        raise ParameterError(f"{result} holds {_WORDS[kind_of(ds)]}: it can't be drawn as {kind}. Known: {', '.join(possible)}.")
+    if trajectory is not None and kind not in OF_TRAJECTORIES:
+        raise ParameterError(f"{result} holds {_WORDS[kind_of(ds)]}, no trajectories. Leave --trajectory out.")
     file = file or result.with_name(f"{result.stem}-{kind}.png")
     formats = FigureCanvasBase.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in formats:
         raise ParameterError(f"a picture can't be written as {file.name!r}. Known: {', '.join('.' + name for name in sorted(formats))}.")
-    axes = getattr(plot, kind)(ds, **({} if own else {"trajectory": trajectory}))
+    axes = getattr(plot, kind)(ds, **({"trajectory": trajectory} if kind in OF_TRAJECTORIES else {}))
     first = axes.flat[0] if hasattr(axes, "flat") else axes
     first.figure.savefig(file)
     plt.close("all")

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
-import re
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,13 +13,15 @@ from saltus.analysis.basins import label_all
 from saltus.analysis.plan import CHUNK, BasinPlan, basin_plan
 from saltus.analysis.serial import cell_types, found_data, found_from, settling_arrays, settling_from
 from saltus.analysis.settling import Settling, settle
-from saltus.errors import StudyError
 from saltus.flow.threads import usable_processors
-from saltus.results.provenance import to_json, version
 from saltus.results.store import Store
 from saltus.study import quantities
-from saltus.study.run import method_of, system_of
-from saltus.study.spec import Basins, Map, Study
+from saltus.study.identity import identity
+from saltus.study.names import slug
+from saltus.study.questions.basins import Basins, Map
+from saltus.study.running import Report, Resources
+from saltus.study.setting import Setting, system_of
+from saltus.study.spec import Study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,62 +33,8 @@ if TYPE_CHECKING:
 LARGE = 20
 #: Cells whose labels are timed for the estimate.
 TIMED = 512
-#: Ends of the names of files that belong to a map.
-ATTRACTORS, AGREEMENT = "-attractors", "-agreement"
 #: Folder of a study's stores, in its output folder.
 STORES = "stores"
-
-
-@dataclass(frozen=True)
-class Resources:
-    """What to compute with.
-
-    Attributes
-    ----------
-    threads : int or None
-        Threads of this process; all usable cores by default.
-    workers : int or None
-        Processes of a dask cluster on this machine.
-    scheduler : str or None
-        Address of a dask scheduler, or ``"local"``.
-    shard : (k, n) or None
-        Only the chunks i with i % n == k: one of n jobs that share the store and nothing else.
-    """
-
-    threads: int | None = None
-    workers: int | None = None
-    scheduler: str | None = None
-    shard: tuple[int, int] | None = None
-
-    @property
-    def cluster(self) -> bool:
-        """Whether dask does the work."""
-        return self.workers is not None or self.scheduler is not None
-
-
-def shard_of(text: str) -> tuple[int, int]:
-    """(k, n) from "k/n". Raises StudyError if that isn't what stands there."""
-    match = re.fullmatch(r"(\d+)/(\d+)", text.strip())
-    if not match or not int(match[1]) < int(match[2]):
-        raise StudyError(f"--shard {text}: write K/N with K from 0 to N - 1, such as 0/4.")
-    return int(match[1]), int(match[2])
-
-
-@dataclass(frozen=True)
-class Report:
-    """How far a map is; read off the store, so that the work of other machines counts too."""
-
-    name: str
-    done: int
-    total: int
-    seconds: float
-    computed: int
-    last: bool = False
-
-    @property
-    def seconds_left(self) -> float | None:
-        """Time left at the rate so far [s]; None before the first chunk."""
-        return self.seconds / self.computed * (self.total - self.done) if self.computed else None
 
 
 @dataclass(frozen=True)
@@ -106,49 +50,30 @@ class MapJob:
         """What must be the same to go on with a store."""
         plan = self.plan
         axes = {name: f"{float(values[0])!r} to {float(values[-1])!r} in {len(values)}" for name, values in plan.axes.items()}
-        return {
-            "equations": plan.system.fingerprint(), "values": to_json(dict(plan.system.values)), "method": plan.method.name,
-            "method options": to_json(plan.method.options()), "axes": to_json(axes), "at": to_json(dict(plan.fixed)),
-            "periods": str(plan.periods), "every": str(plan.every), "saltus": version("saltus"), "code": code_hash(),
-        }  # fmt: skip
-
-
-@cache
-def code_hash() -> str:
-    """SHA-256 of all code that a label depends on."""
-    digest = hashlib.sha256()
-    for package in ("system", "kernels", "codegen", "flow", "analysis"):
-        for file in sorted(resources.files(f"saltus.{package}").iterdir(), key=lambda item: item.name):
-            if file.name.endswith(".py"):
-                digest.update(file.name.encode() + file.read_bytes())
-    return digest.hexdigest()
+        arguments = {"axes": axes, "at": dict(plan.fixed), "periods": plan.periods, "every": plan.every}
+        return identity(plan.system, plan.method, arguments)
 
 
 def jobs_of(study: Study, own: System | None = None) -> list[MapJob]:
-    """The maps of a study, each with its plan.
+    """The maps of a study with [basins], each with its plan.
 
     Raises
     ------
     StudyError, UnitError, ParameterError
         If the study doesn't fit its system.
     """
-    table = study.basins
-    assert table is not None
-    base = system_of(study.system, own)
+    assert study.basins is not None
+    return jobs_of_setting(study.basins, Setting(study, system_of(study.system, own), Path()))
+
+
+def jobs_of_setting(table: Basins, setting: Setting) -> list[MapJob]:
+    """The same, of a system that is known."""
     jobs = []
-    for one in table.map or [Map(name=study.study.name)]:
-        system = base.with_values(**quantities.parameters(base, one.values, "basins.map.values"))
-        slug = _slug(one.name) if table.map else "basins"
-        jobs.append(MapJob(one.name, slug, _plan(table, system, method_of(one.method or study.method)), one.compare))
-    slugs = [job.slug + end for job in jobs for end in ("", ATTRACTORS, *([AGREEMENT] if job.compare else []))]
-    if len(set(slugs)) < len(slugs):
-        raise StudyError(f"[[basins.map]] names give the same file names, among {', '.join(slugs)}. Let them differ in letters or digits.")
+    for one in table.map or [Map(name=setting.study.study.name)]:
+        system = setting.system(one.values, "basins.map.values")
+        stem = slug(one.name) if table.map else "basins"
+        jobs.append(MapJob(one.name, stem, _plan(table, system, setting.method(one.method)), one.compare))
     return jobs
-
-
-def _slug(name: str) -> str:
-    """A name as a file name."""
-    return re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-.") or "map"
 
 
 def _plan(table: Basins, system: System, method: Any) -> BasinPlan:

@@ -11,12 +11,20 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from saltus.errors import nearest
-from saltus.study.spec import METHODS, Axis, Basins, Compare, Header, Map, Simulate, Study, SystemTable
+from saltus.study.questions.basins import Axis, Basins, Map
+from saltus.study.questions.lyapunov import Lyapunov
+from saltus.study.questions.responses import BifurcationDiagram, FrequencyResponse
+from saltus.study.questions.simulate import Compare, Simulate
+from saltus.study.spec import Study
+from saltus.study.spec_parts import METHODS, Header, Range, SystemTable
 
 TABLES: dict[str, type[BaseModel]] = {
     "study": Header, "system": SystemTable, "simulate": Simulate, "compare": Compare, "basins": Basins, "map": Map, "axes": Axis,
+    "lyapunov": Lyapunov, "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram, "frequency": Range,
+    "vary": Range,
 }  # fmt: skip
-_BRANCHES = re.compile(r"float|str|list\[.*\]")
+#: Parts of a place that name the branch of a union, not a key.
+_BRANCHES = re.compile(r"float|str|(list|dict)\[.*\]|function-.*")
 _BARE_QUANTITY = re.compile(r"\s*([\w.-]+)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[A-Za-zµ][^#\"']*?)\s*(?:#.*)?")
 _EXPECTED = {
     "int_type": "a whole number",
@@ -56,18 +64,32 @@ def syntax_fault(error: TOMLDecodeError, text: str) -> str:
     return f"line {number}: {line!r} isn't TOML: {str(error).split(' (at')[0]}."
 
 
-def content_faults(error: ValidationError) -> list[str]:
-    """A sentence for each fault of a study that is TOML, but not a study."""
+def content_faults(error: ValidationError, data: Any = None) -> list[str]:
+    """A sentence for each fault of a study that is TOML, but not a study; ``data`` is what the TOML holds."""
     faults: dict[tuple, list[dict]] = {}
     for detail in error.errors():
         place = tuple(part for part in detail["loc"] if not (isinstance(part, str) and _BRANCHES.fullmatch(part)))
         faults.setdefault(place, []).append(dict(detail))
-    return [_fault(place, details) for place, details in faults.items()]
+    return [_fault(place, details, data) for place, details in faults.items()]
 
 
-def _fault(place: tuple, details: list[dict]) -> str:
+def _path(place: tuple, data: Any) -> list[str]:
+    """The place as words: tables of an array are counted from 1, ``lyapunov 2``; one that stands alone isn't."""
+    path: list[str] = []
+    for part in place:
+        if isinstance(part, int):
+            if isinstance(data, list) and path:
+                path[-1] += f" {part + 1}"
+                data = data[part] if part < len(data) else None
+        elif part not in METHODS:
+            path.append(str(part))
+            data = data.get(part) if isinstance(data, dict) else None
+    return path
+
+
+def _fault(place: tuple, details: list[dict], data: Any) -> str:
     first, kind = details[0], details[0]["type"]
-    path = [str(part) for part in place if part not in METHODS]
+    path = _path(place, data)
     *tables, key = path or [""]
     where = f"[{'.'.join(tables)}] " if tables else ""
     if kind == "extra_forbidden":
@@ -85,6 +107,10 @@ def _fault(place: tuple, details: list[dict]) -> str:
     if len(details) > 1:
         finite = any(detail["type"] == "finite_number" for detail in details)
         expected = "a finite number" if finite else 'a plain number, or text with a unit, such as "0.4 mm"'
+    elif kind in ("too_short", "too_long"):
+        return f"{where}{key} = {toml(first['input'])} must have {first['msg'].split('have ')[1].split(' after')[0]}." + _example(place)
+    elif kind == "list_type" and len(place) == 1:
+        expected = "a table"
     else:
         expected = _EXPECTED.get(kind, first["msg"].removeprefix("Input should be "))
     return f"{where}{key} = {toml(first['input'])} must be {expected}." + _example(place)
@@ -94,7 +120,7 @@ def _table(place: tuple) -> type[BaseModel] | None:
     """The class of the table at a place in a study."""
     table: type[BaseModel] | None = Study
     for part in place:
-        nested = part in ("method", "reference") or isinstance(part, int) or table is Axis
+        nested = part in ("method", "flow", "reference") or isinstance(part, int) or table in (Axis, Range)
         table = METHODS.get(part) or TABLES.get(part) or (table if nested else None)
     return table
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from saltus.errors import StudyError, nearest
-from saltus.study.spec import Quantity, Simulate, Start
 from saltus.units import to_si
 
 if TYPE_CHECKING:
+    from saltus.study.spec_parts import Quantity, Range, Start, Starts
     from saltus.system import System
 
 
@@ -47,26 +47,55 @@ def states(system: System, table: Mapping[str, Quantity], place: str) -> dict[st
     return {name: number(value, _unit(system, name, system.states, place), place, name) for name, value in table.items()}
 
 
-def start(system: System, table: Mapping[str, Start]) -> dict[str, float | list[float]]:
-    """[simulate] start in SI: a number a state, or a list for a batch. Raises StudyError if a state is missing or unknown."""
+def start(system: System, table: Mapping[str, Start], place: str = "simulate") -> dict[str, float | list[float]]:
+    """``start`` in SI: a number a state, or a list for a batch.
+
+    Raises
+    ------
+    StudyError
+        If a state is missing or unknown, lists differ in length, or a unit is missing.
+    """
     missing = [state for state in system.states if state not in table]
     if missing:
-        raise StudyError(f"[simulate] start lacks {', '.join(missing)}. {system.name} has the states {', '.join(system.states)}.")
-    return {state: _numbers(system, state, value, system.states, "simulate.start") for state, value in table.items()}
+        raise StudyError(f"[{place}] start lacks {', '.join(missing)}. {system.name} has the states {', '.join(system.states)}.")
+    is_batch(table, place=place)
+    return {state: _numbers(system, state, value, system.states, f"{place}.start") for state, value in table.items()}
 
 
-def varied(system: System, table: Mapping[str, list[Quantity]]) -> dict[str, list[float]]:
-    """[simulate] values in SI: a list a parameter, one value for each trajectory."""
-    place = "simulate.values"
+def starts(system: System, given: Starts | None, place: str) -> dict[str, float | list[float]] | str | None:
+    """``start`` of an analysis that follows many: states in SI, or text such as ``"sweep_up"``, which the analysis reads."""
+    return given if given is None or isinstance(given, str) else start(system, given, place)
+
+
+def box(system: System, given: Mapping[str, list[Quantity]] | None, place: str) -> dict[str, list[float]] | None:
+    """Ranges of states in SI."""
+    if given is None:
+        return None
+    place = f"{place}.box"
+    return {name: [number(end, _unit(system, name, system.states, place), place, name) for end in ends] for name, ends in given.items()}
+
+
+def grid(system: System, name: str, given: Range, place: str) -> tuple[Any, ...] | list[float]:
+    """Values of a parameter in SI: (first, last, count, scale), or the values themselves."""
+    unit = _unit(system, name, system.values, place)
+    if given.values is not None:
+        return [number(value, unit, place, name) for value in given.values]
+    assert given.first is not None
+    assert given.last is not None
+    return number(given.first, unit, place, f"{name}.first"), number(given.last, unit, place, f"{name}.last"), given.count, given.scale
+
+
+def varied(system: System, table: Mapping[str, list[Quantity]], place: str = "simulate.values") -> dict[str, list[float]]:
+    """Values that differ from trajectory to trajectory in SI: a list a parameter."""
     return {name: [number(value, _unit(system, name, system.values, place), place, name) for value in row] for name, row in table.items()}
 
 
-def is_batch(table: Simulate) -> bool:
-    """Whether [simulate] moves a batch. Raises StudyError if two of its lists differ in length, or one is empty."""
-    lengths = {name: len(value) for part in (table.start, table.values) for name, value in part.items() if isinstance(value, list)}
+def is_batch(*tables: Mapping[str, Start], place: str = "simulate") -> bool:
+    """Whether there are lists among values. Raises StudyError if two of them differ in length, or one is empty."""
+    lengths = {name: len(value) for part in tables for name, value in part.items() if isinstance(value, list)}
     if len(set(lengths.values())) > 1 or 0 in lengths.values():
         told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise StudyError(f"[simulate] lists must have the same length, at least 1: {told}.")
+        raise StudyError(f"[{place}] lists must have the same length, at least 1: {told}.")
     return bool(lengths)
 
 

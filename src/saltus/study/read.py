@@ -43,9 +43,11 @@ def read(path: Path | str) -> tuple[Study, str]:
 def parse(text: str, name: str = "study") -> Study:
     """A study from its text; ``name`` stands in the messages. Raises StudyError as :func:`read` does."""
     try:
-        return Study.model_validate(tomllib.loads(text))
+        data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{name}, {syntax_fault(error, text)}") from None
+    try:
+        return Study.model_validate(data)
     except ValidationError as error:
-        faults = content_faults(error)
+        faults = content_faults(error, data)
         raise StudyError(f"{name}: " + (faults[0] if len(faults) == 1 else "".join(f"\n  - {fault}" for fault in faults))) from None

@@ -1,152 +1,112 @@
-"""Run a study: from a checked file to Datasets and to the tables that tell what came out."""
+"""Run a study: from a checked file to the answers of its questions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from inspect import signature
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import ParameterError, StudyError
-from saltus.study import quantities
-from saltus.study.compare import contact_table
-from saltus.study.report import run_table
-from saltus.study.spec import Study, SystemTable
-from saltus.study.spec import Table as SpecTable
-from saltus.study.table import TextTable
+from saltus.errors import StudyError, nearest
+from saltus.study.copies import keep_copy
+from saltus.study.questions import basins, lyapunov, responses, simulate
+from saltus.study.running import Outcome, Report, Resources, Running
+from saltus.study.setting import Setting, system_of
+from saltus.study.spec import Study
 
 if TYPE_CHECKING:
-    import xarray as xr
-
+    from saltus.study.questions.question import Question
     from saltus.system import System
 
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a study gave.
-
-    Attributes
-    ----------
-    system : System
-        With the study's values.
-    run : Dataset
-        What ``simulate`` returned; the text of the study is in its attribute ``study``.
-    reference : Dataset or None
-        The same by the second method, if [compare] asks for one.
-    table : TextTable
-        What to print.
-    """
-
-    system: System
-    run: xr.Dataset
-    reference: xr.Dataset | None
-    table: TextTable
-
-    def write(self, folder: Path) -> list[Path]:
-        """Write ``run.nc``, ``table.csv`` and, if there is one, ``reference.nc`` to a folder; returns the files."""
-        from saltus.results import save
-
-        folder.mkdir(parents=True, exist_ok=True)
-        files = [save(self.run, folder / "run.nc"), self.table.write_csv(folder / "table.csv")]
-        return files + ([save(self.reference, folder / "reference.nc")] if self.reference is not None else [])
+#: What makes a question of each table.
+_PLANS: dict[str, Callable[[Any, Setting], list[Question]]] = {
+    "simulate": simulate.questions,
+    "lyapunov": lyapunov.questions,
+    "frequency_response": responses.frequency_responses,
+    "bifurcation_diagram": responses.bifurcation_diagrams,
+    "basins": basins.questions,
+}
 
 
 def run_study(
     study: Study,
     text: str,
     folder: Path,
-    own: System | None = None,
-    threads: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    own: System | None,
+    resources: Resources,
+    report: Callable[[Report], None],
+    say: Callable[[str], None],
+    pictures: bool = True,
+    *,
+    beside: Path | None = None,
+    only: Sequence[str] = (),
 ) -> Outcome:
-    """Run a study.
+    """Answer the questions of a study, or what is missing of the answers, and write what came out.
 
     Parameters
     ----------
     study : Study
         What to compute.
     text : str
-        The file as it stands, kept with the result; :func:`saltus.study.read.read` returns both.
+        The file as it stands; a copy goes to the folder. :func:`saltus.study.read.read` returns both.
     folder : Path
-        Where the study stands; files that it names are looked for there.
+        Output: for each question a ``.nc``, a ``.csv`` and pictures; the stores of basins.
     own : System, optional
         The system, if it isn't one of saltus's models.
-    threads : int, optional
-        Threads to compute with.
-    progress : callable, optional
-        Called with the share done.
+    resources : Resources
+        What to compute with.
+    report, say : callable
+        Called with the progress of a question; with a sentence.
+    pictures : bool
+        Whether to draw.
+    beside : Path, optional
+        Where the study stands: files that it names are looked for there. Default: ``folder``.
+    only : sequence of str
+        Names of questions to answer; by default all.
 
     Raises
     ------
     StudyError, UnitError, ParameterError
-        If the study doesn't fit its system.
+        If the study doesn't fit its system: told before anything is computed.
+    StoreError
+        If a store in the folder was made from something else: names what differs.
     """
-    if study.simulate is None:
-        raise StudyError("this study has [basins]: run it with run_maps.")
-    system = system_of(study.system, own)
-    if quantities.is_batch(study.simulate) and study.compare is not None:
-        raise StudyError("[compare] is for one start: let [simulate] start hold single values.")
-    if study.compare is not None and study.simulate.keep is not None:
-        raise StudyError("[compare] counts contacts from the start of the run: leave keep out of [simulate].")
-    computing = {"threads": threads, "progress": progress or False}
-    run = _simulate(system, study, study.method, text, computing)
-    if study.compare is None:
-        return Outcome(system, run, None, run_table(study.study.name, run))
-    second = study.compare.reference
-    reference = _simulate(system, study, second, text, computing) if second is not None else None
-    return Outcome(system, run, reference, contact_table(study.study.name, run, study.compare, folder, reference))
+    asked = questions_of(study, own, beside or folder, only)
+    if resources.scheduler not in (None, "local"):
+        from saltus.study.cluster import check_scheduler
+
+        check_scheduler(str(resources.scheduler))
+    for question in asked:
+        question.prepare(folder)
+    keep_copy(folder, text, (file for question in asked for file in question.files()))
+    at, outcome = Running(folder, text, resources, report, say, pictures), Outcome()
+    for question in asked:
+        if resources.shard is None or resources.shard[0] == 0 or question.shared:
+            outcome.add(question.answer(at))
+    return outcome
 
 
-def system_of(table: SystemTable, own: System | None = None) -> System:
-    """The system that [system] names, with its values.
+def questions_of(study: Study, own: System | None, beside: Path, only: Sequence[str] = ()) -> list[Question]:
+    """The questions of a study, or some of them, checked against its system.
 
     Raises
     ------
-    StudyError
-        If neither or both of the table and the command line give a system, or a value lacks its unit.
-    ParameterError, UnitError
-        If the model, the case or a value is refused.
+    StudyError, UnitError, ParameterError
+        If one doesn't fit the system, two would write the same files, or ``only`` names none.
     """
-    from saltus import models
-
-    if own is not None:
-        if table.model is not None or table.case is not None:
-            raise StudyError("[system] names a model, and --system gives another system. Keep one of the two.")
-        base = own
-    elif table.model is None:
-        raise StudyError('[system] names no model. Write model = "delangre" (`saltus models` lists them), or give --system my_rig.py:rig.')
-    else:
-        model = models.find(table.model)
-        if table.case is not None and "case" not in signature(model).parameters:
-            raise StudyError(f"[system] case: {table.model} has no cases.")
-        base = model() if table.case is None else model(table.case)
-    return base.with_values(**quantities.parameters(base, table.values))
+    setting = Setting(study, system_of(study.system, own), beside)
+    asked = [(name, question) for name, table in study.questions() for question in _PLANS[name](table, setting)]
+    stems = [stem for _, question in asked for stem in question.stems]
+    twice = sorted({stem for stem in stems if stems.count(stem) > 1})
+    if twice:
+        raise StudyError(f"names of this study give the same file names, such as {twice[0]}. Let them differ in letters or digits.")
+    chosen = [question for name, question in asked if not only or _names(name, question) & set(only)]
+    known = {name for one in asked for name in _names(*one)}
+    for name in only:
+        if name not in known:
+            raise StudyError(f"--only {name}: this study has no such question. {nearest(name, known)}")
+    return chosen
 
 
-def method_of(table: SpecTable) -> Any:
-    """The method that a [method] table describes."""
-    from saltus import flow
-
-    options = table.model_dump(exclude_unset=True)
-    return getattr(flow, options.pop("name"))(**options)
-
-
-def _simulate(system: System, study: Study, method: SpecTable, text: str, computing: dict[str, Any]) -> xr.Dataset:
-    from saltus.analysis import simulate
-
-    table = study.simulate
-    assert table is not None
-    if table.periods is not None and system.forced_at is None:
-        raise StudyError(f'[simulate] periods: {system.name} has no forcing period. Write t_end = "2 s" in place of it.')
-    start, values = quantities.start(system, table.start), quantities.varied(system, table.values)
-    t_end = None if table.t_end is None else quantities.number(table.t_end, "s", "simulate", "t_end")
-    t_start = quantities.number(table.t_start, "s", "simulate", "t_start")
-    try:
-        run = simulate(
-            system, start, table.periods, t_end, t_start=t_start, method=method_of(method), samples=table.samples, keep=table.keep,
-            values=values, **computing,
-        )  # fmt: skip
-    except ParameterError as error:
-        raise StudyError(f"[simulate] {error}") from error
-    return run.assign_attrs(study=text)
+def _names(table: str, question: Question) -> set[str]:
+    """What a question may be called on the command line."""
+    return {table, question.title, question.stems[0]}

@@ -6,6 +6,9 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 
+#: Rows printed at most; the files hold them all.
+ROWS = 24
+
 
 @dataclass(frozen=True)
 class TextTable:

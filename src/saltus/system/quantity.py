@@ -14,7 +14,7 @@ from typing import Any
 
 from saltus.errors import ParameterError, TraceError, nearest
 from saltus.system.expression import TIME, Expr, as_expr, parameter, state, sub
-from saltus.system.guards import Guard, join_guards, surface_guard
+from saltus.system.guards import Guard, bits_in, join_guards, surface_guard
 from saltus.system.system import System
 from saltus.system.trace import explained, place
 from saltus.units import check_declared, to_si
@@ -184,6 +184,15 @@ def turning_surface(system: System, name: str) -> System:
     """
     system.state_unit(name)
     return _with_guard(system, system.field[system.states.index(name)], system.guards, f"{name} turns")
+
+
+def acting_guards(system: System) -> tuple[int, ...]:
+    """Numbers of the guards on whose side the equations depend: all but the surfaces that were added."""
+    acting = bits_in(system.field)
+    for number in reversed(range(len(system.guards))):
+        if number in acting:
+            acting |= bits_in([system.guards[number].gap])
+    return tuple(sorted(acting))
 
 
 def _with_guard(system: System, gap: Expr, guards: tuple[Guard, ...], name: str) -> System:

@@ -179,3 +179,14 @@ def test_cubics_turn_where_they_turn():
     found = _turn(value(0.0), value(1.0), slope(0.0), slope(1.0))
     np.testing.assert_allclose(found, at, atol=1e-9)
     assert _turn(np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([-1.0])).item() == 0.5  # a parabola
+
+
+@pytest.mark.parametrize("axes", [{"frequency": ("14 Hz", "16 Hz", 2)}, {"frequency": ("14 Hz", "16 Hz", 2), "force": ("1 N", "2 N", 2)}])
+def test_where_nothing_is_found_the_result_says_so(axes, tmp_path):
+    """Starts beyond the range of numbers: all escape."""
+    ds = sl.bifurcation_diagram(RIG, axes, {"x": 1e200, "v": 0.0}, progress=False)
+    assert ds.sizes["response"] == 0
+    assert (ds["response_of"].values == -1).all()
+    assert (ds["type"].values == "escaped").all()
+    sl.save(ds, tmp_path / "none.nc")
+    assert sl.load(tmp_path / "none.nc").identical(ds)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from saltus.errors import ParameterError
-from saltus.models import MODELS, aeroelastic, chain, delangre, describe, find, gear_pair
+from saltus.models import MODELS, aeroelastic, chain, delangre, describe, energy, find, gear_pair
 from saltus.system import functions
 from saltus.system.evaluate import evaluate, field, mode_number, sides
 
@@ -53,6 +53,13 @@ def test_the_registry():
     assert list(describe()) == list(MODELS)
     with pytest.raises(ParameterError, match="Did you mean 'delangre'"):
         find("delange")
+
+
+def test_every_model_has_its_energies():
+    """That they are right is shown in tests/truth/test_energy.py."""
+    assert all(list(energy(name)) == ["energy", "supplied", "dissipated"] for name in MODELS)
+    with pytest.raises(ParameterError, match="Did you mean 'chain'"):
+        energy("chian")
 
 
 @pytest.mark.parametrize(("case", "gaps"), [("a", (0.4e-3, 0.4e-3)), ("b", (0.0, 0.4e-3)), ("c", (0.0, 0.8e-3))])

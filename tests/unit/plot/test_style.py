@@ -1,6 +1,9 @@
 """Display units, regions and the palette."""
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -86,3 +89,16 @@ def test_opposite_gaps_keep_free_green():
     found = regions.find(ds, ["y"])
     assert [region.label for region in found.regions] == ["no gap > 0", "a > 0", "b > 0"]
     assert found.regions[0].color == OKABE_ITO["green"]
+
+
+def test_a_notebook_stays_interactive(tmp_path):
+    """Notebooks' backend switches interaction on when it is loaded, which the first picture does; later pictures need it too."""
+    (tmp_path / "notebook_backend.py").write_text(
+        "import matplotlib\nfrom matplotlib.backends.backend_agg import FigureCanvas, FigureManager\nmatplotlib.interactive(True)\n"
+    )
+    program = (
+        "import matplotlib, matplotlib.pyplot as plt, saltus as sl\nwith sl.plot.style(): plt.figure()\nassert matplotlib.is_interactive()"
+    )
+    paths = os.pathsep.join([str(tmp_path), *sys.path])
+    environment = os.environ | {"MPLBACKEND": "module://notebook_backend", "PYTHONPATH": paths}
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True)

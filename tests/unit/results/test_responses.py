@@ -1,5 +1,6 @@
 """Steady responses over parameters: what the schema promises, and files that bring all of it back."""
 
+import csv
 import dataclasses
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 import xarray as xr
 
 from saltus.errors import ParameterError
-from saltus.results import Guards, Responses, Starts, content_hash, describe, load, save, schema, to_csv
+from saltus.results import Guards, Responses, Starts, content_hash, describe, load, save, schema
 
 from .responses_data import NO_RESPONSE, RESPONSE_OF, TABLE, responses, two_parameters
 
@@ -122,6 +123,20 @@ def test_describe_counts():
     assert "5 of 6 starts, 1 escaped" in text
 
 
-def test_csv_needs_samples_and_says_who_has_them(tmp_path):
-    with pytest.raises(ParameterError, match="from frequency_response or bifurcation_diagram"):
-        to_csv(responses(), tmp_path / "a.csv")
+def test_describe_a_map_without_branches():
+    text = describe(two_parameters())
+    assert "3 x 2 values, frequency from 4 to 6 Hz, gap from 0.001 to 0.002 m, 1 start at each" in text
+    assert "5 responses: 3 T, 1 3T, 1 chaotic" in text
+
+
+def test_csv_has_a_row_for_each_response(tmp_path):
+    with save(responses(), tmp_path / "a.csv").open(encoding="utf-8") as file:
+        header, *rows = csv.reader(line for line in file if not line.startswith("#"))
+    assert header[:3] == ["response", "frequency [Hz]", "branch"]
+    assert [row[1] for row in rows] == ["4.0", "4.0", "5.0", "6.0", "6.0"]
+    assert float(rows[1][header.index("rms [m]")]) == TABLE.rms[1]
+    with (tmp_path / "a_events.csv").open(encoding="utf-8") as file:
+        header, row = csv.reader(line for line in file if not line.startswith("#"))
+    assert dict(zip(header, row, strict=True)) == {"event": "0", "kind": "graze", "branch": "0", "frequency [Hz]": "5.5"}
+    save(responses(events=None), tmp_path / "b.csv")
+    assert not (tmp_path / "b_events.csv").exists()

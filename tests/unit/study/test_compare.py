@@ -9,8 +9,9 @@ import pytest
 import xarray as xr
 
 from saltus.errors import StudyError
-from saltus.study.compare import contact_table, exact_times
-from saltus.study.spec import ODE45, Compare
+from saltus.study.questions.simulate import Compare
+from saltus.study.questions.simulate_compare import contact_table, exact_times
+from saltus.study.spec_parts import ODE45
 
 
 def made_up_run(method: str, times: list[float]) -> xr.Dataset:
@@ -41,7 +42,7 @@ def folder(tmp_path):
 def table(folder, exact="exact.csv", reference="Taylor"):
     spec = Compare(printed="printed.csv", exact=exact, reference=ODE45(name="ODE45") if reference else None)
     second = made_up_run("Taylor", [0.125, 0.2500001, 0.5 + 1e-13]) if reference else None
-    return contact_table("title", made_up_run("ODE45", [0.125, 0.25 + 2**-50, 0.5]), spec, folder, second)
+    return contact_table("title", made_up_run("ODE45", [0.125, 0.25 + 2**-50, 0.5]), spec, folder.joinpath, second)
 
 
 def test_rows(folder):
@@ -69,7 +70,7 @@ def test_without_exact_times_and_second_method(folder):
 def test_a_residual_off_the_states_is_unknown(folder):
     run = made_up_run("ODE45", [0.125, 0.25, 0.5])
     run["guard_state"] = ("guard", ["", "x"])
-    found = contact_table("title", run, Compare(printed="printed.csv"), folder, None)
+    found = contact_table("title", run, Compare(printed="printed.csv"), folder.joinpath, None)
     assert np.isnan(float(found.rows[0][5]))
 
 

@@ -12,10 +12,13 @@ from saltus.analysis import plan
 from saltus.errors import StudyError
 from saltus.results import load
 from saltus.results.store import Store, StoreError
-from saltus.study import maps, maps_run
-from saltus.study.maps import Resources, jobs_of
-from saltus.study.maps_run import copy_of, run_maps, status_table, statuses
+from saltus.study import copies, identity, maps
+from saltus.study.copies import copy_of
+from saltus.study.maps import jobs_of
 from saltus.study.read import parse
+from saltus.study.run import run_study
+from saltus.study.running import Resources
+from saltus.study.status import status_table, status_tables, stores
 from small_study import small_study
 
 #: 576 starts in 12 chunks; four attractors.
@@ -42,7 +45,7 @@ class Run:
     def __init__(self, folder, text=STUDY, pictures=False, **resources):
         folder.mkdir(exist_ok=True)
         self.folder, self.reports, self.said = folder, [], []
-        self.outcome = run_maps(
+        self.outcome = run_study(
             parse(text), text, folder, None, Resources(**({"threads": 1} | resources)), self.reports.append, self.said.append, pictures
         )
 
@@ -131,7 +134,7 @@ def test_a_study_is_what_basins_returns(whole):
 def test_only_what_is_missing_is_computed(whole, tmp_path):
     folder = copied(whole, tmp_path / "run")
     forget(folder, (0, 5, 11))
-    (status,) = statuses(folder)
+    (status,) = stores(folder)
     assert (status.done, status.total, status.damaged) == (9, 12, 0)
     again = Run(folder)
     assert again.computed == 3
@@ -200,7 +203,7 @@ def test_a_changed_study_is_refused(whole, tmp_path, old, new, told):
 
 def test_other_code_is_refused(whole, tmp_path, monkeypatch):
     folder = copied(whole, tmp_path / "run")
-    monkeypatch.setattr(maps, "code_hash", lambda: "another")
+    monkeypatch.setattr(identity, "code_hash", lambda: "another")
     with pytest.raises(StoreError, match=r"code was .* is 'another'"):
         Run(folder)
 
@@ -235,7 +238,7 @@ def test_two_maps_and_their_agreement(tmp_path):
     with (run.folder / "7-hz.csv").open(encoding="utf-8") as file:
         _, *rows = csv.reader(line for line in file if not line.startswith("#"))
     assert len(rows) == load(run.folder / "7-hz.nc").sizes["attractor"] == 1
-    assert [one.note["name"] for one in statuses(run.folder)] == ["16 Hz", "7 Hz"]
+    assert [one.note["name"] for one in stores(run.folder)] == ["16 Hz", "7 Hz"]
     assert Run(run.folder, PAIR).computed == 0
 
 
@@ -272,7 +275,7 @@ def test_a_large_map_is_estimated_first(tmp_path, monkeypatch):
 
 # -- status ----------------------------------------------------------------------------------------------------------------------
 def test_status_of_a_folder_and_of_a_store(whole):
-    (one,), (other,) = statuses(whole.folder), statuses(whole.folder / "stores" / "basins")
+    (one,), (other,) = stores(whole.folder), stores(whole.folder / "stores" / "basins")
     assert one == other
     assert (one.done, one.total, one.damaged, one.writers) == (12, 12, 0, ())
     table = status_table([one])
@@ -283,15 +286,15 @@ def test_status_of_a_folder_and_of_a_store(whole):
 def test_status_of_a_store_at_work(whole, tmp_path):
     folder = copied(whole, tmp_path / "run")
     with Store.open(folder / "stores" / "basins").lock((1, 2)):
-        (row,) = status_table(statuses(folder)).rows
+        (row,) = status_table(stores(folder)).rows
     assert "shard 1 of 2" in row[-1]
 
 
 def test_no_study_here(tmp_path):
     with pytest.raises(StudyError, match="holds no store"):
-        statuses(tmp_path)
+        status_tables(tmp_path)
     with pytest.raises(StudyError, match="holds no store"):
-        statuses(tmp_path / "nowhere")
+        status_tables(tmp_path / "nowhere")
     with pytest.raises(StudyError, match=r"holds no study\.toml"):
         copy_of(tmp_path)
 
@@ -304,7 +307,7 @@ def test_a_full_disk_keeps_the_copy_of_the_study(whole, tmp_path, monkeypatch):
         self.open("w").close()  # what the system does first
         raise OSError(28, "No space left on device", str(self))
 
-    monkeypatch.setattr(maps_run.Path, "write_text", full)
+    monkeypatch.setattr(copies.Path, "write_text", full)
     with pytest.raises(OSError, match="No space"):
         Run(folder)
     assert copy_of(folder).read_text() == STUDY

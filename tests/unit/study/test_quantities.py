@@ -48,12 +48,12 @@ def test_unknown_parameter_gets_the_nearest():
 
 def test_start_of_a_batch():
     table = simulate_table('start = { x = ["1 mm", "2 mm"], v = "0 m/s" }')
-    assert quantities.is_batch(table)
+    assert quantities.is_batch(table.start, table.values)
     assert quantities.start(RIG, table.start) == {"x": [1e-3, 2e-3], "v": 0.0}
 
 
 def test_single_start():
-    assert not quantities.is_batch(simulate_table('start = { x = "1 mm", v = "0 m/s" }'))
+    assert not quantities.is_batch(simulate_table('start = { x = "1 mm", v = "0 m/s" }').start)
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_start_refusals(start, part):
 )
 def test_lists_of_different_lengths(text):
     with pytest.raises(StudyError, match="same length"):
-        quantities.is_batch(simulate_table(text))
+        quantities.is_batch(simulate_table(text).start, simulate_table(text).values)
 
 
 def test_varied_values():

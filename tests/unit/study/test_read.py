@@ -8,7 +8,8 @@ import pytest
 
 from saltus.errors import StudyError
 from saltus.study.read import parse, read
-from saltus.study.spec import ODE45, Study, Taylor
+from saltus.study.spec import Study
+from saltus.study.spec_parts import ODE45, Taylor
 
 HEAD = '[study]\nname = "a study"\n'
 WHOLE = HEAD + '[simulate]\nstart = { x = "0 mm" }\nperiods = 3\n'
@@ -55,7 +56,7 @@ def test_not_toml(text, parts):
         (HEAD + "nme = 3", "[study] has no key 'nme'. Did you mean 'name'?"),
         (WHOLE + "sampels = 3", "[simulate] has no key 'sampels'. Did you mean 'samples'?"),
         (HEAD + "[simulat]", "the file has no table 'simulat'. Did you mean 'simulate'?"),
-        (HEAD, "a study has one table [simulate] or one table [basins]."),
+        (HEAD, "a study asks something: it has a table [simulate], [lyapunov], [frequency_response], [bifurcation_diagram] or [basins]."),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),
         (WHOLE.replace("3", "3.0"), "[simulate] periods = 3.0 must be a whole number. For example: periods = 60"),
@@ -95,6 +96,8 @@ def test_not_text(tmp_path):
 def test_schema_tells_editors_the_keys():
     schema = Study.model_json_schema()
     json.dumps(schema)
-    assert set(schema["properties"]) == {"study", "system", "method", "simulate", "compare", "basins"}
+    assert set(schema["properties"]) == {
+        "study", "system", "method", "simulate", "compare", "lyapunov", "frequency_response", "bifurcation_diagram", "basins",
+    }  # fmt: skip
     assert schema["$defs"]["Simulate"]["additionalProperties"] is False
     assert schema["$defs"]["SystemTable"]["additionalProperties"] != {}, "values are numbers or text"

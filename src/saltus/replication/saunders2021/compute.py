@@ -25,8 +25,9 @@ from saltus.replication.job import Show
 from saltus.results import attractors_dataset
 from saltus.study import quantities
 from saltus.study.maps import jobs_of
-from saltus.study.run import method_of, system_of
-from saltus.study.spec import METHODS, Study
+from saltus.study.setting import method_of, system_of
+from saltus.study.spec import Study
+from saltus.study.spec_parts import METHODS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,14 +10,11 @@ from saltus.analysis.settled import settled
 from saltus.errors import ParameterError
 from saltus.kernels.status import STATUS
 from saltus.results.schema import end_name, period_text, states_of
-from saltus.study.table import TextTable
+from saltus.study.table import ROWS, TextTable
 from saltus.units import from_si
 
 if TYPE_CHECKING:
     import xarray as xr
-
-#: Rows printed at most; the files hold them all.
-ROWS = 24
 
 
 def run_table(title: str, run: xr.Dataset) -> TextTable:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from saltus.errors import StudyError
-from saltus.study.printed import cell, rows
-from saltus.study.spec import Compare
+from saltus.study.questions.printed import cell, rows
 from saltus.study.table import TextTable
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.study.questions.simulate import Compare
 
-def contact_table(title: str, run: xr.Dataset, compare: Compare, folder: Path, reference: xr.Dataset | None) -> TextTable:
+
+def contact_table(title: str, run: xr.Dataset, compare: Compare, find: Callable[[str], Path], reference: xr.Dataset | None) -> TextTable:
     """A row for each contact that was printed.
 
     Parameters
@@ -27,8 +29,8 @@ def contact_table(title: str, run: xr.Dataset, compare: Compare, folder: Path, r
         What ``simulate`` returned for one start.
     compare : Compare
         [compare] of the study.
-    folder : Path
-        Where the CSV files stand.
+    find : callable
+        Where a CSV file of this name stands.
     reference : Dataset or None
         The same run by the second method.
 
@@ -43,9 +45,9 @@ def contact_table(title: str, run: xr.Dataset, compare: Compare, folder: Path, r
     StudyError
         If a file can't be read, or names a contact that the run doesn't have.
     """
-    path = folder / compare.printed
+    path = find(compare.printed)
     printed = rows(path, ("event_number", "time_s"))
-    exact = exact_times(folder / compare.exact) if compare.exact else {}
+    exact = exact_times(find(compare.exact)) if compare.exact else {}
     residual, legs = _residuals(run), _legs(run)
     table, before = [], 0
     for row in printed:

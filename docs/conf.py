@@ -1,0 +1,60 @@
+"""The documentation: `sphinx-build -W --keep-going -b html docs docs/_build`. Needs no network; notebooks are executed as it builds."""
+
+import os
+import sys
+from pathlib import Path
+
+import saltus
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_ext"))
+
+project = "saltus"
+author = "The saltus developers"
+copyright = author
+version = release = saltus.__version__
+
+extensions = [
+    "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "myst_nb",
+    "glossary_terms", "decision_notes", "study_tables", "measured", "offline",
+]  # fmt: skip
+# pictures/ holds those of the README, comparison/ data that a page reads.
+exclude_patterns = ["_build", "_ext", "pictures", "comparison"]
+templates_path = []
+
+# -- look ----------------------------------------------------------------------------------------------------------------------
+html_theme = "furo"
+html_title = "saltus"
+html_static_path = ["_static"]
+html_css_files = ["saltus.css"]
+html_copy_source = False
+html_show_sphinx = False
+# No server but the reader's own: MathJax lies beside the pages, and `offline` fails the build if one loads anything from elsewhere.
+mathjax_path = "mathjax/tex-svg.js"
+pygments_style, pygments_dark_style = "friendly", "monokai"
+
+# -- text and notebooks --------------------------------------------------------------------------------------------------------
+myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+# Always executed: a page can't show what the code of today doesn't print. In a folder of its own, so that nothing is left behind.
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+#: Seconds for one cell: a cold system of four states compiles for 40 s on a busy core.
+nb_execution_timeout = 600
+nb_execution_show_tb = True
+nb_merge_streams = True
+# A caller's backend for files would leave the notebooks without pictures; the notebooks' own has a sharp 150 dots an inch from the style.
+os.environ.pop("MPLBACKEND", None)
+os.environ["MATPLOTLIBRC"] = str(HERE / "matplotlibrc")
+# The commands `saltus ...` of the notebooks are those of this interpreter, and their tables are as wide as those of a terminal.
+os.environ["COLUMNS"] = "118"
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+
+# -- API -----------------------------------------------------------------------------------------------------------------------
+autodoc_typehints = "none"  # the docstrings say types, with units and shapes
+autodoc_member_order = "bysource"
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+napoleon_custom_sections = [("Raises", "Raises")]

@@ -1,0 +1,80 @@
+"""Delay embedding: the states behind one recorded quantity.
+
+Delay: the first minimum of the mutual information, Fraser & Swinney, Physical Review A 33 (1986) 1134-1140. Dimension: the least that
+leaves no false neighbours, Kennel, Brown & Abarbanel, Physical Review A 45 (1992) 3403-3411.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+#: Longest delay tried, as a share of the series: shorter series don't show so slow a motion anyway.
+LONGEST = 0.05
+#: Samples for each cell of the histogram of the mutual information.
+PER_CELL = 40
+#: Growth of a distance by one more coordinate, and size of it relative to the series, from which a neighbour is false: Kennel's values.
+STRETCHED, SPREAD = 15.0, 2.0
+#: Share of false neighbours that is taken for none, and the largest dimension tried.
+NONE_FALSE, MOST = 0.01, 10
+#: Points whose neighbours are looked at.
+ASKED = 4000
+
+
+def embed(series: np.ndarray, dimension: int, delay: int) -> np.ndarray:
+    """Points float64[n - (m - 1) delay, m] whose coordinates are the series now and one, two, ... delays later."""
+    count = len(series) - (dimension - 1) * delay
+    return np.stack([series[i * delay : i * delay + count] for i in range(dimension)], axis=1)
+
+
+def mutual_information(series: np.ndarray, lag: int) -> float:
+    """What a sample says about the one ``lag`` later [nat], by a histogram of cells of equal chance."""
+    cells = max(int(np.sqrt(len(series) / PER_CELL)), 4)
+    rank = np.argsort(np.argsort(series, kind="stable"), kind="stable") * cells // len(series)
+    joint = np.bincount(rank[:-lag] * cells + rank[lag:], minlength=cells * cells).reshape(cells, cells) / (len(series) - lag)
+    product = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
+    there = joint > 0
+    return float((joint[there] * np.log(joint[there] / product[there])).sum())
+
+
+def first_minimum(series: np.ndarray) -> int:
+    """Delay in samples: the first minimum of the mutual information, the least over two neighbours on either side."""
+    longest = max(int(LONGEST * len(series)), 3)
+    values: list[float] = []
+    for lag in range(1, longest + 3):
+        values.append(mutual_information(series, lag))
+        if lag > 4 and values[-3] == min(values[-5:]):
+            return lag - 2
+    return int(np.argmin(values)) + 1
+
+
+def false_neighbours(series: np.ndarray, dimension: int, delay: int, exclude: int) -> float:
+    """Share of nearest neighbours in this dimension that one more coordinate shows to be none; NaN if nothing has a neighbour."""
+    longer = embed(series, dimension + 1, delay)
+    points = longer[:, :dimension]
+    asked = np.unique(np.linspace(0, len(points) - 1, min(ASKED, len(points))).round().astype(int))
+    distance, place = cKDTree(points).query(points[asked], k=min(2 * exclude + 2, len(points)))
+    allowed = np.abs(place - asked[:, None]) > exclude
+    first, some = allowed.argmax(axis=1), allowed.any(axis=1)
+    rows = np.arange(len(asked))
+    near, partner = distance[rows, first][some], place[rows, first][some]
+    step = np.abs(longer[asked[some], dimension] - longer[partner, dimension])
+    floor = 1e-9 * np.ptp(series)  # neighbours on a motion that repeats lie on one another but for rounding
+    false = (step > STRETCHED * np.maximum(near, floor)) | (np.hypot(step, near) > SPREAD * series.std())
+    return float(false.mean()) if some.any() else float("nan")
+
+
+def least_dimension(series: np.ndarray, delay: int, exclude: int) -> int:
+    """The least dimension without false neighbours; MOST if there is none, as for noise."""
+    for dimension in range(1, MOST):
+        if len(series) <= dimension * delay + 2 * exclude + 2:
+            return dimension
+        if false_neighbours(series, dimension, delay, exclude) < NONE_FALSE:
+            return dimension
+    return MOST
+
+
+def hardly_correlated(series: np.ndarray) -> bool:
+    """Whether neighbouring samples tell little of each other, as those of a map do: autocorrelation below 1/e in magnitude."""
+    centred = series - series.mean()
+    return bool(abs(np.dot(centred[:-1], centred[1:])) < np.dot(centred, centred) / np.e)

@@ -1,0 +1,140 @@
+"""Growth of the distance between neighbours on a trajectory: the fixed evolution time program of Wolf et al.
+
+A point of the trajectory and a neighbour of it are followed for a fixed time, one evolution, and the growth of their distance is noted.
+Then a new neighbour takes over, close to the point and in the direction in which the old one lies. Wolf, Swift, Swinney & Vastano, Physica
+D 16 (1985) 285-317, section 5 and appendix B.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+#: Neighbours that a point has within the default of the largest distance: enough that one of them lies in the old direction.
+CROWD = 20
+#: Points that are asked for it, evenly spread.
+ASKED = 200
+#: Angle that a replacement may turn by at first [rad], and how often the largest distance grows before the angle is doubled: Wolf's.
+ANGLE, WIDENINGS = 0.3, 5
+
+
+@dataclass(frozen=True)
+class Evolutions:
+    """The evolutions of one fiducial trajectory.
+
+    Attributes
+    ----------
+    growth : float64[m]
+        Logarithm of the growth of the distance in each.
+    distance : float64[m]
+        Distance at the beginning of each.
+    angle : float64[m]
+        Angle between the old neighbour and the new one [rad]; NaN where none replaced it.
+    """
+
+    growth: np.ndarray
+    distance: np.ndarray
+    angle: np.ndarray
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where neighbours are looked for.
+
+    Attributes
+    ----------
+    evolve : int
+        Samples of an evolution.
+    smallest, largest : float
+        Distances between which a new neighbour lies, in units of the points.
+    exclude : int
+        Samples around a point that are no neighbours of it: they lie on the same stretch of it.
+    """
+
+    evolve: int
+    smallest: float
+    largest: float
+    exclude: int
+
+
+def crowd_distance(points: np.ndarray, smallest: float, exclude: int) -> float:
+    """Median distance to the 20th allowed neighbour; inf if most points have fewer."""
+    distances = []
+    for here in np.unique(np.linspace(0, len(points) - 1, ASKED).round().astype(int)):
+        distance = np.linalg.norm(points - points[here], axis=1)
+        distance[max(here - exclude, 0) : here + exclude + 1] = np.inf
+        distance[distance < smallest] = np.inf
+        distances.append(np.partition(distance, CROWD - 1)[CROWD - 1] if len(points) > CROWD else np.inf)
+    return float(np.median(distances))
+
+
+def follow(points: np.ndarray, search: Search) -> Evolutions:
+    """The evolutions of the trajectory float64[n, m], from its first point on that has a neighbour; empty if none has."""
+    return _Chase(points, search).run()
+
+
+class _Chase:
+    """A fiducial point and its neighbour on their way."""
+
+    def __init__(self, points: np.ndarray, search: Search):
+        self._points, self._search = points, search
+        self._tree = cKDTree(points[: len(points) - search.evolve])  # a neighbour must be able to go on
+
+    def run(self) -> Evolutions:
+        search, points = self._search, self._points
+        rows: list[tuple[float, float, float]] = []
+        neighbour, angle = None, math.nan
+        for here in range(0, len(points) - search.evolve, search.evolve):
+            if neighbour is None:
+                neighbour, angle = self._nearest(here), math.nan
+            if neighbour is None:
+                continue
+            there = here + search.evolve, neighbour + search.evolve
+            before, after = points[neighbour] - points[here], points[there[1]] - points[there[0]]
+            distance, later = float(np.linalg.norm(before)), float(np.linalg.norm(after))
+            if later == 0.0 or distance == 0.0:  # on one another: no growth to be seen, and no direction
+                neighbour = None
+                continue
+            rows.append((math.log(later / distance), distance, angle))
+            neighbour, angle = self._replacement(there, after / later)
+        return Evolutions(*np.array(rows).reshape(-1, 3).T)
+
+    def _nearest(self, here: int) -> int | None:
+        """The nearest allowed neighbour of a point."""
+        radius = self._search.largest
+        for _ in range(WIDENINGS):
+            places, distances, _ = self._around(here, radius)
+            if len(places):
+                return int(places[distances.argmin()])
+            radius += self._search.largest
+        return None
+
+    def _replacement(self, there: tuple[int, int], direction: np.ndarray) -> tuple[int | None, float]:
+        """The neighbour that takes over: the one that turns least, close by if it can be; the old one if there is no other."""
+        here, old = there
+        if here >= len(self._points) - self._search.evolve:
+            return None, math.nan
+        limit = ANGLE
+        while limit < math.pi:
+            for widening in range(1, WIDENINGS + 1):
+                places, distances, offsets = self._around(here, widening * self._search.largest)
+                if len(places):
+                    angles = np.arccos(np.minimum(np.abs(offsets @ direction) / distances, 1.0))
+                    best = int(angles.argmin())
+                    if angles[best] < limit:
+                        return int(places[best]), float(angles[best])
+            limit *= 2.0
+        return (old if old < len(self._points) - self._search.evolve else None), math.nan
+
+    def _around(self, here: int, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Allowed neighbours of a point within a radius, their distances and offsets."""
+        point = self._points[here]
+        places = np.array(self._tree.query_ball_point(point, radius, return_sorted=True), np.int64)
+        places = places[np.abs(places - here) > self._search.exclude]
+        offsets = self._points[places] - point
+        distances = np.linalg.norm(offsets, axis=1)
+        far = distances >= self._search.smallest
+        return places[far], distances[far], offsets[far]

@@ -1,0 +1,105 @@
+"""Impact statistics and energy balances: bars of speeds, curves of energies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from saltus.plot import axes as draw
+from saltus.plot import selection
+from saltus.plot.style import CYCLE, OKABE_ITO, display_scale
+from saltus.results.schema import ENERGY, IMPACTS, check
+
+
+def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
+    """Histogram of the speeds at contact, a colour for each guard.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What ``impact_statistics`` returned.
+    trajectory : int, optional
+        Which of a batch; all of them together by default.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+    legend : bool
+        Whether to name the guards.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is not from ``impact_statistics``, or there is no such trajectory.
+    """
+    caller = "plot.impacts"
+    check(ds, caller=caller, kinds=[IMPACTS])
+    counts = ds["speed_histogram"]
+    if "trajectory" in counts.dims:
+        labels = selection.chosen(ds, trajectory, caller) if trajectory is not None else ds["trajectory"].values
+        counts = counts.sel(trajectory=labels).sum("trajectory")
+    low, high = ds["speed_low"].values, ds["speed_high"].values
+    scale = display_scale(ds["speed_low"].attrs.get("units", ""), float(np.abs(high).max()))
+    names = ds["guard"].values.tolist()
+    width = (high - low) * scale.factor / len(names)
+    with draw.panels(ax, 1, (5.2, 2.8), caller) as (panel,):
+        for i, name in enumerate(names):
+            panel.bar(low * scale.factor + i * width, counts.values[i], width=width, align="edge", color=CYCLE[i % len(CYCLE)], label=name)
+        panel.set_xlabel(scale.label("speed at contact"))
+        panel.set_ylabel("contacts")
+        if legend:
+            panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
+    return panel
+
+
+def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
+    """Energy supplied, dissipated and stored, interval by interval; the largest imbalance is in the title.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What ``energy_balance`` returned.
+    trajectory : int, optional
+        Which of a batch; the first one by default.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+    legend : bool
+        Whether to name the curves.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is not from ``energy_balance``, or there is no such trajectory.
+    """
+    caller = "plot.energy"
+    check(ds, caller=caller, kinds=[ENERGY])
+    if "trajectory" in ds.dims:
+        first = int(ds["trajectory"].values[0])
+        ds = ds.sel(trajectory=selection.chosen(ds, first if trajectory is None else trajectory, caller)[0])
+    dim = str(ds["residual"].dims[0])
+    curves = {
+        "supplied": (OKABE_ITO["blue"], "-"),
+        "dissipated": (OKABE_ITO["vermillion"], "-"),
+        "change": (OKABE_ITO["green"], "-"),
+        "energy": (OKABE_ITO["black"], (0, (4, 2))),
+    }
+    scale = display_scale("J", max(float(np.abs(ds[name].values).max(initial=0.0)) for name in curves))
+    with draw.panels(ax, 1, (6.0, 2.8), caller) as (panel,):
+        for name, (color, line) in curves.items():
+            label = {"change": "change of the stored energy", "energy": "stored at the end"}.get(name, name)
+            panel.plot(ds[dim].values, ds[name].values * scale.factor, color=color, ls=line, lw=1.0, label=label)
+        panel.set_xlabel("time [s]" if dim == "time" else "forcing periods")
+        panel.set_ylabel(scale.label("energy in an interval"))
+        panel.set_title(f"imbalance {float(ds['imbalance']):.1e}", loc="left", fontsize=8)
+        if legend:
+            panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
+    return panel

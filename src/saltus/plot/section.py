@@ -1,0 +1,136 @@
+"""Poincare section: the states at the crossings of a surface, as points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from saltus.errors import ParameterError, nearest
+from saltus.plot import axes as draw
+from saltus.plot import regions, selection
+from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
+from saltus.results.schema import SECTION, check, states_of
+
+_CALLER = "plot.section"
+#: What can stand on an axis besides the states: variable and name.
+_OTHERS = {"phase": ("crossing_phase", "phase of the forcing, t/T mod 1"), "time": ("crossing_time", "time")}
+#: Colour and name of the two directions of a crossing.
+_DIRECTIONS = {1: (OKABE_ITO["blue"], "upwards"), -1: (OKABE_ITO["vermillion"], "downwards")}
+
+
+def section(
+    ds: xr.Dataset,
+    x: str | None = None,
+    y: str | None = None,
+    trajectory: int | Sequence[int] | None = None,
+    ax: Any = None,
+    *,
+    units: Mapping[str, str] | None = None,
+    legend: bool = True,
+) -> Axes:
+    """Points of a Poincare section: one state against another, or against the phase of the forcing.
+
+    A colour for each direction of crossing; of several trajectories one for each. Crossings too shallow to be sure of are hollow.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What ``poincare`` returned.
+    x, y : str, optional
+        A state, ``"phase"`` (t/T mod 1) or ``"time"``; by default the first two of the states that differ between crossings, then phase
+        (if forced), then time.
+    trajectory : int or list of int, optional
+        Which of a batch; without it all are laid over one another, at most 8.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+    units : mapping of str to str, optional
+        Display units, such as ``{"v": "mm/s"}``; by the size of the numbers by default.
+    legend : bool
+        Whether to name the colours.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is not from ``poincare``, or an argument doesn't fit it.
+    """
+    check(ds, caller=_CALLER, kinds=[SECTION])
+    labels = selection.chosen(ds, trajectory, _CALLER)
+    names = _axes(ds, x, y)
+    wanted = selection.units_of_states(ds, units, _CALLER)
+    rows = np.isin(ds["crossing_trajectory"].values, labels) if labels else np.ones(ds.sizes["crossing"], dtype=bool)
+    points = [_values(ds, name) for name in names]
+    scales = [_scale(ds, name, values[rows], wanted.get(name)) for name, values in zip(names, points, strict=True)]
+    with draw.panels(ax, 1, (4.6, 3.4), _CALLER) as (panel,):
+        for mask, color, name in _groups(ds, labels, rows):
+            _draw(panel, ds, mask, points, scales, color, name)
+        for direction, name, values, scale in zip(("x", "y"), names, points, scales, strict=True):
+            _frame(panel, ds, direction, name, values[rows], scale)  # type: ignore[arg-type]
+        panel.set_title(f"section {ds.attrs.get('surface', '')}", loc="left", fontsize=8)
+        if legend and len(panel.get_legend_handles_labels()[1]) > 1:
+            panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
+    return panel
+
+
+def _axes(ds: xr.Dataset, x: str | None, y: str | None) -> tuple[str, str]:
+    """Names of the two axes, checked."""
+    forced = "crossing_phase" in ds and bool(np.isfinite(ds["crossing_phase"].values).any())
+    known = [*states_of(ds), *(["phase"] if forced else []), "time"]
+    for name in (x, y):
+        if name is not None and name not in known:
+            raise ParameterError(f"{_CALLER}: this section has no {name!r} to draw. {nearest(str(name), known)}")
+    moving = [name for name in states_of(ds) if np.ptp(ds[name].values) > 0] if ds.sizes["crossing"] else list(states_of(ds))
+    free = [name for name in (*moving, *known[len(states_of(ds)) :]) if name not in (x, y)]
+    first = x if x is not None else free.pop(0)
+    return first, y if y is not None else free[0]
+
+
+def _values(ds: xr.Dataset, name: str) -> np.ndarray:
+    return np.asarray(ds[_OTHERS[name][0] if name in _OTHERS and name not in states_of(ds) else name].values, dtype=float)
+
+
+def _scale(ds: xr.Dataset, name: str, values: np.ndarray, unit: str | None) -> Scale:
+    if name in _OTHERS and name not in states_of(ds):
+        return Scale(1.0, "s" if name == "time" else "1")
+    return display_scale(ds[name].attrs.get("units", ""), float(np.abs(values).max(initial=0.0)), unit)
+
+
+def _groups(ds: xr.Dataset, labels: Sequence[int], rows: np.ndarray) -> list[tuple[np.ndarray, str, str]]:
+    """Which crossings share a colour, the colour and its name."""
+    if len(labels) > 1:
+        who = ds["crossing_trajectory"].values
+        return [(who == label, CYCLE[i % len(CYCLE)], f"trajectory {label}") for i, label in enumerate(labels)]
+    directions = ds["crossing_direction"].values
+    return [(rows & (directions == way), *look) for way, look in _DIRECTIONS.items()]
+
+
+def _draw(ax: Axes, ds: xr.Dataset, mask: np.ndarray, points: Sequence[np.ndarray], scales: Sequence[Scale], color: str, name: str) -> None:
+    """One group of crossings; smaller where they are many."""
+    count = int(mask.sum())
+    size = 4.5 if count <= 60 else 2.5 if count <= 500 else 1.2
+    sure = ds["crossing_kind"].values.astype(str) == "crossing"
+    for part, face, label in ((mask & sure, color, name), (mask & ~sure, "white", f"{name}, unresolved")):
+        if part.any():
+            x, y = (values[part] * scale.factor for values, scale in zip(points, scales, strict=True))
+            edge = 0.8 if face == "white" else 0.0
+            draw.draw_points(ax, x, y, marker="o", ms=size, mfc=face, mec=color, mew=edge, label=label, zorder=3)
+
+
+def _frame(ax: Axes, ds: xr.Dataset, direction: draw.Direction, name: str, values: np.ndarray, scale: Scale) -> None:
+    """Limits, gap lines and name of one axis."""
+    label = scale.label(_OTHERS[name][1] if name in _OTHERS and name not in states_of(ds) else name)
+    (ax.set_xlabel if direction == "x" else ax.set_ylabel)(label)
+    if name == "phase" and name not in states_of(ds):
+        (ax.set_xlim if direction == "x" else ax.set_ylim)(0.0, 1.0)
+        return
+    own = regions.along(ds, name) if name in states_of(ds) and ds["guard_boundary"].ndim == 1 else None
+    draw.set_limits(ax, direction, values * scale.factor, [b.value * scale.factor for b in own.boundaries] if own else [])
+    if own:
+        draw.draw_gaps(ax, direction, own, scale)

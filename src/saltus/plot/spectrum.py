@@ -1,0 +1,135 @@
+"""Amplitude spectrum: lines of a periodic response, a curve of any other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from saltus.errors import ParameterError, nearest
+from saltus.plot import axes as draw
+from saltus.plot import selection
+from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
+from saltus.results.schema import SPECTRUM, check, states_of
+
+_CALLER = "plot.spectrum"
+#: The picture reaches down to this share of the largest amplitude, and up to the last frequency that has so much; the rest is what
+#: sampling folds back.
+_SHOWN = 1e-5
+#: The least number of orders shown, so that a harmonic response isn't a single line.
+_ORDERS = 5.0
+
+
+def spectrum(
+    ds: xr.Dataset,
+    state: str | None = None,
+    trajectory: int | Sequence[int] | None = None,
+    ax: Any = None,
+    *,
+    highest: float | None = None,
+    units: Mapping[str, str] | None = None,
+    legend: bool = True,
+) -> Axes:
+    """Amplitudes of one state by frequency, on a logarithmic scale, with the orders of the forcing at the top.
+
+    A response that repeats shows as lines, any other as a curve.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What ``spectrum`` returned.
+    state : str, optional
+        Name of the state; the first one by default.
+    trajectory : int or list of int, optional
+        Which of a batch; without it all are laid over one another, at most 8.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+    highest : float, optional
+        Highest frequency to show [Hz]; by default the last one with 1e-5 of the largest amplitude, and at least order 5.
+    units : mapping of str to str, optional
+        Display units, such as ``{"x": "mm"}``; by the size of the numbers by default.
+    legend : bool
+        Whether to name the trajectories.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is not from ``spectrum``, or an argument doesn't fit it.
+    """
+    check(ds, caller=_CALLER, kinds=[SPECTRUM])
+    known = states_of(ds)
+    state = known[0] if state is None else state
+    if state not in known:
+        raise ParameterError(f"{_CALLER}: this spectrum has no state {state!r}. {nearest(str(state), known)}")
+    labels = selection.chosen(ds, trajectory, _CALLER)
+    singles = [ds.sel(trajectory=label) for label in labels] or [ds]
+    curves = [np.asarray(one[f"{state}_amplitude"].values, dtype=float) for one in singles]
+    largest = max((float(np.nanmax(curve, initial=0.0)) for curve in curves), default=0.0) or 1.0
+    scale = display_scale(
+        ds[f"{state}_amplitude"].attrs.get("units", ""), largest, selection.units_of_states(ds, units, _CALLER).get(state)
+    )
+    with draw.panels(ax, 1, (6.0, 2.8), _CALLER) as (panel,):
+        floor = _SHOWN * largest * scale.factor / 3
+        for i, (one, curve) in enumerate(zip(singles, curves, strict=True)):
+            name = f"trajectory {labels[i]}" if len(labels) > 1 else None
+            _curve(panel, one, curve * scale.factor, floor, CYCLE[i % len(CYCLE)], name)
+        panel.set_yscale("log")
+        panel.set_ylim(floor, 3 * largest * scale.factor)
+        top = highest if highest is not None else max(_top(one, curve, largest) for one, curve in zip(singles, curves, strict=True))
+        panel.set_xlim(0.0, top)
+        panel.set_xlabel("frequency [Hz]")
+        panel.set_ylabel(Scale(scale.factor, scale.unit).label(f"amplitude of {state}"))
+        _mark_orders(panel, singles, top)
+        if legend and len(labels) > 1:
+            panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
+    return panel
+
+
+def _curve(ax: Axes, one: xr.Dataset, values: np.ndarray, floor: float, color: str, name: str | None) -> None:
+    """Stems of a response that repeats, a curve of any other."""
+    frequency = one["frequency"].values
+    if int(one["response_period"]) and one["window"].item() == "none":
+        seen = values > floor
+        ax.vlines(frequency[seen], floor, values[seen], color=color, lw=0.9, zorder=2)
+        draw.draw_points(ax, frequency[seen], values[seen], marker="o", ms=2.6, color=color, label=name, zorder=3)
+    else:
+        ax.plot(frequency, values, color=color, lw=0.8, label=name, zorder=2)
+
+
+def _top(one: xr.Dataset, values: np.ndarray, largest: float) -> float:
+    """Highest frequency worth showing [Hz]."""
+    frequency = one["frequency"].values
+    seen = np.flatnonzero(values > _SHOWN * largest)
+    top = float(frequency[seen[-1]]) if seen.size else float(frequency[-1])
+    if "order" in one:
+        top = max(top, _ORDERS * float(frequency[-1] / one["order"].values[-1]))
+    return min(1.05 * top, float(frequency[-1]))
+
+
+def _mark_orders(ax: Axes, singles: Sequence[xr.Dataset], top: float) -> None:
+    """Whole orders of the forcing as quiet lines, with an axis at the top; only where all trajectories share a forcing frequency."""
+    forcing = {float(one["frequency"].values[-1] / one["order"].values[-1]) for one in singles if "order" in one}
+    if len(forcing) != 1:
+        return
+    frequency = forcing.pop()
+    if top / frequency <= 40:
+        for order in range(1, int(top / frequency) + 1):
+            ax.axvline(order * frequency, color=QUIET, lw=0.4, ls=(0, (1, 3)), zorder=1)
+
+    def orders(x: Any) -> Any:
+        return np.asarray(x, dtype=float) / frequency
+
+    def frequencies(x: Any) -> Any:
+        return np.asarray(x, dtype=float) * frequency
+
+    above = ax.secondary_xaxis("top", functions=(orders, frequencies))
+    above.xaxis.set_major_locator(MaxNLocator(nbins=10, steps=[1, 2, 5, 10], integer=True))
+    above.set_xlabel("order")

@@ -1,0 +1,178 @@
+"""[frequency_response] and [bifurcation_diagram]: all steady responses over a frequency, over any parameter, or over two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic import Field, model_validator
+
+from saltus.errors import SaltusError, StudyError
+from saltus.study import quantities
+from saltus.study.questions.question import OneDataset, Question
+from saltus.study.spec_parts import (
+    BOX,
+    METHOD,
+    PERIODS,
+    SEED,
+    START,
+    VALUES,
+    Interval,
+    Method,
+    Named,
+    Quantity,
+    Range,
+    Starts,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from saltus.study.setting import Setting
+    from saltus.study.table import TextTable
+    from saltus.system import System
+
+#: Names of the tables.
+FREQUENCY_RESPONSE, BIFURCATION_DIAGRAM = "frequency_response", "bifurcation_diagram"
+
+
+class FrequencyResponse(Named):
+    """[frequency_response]: all steady responses over a range of forcing frequencies. Several: [[frequency_response]], each with a name."""
+
+    called = "Frequency response"
+
+    frequency: Range = Field(description="Forcing frequencies.", examples=[{"first": "2 Hz", "last": "30 Hz", "count": 281}])
+    start: Starts | None = START
+    box: dict[str, Interval] | None = BOX
+    follow: bool = Field(False, description="Whether each start goes on, from value to value upwards, where it stood.", examples=[True])
+    periods: int = PERIODS
+    seed: int = SEED
+    method: Method | None = METHOD
+    values: dict[str, Quantity] = VALUES
+    measured: str | None = Field(
+        None, description="CSV beside the study to draw with it: frequency [Hz], amplitude [mm].", examples=["shaker.csv"]
+    )
+
+
+class BifurcationDiagram(Named):
+    """[bifurcation_diagram]: how all steady responses change with a parameter, or with two. Several: [[bifurcation_diagram]]."""
+
+    called = "Bifurcation diagram"
+
+    vary: dict[str, Range] = Field(
+        description="One parameter, or two for a map of the kinds of motion.",
+        examples=[{"contact_stiffness": {"first": "1e3 N/m", "last": "1e9 N/m", "count": 200, "scale": "log"}}],
+    )
+    sample: Literal["turning_points", "stroboscope", "contacts"] = Field(
+        "turning_points", description="What is shown of each response: where its velocity is zero, at whole periods, or at contacts.",
+        examples=["stroboscope"],
+    )  # fmt: skip
+    start: Starts | None = START
+    box: dict[str, Interval] | None = BOX
+    follow: bool = Field(False, description="Whether each start goes on, from value to value upwards, where it stood.", examples=[True])
+    periods: int = PERIODS
+    seed: int = SEED
+    method: Method | None = METHOD
+    values: dict[str, Quantity] = VALUES
+
+    @model_validator(mode="after")
+    def _fits(self) -> BifurcationDiagram:
+        if len(self.vary) not in (1, 2):
+            raise ValueError(f"varies one parameter, or two, such as vary.contact_stiffness, not {len(self.vary)}")
+        return self
+
+
+# -- the questions -------------------------------------------------------------------------------------------------------------
+def frequency_responses(table: FrequencyResponse, setting: Setting) -> list[Question]:
+    """The question that a [frequency_response] asks. Raises a SaltusError if it doesn't fit the system."""
+    place = FREQUENCY_RESPONSE
+    system = setting.system(table.values, f"{place}.values")
+    if system.forced_at is None:
+        raise StudyError(f"[{place}] {system.name} has no forcing frequency. Ask for a [{BIFURCATION_DIAGRAM}] over another parameter.")
+    grid = quantities.grid(system, system.forced_at, table.frequency, f"{place}.frequency")
+    arguments = {"frequency": grid, **_followed(system, table, place)}
+    _check(system, {system.forced_at: grid}, arguments, place)
+    measured = None if table.measured is None else setting.file(table.measured)
+    return [Responses(table.title, table.stem, system, setting.method(table.method), arguments, place, measured)]
+
+
+def bifurcation_diagrams(table: BifurcationDiagram, setting: Setting) -> list[Question]:
+    """The question that a [bifurcation_diagram] asks. Raises a SaltusError if it doesn't fit the system."""
+    place = BIFURCATION_DIAGRAM
+    system = setting.system(table.values, f"{place}.values")
+    vary = {name: quantities.grid(system, name, given, f"{place}.vary") for name, given in table.vary.items()}
+    arguments = {"vary": vary, **_followed(system, table, place), "sample": table.sample}
+    _check(system, vary, arguments, place)
+    return [Responses(table.title, table.stem, system, setting.method(table.method), arguments, place)]
+
+
+def _followed(system: System, table: FrequencyResponse | BifurcationDiagram, place: str) -> dict[str, Any]:
+    """The arguments that both analyses take."""
+    return {
+        "start": quantities.starts(system, table.start, place), "box": quantities.box(system, table.box, place), "follow": table.follow,
+        "periods": table.periods, "seed": table.seed,
+    }  # fmt: skip
+
+
+def _check(system: System, axes: dict[str, Any], arguments: dict[str, Any], place: str) -> None:
+    """Have the analysis look at its arguments before anything is computed."""
+    from saltus.analysis.grid import grid_of
+
+    try:
+        grid_of(system, _arrays(axes), arguments["start"], arguments["box"], None, arguments["seed"], arguments["follow"])
+    except SaltusError as error:
+        raise StudyError(f"[{place}] {error}") from error
+
+
+def _arrays(axes: dict[str, Any]) -> dict[str, Any]:
+    """Lists of values as the arrays that the analyses take."""
+    import numpy as np
+
+    return {name: np.array(values) if isinstance(values, list) else values for name, values in axes.items()}
+
+
+class Responses(OneDataset):
+    """Steady responses over one or two parameters."""
+
+    def __init__(
+        self, title: str, stem: str, system: System, method: Any, arguments: dict[str, Any], analysis: str, measured: Path | None = None
+    ) -> None:
+        super().__init__(title, stem, system, method, arguments)
+        self.analysis, self.measured = analysis, measured
+
+    def files(self) -> list[Path]:
+        """Measured points."""
+        return [] if self.measured is None else [self.measured]
+
+    def compute(self, threads: int | None, progress: Callable[[float], None]) -> xr.Dataset:
+        """Call the analysis."""
+        from saltus import analysis
+
+        axes = _arrays({"frequency": self.arguments["frequency"]} if "frequency" in self.arguments else self.arguments["vary"])
+        call = {name: value for name, value in self.arguments.items() if name not in ("frequency", "vary")}
+        call |= axes if "frequency" in self.arguments else {"vary": axes}
+        return getattr(analysis, self.analysis)(self.system, method=self.method, threads=threads, progress=progress, **call)
+
+    def tables(self, ds: xr.Dataset) -> list[TextTable]:
+        """Branches, and what happens to them; kinds of motion over two parameters."""
+        from saltus.study.questions.responses_table import tables
+
+        return tables(self.title, ds)
+
+    def more_files(self, ds: xr.Dataset, folder: Path) -> list[Path]:
+        """Every response, a row each, with all digits."""
+        from saltus.results import to_csv
+
+        return [to_csv(ds, folder / f"{self.stems[0]}-responses.csv")]
+
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """The picture that fits."""
+        from saltus import plot
+        from saltus.study.draw import default_kind
+
+        kind = default_kind(ds)
+        more = {"measured": self.measured} if self.measured is not None and kind == FREQUENCY_RESPONSE else {}
+        axes = getattr(plot, kind)(ds, **more)
+        axes.set_title(self.title if kind != "type_map" else f"{self.title}: {axes.get_title('left')}", loc="left")
+        return {"": axes.figure}

@@ -1,0 +1,144 @@
+"""[simulate]: move one start, or a batch of them, and keep the motion with its contacts; [compare]: beside printed and exact times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field, model_validator
+
+from saltus.errors import ParameterError, StudyError
+from saltus.study import quantities
+from saltus.study.identity import identity
+from saltus.study.kept import kept_or_computed, save_picture
+from saltus.study.questions.question import Question
+from saltus.study.running import Outcome, Running
+from saltus.study.spec_parts import Method, Quantity, Start, Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from saltus.study.setting import Setting
+
+#: Stems of the files.
+RUN, REFERENCE, TABLE = "run", "reference", "table"
+
+
+class Simulate(Table):
+    """[simulate]: move one start, or a batch of them, and keep the motion with its contacts."""
+
+    start: dict[str, Start] = Field(
+        description="Every state at t_start. A list of values makes a batch; single values beside it hold for all.",
+        examples=[{"x": "0 mm", "v": "0 m/s"}, {"x": ["0.2 mm", "0.4 mm"], "v": "0 m/s"}],
+    )
+    periods: int | None = Field(None, ge=1, description="Length in forcing periods.", examples=[60])
+    t_end: Quantity | None = Field(None, description="End time; in place of periods.", examples=["2 s"])
+    t_start: Quantity = Field("0 s", description="Start time.", examples=["0 s"])
+    samples: int = Field(200, ge=1, description="Samples per period; over the whole span if the system isn't forced.", examples=[200])
+    keep: int | None = Field(None, ge=1, description="Keep only this many periods at the end.", examples=[12])
+    values: dict[str, list[Quantity]] = Field(
+        default_factory=dict,
+        description="Parameters that differ from trajectory to trajectory: one value each.",
+        examples=[{"frequency": ["14 Hz", "15 Hz"]}],
+    )
+
+    @model_validator(mode="after")
+    def _one_length(self) -> Simulate:
+        if (self.periods is None) == (self.t_end is None):
+            raise ValueError('give the length once: periods = 60, or t_end = "2 s"')
+        return self
+
+
+class Compare(Table):
+    """[compare]: set contact times beside those that somebody printed, and beside exact ones."""
+
+    printed: str = Field(description="CSV beside the study: marker, event_number, time_s, and, if printed, position_minus_boundary_m.",
+                         examples=["table2.csv"])  # fmt: skip
+    exact: str | None = Field(None, description="CSV beside the study: event_number, time_s.", examples=["exact_events.csv"])
+    reference: Method | None = Field(None, description="A second method to run on the same system.", examples=[{"name": "Taylor"}])
+
+
+def questions(table: Simulate, setting: Setting) -> list[Question]:
+    """The question that the table asks.
+
+    Raises
+    ------
+    StudyError, UnitError
+        If it doesn't fit the system.
+    """
+    batch, compare, system = quantities.is_batch(table.start, table.values), setting.study.compare, setting.base
+    if batch and compare is not None:
+        raise StudyError("[compare] is for one start: let [simulate] start hold single values.")
+    if compare is not None and table.keep is not None:
+        raise StudyError("[compare] counts contacts from the start of the run: leave keep out of [simulate].")
+    if table.periods is not None and system.forced_at is None:
+        raise StudyError(f'[simulate] periods: {system.name} has no forcing period. Write t_end = "2 s" in place of it.')
+    arguments = {
+        "start": quantities.start(system, table.start),
+        "periods": table.periods,
+        "t_end": None if table.t_end is None else quantities.number(table.t_end, "s", "simulate", "t_end"),
+        "t_start": quantities.number(table.t_start, "s", "simulate", "t_start"),
+        "samples": table.samples,
+        "keep": table.keep,
+        "varied": quantities.varied(system, table.values),
+    }
+    return [Motion(setting, arguments)]
+
+
+class Motion(Question):
+    """How given starts move."""
+
+    def __init__(self, setting: Setting, arguments: Mapping[str, Any]) -> None:
+        self.title, self.stems = setting.study.study.name, (RUN, REFERENCE, TABLE)
+        self.setting, self.arguments, self.compare = setting, dict(arguments), setting.study.compare
+
+    def files(self) -> list[Path]:
+        """Printed and exact times."""
+        names = [self.compare.printed, self.compare.exact] if self.compare is not None else []
+        return [self.setting.file(name) for name in names if name is not None]
+
+    def answer(self, at: Running) -> Outcome:
+        """Simulate with the study's method, and the reference's if there is one; compare, tell, draw."""
+        from saltus.study.questions.simulate_compare import contact_table
+        from saltus.study.questions.simulate_table import run_table
+
+        methods = {RUN: self.setting.method()}
+        if self.compare is not None and self.compare.reference is not None:
+            methods[REFERENCE] = self.setting.method(self.compare.reference)
+        runs = {stem: self._run(stem, method, at) for stem, method in methods.items()}
+        if self.compare is None:
+            table = run_table(self.title, runs[RUN])
+        else:
+            table = contact_table(self.title, runs[RUN], self.compare, self.setting.file, runs.get(REFERENCE))
+        files = [at.folder / f"{RUN}.nc", table.write_csv(at.folder / f"{TABLE}.csv")]
+        files += [at.folder / f"{REFERENCE}.nc"] * (REFERENCE in runs)
+        return Outcome([table], files + ([self._picture(runs[RUN], at.folder)] if at.pictures else []))
+
+    def _run(self, stem: str, method: Any, at: Running) -> xr.Dataset:
+        from saltus.analysis import simulate
+
+        system = self.setting.base
+        call = {name: value for name, value in self.arguments.items() if name != "varied"}
+
+        def compute(show: Callable[[float], None]) -> xr.Dataset:
+            try:
+                return simulate(system, method=method, values=self.arguments["varied"], threads=at.resources.threads, progress=show, **call)
+            except ParameterError as error:
+                raise StudyError(f"[simulate] {error}") from error
+
+        title = self.title if stem == RUN else f"{self.title}, {stem}"
+        return kept_or_computed(stem, title, identity(system, method, self.arguments), compute, at)
+
+    def _picture(self, run: xr.Dataset, folder: Path) -> Path:
+        """Phase portrait, or time history of a system of one state; of a large batch the first trajectories."""
+        from saltus import plot
+        from saltus.plot.selection import MOST
+        from saltus.results.schema import states_of
+
+        draw = plot.phase if len(states_of(run)) > 1 else plot.history
+        some = {"trajectory": run["trajectory"].values[:MOST].tolist()} if "trajectory" in run.dims else {}
+        with plot.style():
+            axes = draw(run, **some)
+            first = axes.flat[0] if hasattr(axes, "flat") else axes
+            return save_picture(first.figure, folder / f"{RUN}.png")

@@ -1,0 +1,108 @@
+"""What a study is computed with, what it reports on the way, and what it gives."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from saltus.errors import StudyError
+from saltus.study.table import TextTable
+
+
+@dataclass(frozen=True)
+class Resources:
+    """What to compute with.
+
+    Attributes
+    ----------
+    threads : int or None
+        Threads of this process; all usable cores by default.
+    workers : int or None
+        Basins: processes of a dask cluster on this machine.
+    scheduler : str or None
+        Basins: address of a dask scheduler, or ``"local"``.
+    shard : (k, n) or None
+        Basins: only the chunks i with i % n == k, one of n jobs that share the store and nothing else. All other questions are left to
+        shard 0.
+    """
+
+    threads: int | None = None
+    workers: int | None = None
+    scheduler: str | None = None
+    shard: tuple[int, int] | None = None
+
+    @property
+    def cluster(self) -> bool:
+        """Whether dask does the work."""
+        return self.workers is not None or self.scheduler is not None
+
+
+def shard_of(text: str) -> tuple[int, int]:
+    """(k, n) from "k/n". Raises StudyError if that isn't what stands there."""
+    match = re.fullmatch(r"(\d+)/(\d+)", text.strip())
+    if not match or not int(match[1]) < int(match[2]):
+        raise StudyError(f"--shard {text}: write K/N with K from 0 to N - 1, such as 0/4.")
+    return int(match[1]), int(match[2])
+
+
+@dataclass(frozen=True)
+class Report:
+    """How far a question is; of a map read off its store, so that the work of other machines counts too.
+
+    ``what`` is counted: chunks, or per cent.
+    """
+
+    name: str
+    done: int
+    total: int
+    seconds: float
+    computed: int
+    last: bool = False
+    what: str = "chunks"
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Time left at the rate so far [s]; None before the first chunk."""
+        return self.seconds / self.computed * (self.total - self.done) if self.computed else None
+
+
+@dataclass
+class Outcome:
+    """What a study gave: tables to print, files written, questions that other shards have still to answer."""
+
+    tables: list[TextTable] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+    waiting: list[str] = field(default_factory=list)
+
+    def add(self, other: Outcome) -> None:
+        """Take in what another question gave."""
+        self.tables += other.tables
+        self.files += other.files
+        self.waiting += other.waiting
+
+
+@dataclass(frozen=True)
+class Running:
+    """Where and with what the questions of a study are answered.
+
+    Attributes
+    ----------
+    folder : Path
+        Output.
+    text : str
+        The study as it stands, kept with each result.
+    resources : Resources
+    report, say : callable
+        Called with the progress of a question; with a sentence.
+    pictures : bool
+        Whether to draw.
+    """
+
+    folder: Path
+    text: str
+    resources: Resources
+    report: Callable[[Report], None]
+    say: Callable[[str], None]
+    pictures: bool = True

@@ -1,0 +1,150 @@
+"""What the tables of a study file are made of: the strict base, quantities as written, systems, methods, ranges.
+
+Quantities stay as written here ("4 N"); :mod:`saltus.study.quantities` turns them into SI once the system is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+
+from saltus.study.names import slug
+
+#: A quantity as written: a bare number if it has no dimension, else text with its unit.
+Quantity = float | str
+Start = Quantity | list[Quantity]
+#: Lower and upper end.
+Interval = Annotated[list[Quantity], Field(min_length=2, max_length=2)]
+
+
+class Table(BaseModel):
+    """A table of a study file: strict types, no unknown keys, never changed after reading."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Header(Table):
+    """[study]: what it is, for people."""
+
+    name: str = Field(min_length=1, description="A title.", examples=["Rig b4 at 15 Hz"])
+    description: str = Field("", description="What the study shows.", examples=["Four starts, four responses"])
+    source: str = Field("", description="Where the setting comes from.", examples=["Saunders et al. (2021), Table 2"])
+
+
+class SystemTable(Table):
+    """[system]: a model that comes with saltus and its values; only values if the system is given on the command line."""
+
+    model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, Quantity] = Field(init=False)
+
+    model: str | None = Field(None, description="A published system; `saltus models` lists them.", examples=["delangre"])
+    case: str | None = Field(None, description="A named set of values of the model.", examples=["b"])
+
+    @property
+    def values(self) -> dict[str, Quantity]:
+        """Parameter values as written."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+# -- methods -------------------------------------------------------------------------------------------------------------------
+class Taylor(Table):
+    """[method] name = "Taylor": machine precision, every contact."""
+
+    name: Literal["Taylor"]
+    order: int | None = Field(None, ge=6, le=40, description="Order of the series; by default chosen for speed.", examples=[20])
+    tolerance: float | None = Field(None, gt=0, description="Relative local error; by default machine precision.", examples=[1e-12])
+
+
+class ODE45(Table):
+    """[method] name = "ODE45": MATLAB's ode45, to the digit."""
+
+    name: Literal["ODE45"]
+    rtol: float = Field(1e-3, gt=0, description="RelTol.", examples=[1e-4])
+    atol: float = Field(1e-6, gt=0, description="AbsTol, in SI.", examples=[1e-7])
+    events: Literal["locate", "ignore"] = Field("locate", description="Restart at contacts, or step over them.", examples=["locate"])
+
+
+Method = Annotated[Taylor | ODE45, Field(discriminator="name")]
+METHODS: dict[str, type[Table]] = {"Taylor": Taylor, "ODE45": ODE45}
+
+
+# -- questions -----------------------------------------------------------------------------------------------------------------
+class Range(Table):
+    """Values of a parameter: from one to another, ends included, or given one by one."""
+
+    first: Quantity | None = Field(None, description="The first value.", examples=["2 Hz"])
+    last: Quantity | None = Field(None, description="The last value.", examples=["30 Hz"])
+    count: int | None = Field(None, ge=1, description="How many values.", examples=[281])
+    scale: Literal["linear", "log"] = Field("linear", description="Evenly spaced in the values, or in their logarithms.", examples=["log"])
+    values: list[Quantity] | None = Field(None, min_length=1, description="The values themselves, ascending.", examples=[["5 Hz", "17 Hz"]])
+
+    @model_validator(mode="after")
+    def _either(self) -> Range:
+        ends = (self.first, self.last, self.count)
+        if self.values is None and None in ends:
+            raise ValueError('needs first, last and count, such as { first = "2 Hz", last = "30 Hz", count = 281 }, or values = [...]')
+        if self.values is not None and (ends != (None, None, None) or self.scale != "linear"):
+            raise ValueError("has values one by one: leave first, last, count and scale out")
+        return self
+
+
+class Named(Table):
+    """What questions have in common that may be asked several times."""
+
+    #: What one without a name is called.
+    called: ClassVar[str]
+
+    name: str | None = Field(None, min_length=1, description="What it is called in tables, pictures and files.", examples=["stiff stop"])
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        return self.name or self.called
+
+    @property
+    def stem(self) -> str:
+        """Stem of the names of its files."""
+        return slug(self.title)
+
+
+#: States at the start for analyses that follow many starts, or how starts are found.
+Starts = Annotated[
+    Annotated[dict[str, Start], Tag("dict[str]")] | Annotated[str, Tag("str")],
+    Discriminator(lambda given: "dict[str]" if isinstance(given, dict) else "str"),
+]
+VALUES: Any = Field(
+    default_factory=dict,
+    description="Values that differ from [system], for this question only.",
+    examples=[{"contact_stiffness": "25.5 kN/m"}],
+)
+METHOD = Field(None, description="How to integrate; the study's [method] by default.", examples=[{"name": "Taylor"}])
+START = Field(
+    None,
+    description='Every state at the start, the same at every value; "sweep_up", "sweep_down", "random 20" with box. At rest by default.',
+    examples=[{"x": ["0 mm", "2 mm"], "v": "0 m/s"}, "sweep_up"],
+)
+BOX = Field(None, description="Range of each state for random starts.", examples=[{"x": ["-5 mm", "5 mm"], "v": ["-1 m/s", "1 m/s"]}])
+PERIODS = Field(2000, ge=1, description="Forcing periods that a start is followed at most.", examples=[2000])
+SEED = Field(1, ge=0, description="Of random starts.", examples=[1])
+
+T = TypeVar("T", bound=Table)
+
+
+def _as_list(given: Any) -> Any:
+    return [given] if isinstance(given, dict) else given
+
+
+def one_or_many(table: type[T]) -> Any:
+    """The type of a question that may be asked once, as a table, or several times, as an array of tables: always a tuple."""
+    return Annotated[list[table], BeforeValidator(_as_list, json_schema_input_type=table | list[table])]  # type: ignore[valid-type]
+
+
+def distinct_names(tables: Sequence[Any], key: str) -> None:
+    """Raise a ValueError unless several tables have names, no two the same."""
+    names = [one.name for one in tables]
+    if len(names) > 1 and None in names:
+        raise ValueError(f"each of several [[{key}]] needs a name of its own")
+    if len(set(names)) < len(names):
+        raise ValueError(f"two [[{key}]] have the same name")

@@ -1,0 +1,89 @@
+"""The pages of the documentation are programs: their code, studies and commands run. Notebooks run when the docs are built."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import saltus
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+#: Commands of other programs that pages may show: CI runs the first (see .ci/run), people the second.
+OTHERS = {"pip install .", "python -m benchmarks"}
+#: What the test of the README or CI run anyway.
+ELSEWHERE = {"saltus demo"}
+
+_BLOCK = re.compile(r"^```(?:\{code-block\} )?(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+def is_notebook(text: str) -> bool:
+    return text.startswith("---\nfile_format: mystnb")
+
+
+def blocks(page: Path) -> list[tuple[str, str]]:
+    """(language, text) of the fenced code of a page, in order."""
+    return _BLOCK.findall(page.read_text(encoding="utf-8"))
+
+
+PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)
+WITH_CODE = [page for page in PAGES if blocks(page)]
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.stem)
+def test_code_of_a_page_runs(page, tmp_path, monkeypatch):
+    """In order, in one namespace and one folder; a study is saved under the name that the next command uses."""
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "page"}
+    for language, text in blocks(page):
+        match language:
+            case "python":
+                assert not is_notebook(page.read_text()), "a notebook's code stands in code cells"
+                exec(compile(text, page.name, "exec"), names)
+            case "toml":
+                Path("study.toml").write_text(text)
+            case "console" | "bash":
+                for line in text.splitlines():
+                    run_command(line.removeprefix("$ "))
+            case _:
+                pytest.fail(f"{page.name} has a block of {language}, which no test runs")
+
+
+def run_command(line: str) -> None:
+    """A command of a page; those of saltus are carried out."""
+    if line in OTHERS | ELSEWHERE:
+        return
+    program, *arguments = shlex.split(line)
+    assert program == "saltus", f"{line!r} is no command that a test runs"
+    from saltus.cli.app import app
+
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, (line, result.output)
+
+
+def test_notebooks_are_executed_and_fail_loudly():
+    conf = (DOCS / "conf.py").read_text()
+    assert 'nb_execution_mode = "force"' in conf
+    assert "nb_execution_raise_on_error = True" in conf
+    notebooks = [page for page in PAGES if "{code-cell}" in page.read_text(encoding="utf-8")]
+    assert notebooks
+    assert [page.name for page in notebooks if not is_notebook(page.read_text(encoding="utf-8"))] == []
+
+
+def test_every_public_name_is_documented():
+    text = (DOCS / "api.md").read_text(encoding="utf-8")
+    documented = {name.rpartition(".")[2] for name in re.findall(r"^\.\. auto\w+:: (\S+)", text, re.MULTILINE)}
+    named = set(re.findall(r"`sl\.(\w+)`", text))
+    assert set(saltus.__all__) - {"models", "plot"} - documented - named == set()
+    assert set(saltus.models.MODELS) <= documented
+    assert {name for name in saltus.plot.__all__ if name.islower()} <= documented
+
+
+def test_ci_builds_the_documentation_without_warnings():
+    script = (ROOT / ".ci" / "run").read_text()
+    assert 'pip install -q -e ".[docs]"' in script
+    assert "sphinx-build -W --keep-going" in script

@@ -1,0 +1,66 @@
+"""The examples run as they stand but for their grids: a system of one's own through every question of one study."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import saltus as sl
+from saltus.analysis import plan
+from saltus.cli import app
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "two_masses"
+
+pytestmark = pytest.mark.slow
+
+
+def saltus(*arguments):
+    """The result of a command; faults that should have been caught surface as exceptions."""
+    result = CliRunner().invoke(app, [str(one) for one in arguments], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory):
+    """The output folder of the study on small grids, with what the command printed."""
+    place = tmp_path_factory.mktemp("two_masses")
+    shutil.copy(EXAMPLE / "two_masses.py", place)
+    text = (EXAMPLE / "study.toml").read_text(encoding="utf-8")
+    text = re.sub(r"count = \d+", "count = 8", text).replace("periods = 2000", "periods = 200")
+    (place / "study.toml").write_text(text, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plan, "SCOUTS", 64)
+        patch.setattr(plan, "CHECKED", 16)
+        yield place, saltus("run", place / "study.toml", "--system", f"{place / 'two_masses.py'}:rig", "--out", place / "out")
+
+
+def test_every_question_is_answered(answered):
+    place, printed = answered
+    for name in ("run", "frequency-response", "bifurcation-diagram", "lyapunov-exponents", "basins"):
+        ds = sl.load(place / "out" / f"{name}.nc")
+        assert ds.attrs["system"] == "rig"
+        assert (place / "out" / f"{name}.png").stat().st_size > 5000, name
+    for title in ("Frequency response", "Bifurcation diagram", "Lyapunov exponents", "share of starts"):
+        assert title in printed
+    assert saltus("status", place / "out").count("done") >= 4
+
+
+def test_the_sum_of_the_exponents_is_the_trace_of_damping(answered):
+    """The divergence of the equations is constant: -(c1 + c2)/m1 - c2/m2 = -10 /s."""
+    ds = sl.load(answered[0] / "out" / "lyapunov-exponents.nc")
+    assert ds["exponent_sum"].values == pytest.approx([-10.0, -10.0], rel=1e-6)
+
+
+def test_far_below_the_stop_the_response_is_linear(answered):
+    """At 14 Hz the second mass stays off the stop: amplitude of the linear system, its complex stiffness solved by hand."""
+    ds = sl.load(answered[0] / "out" / "frequency-response.nc")
+    w = 2 * np.pi * 14
+    dynamic = np.array([[6000 - 2 * w**2 + 12j * w, -2000 - 4j * w], [-2000 - 4j * w, 2000 - w**2 + 4j * w]])
+    amplitude = abs(np.linalg.solve(dynamic, [2.0, 0.0])[0])
+    assert ds["peak"].sel(frequency=14).values == pytest.approx([amplitude] * 3, rel=1e-6)

@@ -1,0 +1,184 @@
+"""Wolf's method: published exponents from recorded series, what isn't chaos, and series that can't be used."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import saltus as sl
+from saltus.errors import ParameterError, SaltusWarning, UnitError
+
+LORENZ, ROESSLER, HENON = 0.9056, 0.0900, 0.41922  # Sprott (2003), appendix A; Wolf et al. (1985), Table I
+
+
+def integrated(field, start, interval, count, lead):
+    times = lead + interval * np.arange(count)
+    return solve_ivp(field, (0.0, times[-1] + interval), start, "DOP853", rtol=1e-9, atol=1e-9, t_eval=times).y.T
+
+
+@pytest.fixture(scope="module")
+def lorenz():
+    return integrated(
+        lambda t, y: (10 * (y[1] - y[0]), y[0] * (28 - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]), (1, 1, 20), 0.02, 16_000, 20
+    )
+
+
+@pytest.fixture(scope="module")
+def roessler():
+    """With Wolf's parameters: 0.15, 0.2, 10."""
+    return integrated(lambda t, y: (-y[1] - y[2], y[0] + 0.15 * y[1], 0.2 + y[2] * (y[0] - 10)), (1, 1, 0), 0.1, 16_000, 100)
+
+
+@pytest.fixture(scope="module")
+def henon():
+    points, x, y = np.empty((4000, 2)), 0.1, 0.1
+    for point in points:
+        point[:] = x, y = 1 - 1.4 * x * x + y, 0.3 * x
+    return points
+
+
+def value(ds):
+    """Exponent, and half of its interval."""
+    return float(ds["lyapunov_exponent"].item()), float(ds["lyapunov_high"].item() - ds["lyapunov_exponent"].item())
+
+
+# -- published values ----------------------------------------------------------------------------------------------------------
+def test_lorenz_from_one_quantity_with_all_defaults(lorenz):
+    ds = sl.wolf(lorenz[:, 0], 0.02)
+    exponent, half = value(ds)
+    assert abs(exponent - LORENZ) < half < 0.125 * LORENZ
+    assert ds["kind"].item() == "chaotic"
+    assert ds.attrs["dimension"] == 3
+    assert 0.1 <= ds.attrs["delay_samples"] * 0.02 <= 0.2  # published: 0.16 s or so
+    assert ds.attrs["false_neighbours"] < 0.01
+    assert ds["replacements"].item() > 400
+    assert ds["replaced_distance"].item() < 0.03
+
+
+def test_lorenz_from_all_states_and_other_settings(lorenz):
+    """Within their intervals and the 10 % of bias that they don't hold: a new neighbour that isn't quite in the old direction."""
+    runs = [sl.wolf(lorenz, "20 ms", **one) for one in ({}, {"evolve": 20}, {"evolve": "0.5 s"}, {"largest_distance": 0.05})]
+    runs += [sl.wolf(lorenz[:, 0], 0.02, dimension=4, delay=delay) for delay in (5, "0.16 s")]
+    exponents, halves = np.array([value(run) for run in runs]).T
+    assert (np.abs(exponents - LORENZ) < halves + 0.1 * LORENZ).all()
+    assert 0.0 < exponents.mean() / LORENZ - 1 < 0.1
+    assert runs[1].attrs["evolve_samples"] == 20
+    assert runs[2].attrs["evolve_samples"] == 25
+    assert runs[5].attrs["delay_samples"] == 8
+
+
+@pytest.mark.parametrize("column", [0, 1])
+def test_roessler(roessler, column):
+    exponent, half = value(sl.wolf(roessler[:, column], 0.1))
+    assert abs(exponent - ROESSLER) < half < 0.015
+
+
+@pytest.mark.parametrize("column", [0, slice(None)], ids=["embedded", "states"])
+def test_henon_is_seen_to_be_a_map(henon, column):
+    ds = sl.wolf(henon[:, column], 1)
+    exponent, half = value(ds)
+    assert abs(exponent - HENON) < half < 0.03 * HENON
+    assert ds.attrs["evolve_samples"] == 1
+    assert value(sl.wolf(henon[:, column], 1, unit="bit/s"))[0] == pytest.approx(exponent / math.log(2), rel=1e-14)
+
+
+def test_units_and_sampling_scale_the_exponent_only(lorenz):
+    """Metres or millimetres, seconds or hours: the evolutions are the same. All times are as good as the interval."""
+    series = lorenz[:6000, 0]
+    exponent, _ = value(sl.wolf(series, 0.02))
+    assert value(sl.wolf(1e-3 * series, 72.0))[0] * 3600 == pytest.approx(exponent, rel=1e-6)
+    assert value(sl.wolf(series, 5.0 + 0.02 * np.arange(6000)))[0] == pytest.approx(exponent, rel=1e-6)
+
+
+def test_the_interval_covers_what_the_evolutions_scatter(roessler):
+    """Quarters of a long series agree within their intervals."""
+    quarters = [value(sl.wolf(part, 0.1)) for part in np.split(roessler[:, 0], 4)]
+    mean = np.mean([exponent for exponent, _ in quarters])
+    assert all(abs(exponent - mean) < 1.5 * half for exponent, half in quarters)
+
+
+# -- what isn't chaos ----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("turn", [50, 50.37, 20 * math.pi])
+def test_a_sine_has_none(turn):
+    ds = sl.wolf(np.sin(2 * math.pi * np.arange(8000) / turn), 1.0)
+    exponent, half = value(ds)
+    assert abs(exponent) * turn < 0.1
+    assert abs(exponent) <= half + 1e-12
+    assert ds["kind"].item() == "regular"
+
+
+def test_two_frequencies_have_none():
+    time = 0.1 * np.arange(8000)
+    ds = sl.wolf(np.sin(time) + np.sin(math.sqrt(2) * time), 0.1)
+    assert abs(value(ds)[0]) < 0.005
+    assert ds["kind"].item() == "regular"
+    assert ds.attrs["dimension"] == 4  # a torus of two dimensions
+
+
+@pytest.mark.parametrize("dimension", [3, None])
+def test_white_noise_is_called_noise(dimension):
+    with pytest.warns(SaltusWarning, match=r"neighbours are false.*mostly noise"):
+        ds = sl.wolf(np.random.default_rng(1).standard_normal(3000), 0.01, dimension=dimension)
+    assert ds["kind"].item() == "unclear"
+    assert ds.attrs["false_neighbours"] > 0.1
+
+
+def test_sparse_points_are_told():
+    noise = np.random.default_rng(1).random((400, 5))
+    with pytest.warns(SaltusWarning, match="points lie far apart"):
+        sl.wolf(noise, 1.0)
+
+
+# -- what can't be used --------------------------------------------------------------------------------------------------------
+SINE = np.sin(0.1 * np.arange(1000))
+
+
+def broken(place):
+    series = SINE.copy()
+    series[place] = math.nan
+    return series
+
+
+@pytest.mark.parametrize(
+    ("series", "interval", "settings", "message"),
+    [
+        (SINE[:150], 1.0, {}, "150 points are too few: 220"),
+        (SINE, 1.0, {"evolve": 100}, "points are too few: 1600"),
+        (SINE, 1.0, {"dimension": 9, "delay": 90}, "samples are too few for 9 coordinates"),
+        (broken([7, 9]), 1.0, {}, "isn't finite at 2 samples .first at 7"),
+        (np.ones(1000), 1.0, {}, "column 0 of the series is constant"),
+        (np.stack([SINE, 0 * SINE], axis=1), 1.0, {}, "column 1 of the series is constant"),
+        (np.zeros((10, 10, 10)), 1.0, {}, "shape"),
+        (["a"] * 1000, 1.0, {}, "array of numbers"),
+        (np.stack([SINE, SINE], axis=1), 1.0, {"embed": True}, "2 columns"),
+        (SINE, np.arange(1000) ** 1.01, {}, "aren't evenly spaced"),
+        (SINE, -np.arange(1000.0), {}, "aren't evenly spaced"),
+        (SINE, np.arange(10.0), {}, "times of all 1000"),
+        (SINE, 0.0, {}, "positive time"),
+        (SINE, "1 m", {}, "sampling_interval is measured in s"),
+        (SINE, 1.0, {"smallest_distance": 0.0}, "share of the range"),
+        (SINE, 1.0, {"largest_distance": 2.0}, "share of the range"),
+        (SINE, 1.0, {"smallest_distance": 0.2, "largest_distance": 0.1}, "must be above"),
+        (np.arange(300.0), 1.0, {"exclude": 50, "largest_distance": 0.01, "embed": False, "evolve": 1}, "no point of the series"),
+        (SINE, 1.0, {"dimension": 0}, "whole number of at least 1"),
+        (SINE, 1.0, {"unit": "bits/s"}, "Did you mean 'bit/s'"),
+    ],
+)
+def test_series_that_can_not_be_used(series, interval, settings, message):
+    with pytest.raises((ParameterError, UnitError), match=message):
+        sl.wolf(series, interval, **settings)
+
+
+# -- beside the variational method ---------------------------------------------------------------------------------------------
+def test_on_the_motions_of_the_rig():
+    """A periodic motion has the flow's zero; a chaotic one what the variational method has, to 20 %."""
+    rig = sl.models.delangre("c", frequency="5 Hz")
+    stiffness = {"contact_stiffness": np.array([2.55e4, 2.89e7])}
+    both = {method: sl.lyapunov(rig, (0.32e-3, 0.0), values=stiffness, method=method, periods=1500) for method in ("wolf", "variational")}
+    assert both["wolf"]["kind"].values.tolist() == ["regular", "chaotic"]
+    zero, largest = both["wolf"]["lyapunov_exponent"].values[:, 0]
+    assert abs(zero) < 1e-6
+    assert abs(largest / both["variational"]["lyapunov_exponent"].values[1, 0] - 1) < 0.2
+    assert both["wolf"].sizes["exponent"] == 1
+    assert both["wolf"]["contact_stiffness"].values.tolist() == [2.55e4, 2.89e7]

@@ -1,0 +1,80 @@
+"""Pictures of sections, spectra, impacts and energies: what is drawn where, and what is refused."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import motions_data as data
+import saltus as sl
+from saltus.errors import ParameterError
+from saltus.study.draw import draw
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    yield
+    plt.close("all")
+
+
+def points(axes):
+    """Points of every marker layer, by label."""
+    return {line.get_label(): np.stack(line.get_data(), axis=1) for line in axes.lines if line.get_marker() == "o"}
+
+
+def test_a_section_shows_what_moves():
+    axes = sl.plot.section(data.section())
+    assert axes.get_xlabel() == "v [m/s]"
+    assert axes.get_ylabel() == "phase of the forcing, t/T mod 1"  # x is the same at every crossing
+    drawn = points(axes)
+    assert set(drawn) == {"upwards", "downwards", "downwards, unresolved"}
+    assert drawn["upwards"] == pytest.approx(np.array([[0.1, 0.0], [0.1 * np.cos(2), 0.2]]))
+    assert "x = 0.3 mm" in axes.get_title(loc="left")
+
+
+def test_a_section_of_what_one_wants():
+    axes = sl.plot.section(data.section(2), x="time", y="x", units={"x": "mm"}, trajectory=[0, 1])
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "x [mm]")
+    assert {"trajectory 0", "trajectory 1"} <= set(points(axes))
+    with pytest.raises(ParameterError, match="no 'y' to draw"):
+        sl.plot.section(data.section(), x="y")
+
+
+def test_lines_of_a_periodic_response_and_the_curve_of_another():
+    axes = sl.plot.spectrum(data.spectrum())
+    assert axes.get_yscale() == "log"
+    assert axes.get_ylabel() == "amplitude of x [m]"
+    assert len(axes.collections) == 1  # the stems
+    assert points(axes)["_child1"][:, 0] == pytest.approx(np.arange(6.0))  # what lies below 1e-5 of the largest isn't shown
+    curve = sl.plot.spectrum(data.spectrum(window="hann"), state="v")
+    assert not curve.collections
+    with pytest.raises(ParameterError, match="no state 'y'"):
+        sl.plot.spectrum(data.spectrum(), state="y")
+
+
+def test_spectra_of_several_trajectories():
+    axes = sl.plot.spectrum(data.spectrum(2, own=True), highest=3.0)
+    assert axes.get_xlim()[1] == 3.0
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["trajectory 0", "trajectory 1"]
+
+
+def test_impacts_are_counted_by_guard():
+    axes = sl.plot.impacts(data.impacts(2))
+    assert {container.get_label() for container in axes.containers} == {"lower_gap", "upper_gap"}
+    assert sum(bar.get_height() for bar in axes.patches) == 12
+    assert axes.get_xlabel() == "speed at contact [m/s]"
+
+
+def test_energies_by_period_or_by_time():
+    assert sl.plot.energy(data.energy()).get_xlabel() == "forcing periods"
+    axes = sl.plot.energy(data.energy(2), trajectory=1)
+    assert axes.get_ylabel() == "energy in an interval [mJ]"
+    assert axes.lines[0].get_ydata() == pytest.approx(np.full(5, 3.0))
+    assert sl.plot.energy(data.energy(along="time")).get_xlabel() == "time [s]"
+
+
+@pytest.mark.parametrize("name", ["section", "spectrum", "impacts", "energy"])
+def test_each_result_knows_its_picture(name, tmp_path):
+    sl.save(getattr(data, name)(2), tmp_path / "result.nc")
+    assert draw(tmp_path / "result.nc", None, 1, None).name == f"result-{name}.png"
+    with pytest.raises(ParameterError, match="can't be drawn as history"):
+        draw(tmp_path / "result.nc", "history", None, None)
