@@ -58,6 +58,8 @@ class BasinPlan:
         Forcing periods that a trajectory is followed at most, before and once more after new attractors are looked for.
     every : float or None
         Time between two looks [s] for a system without forcing.
+    scouts : int
+        Starts from which attractors are looked for first; the fewer, the more is left to what the cells themselves lead to.
     """
 
     system: System
@@ -66,6 +68,7 @@ class BasinPlan:
     fixed: Mapping[str, float]
     periods: int
     every: float | None = None
+    scouts: int = SCOUTS
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -107,7 +110,7 @@ class BasinPlan:
     # -- the three stages -------------------------------------------------------------------------------------------------------
     def scout(self, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
         """The attractors that a fixed quasi-random sample of the box leads to."""
-        unit = qmc.Halton(2, scramble=False).random(SCOUTS)
+        unit = qmc.Halton(2, scramble=False).random(self.scouts)
         low, high = (np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max))
         drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
         return find(self.map(threads), fill(self.system, drawn, self.fixed), self.scale, self.periods, progress=progress)[0]

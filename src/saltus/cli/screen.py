@@ -16,6 +16,7 @@ from rich.measure import Measurement
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from saltus.replication import Progress
     from saltus.study.running import Report
     from saltus.study.table import TextTable
 
@@ -96,6 +97,23 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
             print(json.dumps(told), file=sys.stderr, flush=True)  # noqa: T201
 
     yield report_json, say if kind != "json" else lambda _: None
+
+
+@contextmanager
+def replicating() -> Iterator[Callable[[Progress], None]]:
+    """Show how far a replication is; yields what to call with its progress."""
+    begin = time.perf_counter()
+
+    def text(progress: Progress) -> str:
+        running = f"; computing {', '.join(progress.running)}" if progress.running else ""
+        return escape(
+            f"figure {progress.figure}: {progress.jobs_done} of {progress.jobs}{running}. In all {progress.done} of {progress.total}, "
+            f"{time.perf_counter() - begin:.0f} s"
+        )
+
+    with console(stderr=True).status("compiling the equations, if they are new here (about a minute) ...") as status:
+        yield lambda progress: status.update(text(progress))
+    say(f"computed in {time.perf_counter() - begin:.1f} s")
 
 
 def _progress_text(report: Report) -> str:

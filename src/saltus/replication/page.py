@@ -1,0 +1,160 @@
+"""The report: one HTML file with the pictures inside, that opens without a network."""
+
+from __future__ import annotations
+
+import base64
+import html
+import platform
+from collections import Counter
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING
+
+from saltus.flow.threads import usable_processors
+from saltus.replication.verdict import FAILS, HOLDS, IN_PART, RULE_OF_ALL, UNDECIDED, VERDICTS, Claim, Finding
+from saltus.results.files import replacing
+from saltus.results.provenance import versions
+
+if TYPE_CHECKING:
+    from saltus.replication.papers import Picture
+    from saltus.replication.run import Replication
+    from saltus.study.table import TextTable
+
+#: Class in the style sheet, and sign, of each verdict: colour never stands alone.
+_LOOKS = {HOLDS: ("holds", "✓"), IN_PART: ("part", "◐"), FAILS: ("fails", "✗"), UNDECIDED: ("open", "?")}
+_SIGNS = {True: "✓", False: "✗", None: "?"}
+#: Pictures narrower than this [pixels] aren't stretched over the page.
+_NARROW = 900
+
+
+def write_page(result: Replication) -> Path:
+    """Write the report of a replication; returns the file."""
+    with replacing(result.report) as (part,):
+        part.write_text(page(result), encoding="utf-8")
+    return result.report
+
+
+def page(result: Replication) -> str:
+    """The report as HTML."""
+    paper = result.paper
+    everything = len(result.figures) == len(paper.figures)
+    kind = "".join((", a quick run" if result.quick else "", "" if everything else f", figures {', '.join(result.figures)} only"))
+    return Template(_part("page.html")).substitute(
+        name=_text(paper.name), css=_part("page.css"), version=_text(_version()),
+        kind=_text(kind), title=_text(paper.title), citation=_text(paper.citation), about=_text(paper.about), tally=_tally(result),
+        nav=_nav(result), rule=_text(RULE_OF_ALL), glance=_glance(result), figures="\n".join(_figure(result, one) for one in result.figures),
+        made=_made(result), foot=_text(f"Made by: {command(result)}"),
+    )  # fmt: skip
+
+
+def command(result: Replication, figure: str | None = None) -> str:
+    """The command that makes this report, or one figure of it."""
+    paper = result.paper
+    figures = [figure] if figure else [] if len(result.figures) == len(paper.figures) else list(result.figures)
+    return " ".join(["saltus reproduce", paper.name, *(f"--figure {one}" for one in figures), *(["--quick"] if result.quick else [])])
+
+
+def _part(name: str) -> str:
+    return resources.files("saltus.replication").joinpath(name).read_text(encoding="utf-8")
+
+
+def _version() -> str:
+    from saltus import __version__
+
+    return __version__
+
+
+def _text(value: str) -> str:
+    return html.escape(value, quote=True)
+
+
+# -- top -----------------------------------------------------------------------------------------------------------------------
+def _tally(result: Replication) -> str:
+    """How many claims have each verdict: numbers and a bar."""
+    counts = Counter(finding.verdict for _, finding in result.findings)
+    tiles = "".join(f'<li class="{_LOOKS[one][0]}"><b>{counts[one]}</b>{_LOOKS[one][1]} {one}</li>' for one in VERDICTS)
+    bar = "".join(f'<i class="{_LOOKS[one][0]}" style="flex:{counts[one]}"></i>' for one in VERDICTS if counts[one])
+    return f'<ul class="tally">{tiles}</ul><div class="bar" aria-hidden="true">{bar}</div>'
+
+
+def _nav(result: Replication) -> str:
+    links = "".join(f'<a href="#fig{one}">Fig. {one}</a>' for one in result.figures)
+    return f'<nav><a href="#claims">Claims</a>{links}<a href="#made">How</a></nav>'
+
+
+def _chip(verdict: str) -> str:
+    name, sign = _LOOKS[verdict]
+    return f'<span class="chip {name}">{sign} {verdict}</span>'
+
+
+def _glance(result: Replication) -> str:
+    rows = "".join(
+        f'<tr><td>{_text(claim.figure)}</td><td><a href="#{claim.id}">{_text(claim.says)}</a></td><td>{_chip(finding.verdict)}</td></tr>'
+        for claim, finding in result.findings
+    )
+    head = "<tr><th>Fig.</th><th>What the paper says</th><th>Verdict</th></tr>"
+    return f'<div class="scroll"><table class="all"><thead>{head}</thead><tbody>{rows}</tbody></table></div>'
+
+
+# -- figures -------------------------------------------------------------------------------------------------------------------
+def _figure(result: Replication, figure: str) -> str:
+    """A figure's pictures, tables and claims."""
+    parts = [f'<section id="fig{figure}"><h2>Fig. {figure}: {_text(result.paper.figures[figure])}</h2>']
+    parts += [_picture(picture, path) for picture, path in result.pictures if picture.figure == figure]
+    parts += [_table(table) for one, table in result.tables if one.figure == figure]
+    parts += [_claim(result, claim, finding) for claim, finding in result.findings if claim.figure == figure]
+    return "\n".join([*parts, "</section>"])
+
+
+def _picture(picture: Picture, path: Path) -> str:
+    data = path.read_bytes()
+    width, height = (int.from_bytes(data[at : at + 4], "big") for at in (16, 20))  # of a PNG
+    narrow = ' class="narrow"' if width < _NARROW else ""
+    source = f"data:image/png;base64,{base64.b64encode(data).decode('ascii')}"
+    image = f'<img src="{source}" alt="{_text(picture.title)}" width="{width}" height="{height}" loading="lazy">'
+    return f"<figure{narrow}>{image}<figcaption><b>{_text(picture.title)}.</b> {_text(picture.caption)}</figcaption></figure>"
+
+
+def _table(table: TextTable) -> str:
+    head = "".join(f"<th>{_text(column)}</th>" for column in table.columns)
+    rows = "".join("<tr>" + "".join(f'<td class="number">{_text(cell)}</td>' for cell in row) + "</tr>" for row in table.rows)
+    notes = "".join(f'<p class="quiet">{_text(note)}</p>' for note in table.notes)
+    return f'<div class="scroll"><table><caption>{_text(table.title)}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{notes}'
+
+
+def _claim(result: Replication, claim: Claim, finding: Finding) -> str:
+    """A claim, its answers, its verdict and how this was come by."""
+    why = f'<p class="why">{_text(finding.why)}</p>' if finding.why else ""
+    checks = "".join(f"<li><b>{_SIGNS[check.passed]}</b>{_text(check.text)}</li>" for check in finding.checks)
+    return (
+        f'<article class="claim" id="{claim.id}"><div class="says"><p>{_text(claim.says)}</p>{_chip(finding.verdict)}</div>'
+        f'<p class="where">{_text(claim.where)}</p>'
+        f'<dl class="answers"><dt>The paper\'s own settings give here</dt><dd>{_text(finding.own)}</dd>'
+        f"<dt>Exact arithmetic gives</dt><dd>{_text(finding.exact)}</dd></dl>{why}"
+        f"<details><summary>Rule, checks, and how sure</summary><p><b>Rule.</b> {_text(claim.rule)}</p><ul>{checks}</ul>"
+        f"<p><b>How sure.</b> {_text(finding.sure)}</p><p><code>{_text(command(result, claim.figure))}</code></p></details></article>"
+    )
+
+
+# -- end -----------------------------------------------------------------------------------------------------------------------
+def _made(result: Replication) -> str:
+    """What was computed, on what, for how long."""
+    shelf = result.shelf
+    names = {*shelf.computed, *shelf.kept}
+    total = sum(shelf.seconds.get(name, 0.0) for name in names)
+    python = versions()
+    packages = ", ".join(f"{name} {value}" for name, value in python.items())
+    size = (
+        "Grids and sweeps are coarser than in the full run, and shorter."
+        if result.quick
+        else "Grids and sweeps are those of the study files."
+    )
+    return (
+        f"<p>{len(shelf.computed)} computations in this run, {len(shelf.kept)} from an earlier one with the same settings and code: "
+        f"{total:.0f} s of one core in all, {result.seconds:.0f} s by the clock in this run, on {usable_processors()} cores "
+        f"({_text(platform.machine())}, {_text(platform.system())}). {size}</p>"
+        f'<p class="quiet">{_text(packages)}</p>'
+        f"<p>Every number comes from Datasets that stand beside this file in <code>data/</code>; each knows its equations, values and method "
+        f"(<code>saltus plot</code> draws them, <code>sl.load</code> reads them). The study files are in <code>replications/{_text(result.paper.name)}/</code>.</p>"
+    )

@@ -1,0 +1,62 @@
+"""What the jobs of Figs. 3 and 7 compute: steady responses over a parameter, and three ways of integrating side by side.
+
+Each job runs on one thread; several run at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from saltus import analysis
+from saltus.analysis.compare_methods import method_label
+from saltus.flow import Taylor
+from saltus.replication.job import Show
+from saltus.replication.saunders2021.compute import Inputs, Settings, method_in
+from saltus.study import quantities
+from saltus.study.run import system_of
+from saltus.study.spec import SystemTable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from saltus.system import System
+
+
+def _system(settings: Settings) -> System:
+    system = system_of(SystemTable.model_validate(settings["system"]))
+    return system.with_values(**quantities.parameters(system, settings["table"].get("values", {})))
+
+
+def _arguments(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments that the analysis takes, from a table of the study file; it reads texts with units itself."""
+    keep = ("start", "periods", "sample")
+    return {**{name: table[name] for name in keep if name in table}, **_axis(table)}
+
+
+def _axis(table: Mapping[str, Any]) -> dict[str, Any]:
+    if "frequency" in table:
+        return {"frequency": _range(table["frequency"])}
+    return {"vary": {name: _range(given) for name, given in table["vary"].items()}}
+
+
+def _range(given: Mapping[str, Any]) -> tuple[Any, ...]:
+    ends = (given["first"], given["last"], given["count"])
+    return (*ends, "log") if given.get("scale") == "log" else ends
+
+
+def responses(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noqa: ARG001  (all jobs are called alike)
+    """The [frequency_response] or [bifurcation_diagram] of the settings."""
+    ask = getattr(analysis, settings["question"])
+    ds: xr.Dataset = ask(_system(settings), method=method_in(settings), threads=1, progress=show, **_arguments(settings["table"]))
+    return ds
+
+
+def compared(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noqa: ARG001
+    """Both of the paper's ways of integrating beside the exact one, from the three Datasets that exist already."""
+    methods = [method_in({"method": table}) for table in settings["methods"]]
+    labels = [method_label(method) for method in (Taylor(), *methods)]
+    return analysis.compare_methods(
+        _system(settings), settings["question"], methods, computed=dict(zip(labels, inputs.values(), strict=True)), threads=1,
+        progress=False, **_arguments(settings["table"]),
+    )  # fmt: skip
