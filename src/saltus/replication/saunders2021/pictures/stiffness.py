@@ -62,16 +62,10 @@ def _legend_of_kinds(figure: Figure, data: Data) -> None:
         codes |= set(np.unique(kinds.of(ds)).tolist())
         periods.append(ds["response_period"].values)
     every = np.concatenate(periods)
-<<<<<<< HEAD
     handles = []
     for code in sorted(codes):
         look: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 5, "color": kinds.color(code), "label": kinds.label(code, every)}
         handles.append(Line2D([], [], **look))
-=======
-    handles = [
-        Line2D([], [], ls="none", marker="o", ms=5, color=kinds.color(code), label=kinds.label(code, every)) for code in sorted(codes)
-    ]
->>>>>>> w-e
     handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="none", mec="#222222", label="ode45 (1e-12, 1e-12), located"))
     figure.legend(handles=handles, loc="outside lower center", ncols=6)
 
