@@ -130,7 +130,7 @@ def _claim(result: Replication, claim: Claim, finding: Finding) -> str:
     return (
         f'<article class="claim" id="{claim.id}"><div class="says"><p>{_text(claim.says)}</p>{_chip(finding.verdict)}</div>'
         f'<p class="where">{_text(claim.where)}</p>'
-        f"<dl class=\"answers\"><dt>The paper's own settings give here</dt><dd>{_text(finding.own)}</dd>"
+        f'<dl class="answers"><dt>The paper\'s own settings give here</dt><dd>{_text(finding.own)}</dd>'
         f"<dt>Exact arithmetic gives</dt><dd>{_text(finding.exact)}</dd></dl>{why}"
         f"<details><summary>Rule, checks, and how sure</summary><p><b>Rule.</b> {_text(claim.rule)}</p><ul>{checks}</ul>"
         f"<p><b>How sure.</b> {_text(finding.sure)}</p><p><code>{_text(command(result, claim.figure))}</code></p></details></article>"
@@ -145,7 +145,11 @@ def _made(result: Replication) -> str:
     total = sum(shelf.seconds.get(name, 0.0) for name in names)
     python = versions()
     packages = ", ".join(f"{name} {value}" for name, value in python.items())
-    size = "Grids and sweeps are coarser than in the full run, and shorter." if result.quick else "Grids and sweeps are those of the study files."
+    size = (
+        "Grids and sweeps are coarser than in the full run, and shorter."
+        if result.quick
+        else "Grids and sweeps are those of the study files."
+    )
     return (
         f"<p>{len(shelf.computed)} computations in this run, {len(shelf.kept)} from an earlier one with the same settings and code: "
         f"{total:.0f} s of one core in all, {result.seconds:.0f} s by the clock in this run, on {usable_processors()} cores "

@@ -84,7 +84,7 @@ def beside(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noq
     x = (start[first][:, None] + offsets).ravel()
     v = np.repeat(np.broadcast_to(start[second], start[first].shape), len(offsets))
     return analysis.stroboscope(
-        system, {first: x, second: v}, table.periods, settings["keep"], method=method_in(settings), threads=1, progress=show
+        system, {first: x, second: v}, table.periods or 1, settings["keep"], method=method_in(settings), threads=1, progress=show
     )
 
 

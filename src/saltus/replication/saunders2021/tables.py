@@ -27,7 +27,9 @@ def table2(data: Data) -> TextTable:
         number = int(line["event_number"]) - 1
         ours, printed, true = float(run["contact_time"][number]), float(line["time_s"]), float(exact["contact_time"][number])
         rest = abs(float(run["contact_x"][number]) - boundary[str(run["contact_guard"].values[number])])
-        rows.append((letter, f"{printed:.16f}", f"{ours:.16f}", f"{ours - printed:.1e}", f"{true:.16f}", f"{ours - true:.2e}", f"{rest:.2e}"))
+        rows.append(
+            (letter, f"{printed:.16f}", f"{ours:.16f}", f"{ours - printed:.1e}", f"{true:.16f}", f"{ours - true:.2e}", f"{rest:.2e}")
+        )
     columns = ("", "printed [s]", "our ode45 [s]", "difference [s]", "exact [s]", "ode45 − exact [s]", "|x − j| [m]")
     worst = np.abs(run["contact_time"].values - exact["contact_time"].values[: run.sizes["contact"]]).max()
     note = f"All {run.sizes['contact']} contacts of the run: the largest error of ode45's times is {worst:.2e} s."

@@ -9,4 +9,6 @@ def _figure(claim: Claim) -> int:
 
 
 #: All claims, figure by figure.
-CLAIMS = tuple(sorted((*validation.CLAIMS, *multistable.CLAIMS, *stiffness.CLAIMS, *basin_claims.CLAIMS, *attractor_claims.CLAIMS), key=_figure))
+CLAIMS = tuple(
+    sorted((*validation.CLAIMS, *multistable.CLAIMS, *stiffness.CLAIMS, *basin_claims.CLAIMS, *attractor_claims.CLAIMS), key=_figure)
+)

@@ -86,7 +86,7 @@ def _regular(data: Data, figure: str, settings: Sequence[str]) -> Finding:
     checks, exact, own = [], [], []
     for setting in settings:
         ds = data[f"{figure}/{setting}, {EXACT}"]
-        size = np.hypot(ds["attractor_multiplier_real"], ds["attractor_multiplier_imag"]).values
+        size = np.hypot(ds["attractor_multiplier_real"].values, ds["attractor_multiplier_imag"].values)
         place, small = setting.replace(" per ", "/"), SMALL * parameter(ds, "frequency")
         wolf = {end: _wolf(data, figure, setting, end) for end in (EXACT, ON, OFF)}
         checks.append(check(f"{place}: all exact attractors are periodic and stable (largest multiplier {np.nanmax(size):.3f})",

@@ -7,7 +7,19 @@ import xarray as xr
 
 from saltus.analysis import compare
 from saltus.plot.maps import share_text
-from saltus.replication.saunders2021.claims.reading import EXACT, OFF, ON, SECTION_5, by_peak, certainty, check, count, listed, micrometres, names
+from saltus.replication.saunders2021.claims.reading import (
+    EXACT,
+    OFF,
+    ON,
+    SECTION_5,
+    by_peak,
+    certainty,
+    check,
+    count,
+    listed,
+    micrometres,
+    names,
+)
 from saltus.replication.verdict import Claim, Data, Finding
 
 BEFORE, AFTER = "25.5 kN per m", "23.2 kN per m"
@@ -48,7 +60,9 @@ def fig8_after(data: Data) -> Finding:
     for end, ds in rare.items():
         same = np.abs(ds["attractor_peak"].values - peak) < 0.01 * peak
         other = np.abs(maps[end]["attractor_peak"].values - peak) < 0.01 * peak
-        hits[end] = int(np.isin(ds["basin"].values, np.flatnonzero(same)).sum()) + int(np.isin(maps[end]["basin"].values, np.flatnonzero(other)).sum())
+        hits[end] = int(np.isin(ds["basin"].values, np.flatnonzero(same)).sum()) + int(
+            np.isin(maps[end]["basin"].values, np.flatnonzero(other)).sum()
+        )
     starts = maps[EXACT]["basin"].size + rare[EXACT].sizes["trajectory"]
     return Finding(
         f"Starts that lead to the third: located {hits[ON]}, not located {hits[OFF]}, of {starts}.",
@@ -95,7 +109,9 @@ def coarser(data: Data) -> Finding:
     for setting in SETTINGS["fig8"]:
         maps = _three(data, "fig8", setting)
         share = {end: compare(maps[EXACT], maps[end]).attrs for end in (ON, OFF)}
-        told.append(f"{setting.replace(' per ', '/')}: located {share_text(share[ON]['agreement'])}, not located {share_text(share[OFF]['agreement'])} as exact")
+        told.append(
+            f"{setting.replace(' per ', '/')}: located {share_text(share[ON]['agreement'])}, not located {share_text(share[OFF]['agreement'])} as exact"
+        )
         checks.append(check(f"{setting.replace(' per ', '/')}: more starts lead to the exact attractor with location, beyond the 95 % intervals",
                             share[ON]["agreement_low"] > share[OFF]["agreement_high"]))  # fmt: skip
     return Finding("; ".join(told), "The reference.", tuple(checks), certainty([data[f"fig8/{BEFORE}, {EXACT}"]]))
@@ -126,7 +142,10 @@ def fig13_four(data: Data) -> Finding:
         maps = _three(data, "fig13", setting)
         place = setting.replace(" per ", "/")
         checks.append(check(f"{place}: four attractors, exact ({count(maps[EXACT])})", count(maps[EXACT]) == 4))
-        checks += [check(f"{place}: four by ode45, {word} ({count(maps[end])})", count(maps[end]) == 4) for end, word in ((ON, "located"), (OFF, "not located"))]
+        checks += [
+            check(f"{place}: four by ode45, {word} ({count(maps[end])})", count(maps[end]) == 4)
+            for end, word in ((ON, "located"), (OFF, "not located"))
+        ]
         own.append(f"{place}: {_own(maps)}")
         exact.append(f"{place}: {listed(maps[EXACT])}")
     return Finding(
@@ -137,7 +156,9 @@ def fig13_four(data: Data) -> Finding:
 
 def fig13_dominant(data: Data) -> Finding:
     """The attractor of highest amplitude dominant."""
-    checks, told, own = [], [], []
+    checks = []
+    told: list = []
+    own: list = []
     for setting in STIFF:
         for end in (EXACT, ON):
             ds = data[f"fig13/{setting}, {end}"]
@@ -147,7 +168,12 @@ def fig13_dominant(data: Data) -> Finding:
             text = f"{setting.replace(' per ', '/')}: {', '.join(np.array(names(ds))[level])} have peaks within 2 %, together {share_text(share)}"
             (told if end == EXACT else own).append(text)
             if end == EXACT:
-                checks.append(check(f"{setting.replace(' per ', '/')}: attractors of the highest peak (within 2 %) have most starts ({share_text(share)})", share > 0.5))
+                checks.append(
+                    check(
+                        f"{setting.replace(' per ', '/')}: attractors of the highest peak (within 2 %) have most starts ({share_text(share)})",
+                        share > 0.5,
+                    )
+                )
                 checks.append(check("and that is one attractor", int(level.sum()) == 1))
     return Finding("; ".join(own), "; ".join(told), tuple(checks), certainty([data[f"fig13/{s}, {EXACT}"] for s in STIFF]),
                    "By peak amplitude, the paper's colour, several attractors look like one.")  # fmt: skip
@@ -207,7 +233,8 @@ def graze_margins(data: Data) -> Finding:
     found = {setting: data[f"fig8/{setting}, {EXACT}"] for setting in (BEFORE, AFTER)}
     near = {setting: int((ds["attractor_margin"].values < 0.02 * ds["attractor_peak"].values).sum()) for setting, ds in found.items()}
     told = "; ".join(
-        f"{setting.replace(' per ', '/')}: {', '.join(micrometres(float(m)) for m in ds['attractor_margin'].values)}" for setting, ds in found.items()
+        f"{setting.replace(' per ', '/')}: {', '.join(micrometres(float(m)) for m in ds['attractor_margin'].values)}"
+        for setting, ds in found.items()
     )
     return Finding(
         "Margins by ode45 are the same to a few µm.", f"Distance of each attractor from a graze: {told}.",

@@ -37,6 +37,7 @@ def peak_shift(data: Data) -> Finding:
 
 def peak_gone(data: Data) -> Finding:
     """No resonance at hard contact."""
+
     def prominence(ds: xr.Dataset) -> float:
         return _peak(ds)[1] / float(np.median(ds["response_rms"].values))
 
@@ -156,7 +157,8 @@ def doubling(data: Data) -> Finding:
         two = np.flatnonzero((period[1:] == 2) & (period[:-1] == 1))
         told[end] = float(np.sqrt(stiffness[two[0]] * stiffness[two[0] + 1])) if two.size else np.nan
     return Finding(
-        f"T becomes 2T at {told[ON]:.4g} (located), {told[OFF]:.4g} N/m (not located).", f"T becomes 2T at {told[EXACT]:.4g} N/m.",
+        f"T becomes 2T at {told[ON]:.4g} (located), {told[OFF]:.4g} N/m (not located).",
+        f"T becomes 2T at {told[EXACT]:.4g} N/m.",
         (check(f"within 10 % of 8.0e3 N/m ({told[EXACT]:.4g})", abs(told[EXACT] / 8.0e3 - 1) < 0.1),),
         "Known to half a step of the stiffness; the multiplier −1 is crossed between T and 2T.",
     )
@@ -206,7 +208,11 @@ def other_chaos(data: Data) -> Finding:
     for end in (EXACT, ON, OFF):
         stiffness, kind, period, _ = _row(data, "f", end)
         middle = (stiffness > 1e5) & (stiffness < 2e7)
-        told[end] = (int((kind[middle] == "chaotic").sum()), int(np.unique(period[middle & (period > 0)]).size), float((kind[middle] == "unconverged").mean()))
+        told[end] = (
+            int((kind[middle] == "chaotic").sum()),
+            int(np.unique(period[middle & (period > 0)]).size),
+            float((kind[middle] == "unconverged").mean()),
+        )
     return Finding(
         "; ".join(f"{name}: {told[end][0]} chaotic, {told[end][1]} different periods, {share_text(told[end][2])} never settle"
                   for name, end in (("located", ON), ("not located", OFF))),

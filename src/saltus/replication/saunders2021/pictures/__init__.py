@@ -27,7 +27,9 @@ def _basins(number: str, title: str, settings: tuple[str, ...], caption: str = "
 def _rows(number: str, of: str, setting: str, title: str, caption: str = "", name: str = "") -> Picture:
     needs = _maps(of, setting)
     draw = partial(rows.attractors, figure=of, setting=setting)
-    return Picture(number, name or f"fig{number}", title, f"{_ROWS} {caption}".strip(), (*needs, *(f"{one}, motions" for one in needs)), draw)
+    return Picture(
+        number, name or f"fig{number}", title, f"{_ROWS} {caption}".strip(), (*needs, *(f"{one}, motions" for one in needs)), draw
+    )
 
 
 _FIG3 = tuple(f"fig3/{case}, {kind}" for case in stiffness.CASES for kind in ("exact", "ode45"))

@@ -59,7 +59,9 @@ def _residuals(ax: Axes, run: xr.Dataset, exact: xr.Dataset) -> None:
     suggested = residual / np.abs(run["contact_velocity"].values[:count])
     ours = np.maximum(np.abs(exact["contact_time_error"].values[:count]), 1e-18)
     ax.semilogy(number, error, "o-", ms=3.5, color=OKABE_ITO["vermillion"], label="true error of ode45's contact time", lw=0.8)
-    ax.semilogy(number, np.maximum(suggested, 1e-18), "s", ms=3.5, color=OKABE_ITO["blue"], label="error that |x − j| suggests: |x − j| / |v|")
+    ax.semilogy(
+        number, np.maximum(suggested, 1e-18), "s", ms=3.5, color=OKABE_ITO["blue"], label="error that |x − j| suggests: |x − j| / |v|"
+    )
     ax.semilogy(number, ours, "-", color="#999999", lw=1.0, label="claimed error of the exact times")
     for letter, place in MARKED.items():
         ax.annotate(letter, (place, error[place - 1]), (0, 5), textcoords="offset points", ha="center", fontweight="bold")

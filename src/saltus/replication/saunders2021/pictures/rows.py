@@ -106,7 +106,9 @@ def _deviations(ax: Axes, data: Data, figure: str, setting: str, trio: Trio) -> 
     """States at whole periods, less the nearest exact one."""
     clouds = deviations(data, figure, setting, trio)
     if not clouds:
-        ax.text(0.5, 0.5, _ABSENT[trio.number[EXACT.end] < 0], ha="center", va="center", transform=ax.transAxes, fontsize=7, color="#555555")
+        ax.text(
+            0.5, 0.5, _ABSENT[trio.number[EXACT.end] < 0], ha="center", va="center", transform=ax.transAxes, fontsize=7, color="#555555"
+        )
         ax.set_axis_off()
         return
     every = np.concatenate(list(clouds.values()))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
@@ -60,7 +62,10 @@ def _legend_of_kinds(figure: Figure, data: Data) -> None:
         codes |= set(np.unique(kinds.of(ds)).tolist())
         periods.append(ds["response_period"].values)
     every = np.concatenate(periods)
-    handles = [Line2D([], [], ls="none", marker="o", ms=5, color=kinds.color(code), label=kinds.label(code, every)) for code in sorted(codes)]
+    handles = []
+    for code in sorted(codes):
+        look: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 5, "color": kinds.color(code), "label": kinds.label(code, every)}
+        handles.append(Line2D([], [], **look))
     handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="none", mec="#222222", label="ode45 (1e-12, 1e-12), located"))
     figure.legend(handles=handles, loc="outside lower center", ncols=6)
 
@@ -69,7 +74,11 @@ def three_stiffnesses(data: Data) -> Figure:
     """Fig. 7(a-c): every response in three ways."""
     figure, axes = plt.subplots(1, 3, figsize=(9.0, 3.4), layout="constrained")
     for ax, (panel, stiffness) in zip(axes, STIFFNESS.items(), strict=True):
-        for end, color, size, label in (("exact", _GREY, 6.0, "exact"), (ON.end, ON.color, 3.4, ON.label), (OFF.end, OFF.color, 1.6, OFF.label)):
+        for end, color, size, label in (
+            ("exact", _GREY, 6.0, "exact"),
+            (ON.end, ON.color, 3.4, ON.label),
+            (OFF.end, OFF.color, 1.6, OFF.label),
+        ):
             ds = data[f"fig7/{panel}, {end}"]
             frequency = np.broadcast_to(ds["frequency"].values[:, None], ds["rms"].shape)
             ax.plot(frequency.ravel(), 1e3 * ds["rms"].values.ravel(), "o", ms=size, mfc=color, mec="none", label=label, rasterized=True)
@@ -123,11 +132,14 @@ def differences(data: Data) -> Figure:
         ds = data[f"fig7/{panel}, compared"]
         for number, look in ((1, ON), (2, OFF)):
             at, median = running_median(ds["contact_stiffness"].values, ds["step_error_rms"].values[number])
-            axes[3].plot(at, median, color=look.color, ls=style, lw=1.2, label=f"{look.label}, {PANELS[panel]}")  # type: ignore[arg-type]
+            axes[3].plot(at, median, color=look.color, ls=style, lw=1.2, label=f"{look.label}, {PANELS[panel]}")
     axes[3].set(yscale="log", xscale="log", xlabel="contact stiffness Kc [N/m]", ylabel="error after one period")
     axes[3].set_title("Error of one forcing period begun on the exact response, in units of the motion's range (median)")
     axes[3].legend(ncols=3, fontsize=7, loc="upper left")
-    extra = [Line2D([], [], color="#555555", ls=(0, (1, 1.5)), label="of these: never settles"), Patch(fc="#BBBBBB", alpha=0.6, label="exact: chaotic")]
+    extra = [
+        Line2D([], [], color="#555555", ls=(0, (1, 1.5)), label="of these: never settles"),
+        Patch(fc="#BBBBBB", alpha=0.6, label="exact: chaotic"),
+    ]
     axes[0].legend(handles=[*axes[0].get_legend_handles_labels()[0], *extra], loc="upper left", ncols=2)
     return figure
 
@@ -144,5 +156,3 @@ def _shares(ax: Axes, ds: xr.Dataset, number: int, color: str, label: str) -> No
 def _chaos(ax: Axes, ds: xr.Dataset) -> None:
     at, share, _, _ = running_share(ds["contact_stiffness"].values, ds["type"].values[0, :, 0] == "chaotic")
     ax.fill_between(at, 0, share, color="#BBBBBB", alpha=0.45, lw=0, zorder=0)
-
-
