@@ -99,6 +99,17 @@ def on_attractors(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:
     )
 
 
+def exponents_on_attractors(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:
+    """Lyapunov exponents on each attractor of a map, by the map's own way of integrating: trajectory i starts on attractor i."""
+    (found,) = inputs.values()
+    system = _system(settings, study_of(settings))
+    start = {name: found[f"attractor_{name}"].values[:, 0] for name in system.states}
+    return analysis.lyapunov(
+        system, start, method=settings["by"], flow=method_in(settings), periods=settings["periods"], transient=settings["transient"],
+        threads=1, progress=show,
+    )  # fmt: skip
+
+
 # -- attractors ----------------------------------------------------------------------------------------------------------------
 def settled_from(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noqa: ARG001
     """The attractors that the starts of [simulate] lead to."""

@@ -23,6 +23,8 @@ QUICK_CELLS = {"fig6": 72, "fig8": 72, "fig11": 48, "fig13": 40}
 SCOUTS = 1024, 256
 #: Periods run on each attractor, and kept, for its picture: ode45's own scatter shows in the last of them.
 FOLLOWED, KEPT = 320, 64
+#: Periods that exponents are measured over: full, quick; and periods before them.
+EXPONENTS, TRANSIENT = (2000, 320), 256
 #: Half-width of the bunch of starts around each start of Fig. 5 [m]: less than an experiment can set. Starts in it: full, quick.
 NANOMETRE, BUNCH = 1e-9, (101, 21)
 #: Values of a frequency response and of a bifurcation diagram in a quick run, starts taken of those in the study file (every so manieth),
@@ -148,16 +150,16 @@ class _Plan:
         return [*made, Job("fig6/16.5 Hz, exact", {**last.settings, "study": study}, compute.mapped)]
 
     def _motions(self, name: str, prefix: str, values: dict[str, str]) -> list[Job]:
-        """A motion on each attractor of three maps: exact, ode45 located, not located."""
-        study = self._study(name)
-        ends = {"exact": TAYLOR, "ode45 located": ON, "ode45 not located": OFF}
-        return [
-            self._job(
-                f"{name}/{prefix}, {end}, motions", compute.on_attractors, study, map_name(name, f"{prefix}, {end}"), method=method,
-                values=values, periods=FOLLOWED, keep=KEPT,
-            )
-            for end, method in ends.items()
-        ]  # fmt: skip
+        """A motion on each attractor of three maps (exact, ode45 located, not located), and its exponents by two algorithms."""
+        study, made = self._study(name), []
+        for end, method in {"exact": TAYLOR, "ode45 located": ON, "ode45 not located": OFF}.items():
+            of = map_name(name, f"{prefix}, {end}")
+            way = {"method": method, "values": values}
+            made.append(self._job(f"{of}, motions", compute.on_attractors, study, of, **way, periods=FOLLOWED, keep=KEPT))
+            for by in ("variational", "wolf"):
+                length = {"periods": EXPONENTS[self.quick], "transient": TRANSIENT}
+                made.append(self._job(f"{of}, {by}", compute.exponents_on_attractors, study, of, **way, by=by, **length))
+        return made
 
     def fig8(self) -> list[Job]:
         """Basins around the grazing, motions on their attractors (Figs. 9, 10), and the rare attractor by each method."""
