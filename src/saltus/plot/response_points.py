@@ -22,13 +22,15 @@ Source = xr.Dataset | Mapping[str, xr.Dataset]
 NEEDS = ("response_of", "response_branch", "response_type", "response_period")
 #: Markers of Datasets that are drawn over each other.
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-#: Name and marker of what happens to a branch between two values.
+#: Name and marker of what happens to a branch between two values. That a branch isn't found any more is no mark: the picture shows it.
 _EVENTS = {
-    "graze": ("graze", "^"), "period_doubling": ("period doubling", "D"), "fold": ("fold", ">"), "neimark_sacker": ("Neimark-Sacker", "o"),
-    "chaos": ("onset of chaos", "s"), "end": ("branch ends", "|"),
+    "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"), "neimark_sacker": ("Neimark-Sacker", "o"),
+    "chaos": ("onset of chaos", "s"), "graze": ("graze", "^"),
 }  # fmt: skip
 #: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
 _EVEN = 1e-6
+#: More marks than these on an axis are drawn smaller.
+_MANY_EVENTS = 40
 #: A legend of more entries is set smaller, to stay beside its picture.
 _LONG_LEGEND = 14
 
@@ -182,16 +184,16 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
         name = event_name(one.axis)
         if name not in one.ds or not one.ds.sizes.get("event"):
             continue
-        words, values = one.ds["event_kind"].values, one.ds[name].values * scale.factor
+        values, words = one.ds[name].values * scale.factor, one.ds["event_kind"].values
         low, high = ax.get_xlim()
-        for word in dict.fromkeys(words.tolist()):
-            text, marker = _EVENTS.get(word, (word.replace("_", " "), "|"))
+        for word, (text, marker) in _EVENTS.items():
             here = values[(words == word) & (values >= low) & (values <= high)]
-            edge = dataset_color(one) if one.name else QUIET
-            ax.plot(
-                here, np.zeros(here.size), transform=ax.get_xaxis_transform(), ls="none", marker=marker, ms=4.5, mfc="white", mec=edge,
-                mew=0.8, clip_on=False, zorder=5, label=text, gid=f"event {word}",
-            )  # fmt: skip
+            if here.size:
+                size, width = (4.5, 0.8) if values.size <= _MANY_EVENTS else (3.0, 0.5)
+                ax.plot(
+                    here, np.zeros(here.size), transform=ax.get_xaxis_transform(), ls="none", marker=marker, ms=size, mfc="white",
+                    mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False, zorder=5, label=text, gid=f"event {word}",
+                )  # fmt: skip
 
 
 def legend(ax: Axes, named: Mapping[str, Any], left: float = 1.02) -> None:

@@ -85,10 +85,7 @@ class Exponents(OneDataset):
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """How the exponents settle."""
         from saltus import plot
-        from saltus.study.draw import default_kind
+        from saltus.plot.selection import MOST
 
-        kind = default_kind(ds)
-        if not kind:
-            return {}
-        axes = getattr(plot, kind)(ds)
+        axes = plot.exponents(ds, ds["trajectory"].values[:MOST].tolist())
         return {"": (axes.flat[0] if hasattr(axes, "flat") else axes).figure}
