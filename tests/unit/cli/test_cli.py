@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from saltus.cli import app, commands
 
-COMMANDS = ["demo", "run", "status", "resume", "plot", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
+COMMANDS = ["demo", "run", "status", "resume", "plot", "reproduce", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
 
 
 def saltus(*arguments: str):
@@ -120,3 +120,18 @@ def test_cases_of_the_demo_are_those_of_the_rig():
     from saltus.models.delangre import CASES
 
     assert [case.value for case in commands.Case] == list(CASES)
+
+
+def test_papers_are_listed_and_a_wrong_name_gets_the_nearest():
+    listed = saltus("reproduce")
+    assert listed.exit_code == 0
+    assert "saunders2021" in listed.output
+    wrong = saltus("reproduce", "sanders2021")
+    assert wrong.exit_code == 2
+    assert "'saunders2021'" in wrong.output
+
+
+def test_a_wrong_figure_gets_those_that_there_are(tmp_path):
+    wrong = saltus("reproduce", "saunders2021", "--figure", "44", "--out", str(tmp_path))
+    assert wrong.exit_code == 2
+    assert "14" in wrong.output

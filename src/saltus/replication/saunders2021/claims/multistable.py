@@ -7,7 +7,7 @@ import xarray as xr
 
 from saltus.analysis import settled
 from saltus.plot.maps import share_text
-from saltus.replication.saunders2021.claims.reading import EXACT, OFF, ON, SECTION_4, by_peak, certainty, check, count, listed, names
+from saltus.replication.saunders2021.claims.reading import EXACT, OFF, ON, SECTION_4, below, by_peak, certainty, check, count, listed, names
 from saltus.replication.verdict import Check, Claim, Data, Finding
 from saltus.results.schema import period_text
 
@@ -212,7 +212,7 @@ def fig6_granular(data: Data) -> Finding:
     return Finding(
         "; ".join(f"{f}: {data[f'fig6/{f}, {ON}'].attrs['uncertainty_exponent']:.2f}" for f in COUNTED),
         "Uncertainty exponents (1: smooth boundary, 0: hopeless): " + "; ".join(f"{f}: {value:.2f}" for f, value in numbers.items()),
-        tuple(check(f"{f}: uncertainty exponent below 0.5 ({value:.2f})", value < 0.5 if np.isfinite(value) else None) for f, value in numbers.items()),
+        tuple(below(f"{f}: uncertainty exponent", value, 0.5) for f, value in numbers.items()),
         "; ".join(f"{f}: ± {ds.attrs['uncertainty_exponent_error']:.2f}" for f, ds in maps.items()),
     )  # fmt: skip
 

@@ -23,6 +23,18 @@ def check(text: str, passed: object) -> Check:
     return Check(text, None if passed is None else bool(passed))
 
 
+def below(what: str, value: float, limit: float) -> Check:
+    """The check that a number is below a limit; undecided where the number isn't known."""
+    if not np.isfinite(value):
+        return Check(f"{what} below {limit:g} (not measurable on this grid)", None)
+    return Check(f"{what} below {limit:g} ({value:.2f})", value < limit)
+
+
+def exponent_text(value: float) -> str:
+    """An uncertainty exponent, or that there is none."""
+    return f"{value:.2f}" if np.isfinite(value) else "not measurable"
+
+
 def names(ds: xr.Dataset) -> list[str]:
     """The attractors in words, by their ids: ``T``, ``3T``, ``chaotic``."""
     kinds, periods = ds["attractor_type"].values.tolist(), ds["attractor_period"].values.tolist()
@@ -74,4 +86,6 @@ def where(ds: xr.Dataset, axis: str, low: float, high: float) -> np.ndarray:
 
 def band(values: np.ndarray) -> str:
     """First and last of some frequencies as text."""
-    return f"{values.min():g} to {values.max():g} Hz" if values.size else "nowhere"
+    if not values.size:
+        return "nowhere"
+    return f"{values.min():g} to {values.max():g} Hz" if np.ptp(values) > 0 else f"{values[0]:g} Hz"

@@ -9,6 +9,7 @@ from saltus.plot.maps import share_text
 from saltus.replication.saunders2021.claims.reading import EXACT, OFF, ON, SECTION_5, check
 from saltus.replication.saunders2021.sameness import SAME, SAME_ONE, classes
 from saltus.replication.verdict import Claim, Data, Finding
+from saltus.results.schema import period_text
 
 #: Soft contact ends, hard contact begins [N/m]: the decades in which the paper sees the responses converge.
 SOFT, HARD = 1e4, 1e8
@@ -54,19 +55,26 @@ def peak_gone(data: Data) -> Finding:
 def soft_agrees(data: Data) -> Finding:
     """Small differences at 14 kN/m, mainly at 11 to 16 Hz."""
     ds = data["fig7/a, compared"]
-    of = {name: classes(ds, number) != SAME_ONE for number, name in ((1, "located"), (2, "not located"))}
     inside = (ds["frequency"].values >= 11) & (ds["frequency"].values <= 16)
-    told = {name: (float(wrong[inside].mean()), float(wrong[~inside].mean())) for name, wrong in of.items()}
-    apart = _on_off(ds)
+    apart = _curves_differ(ds["rms"].values[1], ds["rms"].values[2])
+    shares = float(apart[inside].mean()), float(apart[~inside].mean())
+    wrong = {name: float((classes(ds, number) != SAME_ONE).mean()) for number, name in ((1, "located"), (2, "not located"))}
     return Finding(
-        "; ".join(f"{name}: another response than exact for {share_text(a)} of the starts at 11 to 16 Hz, {share_text(b)} elsewhere"
-                  for name, (a, b) in told.items()),
-        "The reference.",
-        (check(f"on and off differ for less than 5 % of the starts outside 11 to 16 Hz ({share_text(float(apart[~inside].mean()))})",
-               apart[~inside].mean() < 0.05),
-         check(f"and for more of them inside ({share_text(float(apart[inside].mean()))})", apart[inside].mean() > apart[~inside].mean())),
-        f"{apart.size} pairs of frequency and start; the same: rms within {SAME:.0%}.",
+        f"The dots on and off differ at {share_text(shares[0])} of the frequencies from 11 to 16 Hz, at {share_text(shares[1])} of the others. Start "
+        f"by start, another response than exact: {', '.join(f'{name} {share_text(value)}' for name, value in wrong.items())}.",
+        "The reference of the last numbers.",
+        (check(f"at less than a tenth of the frequencies outside 11 to 16 Hz on and off show different dots ({share_text(shares[1])})", shares[1] < 0.1),
+         check(f"and at more of those inside ({share_text(shares[0])})", shares[0] > shares[1])),
+        f"{inside.size} frequencies, {ds.sizes['start']} starts. Dots differ if one has no partner within {SAME:.0%}.",
     )  # fmt: skip
+
+
+def _curves_differ(on: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """Frequencies at which some rms of one, float64[frequencies, starts], has no partner in the other: what an eye sees, bool[frequencies]."""
+    gap = np.abs(on[:, :, None] - off[:, None, :]) / np.maximum(on[:, :, None], off[:, None, :])
+    gap = np.where(np.isfinite(gap), gap, np.inf)
+    lonely = [(gap.min(axis=axis) > SAME) & np.isfinite(values) for axis, values in ((2, on), (1, off))]
+    return lonely[0].any(axis=1) | lonely[1].any(axis=1)
 
 
 def _on_off(ds: xr.Dataset) -> np.ndarray:
@@ -95,12 +103,13 @@ def _onset(stiffness: np.ndarray, kind: np.ndarray) -> float:
 
 def _beyond(data: Data, panel: str, limit: float) -> Finding:
     """Whether everything beyond a stiffness is chaotic."""
-    told, shares = {}, {}
+    told, shares, rough = {}, {}, {}
     for end in (EXACT, ON, OFF):
         stiffness, kind, period, _ = _row(data, panel, end)
         hard = stiffness > limit
+        rough[end] = float(np.isin(kind[hard], ("chaotic", "quasi_periodic", "unconverged")).mean())
         shares[end] = float((kind[hard] == "chaotic").mean())
-        periods = [f"{n}T" for n in np.unique(period[hard & (period > 0)])[:6]]
+        periods = [period_text(int(n)) for n in np.unique(period[hard & (period > 0)])[:6]]
         lost = float((kind[hard] == "unconverged").mean())
         onset = _onset(stiffness, kind)
         told[end] = (
@@ -112,11 +121,20 @@ def _beyond(data: Data, panel: str, limit: float) -> Finding:
     return Finding(
         f"Located: {told[ON]}. Not located: {told[OFF]}.", told[EXACT] + ".",
         (check(f"at least 95 % of the exact responses beyond {limit:.0e} N/m are chaotic ({share_text(shares[EXACT])})", shares[EXACT] >= 0.95),
-         check(f"chaos persists at the hard end (from {onset:.2g} N/m on)", bool(np.isfinite(onset)))),
+         check(f"chaos persists at the hard end ({f'from {onset:.2g} N/m on' if np.isfinite(onset) else 'it never does'})", np.isfinite(onset))),
         f"{stiffness.size} stiffnesses over six decades; chaos told by the largest Lyapunov exponent, four standard errors from zero.",
-        "ode45 scatters about an orbit of stiff contact by a few per cent of its size at these tolerances: on a diagram that looks like chaos."
-        if shares[EXACT] < 0.95 else "",
+        _why_chaos(rough) if shares[EXACT] < 0.95 else "",
     )  # fmt: skip
+
+
+def _why_chaos(rough: dict[str, float]) -> str:
+    """Where chaos is said to be and isn't: whether ode45 makes it look so."""
+    if max(rough[ON], rough[OFF]) > rough[EXACT] + 0.1:
+        return (
+            f"By ode45 {share_text(rough[ON])} (located) and {share_text(rough[OFF])} (not) never repeat there, exact {share_text(rough[EXACT])}: it "
+            "scatters about orbits of stiff contact by some per cent of their size at these tolerances, which on a diagram looks like chaos."
+        )
+    return "By ode45 it is the same here. The limit is read off a figure, and short runs show transients; the length of the paper's isn't given."
 
 
 def chaos_5(data: Data) -> Finding:
@@ -312,7 +330,8 @@ CLAIMS = (
     Claim("peak-gone", "7", "At Kc = 1.4e10 N/m there is no resonance peak; amplitudes are uniform.", _WHERE,
           "The largest rms is below twice the median there, and above three times the median at 1.4e4 N/m.", (*_RESPONSES["a"], *_RESPONSES["c"]), peak_gone),
     Claim("soft-agrees", "7", "At 1.4e4 N/m on and off differ slightly, mainly at 11 to 16 Hz.", _WHERE,
-          "On and off lead to different rms for less than 5 % of the starts outside 11 to 16 Hz, and for more of them inside.",
+          "Some rms on has no partner off within 5 %, or the other way round, at less than a tenth of the frequencies outside 11 to 16 Hz, and at more of "
+          "those inside.",
           ("fig7/a, compared",), soft_agrees),
     Claim("grazing", "7", "At 5 Hz a grazing near Kc = 2.5e4 N/m changes the response.", _WHERE,
           "Between 1.5e4 and 4e4 N/m the rms changes most within 2e4 to 3e4 N/m; at 2.55e4 N/m an attractor is within 20 µm of a graze.",

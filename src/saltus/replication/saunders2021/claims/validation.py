@@ -112,7 +112,7 @@ def isolated_branch(data: Data) -> Finding:
         told = f"{case}: at each of these frequencies a T response coexists, at least a fifth smaller (3T is {ratio:.2f} times as large or more)"
         checks.append(check(told, apart if bands[case].size else False))
         tight = _branch(data[f"fig3/{case}, ode45"], 3, peak + 0.01, 30.0)
-        own.append(f"{case}: 3T at {', '.join(f'{f:g}' for f in tight) or 'none of its frequencies'} Hz")
+        own.append(f"{case}: 3T at {', '.join(f'{f:g} Hz' for f in tight) or 'none of the frequencies asked'}")
     width = {case: float(np.ptp(one)) if one.size else 0.0 for case, one in bands.items()}
     checks.append(
         check(f"the band is wider at 4 N ({width['a4']:.1f} Hz) than at 1.5 N ({width['a1.5']:.1f} Hz)", width["a4"] > width["a1.5"])
