@@ -8,14 +8,14 @@ from sphinx.application import Sphinx
 
 #: The page.
 PAGE = "glossary"
-_ROW = re.compile(r"^\| (\*\*.+?\*\*) \| (.+) \|$")
+_ROW = re.compile(r"^\| (\*\*.+?) \| (.+) \|$")
 _TERM = re.compile(r"\*\*(.+?)\*\*")
 
 
 def terms(text: str) -> list[tuple[list[str], str]]:
-    """(words, meaning) of every row of the table."""
+    """(words, meaning) of every row of the table; what stands behind the words, ``**event** (of a branch)``, begins the meaning."""
     rows = (_ROW.match(line) for line in text.splitlines())
-    return [(_TERM.findall(row[1]), row[2]) for row in rows if row]
+    return [(_TERM.findall(row[1]), f"{row[1].rpartition('**')[2].strip()} {row[2]}".strip()) for row in rows if row]
 
 
 def as_glossary(text: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.lyapunov_spectrum import spectrum
+from saltus.analysis.lyapunov_spectrum import kind_of, spectrum
 from saltus.analysis.walks import MapWalk
 from saltus.errors import SaltusWarning
 from saltus.flow.maps import FunctionMap, Stroboscope
@@ -196,6 +196,23 @@ def test_a_rigid_rotation_is_quasi_periodic_and_no_orbit_is_called_chaotic():
     bound = np.abs(np.log(found.growth.scale[:, 0] / found.growth.scale[:, 1])) / 1000  # lengths in units of slightly unequal ranges
     assert (np.abs(found.exponents[:, 0]) <= bound + 1e-12).all()
     assert (np.abs(found.exponents[:, 1] + math.log(2)) <= bound + 1e-12).all()  # the radius goes to its square root
+
+
+@pytest.mark.parametrize(("late", "kind"), [(0.5, "chaotic"), (-0.05, "unclear")])
+def test_a_motion_that_was_chaotic_only_at_first_is_not_called_chaotic(late, kind):
+    """A mean far above zero, of growth that has ended in the second half."""
+    rates = 0.5 + drawn(2000, 1) - 0.5
+    rates[1200:] += late - 0.5
+    assert kind_of(rates, np.array([0.01]), forced=True) == kind
+
+
+def test_an_orbit_that_is_still_approached_slowly_is_recognised():
+    """The logistic map at 2.998: multiplier -0.998; after 3100 iterates the distance is far above rounding."""
+    logistic = FunctionMap(lambda z: 2.998 * z * (1 - z), "x", lambda z: (2.998 * (1 - 2 * z))[:, :, None])
+    found = lyapunov_of(logistic, [0.3], 3000)
+    assert abs(found.growth.stretch.trail[0, -1, 0] - found.orbits[0].points[0, 0]) > 1e-5
+    assert found.kinds == ["periodic"]
+    assert found.exponents[0, 0] == pytest.approx(math.log(0.998), abs=1e-12)
 
 
 def test_deviations_that_grow_like_time_are_not_chaos():

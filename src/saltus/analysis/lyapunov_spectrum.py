@@ -90,7 +90,7 @@ def spectrum(
     kinds = []
     for i, orbit in enumerate(orbits):
         if orbit is None:
-            kinds.append(_kind(rates[i], errors[i], forced))
+            kinds.append(kind_of(rates[i], errors[i], forced))
             continue
         kinds.append("periodic" if forced else "equilibrium")
         exponents[i], errors[i] = _of_orbit(walk, i, orbit, growth.scale[i])
@@ -168,13 +168,13 @@ def _volume(walk: Walk, i: int, orbit: Orbit) -> float:
 
 
 # -- kinds ---------------------------------------------------------------------------------------------------------------------
-def _kind(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
+def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
     """What a motion that isn't an orbit of the map is called, from rates float64[n, D] and the errors of their means."""
     mean, first, second = rates.mean(axis=0), *(half.mean(axis=0) for half in np.array_split(rates, 2))
     if not np.isfinite(mean[0]) or not errors[0] <= UNCLEAR:
         return "unclear"
     limit = np.maximum(SURE * errors, BOUNDED / len(rates))
-    if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # growth like t looks positive at first
+    if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # not one that was chaotic only at first
         return "chaotic"
     if abs(second[0]) > limit[0]:
         return "unclear"

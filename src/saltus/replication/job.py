@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from saltus.results import load, save
 from saltus.results.files import ResultFileError, replacing
 from saltus.results.provenance import to_json, version
-from saltus.study.maps import code_hash
+from saltus.study.identity import code_hash
 
 if TYPE_CHECKING:
     import xarray as xr

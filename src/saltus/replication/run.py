@@ -169,8 +169,8 @@ def _chosen(paper: Paper, figures: Sequence[str]) -> tuple[str, ...]:
 
 def wanted_by(paper: Paper, figure: str) -> set[str]:
     """Names of the jobs that a figure's pictures and claims ask for."""
-    asking = [one.needs for one in (*paper.pictures, *paper.claims, *paper.tables) if one.figure == figure]
-    return {name for needs in asking for name in needs}
+    parts: list[Any] = [*paper.pictures, *paper.claims, *paper.tables]
+    return {name for one in parts if one.figure == figure for name in one.needs}
 
 
 def closure(jobs: Mapping[str, Job], wanted: set[str]) -> list[str]:

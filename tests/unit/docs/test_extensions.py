@@ -15,8 +15,8 @@ def test_every_row_of_the_glossary_becomes_a_term(root):
     assert len(terms(text)) == len(rows) == sum(line.startswith("|") for line in text.splitlines()) - 2
     words = [word for names, _ in terms(text) for word in names]
     assert len(words) == len(set(words))
-    made = as_glossary("# T\n\n| word | meaning |\n|---|---|\n| **a**, **b c** | `x` is *one*. |\n")
-    assert made == "# T\n\n```{glossary}\na\nb c\n  `x` is *one*.\n```\n"
+    made = as_glossary("# T\n\n| word | meaning |\n|---|---|\n| **a**, **b c** | `x` is *one*. |\n| **d** (of e) | f |\n")
+    assert made == "# T\n\n```{glossary}\na\nb c\n  `x` is *one*.\n\nd\n  (of e) f\n```\n"
 
 
 def test_every_key_of_a_study_stands_in_the_tables():

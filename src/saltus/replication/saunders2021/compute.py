@@ -25,8 +25,9 @@ from saltus.replication.job import Show
 from saltus.results import attractors_dataset
 from saltus.study import quantities
 from saltus.study.maps import jobs_of
-from saltus.study.run import method_of, system_of
-from saltus.study.spec import METHODS, Study
+from saltus.study.setting import method_of, system_of
+from saltus.study.spec import Study
+from saltus.study.spec_parts import METHODS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,7 +84,7 @@ def beside(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noq
     x = (start[first][:, None] + offsets).ravel()
     v = np.repeat(np.broadcast_to(start[second], start[first].shape), len(offsets))
     return analysis.stroboscope(
-        system, {first: x, second: v}, table.periods, settings["keep"], method=method_in(settings), threads=1, progress=show
+        system, {first: x, second: v}, table.periods or 1, settings["keep"], method=method_in(settings), threads=1, progress=show
     )
 
 

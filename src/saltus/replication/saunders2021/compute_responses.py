@@ -14,8 +14,8 @@ from saltus.flow import Taylor
 from saltus.replication.job import Show
 from saltus.replication.saunders2021.compute import Inputs, Settings, method_in
 from saltus.study import quantities
-from saltus.study.run import system_of
-from saltus.study.spec import SystemTable
+from saltus.study.setting import system_of
+from saltus.study.spec_parts import SystemTable
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -106,7 +105,7 @@ class _Plan:
 
     def _responses(self, name: str) -> list[Job]:
         """A job for each [[frequency_response]] and [[bifurcation_diagram]] of a study file."""
-        text = tomllib.loads((self.folder / f"{name}.toml").read_text(encoding="utf-8"))
+        text = self._study(name).model_dump(mode="json", exclude_unset=True)
         made = []
         for question in ("frequency_response", "bifurcation_diagram"):
             for table in text.get(question, []):

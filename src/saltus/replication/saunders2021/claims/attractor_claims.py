@@ -75,7 +75,7 @@ def _regular(data: Data, figure: str, settings: Sequence[str]) -> Finding:
     checks, exact, own = [], [], []
     for setting in settings:
         ds = data[f"{figure}/{setting}, {EXACT}"]
-        size = np.hypot(ds["attractor_multiplier_real"], ds["attractor_multiplier_imag"]).values
+        size = np.hypot(ds["attractor_multiplier_real"].values, ds["attractor_multiplier_imag"].values)
         place = setting.replace(" per ", "/")
         checks.append(check(f"{place}: all exact attractors are periodic and stable (largest multiplier {np.nanmax(size):.3f})",
                             bool((ds["attractor_type"] == "periodic").all()) and bool(np.nanmax(size) < 1)))  # fmt: skip

@@ -156,7 +156,9 @@ def fig13_four(data: Data) -> Finding:
 
 def fig13_dominant(data: Data) -> Finding:
     """The attractor of highest amplitude dominant."""
-    checks, told, own = [], [], []
+    checks = []
+    told: list = []
+    own: list = []
     for setting in STIFF:
         for end in (EXACT, ON):
             ds = data[f"fig13/{setting}, {end}"]

@@ -186,7 +186,9 @@ def fig6_dominance(data: Data) -> Finding:
 def fig6_gap(data: Data) -> Finding:
     """Starts near the gap and the large solution."""
     slow = float(np.nanmax([np.abs(data["fig5/exact"]["v"].isel(trajectory=i)).max() for i in range(4)]))
-    checks, told, own = [], [], []
+    checks = []
+    told: list = []
+    own: list = []
     for f in COUNTED:
         for end, into in ((EXACT, told), (ON, own)):
             ds = data[f"fig6/{f}, {end}"]

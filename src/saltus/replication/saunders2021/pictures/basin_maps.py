@@ -76,7 +76,7 @@ def _common(found: dict[str, xr.Dataset]) -> _Row:
             entries.append([f"{kind_text(str(both['match_type'].values[pair]), int(both['match_period'][pair]))}, not exact", [np.nan] * 3])
         for pair in range(both.sizes["pair"]):
             if int(both["match_b"][pair]) >= 0:
-                entries[number[pair]][1][column] = float(both["match_fraction_b"][pair])  # type: ignore[index]
+                entries[number[pair]][1][column] = float(both["match_fraction_b"][pair])
         cells[look.label] = np.where(values >= 0, number[np.maximum(values, 0)], values)
         agreement[look.label] = float(both.attrs["agreement"])
     return _Row(cells, [_Entry(str(text), tuple(shares)) for text, shares in entries], agreement)  # type: ignore[arg-type]

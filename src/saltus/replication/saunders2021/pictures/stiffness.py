@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
@@ -60,9 +62,10 @@ def _legend_of_kinds(figure: Figure, data: Data) -> None:
         codes |= set(np.unique(kinds.of(ds)).tolist())
         periods.append(ds["response_period"].values)
     every = np.concatenate(periods)
-    handles = [
-        Line2D([], [], ls="none", marker="o", ms=5, color=kinds.color(code), label=kinds.label(code, every)) for code in sorted(codes)
-    ]
+    handles = []
+    for code in sorted(codes):
+        look: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 5, "color": kinds.color(code), "label": kinds.label(code, every)}
+        handles.append(Line2D([], [], **look))
     handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="none", mec="#222222", label="ode45 (1e-12, 1e-12), located"))
     figure.legend(handles=handles, loc="outside lower center", ncols=6)
 
@@ -129,7 +132,7 @@ def differences(data: Data) -> Figure:
         ds = data[f"fig7/{panel}, compared"]
         for number, look in ((1, ON), (2, OFF)):
             at, median = running_median(ds["contact_stiffness"].values, ds["step_error_rms"].values[number])
-            axes[3].plot(at, median, color=look.color, ls=style, lw=1.2, label=f"{look.label}, {PANELS[panel]}")  # type: ignore[arg-type]
+            axes[3].plot(at, median, color=look.color, ls=style, lw=1.2, label=f"{look.label}, {PANELS[panel]}")
     axes[3].set(yscale="log", xscale="log", xlabel="contact stiffness Kc [N/m]", ylabel="error after one period")
     axes[3].set_title("Error of one forcing period begun on the exact response, in units of the motion's range (median)")
     axes[3].legend(ncols=3, fontsize=7, loc="upper left")
