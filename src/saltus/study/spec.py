@@ -55,7 +55,7 @@ class Study(Table):
         for _, table in self.questions():
             if isinstance(table, Named):
                 yield table.title, table.stem
-        if self.simulate is not None:
-            yield self.study.name, RUN
-            if self.compare is not None and self.compare.reference is not None:
-                yield f"{self.study.name}, {REFERENCE}", REFERENCE
+            elif table is self.simulate:
+                yield self.study.name, RUN
+                if self.compare is not None and self.compare.reference is not None:
+                    yield f"{self.study.name}, {REFERENCE}", REFERENCE

@@ -190,7 +190,7 @@ def test_the_axis_is_logarithmic_as_the_grid_is(diagram):
 @pytest.mark.parametrize(
     ("values", "log"),
     [(np.geomspace(1, 1e6, 50), True), (np.geomspace(1, 2, 9), True), (np.linspace(1, 1e6, 50), False), (np.array([1.0, 10.0]), False),
-     (np.linspace(-1, 1, 5), False), (np.geomspace(1, 1e6, 50)[[0, 3, 4, 20]], False)],
+     (np.linspace(-1, 1, 5), False), (np.linspace(1e6, 1e6 + 0.1, 5), False), (np.geomspace(1, 1e6, 50)[[0, 3, 4, 20]], False)],
 )  # fmt: skip
 def test_grids_even_in_their_logarithms(values, log):
     assert response_points.is_log(values) is log
