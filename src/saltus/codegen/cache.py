@@ -2,20 +2,26 @@
 
 An entry is built in a private folder and renamed into place, so processes that start cold at once can't disturb each other. A manifest of
 checksums is verified before anything is loaded; an entry that doesn't match is thrown away and built again.
+
+Numba compiles one function at a time and holds the interpreter meanwhile. The main thread compiles where it is; other threads compile in
+processes of their own (build_one.py), so that they neither wait for each other nor keep those that compute from going on.
 """
 
 from __future__ import annotations
 
 import atexit
+import contextlib
 import hashlib
 import importlib.util
 import json
 import os
 import shutil
+import subprocess
 import sys
 import tempfile
 import threading
 import warnings
+from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -27,7 +33,8 @@ from saltus.errors import CacheError, SaltusWarning
 MANIFEST = "manifest.json"
 MODULE = "kernels.py"
 _BUILDING = ".building-"
-_LOADING = threading.Lock()
+#: One thread at a time sees to an entry: a module stands in sys.modules before it is complete.
+_LOCKS: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
 
 
 @dataclass(frozen=True)
@@ -89,13 +96,15 @@ def load(key: str, source: str, title: str) -> ModuleType:
     CacheError
         If no folder at all can be written.
     """
-    with _LOADING:  # a module stands in sys.modules before it is complete
+    with _LOCKS[key]:
         return _load(f"saltus_kernels_{key}", folder() / key, source, title)
 
 
 def _load(name: str, final: Path, source: str, title: str) -> ModuleType:
     if name in sys.modules:
         return sys.modules[name]
+    if not (final / MANIFEST).exists() and threading.current_thread() is not threading.main_thread():
+        _build_in_a_process(final.name, source, title)
     if _intact(final, source):
         try:
             return _import(name, final / MODULE)
@@ -135,6 +144,19 @@ def _import(name: str, file: Path) -> ModuleType:
         del sys.modules[name]
         raise
     return module
+
+
+def _build_in_a_process(key: str, source: str, title: str) -> None:
+    """Let another process make the entry. Whether it did shows in the folder; if not, this process builds it, and says why it can't."""
+    order = json.dumps({"key": key, "source": source, "title": title}).encode()
+    here = str(Path(__file__).parents[2])
+    path = os.pathsep.join([here, *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-P", "-m", "saltus.codegen.build_one"]  # -P: not what lies in the working folder
+    with contextlib.suppress(OSError):  # no processes here
+        subprocess.run(
+            command, input=order, env={**os.environ, "PYTHONPATH": path}, capture_output=True, check=False,
+            start_new_session=True,  # Ctrl-C is for this process
+        )  # fmt: skip
 
 
 def _build(name: str, final: Path, source: str, title: str) -> ModuleType:

@@ -19,8 +19,9 @@ def derivative_name(row: str, column: str) -> str:
     return f"d{row}/d{column}(0)"
 
 
+@functools.lru_cache(maxsize=64)
 def tangent_system(system: System) -> System:
-    """The system with D states extended to D + D*D: the states, then the rows of Y one after the other.
+    """The system with D states extended to D + D*D: the states, then the rows of Y one after the other; the same one each time.
 
     Parameter values, guards and forcing are those of the system. Y starts as the identity; its units are those of its row over those of its
     column.

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numba
@@ -158,6 +159,42 @@ def test_four_processes_that_start_cold_at_once(folder):
     before = stamps(folder)
     assert load().propagate(1) == 2
     assert stamps(folder) == before
+
+
+def in_threads(*sources):
+    """What threads get that each load an entry of its own, or the exceptions."""
+    forget()
+
+    def one(number):
+        name = f"{number:x}" * 32
+        try:
+            return cache.load(name, sources[number], "one line")
+        finally:
+            sys.modules.pop(f"saltus_kernels_{name}", None)
+
+    with ThreadPoolExecutor(len(sources)) as pool:
+        futures = [pool.submit(one, number) for number in range(len(sources))]
+    return [future.exception() or future.result() for future in futures]
+
+
+def test_threads_compile_in_processes_of_their_own(folder, monkeypatch):
+    """So that they don't wait for each other: no thread of this process calls Numba's compiler."""
+    monkeypatch.setattr(cache, "_compile", lambda *_: pytest.fail("compiled here"))
+    first, second = in_threads(SOURCE, SOURCE.replace("n + 1", "n + 2"))
+    assert (first.propagate(1), second.propagate(1)) == (2, 3)
+    assert len(cache.entries()) == len(list(folder.iterdir())) == 2
+
+
+def test_a_thread_whose_process_fails_compiles_itself(folder, monkeypatch):
+    monkeypatch.setattr(cache.sys, "executable", "/no/such/python")
+    (module,) = in_threads(SOURCE)
+    assert module.propagate(1) == 2
+
+
+def test_a_thread_says_what_does_not_compile(folder):
+    (error,) = in_threads(SOURCE.replace("n + 1", "n + nothing"))
+    assert isinstance(error, numba.errors.NumbaError)
+    assert list(folder.iterdir()) == []
 
 
 def test_a_folder_that_cannot_be_written_costs_time_not_the_run(tmp_path, monkeypatch):

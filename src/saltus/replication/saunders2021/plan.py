@@ -18,7 +18,7 @@ ON = {"name": "ODE45", "rtol": 1e-4, "atol": 1e-7, "events": "locate"}
 OFF = {"name": "ODE45", "rtol": 1e-4, "atol": 1e-7, "events": "ignore"}
 
 #: Starts along each axis of a basin map in a quick run; the full one takes those of the study file.
-QUICK_CELLS = {"fig6": 72, "fig8": 72, "fig11": 48, "fig13": 40}
+QUICK_CELLS = {"fig6": 56, "fig8": 56, "fig11": 48, "fig13": 28}
 #: Starts from which attractors are looked for first: full, quick.
 SCOUTS = 1024, 256
 #: Periods run on each attractor, and kept, for its picture: ode45's own scatter shows in the last of them.
