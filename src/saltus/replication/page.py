@@ -65,6 +65,11 @@ def _version() -> str:
     return __version__
 
 
+def _sentence(text: str) -> str:
+    """With a full stop, if nothing else ends it."""
+    return text if text.endswith(("?", "!", ".")) else f"{text}."
+
+
 def _text(value: str) -> str:
     return html.escape(value, quote=True)
 
@@ -113,7 +118,7 @@ def _picture(picture: Picture, path: Path) -> str:
     narrow = ' class="narrow"' if width < _NARROW else ""
     source = f"data:image/png;base64,{base64.b64encode(data).decode('ascii')}"
     image = f'<img src="{source}" alt="{_text(picture.title)}" width="{width}" height="{height}" loading="lazy">'
-    return f"<figure{narrow}>{image}<figcaption><b>{_text(picture.title)}.</b> {_text(picture.caption)}</figcaption></figure>"
+    return f"<figure{narrow}>{image}<figcaption><b>{_text(_sentence(picture.title))}</b> {_text(picture.caption)}</figcaption></figure>"
 
 
 def _table(table: TextTable) -> str:

@@ -8,11 +8,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from saltus import analysis
+from saltus.analysis.answers import provenance
 from saltus.analysis.compare_methods import method_label
+from saltus.analysis.method_errors import one_period_errors
 from saltus.flow import Taylor
 from saltus.replication.job import Show
 from saltus.replication.saunders2021.compute import Inputs, Settings, method_in
+from saltus.results import methods_dataset
 from saltus.study import quantities
 from saltus.study.setting import system_of
 from saltus.study.spec_parts import SystemTable
@@ -59,4 +64,16 @@ def compared(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # n
     return analysis.compare_methods(
         _system(settings), settings["question"], methods, computed=dict(zip(labels, inputs.values(), strict=True)), threads=1,
         progress=False, **_arguments(settings["table"]),
+    )  # fmt: skip
+
+
+def period_errors(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noqa: ARG001
+    """The error of one forcing period by further methods, begun on the exact responses of another job."""
+    (exact,) = inputs.values()
+    system, methods = _system(settings), [method_in({"method": table}) for table in settings["methods"]]
+    errors = [one_period_errors(system, Taylor(), method, exact, threads=1) for method in methods]
+    return methods_dataset(
+        base=exact, labels=[method_label(method) for method in methods], columns={},
+        fields={name: np.stack([error[name] for error in errors]) for name in errors[0]},
+        attrs=provenance(system, methods[0], system.values) | {"analysis": settings["question"]},
     )  # fmt: skip

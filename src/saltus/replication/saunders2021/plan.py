@@ -14,11 +14,13 @@ from saltus.study.spec import Study
 TAYLOR = {"name": "Taylor"}
 #: The paper's sections 4 (validation) and 5 (with and without event location).
 TIGHT = {"name": "ODE45", "rtol": 1e-12, "atol": 1e-12, "events": "locate"}
+#: Those of section 5, and ten thousand times tighter: whether location or the tolerances make the error.
 ON = {"name": "ODE45", "rtol": 1e-4, "atol": 1e-7, "events": "locate"}
 OFF = {"name": "ODE45", "rtol": 1e-4, "atol": 1e-7, "events": "ignore"}
+TIGHTER = [{**table, "rtol": 1e-8, "atol": 1e-11} for table in (ON, OFF)]
 
 #: Starts along each axis of a basin map in a quick run; the full one takes those of the study file.
-QUICK_CELLS = {"fig6": 56, "fig8": 56, "fig11": 48, "fig13": 28}
+QUICK_CELLS = {"fig6": 72, "fig8": 56, "fig11": 48, "fig13": 28}
 #: Starts from which attractors are looked for first: full, quick.
 SCOUTS = 1024, 256
 #: Periods run on each attractor, and kept, for its picture: ode45's own scatter shows in the last of them.
@@ -97,12 +99,18 @@ class _Plan:
         return self._responses("fig3")
 
     def fig7(self) -> list[Job]:
-        """Three frequency responses and three bifurcation diagrams, each in three ways, and these ways side by side."""
+        """Three frequency responses and three bifurcation diagrams, each in three ways, and these ways side by side.
+
+        Along the diagrams also the error of one period at tighter tolerances.
+        """
         made = self._responses("fig7")
         for panel in "abcdef":
             three = [job for job in made if job.name.startswith(f"fig7/{panel}, ")]
             settings = {**{key: value for key, value in three[0].settings.items() if key != "method"}, "methods": [ON, OFF]}
             made.append(Job(f"fig7/{panel}, compared", settings, compute_responses.compared, tuple(job.name for job in three)))
+            if panel in "def":
+                tighter = {**settings, "methods": TIGHTER}
+                made.append(Job(f"fig7/{panel}, tighter", tighter, compute_responses.period_errors, (f"fig7/{panel}, exact",)))
         return made
 
     def _responses(self, name: str) -> list[Job]:

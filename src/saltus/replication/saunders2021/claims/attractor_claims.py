@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from saltus.plot.maps import share_text
 from saltus.replication.saunders2021.claims.basin_claims import NEAR_GRAZE
 from saltus.replication.saunders2021.claims.reading import EXACT, OFF, ON, SECTION_5, check, count, listed, names, parameter
 from saltus.replication.saunders2021.pictures.looks import strobe
@@ -55,7 +56,7 @@ def _agree(data: Data, settings: Sequence[tuple[str, str]]) -> Finding:
         for trio, misses in rows:
             if ON in misses and OFF in misses:
                 name = kind_text(trio.kind, trio.period)
-                checks.append(check(f"{place}, {name}: both within {EXCELLENT:.0%} of the exact one ({misses[ON]:.1e}, {misses[OFF]:.1e})",
+                checks.append(check(f"{place}, {name}: both within {share_text(EXCELLENT)} of the exact one ({misses[ON]:.1e}, {misses[OFF]:.1e})",
                                     max(misses.values()) < EXCELLENT))  # fmt: skip
     return Finding(
         f"Largest deviation from the exact orbit at whole periods, in units of the motion's range. Located: {'; '.join(on)}. Not located: {'; '.join(off)}.",
@@ -132,7 +133,7 @@ def fig12_doubles(data: Data) -> Finding:
     return Finding(
         f"Located: {listed(data[f'fig11/7694 N per m, {ON}'])}; {listed(data[f'fig11/8833 N per m, {ON}'])}.", f"{listed(before)}; {listed(after)}.",
         (check(f"the dominant attractor has period T before ({period_text(n[0])})", n[0] == 1), check(f"and 2T after ({period_text(n[1])})", n[1] == 2),
-         check(f"it comes nearer to a graze than {NEAR_GRAZE:.0%} of the gap ({1e6 * margin:.1f} µm)", margin < NEAR_GRAZE * gap)),
+         check(f"it comes nearer to a graze than {share_text(NEAR_GRAZE)} of the gap ({1e6 * margin:.1f} µm)", margin < NEAR_GRAZE * gap)),
         "Periods and stability by Newton's method and multipliers.",
     )  # fmt: skip
 

@@ -246,7 +246,9 @@ def graze_margins(data: Data) -> Finding:
         "Not needed: the attractors lie within 2 % of the exact ones (Fig. 9).",
         f"Distance of each attractor from a graze: {told}.",
         (
-            check(f"before: one attractor is closer to a graze than {NEAR_GRAZE:.0%} of the gap ({near[BEFORE]})", near[BEFORE] == 1),
+            check(
+                f"before: one attractor is closer to a graze than {share_text(NEAR_GRAZE)} of the gap ({near[BEFORE]})", near[BEFORE] == 1
+            ),
             check(f"after: two are ({near[AFTER]})", near[AFTER] == 2),
         ),
         "Margins from samples a thousandth of a period apart, with parabolas through the extremes.",

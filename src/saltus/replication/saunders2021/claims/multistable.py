@@ -7,7 +7,20 @@ import xarray as xr
 
 from saltus.analysis import settled
 from saltus.plot.maps import share_text
-from saltus.replication.saunders2021.claims.reading import EXACT, OFF, ON, SECTION_4, below, by_peak, certainty, check, count, listed, names
+from saltus.replication.saunders2021.claims.reading import (
+    EXACT,
+    OFF,
+    ON,
+    SECTION_4,
+    below,
+    by_peak,
+    certainty,
+    check,
+    count,
+    exponent_text,
+    listed,
+    names,
+)
 from saltus.replication.verdict import Check, Claim, Data, Finding
 from saltus.results.schema import period_text
 
@@ -209,11 +222,14 @@ def fig6_granular(data: Data) -> Finding:
     """Sensitivity to the start."""
     maps = {f: data[f"fig6/{f}, {EXACT}"] for f in COUNTED}
     numbers = {f: float(ds.attrs["uncertainty_exponent"]) for f, ds in maps.items()}
+    errors = {f: float(ds.attrs["uncertainty_exponent_error"]) for f, ds in maps.items()}
+    own = {f: float(data[f"fig6/{f}, {ON}"].attrs["uncertainty_exponent"]) for f in COUNTED}
     return Finding(
-        "; ".join(f"{f}: {data[f'fig6/{f}, {ON}'].attrs['uncertainty_exponent']:.2f}" for f in COUNTED),
-        "Uncertainty exponents (1: smooth boundary, 0: hopeless): " + "; ".join(f"{f}: {value:.2f}" for f, value in numbers.items()),
+        "; ".join(f"{f}: {exponent_text(value)}" for f, value in own.items()),
+        "Uncertainty exponents (1: smooth boundary, 0: hopeless): " + "; ".join(f"{f}: {exponent_text(value)}" for f, value in numbers.items()),
         tuple(below(f"{f}: uncertainty exponent", value, 0.5) for f, value in numbers.items()),
-        "; ".join(f"{f}: ± {ds.attrs['uncertainty_exponent_error']:.2f}" for f, ds in maps.items()),
+        f"Standard errors: {'; '.join(f'{f}: {exponent_text(value)}' for f, value in errors.items())}. They are measurable "
+        "on grids of 64 cells or more along each axis.",
     )  # fmt: skip
 
 

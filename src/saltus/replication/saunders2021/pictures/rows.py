@@ -57,8 +57,7 @@ def attractors(data: Data, figure: str, setting: str) -> Figure:
     )
     for row, trio in zip(grid, rows, strict=True):
         _row(row, data, figure, setting, trio)
-        if row is not grid[-1]:
-            row[0].set_xlabel("")
+    grid[-1, 0].set_xlabel("time [T]")
     named = {label: handle for one in grid.flat for handle, label in zip(*one.get_legend_handles_labels(), strict=True)}
     order = [look.label for look in LOOKS if look.label in named]
     drawn.legend([named[label] for label in order], order, loc="outside lower center", ncols=3)
@@ -82,7 +81,7 @@ def _row(row: np.ndarray, data: Data, figure: str, setting: str, trio: Trio) -> 
     for boundary in run["guard_boundary"].values:
         row[0].axhline(boundary * 1e3, color="#555555", lw=0.7, ls=(0, (4, 3)), zorder=0)
         row[1].axvline(boundary * 1e3, color="#555555", lw=0.7, ls=(0, (4, 3)), zorder=0)
-    row[0].set(xlabel="time [T]", ylabel="x [mm]", title=_title(data, figure, setting, trio))
+    row[0].set(ylabel="x [mm]", title=_title(data, figure, setting, trio))
     row[0].margins(x=0)
     row[1].set(xlabel="x [mm]", ylabel="v [mm/s]")
 
