@@ -1,6 +1,7 @@
 """Ctrl-C while trajectories are computed: at whatever moment it comes, what is kept is the beginning of the undisturbed answer."""
 
 import _thread
+import signal
 import time
 
 import numpy as np
@@ -20,6 +21,14 @@ class Interrupting(list):
         if len(self) == 3:
             _thread.interrupt_main()
             time.sleep(0.2)
+
+
+@pytest.fixture(autouse=True)
+def ctrl_c():
+    """Ctrl-C counts, also where the tests were started in the background, for which shells switch it off."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.parametrize("threads", [1, 2])

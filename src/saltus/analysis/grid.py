@@ -66,7 +66,9 @@ class Grid:
 
     def family(self, method: Method, threads: int | None = None) -> Family:
         """A map for every point of the grid."""
-        return Family(self.system, method, self.rows, threads=threads)
+        family = Family(self.system, method, self.rows, threads=threads)
+        family.begin_tangent()
+        return family
 
 
 def grid_of(system: System, axes: Mapping[str, Any], start: Any, box: Any, values: Any, seed: int, follow: bool | None) -> Grid:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import platform
 import sys
+import threading
+from collections.abc import Callable
 from functools import cache, lru_cache
 from importlib import resources
 from types import ModuleType
@@ -77,6 +80,18 @@ def ode45_module(system: System) -> ModuleType:
 def capture_module() -> ModuleType:
     """The compiled test of capture, the same for all systems."""
     return _module("capture", "", ("capture.py",), (_F3, _F2, _F3, _I1, _F1, _I1, _I1))
+
+
+@lru_cache(maxsize=64)
+def in_background(kernels: Callable[[System], ModuleType], system: System) -> None:
+    """Make a module in a thread of its own, once. What goes wrong there goes wrong again, and is told, where the module is asked for."""
+
+    def make() -> None:
+        with contextlib.suppress(Exception):
+            kernels(system)
+
+    if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        threading.Thread(target=make, name=f"kernels of {system.name}", daemon=True).start()
 
 
 def _module(title: str, head: str, templates: tuple[str, ...], arguments: tuple[str, ...]) -> ModuleType:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import threading
 from importlib import resources
 
 import numba
@@ -52,6 +53,52 @@ def test_methods_orders_and_lanes_have_kernels_of_their_own(key):
     rig = sl.models.delangre("b")
     keys = {module.taylor_module(rig, order, lanes) for order in (19, 20) for lanes in (2, 4, 8)} | {key(rig, "ode45")}
     assert len(keys) == 7
+
+
+@pytest.fixture
+def jit(monkeypatch):
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", 0)
+
+
+def test_what_is_made_in_the_background_is_made_once_in_another_thread(jit):
+    made, done = [], threading.Event()
+
+    def kernels(system):
+        made.append((system, threading.current_thread()))
+        done.set()
+
+    rig = sl.models.delangre("b")
+    module.in_background(kernels, rig)
+    assert done.wait(60)
+    module.in_background(kernels, rig)
+    ((system, thread),) = made
+    assert system is rig
+    assert thread is not threading.main_thread()
+
+
+def test_what_goes_wrong_in_the_background_is_told_where_it_is_asked_for(jit, recwarn, capfd):
+    done = threading.Event()
+
+    def kernels(system):
+        done.set()
+        raise sl.SaltusError(system.name)
+
+    module.in_background(kernels, sl.models.delangre("b"))
+    assert done.wait(60)
+    for thread in threading.enumerate():
+        if thread.name.startswith("kernels of"):
+            thread.join(60)
+    assert not recwarn
+    assert capfd.readouterr() == ("", "")
+
+
+def test_analyses_that_need_the_tangent_begin_it_at_once(monkeypatch):
+    begun = []
+    monkeypatch.setattr(sl.Taylor, "begin_kernels", lambda self, system: begun.append(system.tangent_of))
+    rig = sl.models.delangre("b", force="4 N")
+    sl.frequency_response(rig, frequency=("6 Hz", "7 Hz", 2), start=[(0.0, 0.0)], periods=2, progress=False)
+    assert begun
+    assert set(begun) == {rig}
 
 
 def modules_behind(method):

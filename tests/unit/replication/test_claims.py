@@ -92,6 +92,12 @@ def beside(exact, on, off, error=(1e-4, 1e-4)):
     )  # fmt: skip
 
 
+def tighter(*errors):
+    """The errors of one period of two further methods along the stiffness."""
+    values = np.repeat(np.array(errors)[:, None], 50, axis=1)
+    return xr.Dataset({"step_error_rms": (("method", "contact_stiffness"), values)}, {"contact_stiffness": np.logspace(3, 9, 50)})
+
+
 def test_errors_at_intermediate_stiffness():
     at = np.logspace(3, 9, 301)
     hump = np.where((at > 1e5) & (at < 1e7), 2.0, 1.0)
@@ -107,8 +113,10 @@ def test_errors_at_intermediate_stiffness():
 def test_location_helps_only_if_it_does():
     wrong, right = np.full(50, 2.0), np.ones(50)
     good = {f"fig7/{panel}, compared": beside(right, right, wrong, (1e-5, 1e-3)) for panel in "def"}
+    good |= {f"fig7/{panel}, tighter": tighter(1e-6, 1e-4) for panel in "def"}
     assert stiffness.location_helps(good).verdict == HOLDS
     bad = {f"fig7/{panel}, compared": beside(right, wrong, right, (1e-3, 1e-5)) for panel in "def"}
+    bad |= {f"fig7/{panel}, tighter": tighter(1e-6, 1e-6) for panel in "def"}
     assert stiffness.location_helps(bad).verdict == FAILS
 
 
