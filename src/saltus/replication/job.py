@@ -13,9 +13,10 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from saltus.errors import SaltusError
 from saltus.results import load, save
 from saltus.results.files import ResultFileError, replacing
-from saltus.results.provenance import to_json, version
+from saltus.results.provenance import content_hash, to_json, version
 from saltus.study.identity import code_hash
 
 if TYPE_CHECKING:
@@ -23,6 +24,13 @@ if TYPE_CHECKING:
 
 #: Called by a job with the share done; raises what ends the job.
 Show = Callable[[float], None]
+
+#: What stands between a job's settings, which are texts of a study file, and what is computed: the models, and the reading of such files.
+_READING = ("models", "study", "study.questions")
+
+
+class JobError(SaltusError):
+    """A job could not be computed."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +63,8 @@ class Job:
         """What must be equal for a kept result to be this job's."""
         return {
             "settings": json.loads(to_json(dict(self.settings))),
-            "inputs": {name: str(inputs[name].attrs.get("result_hash", "")) for name in self.needs},
-            "code": code_hash(),
+            "inputs": {name: content_hash(inputs[name]) for name in self.needs},
+            "code": code_hash(*_READING),
             "job": _source_hash(self.compute.__module__),
             "saltus": version("saltus"),
         }
@@ -116,10 +124,13 @@ class Shelf:
             told = json.loads(note.read_text(encoding="utf-8"))
             if told["identity"] != identity:
                 return None
+            seconds = float(told["seconds"])
             ds = load(data)
+            if told["result_hash"] != content_hash(ds):  # the note of one result beside the data of another
+                return None
         except (OSError, ValueError, KeyError, TypeError, ResultFileError):  # not there, half there, or damaged: it is computed again
             return None
-        self.seconds[job.name] = float(told["seconds"])
+        self.seconds[job.name] = seconds
         return ds
 
     def _keep(self, job: Job, identity: Mapping[str, Any], ds: xr.Dataset) -> None:
@@ -127,5 +138,6 @@ class Shelf:
         data, note = self.files(job)
         note.unlink(missing_ok=True)
         save(ds, data)
+        told = {"identity": identity, "result_hash": content_hash(ds), "seconds": self.seconds[job.name]}
         with replacing(note) as (part,):
-            part.write_text(json.dumps({"identity": identity, "seconds": self.seconds[job.name]}, indent=1), encoding="utf-8")
+            part.write_text(json.dumps(told, indent=1), encoding="utf-8")

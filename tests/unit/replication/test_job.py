@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import ast
+import json
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import saltus
+from saltus.replication import job as jobs
 from saltus.replication.job import Job, Shelf
 from saltus.results import AttractorTable, attractors_dataset
+from saltus.study import identity
 
 CALLS = []
 
@@ -88,6 +96,98 @@ def test_a_damaged_file_is_computed_again(shelf, what):
 def test_other_code_is_another_result(shelf, monkeypatch):
     job = Job("one", {"value": 1.0}, compute)
     shelf.result(job, {}, lambda _: None)
-    monkeypatch.setattr("saltus.replication.job.code_hash", lambda: "other")
+    monkeypatch.setattr("saltus.replication.job.code_hash", lambda *_: "other")
     shelf.result(job, {}, lambda _: None)
     assert CALLS == [1.0, 1.0]
+
+
+# -- data and their note belong together -----------------------------------------------------------------------------------------
+def test_the_note_of_one_result_does_not_vouch_for_the_data_of_another(shelf, tmp_path):
+    """As two runs at a time in one folder would leave them."""
+    other = Shelf(tmp_path / "other")
+    other.folder.mkdir()
+    shelf.result(Job("one", {"value": 1.0}, compute), {}, lambda _: None)
+    other.result(Job("one", {"value": 2.0}, compute), {}, lambda _: None)
+    job = Job("one", {"value": 1.0}, compute)
+    shutil.copy(other.files(job)[0], shelf.files(job)[0])
+    assert float(shelf.result(job, {}, lambda _: None)["attractor_peak"][0]) == 1.0
+    assert CALLS == [1.0, 2.0, 1.0]
+
+
+@pytest.mark.parametrize("missing", ["identity", "result_hash", "seconds"])
+def test_a_note_that_lacks_something_counts_for_nothing(shelf, missing):
+    job = Job("one", {"value": 1.0}, compute)
+    shelf.result(job, {}, lambda _: None)
+    note = shelf.files(job)[1]
+    told = json.loads(note.read_text())
+    del told[missing]
+    note.write_text(json.dumps(told))
+    shelf.result(job, {}, lambda _: None)
+    assert CALLS == [1.0, 1.0]
+
+
+# -- what a result depends on ----------------------------------------------------------------------------------------------------
+#: Packages that take no part in numbers: messages, and pictures of what was computed.
+NO_NUMBERS = ("errors", "plot")
+
+
+def sources(place):
+    """The modules of a package of saltus, or one module that stands alone."""
+    folder = Path(saltus.__file__).parent / place.replace(".", "/")
+    return sorted(folder.glob("*.py")) or [folder.with_suffix(".py")]
+
+
+def subpackages(place):
+    folder = Path(saltus.__file__).parent / place.replace(".", "/")
+    return {f"{place}.{file.parent.name}" for file in folder.glob("*/__init__.py")}
+
+
+def imported(file):
+    """What a module imports of saltus, wherever it does so: ``analysis.lyapunov``, ``units.to_si``."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.partition(".")[0] == "saltus":
+            yield from (f"{node.module}.{alias.name}".partition(".")[2] for alias in node.names)
+
+
+def strangers(files, known):
+    """Imports from outside of some packages."""
+    inside = tuple(f"{place}." for place in known)
+    found = {(file.name, name) for file in files for name in imported(file) if not f"{name}.".startswith(inside)}
+    return {one for one in found if one[1] != "__version__"}
+
+
+def test_the_hash_of_a_study_covers_all_that_its_code_calls():
+    files = [file for place in identity.COMPUTING for file in sources(place)]
+    assert len(files) > 80
+    assert strangers(files, (*identity.COMPUTING, *NO_NUMBERS)) == set()
+    assert not any(map(subpackages, identity.COMPUTING))
+
+
+def test_the_hash_of_a_job_covers_all_that_its_code_calls():
+    known = (*identity.COMPUTING, *jobs._READING)
+    own = [file for file in sources("replication.saunders2021") if file.name.startswith("compute")]
+    files = [*own, *(file for place in known for file in sources(place))]
+    siblings = ("replication.job.Show", "replication.saunders2021.compute")
+    assert strangers(files, (*known, *NO_NUMBERS, *siblings)) == set()
+    assert set().union(*map(subpackages, known)) <= set(known)
+
+
+@pytest.mark.parametrize("changed", ["delangre.py", "setting.py", "spec_parts.py", "lyapunov_table.py", "intervals.py", "units.py"])
+def test_an_edit_of_a_model_or_of_the_reading_is_another_result(shelf, monkeypatch, changed):
+    read = identity.resources.files
+    before = Job("one", {"value": 1.0}, compute).identity({})
+
+    class Edited:
+        def __init__(self, file):
+            self.name, self._file = file.name, file
+
+        def read_bytes(self):
+            return self._file.read_bytes() + (b"#" if self.name == changed else b"")
+
+    monkeypatch.setattr(
+        identity.resources, "files", lambda package: type("F", (), {"iterdir": lambda _: map(Edited, read(package).iterdir())})()
+    )
+    identity.code_hash.cache_clear()
+    after = Job("one", {"value": 1.0}, compute).identity({})
+    identity.code_hash.cache_clear()
+    assert after["code"] != before["code"]

@@ -188,7 +188,8 @@ def test_the_code_is_part_of_the_identity(monkeypatch):
         def read_bytes(self):
             return self._file.read_bytes() + (b"#" if self.name == target else b"")
 
-    for target in ("taylor_step.py", "settling.py", "engine.py", "trace.py", "recurrence.py", "capture.py", "maps.py", "module.py"):
+    for target in ("taylor_step.py", "settling.py", "engine.py", "trace.py", "recurrence.py", "capture.py", "maps.py", "module.py",
+                   "assemble.py", "units.py"):  # fmt: skip
         with monkeypatch.context() as patch:
             patch.setattr(
                 identity.resources, "files", lambda package: type("F", (), {"iterdir": lambda _: map(Changed, read(package).iterdir())})()
