@@ -215,7 +215,9 @@ def plot(
 @app.command()
 def reproduce(
     paper: Annotated[str, typer.Argument(help="The paper; leave it out to list those that can be reproduced.")] = "",
-    figure: Annotated[list[str] | None, typer.Option(help="A figure of the paper; may be given several times. By default all.")] = None,
+    figure: Annotated[
+        list[str] | None, typer.Option(help="A figure of the paper, 8 or fig8; may be given several times. By default all.")
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Coarser and shorter: a few minutes in place of half an hour.")] = False,
     out: Annotated[Path | None, typer.Option(help="Folder for the report; default saltus-runs/PAPER or PAPER-quick.")] = None,
     threads: Threads = None,
@@ -225,28 +227,37 @@ def reproduce(
     Every claim gets a verdict (holds, holds in part, does not hold, not decidable), computed from the data by a rule that stands beside
     it. Stopped at any moment, it goes on where it was when it is run again; what is computed already isn't computed twice.
 
+    Writes report.html; claims.csv, each claim with the answers and the verdict in a row; the data and the pictures. Of some figures only:
+    report-fig8.html and claims-fig8.csv, beside those of all figures. Exit code 1 if something could not be computed; the report says what.
+
     Example: `saltus reproduce saunders2021 --quick`
 
     Example: `saltus reproduce saunders2021 --figure 8 --figure 9`
     """
+    import matplotlib
+
     from saltus import replication
     from saltus.cli import screen
-    from saltus.results import usable_folder
     from saltus.study.table import TextTable
 
     if not paper:
         screen.show(TextTable("Papers; `saltus reproduce NAME` does one", ("name", "what it is"), tuple(replication.names().items())))
         return
     chosen = replication.find(paper)
-    folder = usable_folder(out or Path("saltus-runs") / (f"{paper}-quick" if quick else paper))
+    folder = out or Path("saltus-runs") / (f"{paper}-quick" if quick else paper)
+    matplotlib.use("Agg")  # no window, and none needed
     try:
-        with screen.replicating() as report:
-            result = replication.reproduce(chosen, folder, figure or (), quick, threads, report, screen.say)
+        with screen.replicating() as progress:
+            result = replication.reproduce(chosen, folder, figure or (), quick, threads, progress, screen.say)
     except KeyboardInterrupt:
         screen.fail(f"stopped; what is computed is kept in {folder}. Go on with the same command.")
         raise
     screen.show(replication.verdict_table(result))
-    screen.files([result.report])
+    screen.files([result.report, result.claims_file])
+    for why in dict.fromkeys(result.failures.values()):
+        screen.fail(why)
+    if result.failures:
+        raise typer.Exit(1)
 
 
 @app.command()

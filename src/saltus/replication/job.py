@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,19 +65,17 @@ class Job:
             "settings": json.loads(to_json(dict(self.settings))),
             "inputs": {name: content_hash(inputs[name]) for name in self.needs},
             "code": code_hash(*_READING),
-            "job": _source_hash(self.compute.__module__),
+            "job": _source_hash(Path(inspect.getfile(self.compute))),
             "saltus": version("saltus"),
         }
 
 
 @cache
-def _source_hash(module: str) -> str:
+def _source_hash(own: Path) -> str:
     """SHA-256 of the file that holds a job's function, and of the modules beside it that it may call."""
-    package, _, _ = module.rpartition(".")
     digest = hashlib.sha256()
-    for file in sorted(resources.files(package).iterdir(), key=lambda item: item.name):
-        if file.name.startswith("compute") and file.name.endswith(".py"):
-            digest.update(file.name.encode() + file.read_bytes())
+    for file in sorted({own, *own.parent.glob("compute*.py")}):
+        digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()
 
 

@@ -70,6 +70,11 @@ def _sentence(text: str) -> str:
     return text if text.endswith(("?", "!", ".")) else f"{text}."
 
 
+def _many(count: int, what: str) -> str:
+    """``1 core``, ``2 cores``."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def _text(value: str) -> str:
     return html.escape(value, quote=True)
 
@@ -108,6 +113,7 @@ def _figure(result: Replication, figure: str) -> str:
     parts = [f'<section id="fig{figure}"><h2>Fig. {figure}: {_text(result.paper.figures[figure])}</h2>']
     parts += [_picture(picture, path) for picture, path in result.pictures if picture.figure == figure]
     parts += [_table(table) for one, table in result.tables if one.figure == figure]
+    parts += _missing(result, figure)
     parts += [_claim(result, claim, finding) for claim, finding in result.findings if claim.figure == figure]
     return "\n".join([*parts, "</section>"])
 
@@ -126,6 +132,15 @@ def _table(table: TextTable) -> str:
     rows = "".join("<tr>" + "".join(f'<td class="number">{_text(cell)}</td>' for cell in row) + "</tr>" for row in table.rows)
     notes = "".join(f'<p class="quiet">{_text(note)}</p>' for note in table.notes)
     return f'<div class="scroll"><table><caption>{_text(table.title)}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{notes}'
+
+
+def _missing(result: Replication, figure: str) -> list[str]:
+    """What isn't there of a figure's pictures and tables, and why."""
+    paper = result.paper
+    parts = [(f"picture {one.name}", _sentence(one.title)) for one in paper.pictures if one.figure == figure]
+    parts += [(f"table {one.name}", f"The table {one.name}.") for one in paper.tables if one.figure == figure]
+    failed = [(title, result.failures[what]) for what, title in parts if what in result.failures]
+    return [f'<p class="why"><b>Missing: {_text(title)}</b> {_text(why)}</p>' for title, why in failed]
 
 
 def _claim(result: Replication, claim: Claim, finding: Finding) -> str:
@@ -156,10 +171,12 @@ def _made(result: Replication) -> str:
         else "Grids and sweeps are those of the study files."
     )
     return (
-        f"<p>{len(shelf.computed)} computations in this run, {len(shelf.kept)} from an earlier one with the same settings and code: "
-        f"{total:.0f} s of one core in all, {result.seconds:.0f} s by the clock in this run, on {usable_processors()} cores "
-        f"({_text(platform.machine())}, {_text(platform.system())}). {size}</p>"
+        f"<p>{_many(len(shelf.computed), 'computation')} in this run, {len(shelf.kept)} from an earlier one with the same settings and code. "
+        f"This run took {result.seconds:.0f} s, with up to {_many(result.threads, 'computation')} at a time on "
+        f"{_many(usable_processors(), 'usable core')} ({_text(platform.machine())}, {_text(platform.system())}). The times from begin to end of "
+        f"all computations, the earlier ones too, add up to {total:.0f} s; those that run at a time slow each other. {size}</p>"
         f'<p class="quiet">{_text(packages)}</p>'
         f"<p>Every number comes from Datasets that stand beside this file in <code>data/</code>; each knows its equations, values and method "
-        f"(<code>saltus plot</code> draws them, <code>sl.load</code> reads them). The study files are in <code>replications/{_text(result.paper.name)}/</code>.</p>"
+        f"(<code>saltus plot</code> draws them, <code>sl.load</code> reads them). The claims, both answers and the verdicts are also in "
+        f"<code>{_text(result.claims_file.name)}</code>. The study files are in <code>replications/{_text(result.paper.name)}/</code>.</p>"
     )

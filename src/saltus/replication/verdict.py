@@ -107,3 +107,10 @@ def verdict_of(checks: Sequence[Check]) -> str:
     if all(decided):
         return HOLDS if len(decided) == len(passed) else IN_PART
     return IN_PART if any(decided) else FAILS
+
+
+def undecided(why: str) -> Finding:
+    """The finding on a claim that couldn't be judged."""
+    return Finding(
+        "not known", "not known", (Check("The data are there, and the rule can be applied to them.", None),), "Nothing is known.", why
+    )

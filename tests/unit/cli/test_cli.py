@@ -131,7 +131,7 @@ def test_papers_are_listed_and_a_wrong_name_gets_the_nearest():
     assert "'saunders2021'" in wrong.output
 
 
-def test_a_wrong_figure_gets_the_nearest(tmp_path):
+def test_a_wrong_figure_gets_those_that_there_are(tmp_path):
     wrong = saltus("reproduce", "saunders2021", "--figure", "44", "--out", str(tmp_path))
     assert wrong.exit_code == 2
-    assert "'4'" in wrong.output
+    assert "2, 3, 4, 5, 6" in wrong.output

@@ -7,32 +7,21 @@ import json
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import saltus
 from saltus.replication import job as jobs
 from saltus.replication.job import Job, Shelf
-from saltus.results import AttractorTable, attractors_dataset
 from saltus.study import identity
+from small_paper import small_result
 
 CALLS = []
-
-
-def result(value):
-    """A small Dataset that any file can hold."""
-    table = AttractorTable(
-        kind=["periodic"], period=np.array([1]), contacts=np.array([2.0]), itinerary=[""], peak=np.array([value]), rms=np.array([value]),
-        margin=np.array([1.0]), multipliers=np.array([[0.5, 0.1]]), exponent=np.array([-1.0]), exponent_error=np.array([0.0]),
-        points=[np.array([[value, 0.0]])],
-    )  # fmt: skip
-    return attractors_dataset(states=("x", "v"), units={"x": "m", "v": "m/s"}, attractors=table)
 
 
 def compute(settings, inputs, show):
     CALLS.append(settings["value"])
     show(0.5)
-    return result(settings["value"] + sum(float(ds["attractor_peak"][0]) for ds in inputs.values()))
+    return small_result(settings["value"] + sum(float(ds["attractor_peak"][0]) for ds in inputs.values()))
 
 
 def stopped(settings, inputs, show):
@@ -63,7 +52,7 @@ def test_another_setting_is_another_result(shelf):
 def test_another_input_is_another_result(shelf):
     job = Job("two", {"value": 1.0}, compute, ("one",))
     for value in (1.0, 1.0, 2.0):
-        shelf.result(job, {"one": result(value)}, lambda _: None)
+        shelf.result(job, {"one": small_result(value)}, lambda _: None)
     assert CALLS == [1.0, 1.0]
 
 
@@ -124,6 +113,17 @@ def test_a_note_that_lacks_something_counts_for_nothing(shelf, missing):
     note.write_text(json.dumps(told))
     shelf.result(job, {}, lambda _: None)
     assert CALLS == [1.0, 1.0]
+
+
+def test_the_file_of_a_job_s_function_is_part_of_its_identity(tmp_path):
+    """And so are modules beside it that it may call."""
+    before = jobs._source_hash.__wrapped__(Path(__file__))
+    copied = Path(shutil.copy(__file__, tmp_path))
+    assert jobs._source_hash.__wrapped__(copied) == before
+    (tmp_path / "compute_more.py").write_text("")
+    more = jobs._source_hash.__wrapped__(copied)
+    copied.write_text(copied.read_text(encoding="utf-8") + "#")
+    assert len({before, more, jobs._source_hash.__wrapped__(copied)}) == 3
 
 
 # -- what a result depends on ----------------------------------------------------------------------------------------------------
