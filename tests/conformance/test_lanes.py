@@ -92,7 +92,7 @@ def test_among_other_neighbours(batch):
     assert _differing(_each(mixed)[1::2], _each(batch)) == {}
 
 
-@pytest.mark.parametrize("lanes", [2, 4, 8, 16])
+@pytest.mark.parametrize("lanes", [pytest.param(2, marks=pytest.mark.nightly), 4, pytest.param(8, marks=pytest.mark.nightly), 16])
 def test_lanes(batch, lanes):
     """Any number of lanes gives the digits of the default."""
     assert _differing(_each(_run(values=_values(), method=sl.Taylor(lanes=lanes))), _each(batch)) == {}

@@ -47,7 +47,11 @@ def test_power_identity_of_every_model_in_every_mode(name):
     ("name", "arguments"),
     [
         ("delangre", {"start": (1e-3, 0.0), "periods": 60, "transient": 10}),
-        ("aeroelastic", {"start": {"plunge": 0, "pitch": 0.02, "plunge_rate": 0, "pitch_rate": 0}, "t_end": 5, "transient": "1 s"}),
+        pytest.param(
+            "aeroelastic",
+            {"start": {"plunge": 0, "pitch": 0.02, "plunge_rate": 0, "pitch_rate": 0}, "t_end": 5, "transient": "1 s"},
+            marks=pytest.mark.nightly,
+        ),
         pytest.param("chain", {"periods": 60}, marks=pytest.mark.nightly),
         pytest.param("gear_pair", {"start": (3e-5, 0.0), "periods": 60}, marks=pytest.mark.nightly),
     ],

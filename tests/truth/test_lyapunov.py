@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from jumps import jumping
 from saltus.analysis.lyapunov_spectrum import kind_of, spectrum
 from saltus.analysis.walks import MapWalk
 from saltus.errors import SaltusWarning
@@ -289,14 +290,6 @@ def test_other_motions_of_the_lorenz_system():
 
 
 # -- where the force jumps -----------------------------------------------------------------------------------------------------
-@sl.system(states="x v", forced_at="frequency", units={"frequency": "Hz"})
-def jumping(t, x, v, *, stiffness=3.0, preload=0.6, loss=0.8, gap=0.2, other=-0.3, force=1.3, frequency=0.2):
-    """Contact with a preload (the force jumps) and a damper (it jumps with the speed), and a wall that moves."""
-    pushes = sl.piecewise((stiffness * (x - gap) + preload + loss * v, x > gap + 0.05 * sl.sin(2 * sl.pi * frequency * t)), otherwise=0)
-    pulls = sl.piecewise((2.0 * (x - other) - preload, x < other), otherwise=0)
-    return v, force * sl.cos(2 * sl.pi * frequency * t) - pushes - pulls - 0.1 * v - x
-
-
 def test_exponents_where_the_force_jumps_against_finite_differences_of_the_flow():
     """The multipliers of the orbit from differences of whole runs, which know no tangent and no saltation."""
     ds = sl.lyapunov(jumping, (0.9, 0.0), periods=200, transient=300)

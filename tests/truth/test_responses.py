@@ -235,3 +235,18 @@ def test_ode45_at_the_tightest_tolerance_finds_the_same_responses():
     assert (ode45.type == "periodic").all()
     np.testing.assert_array_equal(ode45.period, exact.period)
     np.testing.assert_allclose(ode45.rms, exact.rms, rtol=1e-6)
+
+
+def test_a_start_that_hops_between_responses_joins_none_of_them():
+    """Three T responses coexist; from value to value the start leads to one or another. Margins to the next graze tell them apart."""
+    rig = sl.models.delangre("c", force="4 N", frequency="5 Hz")
+    ds = sl.bifurcation_diagram(
+        rig, vary={"contact_stiffness": ("20.4 kN/m", "24 kN/m", 26)}, start=(0.32e-3, 0.0), sample="stroboscope", progress=False
+    )
+    assert ds["response_period"].values.tolist() == [1] * 26
+    wide, many = ds["response_margin"].values > 1e-4, ds["response_contacts"].values > 5
+    branch = ds["response_branch"].values
+    groups = [branch[wide], branch[~wide & ~many], branch[many]]
+    assert [len(set(group)) for group in groups] == [1, 1, 1]
+    assert len({group[0] for group in groups}) == 3
+    assert ds.sizes["event"] == 0, "no response ends: just no start leads there"

@@ -1,9 +1,9 @@
 """Branches: the same response followed from one value of a parameter to the next, and what happens to it on the way.
 
 Two responses at neighbouring values belong to one branch if Newton's method, started on the one, arrives at the other (natural parameter
-continuation), or if their orbits are near each other, point by point at the best phase shift: by identity, never by amplitude, which
-crossing branches share. Names of bifurcations: di Bernardo, Budd, Champneys & Kowalczyk,
-Piecewise-smooth Dynamical Systems (2008), chapter 2.
+continuation); so do those some values apart, if no start led to what it finds in between. Where Newton's method arrives nowhere near, they
+do if their orbits are near each other, point by point at the best phase shift: by identity, never by amplitude, which crossing branches
+share. Names of bifurcations: di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapter 2.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from saltus.results import AttractorTable
 
 #: Farthest that an orbit moves between two values, in units of its own range; twice and more as far only if Newton's method went with it.
 LINK, FARTHEST = 0.35, 1.0
-#: Values over which a branch may be missing.
-MISSED = 3
+#: Values over which a branch may be missing: followed by Newton's method, or not.
+FOLLOWED, MISSED = 16, 3
 #: A branch that ends folds if its leading multiplier is real and beyond this (it moves to 1 as the root of the distance), and sheds a torus
 #: if it is complex and beyond that.
 FOLDING, TURNING = 0.5, 0.95
@@ -42,7 +42,7 @@ class Event:
         Middle of the two values [SI].
     kind : str
         ``graze`` (contacts come or go), ``period_doubling``, ``fold``, ``neimark_sacker`` (a torus is born), ``chaos`` (its starts are
-        chaotic beyond), or ``end`` (it isn't found any more).
+        chaotic beyond), or ``end`` (it isn't found any more, by the starts nor by Newton's method).
     branch : int
         Its number.
     """
@@ -54,13 +54,15 @@ class Event:
 
 def follow(found: Found, grid: Grid, method: Method, threads: int | None = None) -> np.ndarray:
     """Branch of every response of a grid with one axis, int64[m]; numbered in the order in which they begin."""
-    onward = _continued(found, grid, method, threads)
+    onward, moved = _continued(found, grid, method, threads)
     branch = np.full(len(found), -1, np.int64)
     heads: list[tuple[int, int]] = []  # response that a branch ends with so far, and its place
     for place in range(grid.places):
         here = np.flatnonzero(found.place == place)
-        tails = [i for i, (_, at) in enumerate(heads) if place - at <= MISSED]
-        for tail, response in _matches(found, [heads[i][0] for i in tails], here, onward):
+        tails = [
+            i for i, (last, at) in enumerate(heads) if place - at <= MISSED or (onward[last] >= 0 and found.place[onward[last]] == place)
+        ]
+        for tail, response in _matches(found, [heads[i][0] for i in tails], here, onward, moved):
             branch[response] = tails[tail]
             heads[tails[tail]] = (int(response), place)
         for response in here[branch[here] < 0]:
@@ -69,27 +71,46 @@ def follow(found: Found, grid: Grid, method: Method, threads: int | None = None)
     return branch
 
 
-def _continued(found: Found, grid: Grid, method: Method, threads: int | None) -> np.ndarray:
-    """The response at the next value at which Newton's method arrives from each, int64[m]; -1 where at none."""
-    onward = np.full(len(found), -1, np.int64)
-    rows = np.flatnonzero((found.kind == PERIODIC) & (found.place < grid.places - 1))
+def _continued(found: Found, grid: Grid, method: Method, threads: int | None) -> tuple[np.ndarray, np.ndarray]:
+    """Where Newton's method arrives from each response.
+
+    Returns
+    -------
+    onward : int64[m]
+        The response at the next value to which some start led, or one of the values after it; -1 where there is none.
+    moved : float64[m]
+        How far the orbit moves to the next value, in units of its range; inf where none that attracts is found.
+    """
+    onward, moved = np.full(len(found), -1, np.int64), np.full(len(found), np.inf)
+    rows = np.flatnonzero(found.kind == PERIODIC)
     family = grid.family(method, threads)
-    if not len(rows) or not family.exact:
-        return onward
-    scale = found.steady.scale[found.row[rows]]
-    arrived = close(family.rows(found.place[rows] + 1), found.start()[rows], found.period[rows], scale, LONGEST)
-    for i in np.flatnonzero(arrived.stable):
-        for other in np.flatnonzero((found.place == found.place[rows[i]] + 1) & (found.period == arrived.period[i])):
-            if arrived.distance(found.points(int(other))[:1], scale[[i]], np.array([i]))[0] < SAME:
-                onward[rows[i]] = other
-    return onward
+    start, scale = found.start()[rows], found.steady.scale[found.row[rows]]
+    for ahead in range(1, FOLLOWED + 1 if family.exact else 1):
+        inside = found.place[rows] + ahead < grid.places
+        rows, start, scale = rows[inside], start[inside], scale[inside]
+        if not len(rows):
+            break
+        place = found.place[rows] + ahead
+        arrived = close(family.rows(place), start, found.period[rows], scale, LONGEST)
+        going = arrived.stable & (arrived.period == found.period[rows])
+        for i in np.flatnonzero(going):
+            orbit = arrived.points[i, : arrived.period[i]]
+            if ahead == 1:
+                moved[rows[i]] = _orbit_distance(found.points(int(rows[i])), orbit, scale[i])
+            for other in np.flatnonzero((found.place == place[i]) & (found.period == arrived.period[i])):
+                if arrived.distance(found.points(int(other))[:1], scale[[i]], np.array([i]))[0] < SAME:
+                    onward[rows[i]], going[i] = other, False
+        rows, start, scale = rows[going], arrived.points[going, 0], scale[going]
+    return onward, moved
 
 
-def _matches(found: Found, before: list[int], here: np.ndarray, onward: np.ndarray) -> list[tuple[int, int]]:
+def _matches(found: Found, before: list[int], here: np.ndarray, onward: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
     """Pairs (index into before, response) of responses that are one, each used once, the nearest first."""
     cost = np.array([[_distance(found, a, int(b)) for b in here] for a in before]).reshape(len(before), len(here))
     led = onward[np.array(before, np.int64)][:, None] == here[None]
-    cost = np.where(led & (cost < FARTHEST), cost * LINK / FARTHEST, cost)
+    steps = found.place[here][None] - found.place[np.array(before, np.int64)][:, None]
+    beyond = cost > steps * moved[np.array(before, np.int64)][:, None]  # Newton's method knows a nearer one: this is another response
+    cost = np.where(led, np.where(cost < FARTHEST, cost * LINK / FARTHEST, cost), np.where(beyond, np.inf, cost))
     rows, columns = linear_sum_assignment(np.minimum(cost, _NEVER))
     return [(int(i), int(here[j])) for i, j in zip(rows, columns, strict=True) if cost[i, j] < LINK]
 
@@ -99,22 +120,47 @@ def _distance(found: Found, a: int, b: int) -> float:
     if found.kind[a] != found.kind[b] or found.period[a] != found.period[b]:
         return np.inf
     scale = np.maximum(found.steady.scale[found.row[a]], found.steady.scale[found.row[b]])
-    p, q = found.points(a) / scale, found.points(b) / scale
+    p, q = found.points(a), found.points(b)
     if found.kind[a] != PERIODIC:  # a strange set: where it lies and how wide
-        return float(max(np.abs(p.mean(axis=0) - q.mean(axis=0)).max(), np.abs(p.std(axis=0) - q.std(axis=0)).max()))
+        return float(max(np.abs((p.mean(axis=0) - q.mean(axis=0)) / scale).max(), np.abs((p.std(axis=0) - q.std(axis=0)) / scale).max()))
+    return _orbit_distance(p, q, scale)
+
+
+def _orbit_distance(p: np.ndarray, q: np.ndarray, scale: np.ndarray) -> float:
+    """Largest distance of the points of two orbits float64[n, D] of the same period, at the best phase shift, in units of the scale."""
     shifts = (np.arange(len(q))[:, None] + np.arange(len(q))) % len(q)
-    return float(np.abs(p[None] - q[shifts]).max(axis=(1, 2)).min())
+    return float(np.abs((p[None] - q[shifts]) / scale).max(axis=(1, 2)).min())
 
 
-def events(found: Found, table: AttractorTable, branch: np.ndarray, values: np.ndarray) -> list[Event]:
+def events(found: Found, table: AttractorTable, branch: np.ndarray, grid: Grid, method: Method, threads: int | None = None) -> list[Event]:
     """What happens to the branches of :func:`follow`, in the order of the values."""
+    (values,) = grid.axes.values()
     result = []
-    for number in range(branch.max(initial=-1) + 1):
-        members = np.flatnonzero(branch == number)
+    groups = [np.flatnonzero(branch == number) for number in range(branch.max(initial=-1) + 1)]
+    for number, members in enumerate(groups):
         result += _grazes(found, table, members, values, number)
-        result += _end(found, table, int(members[-1]), values, number, +1)
-        result += _end(found, table, int(members[0]), values, number, -1)
+    for way, side in ((+1, -1), (-1, 0)):
+        ends = np.array([members[side] for members in groups], np.int64)
+        goes_on = _goes_on(found, grid, method, ends, way, threads)
+        for number in np.flatnonzero(~goes_on).tolist():
+            result += _end(found, table, int(ends[number]), values, number, way)
     return sorted(result, key=lambda event: (event.value, event.branch, event.kind))
+
+
+def _goes_on(found: Found, grid: Grid, method: Method, ends: np.ndarray, way: int, threads: int | None) -> np.ndarray:
+    """Which responses Newton's method finds at the next value (way 1) or the one before (-1) too, bool[k]: just no start leads there."""
+    result, place = np.zeros(len(ends), bool), found.place[ends] + way
+    family = grid.family(method, threads)
+    inside = np.flatnonzero((found.kind[ends] == PERIODIC) & (place >= 0) & (place < grid.places))
+    if not family.exact or not len(inside):
+        return result
+    rows = ends[inside]
+    scale = found.steady.scale[found.row[rows]]
+    arrived = close(family.rows(place[inside]), found.start()[rows], found.period[rows], scale, LONGEST)
+    for i in np.flatnonzero(arrived.stable & (arrived.period == found.period[rows])):
+        orbit = arrived.points[i, : arrived.period[i]]
+        result[inside[i]] = _orbit_distance(found.points(int(rows[i])), orbit, scale[i]) < LINK
+    return result
 
 
 def _grazes(found: Found, table: AttractorTable, members: np.ndarray, values: np.ndarray, number: int) -> list[Event]:

@@ -46,9 +46,8 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
     table = table_of(found, grid, method, threads)
     branch, happened = np.full(len(found), -1, np.int64), []
     if len(grid.axes) == 1:
-        (values,) = grid.axes.values()
         branch = branches.follow(found, grid, method, threads)
-        happened = branches.events(found, table, branch, values)
+        happened = branches.events(found, table, branch, grid, method, threads)
     (name, *_) = grid.axes
     system = grid.system
     fixed = {key: value for key, value in system.values.items() if key not in grid.axes}

@@ -19,8 +19,8 @@ PAPER = Paper(
     citation="B. E. Saunders, R. Vasconcellos, R. J. Kuether, A. Abdelkefi (2021)",
     about=(
         "The paper asks how MATLAB's ode45 goes wrong on a vibrating block with freeplay when contacts are not located, and how that depends "
-        "on how hard the contact is. Here the same computations are made three times: by ode45 with and without event location, reproduced "
-        "to the digit, and by Taylor series with every contact, exact but for rounding."
+        "on how hard the contact is. Here the same computations are made three times: by ode45 with and without event location, rebuilt "
+        "from its rules (the printed contact times come out to 2e-15 s), and by Taylor series with every contact, exact but for rounding."
     ),
     figures=FIGURES,
     jobs=jobs,

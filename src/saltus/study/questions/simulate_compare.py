@@ -48,7 +48,7 @@ def contact_table(title: str, run: xr.Dataset, compare: Compare, find: Callable[
     path = find(compare.printed)
     printed = rows(path, ("event_number", "time_s"))
     exact = exact_times(find(compare.exact)) if compare.exact else {}
-    residual, legs = _residuals(run), _legs(run)
+    residual, legs = residuals(run), _legs(run)
     table, before = [], 0
     for row in printed:
         number = int(cell(row, "event_number", path))
@@ -104,7 +104,7 @@ def _time(run: xr.Dataset, number: int, path: Path) -> float:
     return float(run["contact_time"][number - 1])
 
 
-def _residuals(run: xr.Dataset) -> np.ndarray:
+def residuals(run: xr.Dataset) -> np.ndarray:
     """|state - boundary| at every contact whose guard is on one state; NaN elsewhere."""
     residual = np.full(run.sizes["contact"], np.nan)
     for guard, state, boundary in zip(run["guard"].values, run["guard_state"].values, run["guard_boundary"].values, strict=True):

@@ -23,6 +23,19 @@ def check(text: str, passed: object) -> Check:
     return Check(text, None if passed is None else bool(passed))
 
 
+def number(value: float) -> str:
+    """A stiffness as the paper writes it: ``2.55e4``."""
+    if not np.isfinite(value):
+        return "nowhere"
+    mantissa, exponent = f"{value:.2e}".split("e")
+    return f"{float(mantissa):g}e{int(exponent)}"
+
+
+def place_of(setting: str) -> str:
+    """The setting of a map in words: ``25.5 kN/m``."""
+    return setting.replace(" per ", "/")
+
+
 def below(what: str, value: float, limit: float) -> Check:
     """The check that a number is below a limit; undecided where the number isn't known."""
     if not np.isfinite(value):
@@ -69,7 +82,7 @@ def certainty(maps: Iterable[xr.Dataset]) -> str:
     starts = [one["basin"].size for one in maps]
     seen = max(float(one.attrs["smallest_basin_seen"]) for one in maps)
     flips = [float(one.attrs["flip_rate"]) for one in maps if np.isfinite(one.attrs.get("flip_rate", np.nan))]
-    told = f"{min(starts)} starts a map; a basin below {share_text(seen)} of them may have been missed"
+    told = f"{min(starts)} starts a map; a basin of less than {100 * seen:.2g} % of them may have been missed"
     return told + (f"; {share_text(max(flips))} of the starts at most lead elsewhere when recomputed more exactly" if flips else "")
 
 

@@ -28,7 +28,12 @@ def _rows(number: str, of: str, setting: str, title: str, caption: str = "", nam
     needs = _maps(of, setting)
     draw = partial(rows.attractors, figure=of, setting=setting)
     return Picture(
-        number, name or f"fig{number}", title, f"{_ROWS} {caption}".strip(), (*needs, *(f"{one}, motions" for one in needs)), draw
+        number,
+        name or f"fig{number}",
+        title,
+        f"{_ROWS} {caption}".strip(),
+        (*needs, *(f"{one}, {what}" for one in needs for what in ("motions", "variational"))),
+        draw,
     )
 
 

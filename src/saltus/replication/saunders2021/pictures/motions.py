@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from saltus import plot
 from saltus.plot import maps
 from saltus.plot.style import OKABE_ITO
+from saltus.replication.saunders2021 import printed
 from saltus.replication.saunders2021.pictures.looks import Data
+from saltus.study.questions.simulate_compare import residuals
 
-#: Contacts of the run that the paper marks A to E.
-MARKED = {"A": 1, "B": 3, "C": 7, "D": 10, "E": 13}
 #: Half-width of the zoom onto one contact [s].
 ZOOM = 1.2e-3
 
@@ -31,11 +31,12 @@ def located(data: Data) -> Figure:
     plot.history(run, ax=top, periods=(0, 3))
     top.set_title("Case b4, 7 Hz, from rest: ode45 (1e-4, 1e-7), located", pad=18)
     times = run["contact_time"].values
-    for letter, number in MARKED.items():
-        x = float(run["contact_x"][number - 1]) * 1e3
-        top.annotate(letter, (times[number - 1], x), (0, 9 if x < 0.2 else -14), textcoords="offset points", ha="center", fontweight="bold")
-    _zoom(near, run, MARKED["D"] - 1)
-    _residuals(bottom, run, exact)
+    marked = {letter: number for letter, number, _ in printed.contacts()}
+    for letter, number in marked.items():
+        x = float(run["contact_x"][number]) * 1e3
+        top.annotate(letter, (times[number], x), (0, 9 if x < 0.2 else -14), textcoords="offset points", ha="center", fontweight="bold")
+    _zoom(near, run, marked["D"])
+    _residuals(bottom, run, exact, marked)
     return figure
 
 
@@ -49,22 +50,20 @@ def _zoom(ax: Axes, run: xr.Dataset, number: int) -> None:
     ax.set(xlabel="time since D [ms]", ylabel="x − j [µm]", title="Contact D")
 
 
-def _residuals(ax: Axes, run: xr.Dataset, exact: xr.Dataset) -> None:
+def _residuals(ax: Axes, run: xr.Dataset, exact: xr.Dataset, marked: Mapping[str, int]) -> None:
     """For each contact: the error of its time, and the error that its residual suggests."""
     count = min(run.sizes["contact"], exact.sizes["contact"])
     number = np.arange(1, count + 1)
     error = np.abs(run["contact_time"].values[:count] - exact["contact_time"].values[:count])
-    boundary = dict(zip(run["guard"].values.tolist(), run["guard_boundary"].values.tolist(), strict=True))
-    residual = np.array([abs(x - boundary[g]) for x, g in zip(run["contact_x"].values, run["contact_guard"].values, strict=True)])[:count]
-    suggested = residual / np.abs(run["contact_velocity"].values[:count])
+    suggested = residuals(run)[:count] / np.abs(run["contact_velocity"].values[:count])
     ours = np.maximum(np.abs(exact["contact_time_error"].values[:count]), 1e-18)
     ax.semilogy(number, error, "o-", ms=3.5, color=OKABE_ITO["vermillion"], label="true error of ode45's contact time", lw=0.8)
     ax.semilogy(
         number, np.maximum(suggested, 1e-18), "s", ms=3.5, color=OKABE_ITO["blue"], label="error that |x − j| suggests: |x − j| / |v|"
     )
     ax.semilogy(number, ours, "-", color="#999999", lw=1.0, label="claimed error of the exact times")
-    for letter, place in MARKED.items():
-        ax.annotate(letter, (place, error[place - 1]), (0, 5), textcoords="offset points", ha="center", fontweight="bold")
+    for letter, place in marked.items():
+        ax.annotate(letter, (place + 1, error[place]), (0, 5), textcoords="offset points", ha="center", fontweight="bold")
     ax.set(xlabel="contact", ylabel="time [s]", ylim=(1e-18, 1e-2), xlim=(0, count + 1))
     ax.set_title("A state on the boundary to 1e-16 m says nothing about when it got there")
     ax.legend(loc="center right")

@@ -142,7 +142,7 @@ def _title(data: Data, figure: str, setting: str, trio: Trio) -> str:
     texts = []
     for look in LOOKS:
         if trio.number[look.end] >= 0:
-            ds = data[f"{figure}/{setting}, {look.end}"].isel(attractor=trio.number[look.end])
-            texts.append(f"{look.label.removeprefix('ode45, ')} {float(ds['attractor_exponent']):.3f}")
+            found = data[f"{figure}/{setting}, {look.end}, variational"]["lyapunov_exponent"].values[trio.number[look.end], 0]
+            texts.append(f"{look.label.removeprefix('ode45, ')} {round(float(found), 2) + 0.0:.2f}")
     name = kind_text(trio.kind, trio.period)
-    return f"{name}, {maps.peak_text(one)};  λ [1/s]: {', '.join(texts)}"
+    return f"{name}, {maps.peak_text(one)};  exponent along it [1/s]: {', '.join(texts)}"
