@@ -12,6 +12,7 @@ import pytest
 import saltus
 from saltus.replication import job as jobs
 from saltus.replication.job import Job, Shelf
+from saltus.replication.saunders2021 import compute_responses, plan
 from saltus.study import identity
 from small_paper import small_result
 
@@ -191,3 +192,23 @@ def test_an_edit_of_a_model_or_of_the_reading_is_another_result(shelf, monkeypat
     after = Job("one", {"value": 1.0}, compute).identity({})
     identity.code_hash.cache_clear()
     assert after["code"] != before["code"]
+
+
+def test_errors_of_further_methods_are_kept(tmp_path):
+    """From a diagram of three values: as Fig. 7 asks for them."""
+    vary = {"contact_stiffness": {"first": "1 kN/m", "last": "1 MN/m", "count": 3, "scale": "log"}}
+    settings = {
+        "question": "bifurcation_diagram", "method": plan.TAYLOR,
+        "system": {"model": "delangre", "case": "c", "force": "4 N", "frequency": "5 Hz"},
+        "table": {"vary": vary, "start": {"x": "0.32 mm", "v": "0 m/s"}, "periods": 200, "sample": "stroboscope"},
+    }  # fmt: skip
+    exact = Job("exact", settings, compute_responses.responses)
+    tighter = Job("tighter", {**settings, "methods": plan.TIGHTER}, compute_responses.period_errors, ("exact",))
+    shelf = Shelf(tmp_path)
+    diagram = shelf.result(exact, {}, lambda _: None)
+    shelf.result(tighter, {"exact": diagram}, lambda _: None)
+    kept = Shelf(tmp_path).result(tighter, {"exact": diagram}, lambda _: pytest.fail("computed again"))
+    errors = kept["step_error_rms"].values
+    assert errors.shape == (2, 3)
+    assert (errors < 1e-5).all()
+    assert (errors > 1e-12).all()

@@ -72,8 +72,9 @@ def period_errors(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:
     (exact,) = inputs.values()
     system, methods = _system(settings), [method_in({"method": table}) for table in settings["methods"]]
     errors = [one_period_errors(system, Taylor(), method, exact, threads=1) for method in methods]
+    no_long_runs = np.full((len(methods), *exact["response_of"].shape), -1, np.int8)
     return methods_dataset(
         base=exact, labels=[method_label(method) for method in methods], columns={},
-        fields={name: np.stack([error[name] for error in errors]) for name in errors[0]},
+        fields={"agrees": no_long_runs, **{name: np.stack([error[name] for error in errors]) for name in errors[0]}},
         attrs=provenance(system, methods[0], system.values) | {"analysis": settings["question"]},
     )  # fmt: skip
