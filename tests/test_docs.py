@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 #: Commands of other programs that pages may show: CI runs the first (see .ci/run), people the second.
 OTHERS = {"pip install .", "python -m benchmarks"}
-#: What the test of the README or CI run anyway.
-ELSEWHERE = {"saltus demo"}
+#: What other tests run, or CI does: `reproduce` with its smallest figure, since the whole takes minutes.
+ELSEWHERE = {"saltus demo", "saltus reproduce saunders2021 --quick", "saltus reproduce saunders2021"}
 
 _BLOCK = re.compile(r"^```(?:\{code-block\} )?(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 

@@ -77,7 +77,7 @@ def three_responses(data: Data) -> Figure:
 
 def four_starts(data: Data) -> Figure:
     """Fig. 5: what the four starts settle to."""
-    starts = [f"x₀ = {x} mm" for x in ("1.0", "0.2", "0.4", "2.0")]
+    starts = [f"$x_0$ = {x} mm" for x in ("1.0", "0.2", "0.4", "2.0")]
     return _rows(data["fig5/exact"], starts, (24, 24, 24, 24))
 
 
