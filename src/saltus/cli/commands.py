@@ -218,7 +218,9 @@ def reproduce(
     figure: Annotated[
         list[str] | None, typer.Option(help="A figure of the paper, 8 or fig8; may be given several times. By default all.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Coarser and shorter: about three minutes on two cores in place of ten to fifteen.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Coarser and shorter: some three minutes on two cores, not ten to fifteen.")
+    ] = False,
     out: Annotated[Path | None, typer.Option(help="Folder for the report; default saltus-runs/PAPER or PAPER-quick.")] = None,
     threads: Threads = None,
 ) -> None:
