@@ -328,7 +328,7 @@ def five_hertz_agrees(data: Data) -> Finding:
     far = stiffness[apart & ~near]
     return Finding(
         f"On and off differ at {share_text(float(apart[near].mean()))} of the values in 1.8e4 to 1e5 N/m, at {share_text(float(apart[~near].mean()))} elsewhere"
-        + (f", most between {np.quantile(far, 0.1):.1e} and {np.quantile(far, 0.9):.1e} N/m." if far.size else "."),
+        + (f", most between {number(float(np.quantile(far, 0.1)))} and {number(float(np.quantile(far, 0.9)))} N/m." if far.size else "."),
         "Of the two, neither is exact: see the curve.",
         (check(f"elsewhere they differ at less than 2 % of the values ({share_text(float(apart[~near].mean()))})", apart[~near].mean() < 0.02),
          check("near the grazing they differ more than elsewhere", apart[near].mean() > apart[~near].mean())),
