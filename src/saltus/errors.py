@@ -34,6 +34,10 @@ class SaltusWarning(UserWarning):
     """Something that doesn't stop the work but should be known: trajectories that ended early, a cache that can't be used."""
 
 
+class UnusedParameterWarning(SaltusWarning):
+    """A parameter of a system stands in none of its equations."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """A sentence that offers the nearest known name, or lists all of them."""
     known = list(known)
