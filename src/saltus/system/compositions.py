@@ -28,15 +28,15 @@ def sign(a: Operand) -> Any:
     ``sl.tanh(a/width)`` is its smooth stand-in.
     """
     if _traced(a):
-        return piecewise((1.0, a > 0), otherwise=-1.0)  # type: ignore[operator]
-    return float((a > 0) - (a < 0))  # type: ignore[operator]
+        return piecewise((1.0, a > 0), otherwise=-1.0)
+    return float((a > 0) - (a < 0))
 
 
 def heaviside(a: Operand, at_zero: float = 0.5) -> Any:
     """1 where ``a > 0``, 0 where ``a < 0``; a boundary at ``a = 0``. Of the number 0 it is ``at_zero``."""
     if _traced(a):
-        return piecewise((1.0, a > 0), otherwise=0.0)  # type: ignore[operator]
-    return 1.0 if a > 0 else float(at_zero) if a == 0 else 0.0  # type: ignore[operator]
+        return piecewise((1.0, a > 0), otherwise=0.0)
+    return 1.0 if a > 0 else float(at_zero) if a == 0 else 0.0
 
 
 def clip(a: Operand, low: Operand, high: Operand) -> Any:
@@ -46,29 +46,29 @@ def clip(a: Operand, low: Operand, high: Operand) -> Any:
 
 def cosh(a: Operand) -> Any:
     """Hyperbolic cosine."""
-    return (exp(a) + exp(-a)) * 0.5 if _traced(a) else math.cosh(a)  # type: ignore[arg-type, operator]
+    return (exp(a) + exp(-a)) * 0.5 if _traced(a) else math.cosh(a)
 
 
 def sinh(a: Operand) -> Any:
     """Hyperbolic sine, to a few ulp of its value near zero too (the difference of two exponentials has no digits there)."""
-    return tanh(a) * cosh(a) if _traced(a) else math.sinh(a)  # type: ignore[arg-type]
+    return tanh(a) * cosh(a) if _traced(a) else math.sinh(a)
 
 
 def asin(a: Operand) -> Any:
     """Inverse sine [rad], in [-pi/2, pi/2]. Its rate is infinite at -1 and 1; beyond them it isn't a number."""
     if not _traced(a):
-        return math.asin(a)  # type: ignore[arg-type]
-    return 2.0 * atan(a / (1.0 + sqrt((1.0 - a) * (1.0 + a))))  # type: ignore[operator]
+        return math.asin(a)
+    return 2.0 * atan(a / (1.0 + sqrt((1.0 - a) * (1.0 + a))))
 
 
 def acos(a: Operand) -> Any:
     """Inverse cosine [rad], in [0, pi]. Its rate is infinite at -1 and 1; beyond them it isn't a number."""
-    return 2.0 * atan(sqrt((1.0 - a) / (1.0 + a))) if _traced(a) else math.acos(a)  # type: ignore[arg-type, operator]
+    return 2.0 * atan(sqrt((1.0 - a) / (1.0 + a))) if _traced(a) else math.acos(a)
 
 
 def hypot(a: Operand, b: Operand) -> Any:
     """``sqrt(a**2 + b**2)``. A cone: it has no derivative where both are zero."""
-    return sqrt(a * a + b * b) if _traced(a, b) else math.hypot(a, b)  # type: ignore[arg-type, operator]
+    return sqrt(a * a + b * b) if _traced(a, b) else math.hypot(a, b)
 
 
 def atan2(y: Operand, x: Operand) -> Any:
@@ -78,12 +78,12 @@ def atan2(y: Operand, x: Operand) -> Any:
     inside, for which no two terms cancel.
     """
     if not _traced(y, x):
-        return math.atan2(y, x)  # type: ignore[arg-type]
+        return math.atan2(y, x)
     if not _traced(x):
         return _at_distance(y, x)
     r = hypot(y, x)
-    above = piecewise((pi, y > 0), otherwise=-pi)  # type: ignore[operator]
-    return piecewise((2.0 * atan(y / (r + x)), x > 0), otherwise=above - 2.0 * atan(y / (r - x)))  # type: ignore[operator]
+    above = piecewise((pi, y > 0), otherwise=-pi)
+    return piecewise((2.0 * atan(y / (r + x)), x > 0), otherwise=above - 2.0 * atan(y / (r - x)))
 
 
 def _at_distance(y: Any, x: Any) -> Any:

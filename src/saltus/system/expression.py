@@ -102,6 +102,7 @@ class Expr:
         return absolute(self)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **keywords: Any) -> Any:
+        """A NumPy function of traced values is saltus's own."""
         from saltus.system.foreign import traced_ufunc  # foreign.py builds on this module
 
         return traced_ufunc(ufunc, method, inputs, keywords)

@@ -32,7 +32,8 @@ _STOP = (
 ADVICE: dict[str, str] = {
     "arctan2": "Write sl.atan2(y, x).", "arctan": "Write sl.atan.", "arcsin": "Write sl.asin.", "arccos": "Write sl.acos.",
     "absolute": "Write sl.abs or abs.", "fabs": "Write sl.abs or abs.", "maximum": "Write sl.max.", "minimum": "Write sl.min.",
-    "square": "Write x**2.", "pow": "Write x**2.", "power": "Write x**2.", "signum": "Write sl.sign.", "step": "Write sl.heaviside(t - t0).",
+    "square": "Write x**2.", "pow": "Write x**2.", "power": "Write x**2.", "signum": "Write sl.sign.",
+    "step": "Write sl.heaviside(t - t0).",
     "select": "Write sl.where or sl.piecewise.", "Piecewise": "Write sl.piecewise((value, condition), otherwise=...).",
     "erf": "There is none; sl.tanh is the nearest smooth step.", "log10": "Write sl.log(x)/math.log(10).",
     "expm1": "Write sl.exp(x) - 1.", "log1p": "Write sl.log(1 + x).",
