@@ -34,6 +34,10 @@ class SaltusWarning(UserWarning):
     """Something that doesn't stop the work but should be known: trajectories that ended early, a cache that can't be used."""
 
 
+class UnusedParameterWarning(SaltusWarning):
+    """A parameter of a system stands in none of its equations."""
+
+
 def shown(value: object, limit: int = 80) -> str:
     """A value as a message shows it: at most so many characters of it."""
     text = repr(value)

@@ -158,7 +158,7 @@ def branching(t, x, v, *, gap=0.1):
 
 
 def numpy_call(t, x, v):
-    return v, -np.cos(x)
+    return v, -np.floor(x)
 
 
 def math_call(t, x, v):
@@ -215,11 +215,11 @@ def of_parameters(t, x, v, *, a=1.0, b=2.0):
     ("function", "line", "teaches"),
     [
         (branching, "if x > gap:", "sl.piecewise"),
-        (numpy_call, "return v, -np.cos", "TypeError.*sl.cos.*numpy"),
+        (numpy_call, "return v, -np.floor", "np.floor on a traced value.*sl.cos"),
         (math_call, "return v, -math.cos", "sl.cos"),
         (sympy_call, "return v, -sympy.cos", "sl.cos"),
         (unknown_name, "return v, -stiffness", "NameError.*stiffness"),
-        (modulo, "return v, x % 1", "TypeError"),
+        (modulo, "return v, x % 1", "the remainder"),
         (chained, "return v, piecewise", "a < x < b"),
         (too_few, "", "returns 1 value, but there are 2 states"),
         (nothing, "", "returns nothing. End it with: return dx/dt, dv/dt"),
