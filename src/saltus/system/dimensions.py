@@ -91,11 +91,11 @@ class DimensionCheck:
             case "neg":
                 return args[0]
             case "add" | "sub" | "select":
-                return self._alike(node, *args)
+                return self._alike(node, args[0], args[1])
             case "mul" | "div":
-                return _joined(*args, sign=-1 if node.op == "div" else 1)
+                return _joined(args[0], args[1], -1 if node.op == "div" else 1)
             case "pow":
-                return self._power(node, *args)
+                return self._power(node, args[0], args[1])
             case "sqrt":
                 return args[0] if not args[0] else {base: exponent / 2 for base, exponent in args[0].items()}
             case op if op in ELEMENTARY:
