@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
@@ -71,13 +72,14 @@ def _fonts(wanted: list[str]) -> list[str]:
 
 def _keep_ticks(figure: Figure) -> None:
     """Ticks are made as they are needed, by the settings of that moment: write the present ones into the axes."""
+    now: dict[str, Any] = {str(name): value for name, value in plt.rcParams.items()}
     for ax in figure.axes:
         for one in (ax, *ax.child_axes):
             for direction in ("x", "y"):
-                look = {name: plt.rcParams[f"{direction}tick.{name}"] for name in ("labelsize", "direction", "color")}
-                one.tick_params(axis=direction, which="both", labelfontfamily=plt.rcParams["font.family"], **look)
+                look = {name: now[f"{direction}tick.{name}"] for name in ("labelsize", "direction", "color")}
+                one.tick_params(axis=direction, which="both", labelfontfamily=now["font.family"], **look)
                 for which in ("major", "minor"):
-                    sizes = {name: plt.rcParams[f"{direction}tick.{which}.{name}"] for name in ("size", "width", "pad")}
+                    sizes = {name: now[f"{direction}tick.{which}.{name}"] for name in ("size", "width", "pad")}
                     one.tick_params(axis=direction, which=which, **sizes)
 
 
