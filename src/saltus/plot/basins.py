@@ -226,7 +226,7 @@ def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int
             texts.append(f"{look.label}, {maps.share_text(shares[code])}")
     if points and colors and any(len(_stroboscopic(ds, pair, key)) for key in colors):
         handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="#BBBBBB", mec="#222222", mew=0.7))
-        texts.append("attractor at whole periods")
+        texts.append("Poincaré points of the attractors")
     if handles:
         small = len(handles) > _LONG_LEGEND
         drawing = {_Ramp: _DrawRamp(), _Ruler: _DrawRuler()}

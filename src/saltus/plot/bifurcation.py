@@ -18,7 +18,7 @@ from saltus.results.schema import response_name, sample_name, states_of
 _CALLER = "plot.bifurcation_diagram"
 #: What the vertical axis shows, by what was sampled.
 _SHOWN = {
-    "turning_points": "{} at rest", "contacts": "{} at the contacts", "stroboscope": "{} at whole periods",
+    "turning_points": "{} at turning points", "contacts": "{} at the contacts", "stroboscope": "{} at the Poincaré points",
 }  # fmt: skip
 #: Where the legend begins, in widths of the Axes, if the names of the gaps stand beside it.
 _BESIDE_GAPS = 1.16
