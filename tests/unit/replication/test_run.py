@@ -68,6 +68,13 @@ def test_what_failed_is_tried_again_and_only_that(tmp_path):
     assert verdicts(again) == {"two-is": HOLDS, "ten-is": HOLDS}
 
 
+def test_claims_that_fail_come_first(tmp_path):
+    paper = small_paper(judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite"))
+    failing, holding = paper.claims
+    text = page(reproduce(replace(paper, claims=(holding, failing)), tmp_path))
+    assert text.index(f'href="#{failing.id}"') < text.index(f'href="#{holding.id}"')
+
+
 @pytest.mark.parametrize(("part", "what"), [("draw", "picture two"), ("judge", "claim two-is"), ("table", "table numbers")])
 def test_a_picture_table_or_judge_that_fails_costs_only_itself(tmp_path, part, what):
     result = reproduce(small_paper(**{part: broken}), tmp_path)
@@ -149,13 +156,6 @@ def test_a_run_holds_the_folder_while_it_computes(tmp_path):
 
     assert reproduce(small_paper(compute=meeting), tmp_path).failures == {}
     assert len(refused) == 1
-
-
-def test_claims_that_fail_come_first(tmp_path):
-    paper = small_paper(judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite"))
-    failing, holding = paper.claims
-    text = page(reproduce(replace(paper, claims=(holding, failing)), tmp_path))
-    assert text.index(f'href="#{failing.id}"') < text.index(f'href="#{holding.id}"')
 
 
 def test_a_figure_has_a_report_of_its_own(tmp_path, figure):
