@@ -68,13 +68,6 @@ def test_what_failed_is_tried_again_and_only_that(tmp_path):
     assert verdicts(again) == {"two-is": HOLDS, "ten-is": HOLDS}
 
 
-def test_claims_that_fail_come_first(tmp_path):
-    paper = small_paper(judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite"))
-    failing, holding = paper.claims
-    text = page(reproduce(replace(paper, claims=(holding, failing)), tmp_path))
-    assert text.index(f'href="#{failing.id}"') < text.index(f'href="#{holding.id}"')
-
-
 @pytest.mark.parametrize(("part", "what"), [("draw", "picture two"), ("judge", "claim two-is"), ("table", "table numbers")])
 def test_a_picture_table_or_judge_that_fails_costs_only_itself(tmp_path, part, what):
     result = reproduce(small_paper(**{part: broken}), tmp_path)
@@ -109,6 +102,13 @@ def test_a_failed_job_is_an_error_of_ours(tmp_path):
     paper = small_paper(compute=broken)
     with run.Workers(paper, ["2"], False, run.Shelf(tmp_path), 1) as workers:
         assert isinstance(workers.wait_for("2", lambda _: None)["fig2/second"], JobError)
+
+
+def test_claims_that_fail_come_first(tmp_path):
+    paper = small_paper(judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite"))
+    failing, holding = paper.claims
+    text = page(reproduce(replace(paper, claims=(holding, failing)), tmp_path))
+    assert text.index(f'href="#{failing.id}"') < text.index(f'href="#{holding.id}"')
 
 
 # -- it is stopped ---------------------------------------------------------------------------------------------------------------
@@ -158,6 +158,8 @@ def test_a_run_holds_the_folder_while_it_computes(tmp_path):
     assert len(refused) == 1
 
 
+# -- some figures ----------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("figure", ["10", "fig10", "Fig. 10", "FIG.10", "figure 10"])
 def test_a_figure_has_a_report_of_its_own(tmp_path, figure):
     result = reproduce(small_paper(), tmp_path, [figure])
     assert result.figures == ("10",)
