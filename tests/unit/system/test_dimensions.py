@@ -72,7 +72,8 @@ def powered(t, x, v, *, rate="3 1/s^2", length="2 mm"):
     ("function", "says"),
     [
         (missing_mass, r"line \d+: return v, -stiffness \* x - damping \* v / mass\): -stiffness\*x \[N\] and damping\*v/mass "
-                       r"\[m/s\^2\] are added or compared, which needs one unit: a division by a mass is missing in the first\. .*check_units=False"),
+                       r"\[m/s\^2\] are added or compared, which needs one unit: a division by a mass is missing in the first\. "
+                       r".*check_units=False"),
         (no_mass, r"line \d+\): dv/dt is a rate in m/s\^2, but force is in N: a division by a mass is missing\."),
         (stiffness_as_damping, r"dv/dt is a rate in m/s\^2, but -stiffness\*v/mass is in m/s\^3: they differ by a factor in s\."),
         (wrong_gap, r"x \[m\] and gap \[m/s\] are added or compared"),
