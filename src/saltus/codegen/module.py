@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import platform
 import sys
 import threading
@@ -13,11 +14,13 @@ from importlib import resources
 from types import ModuleType
 
 import numba
+import numpy as np
 from llvmlite import binding as llvm
 
 from saltus.codegen.cache import load
 from saltus.codegen.ode45_head import ode45_head
 from saltus.codegen.taylor_head import taylor_head
+from saltus.kernels import lanes, trigonometry
 from saltus.system.system import System
 
 _F1, _F2, _F3 = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
@@ -75,6 +78,29 @@ def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
 def ode45_module(system: System) -> ModuleType:
     """The compiled ode45 of a system."""
     return _module(f"{system.name}, ode45", ode45_head(system), ("dormand_prince.py", "odezero.py", "ode45.py"), BATCH + ODE45_WORKSPACE)
+
+
+def series_module(system: System, order: int) -> ModuleType:
+    """The Taylor series of a system in plain NumPy: jets and step length as :func:`taylor_module` compiles them, on arrays of any width.
+
+    It is for what looks at a motion that a compiled flow has computed already. Nothing is compiled, so a new function costs no time.
+    """
+    return _plain(taylor_head(system, order, 1))
+
+
+@lru_cache(maxsize=64)
+def _plain(head: str) -> ModuleType:
+    """A head and the templates of a step as a Python module, its lanes whole arrays."""
+    module = ModuleType(f"saltus_series_{hashlib.sha256(head.encode()).hexdigest()[:32]}")
+    names = module.__dict__
+    names |= {name: value for name, value in vars(lanes).items() if callable(value) and not name.startswith("_")}
+    names |= dict.fromkeys(("kernel", "inner"), lambda function: function)
+    names |= {"math": math, "np": np, "sincos": getattr(trigonometry.sincos, "py_func", trigonometry.sincos), "turned": trigonometry.turned}
+    exec(compile(head, "<generated head>", "exec"), names)
+    for template in ("taylor_layout.py", "taylor_step.py"):
+        exec(compile(_template(template), template, "exec"), names)
+    names["splat"] = lambda value, width: value  # noqa: ARG005  (NumPy spreads a number over any width)
+    return module
 
 
 def capture_module() -> ModuleType:
