@@ -41,7 +41,7 @@ def basins(
     ----------
     system : System
         Equations, contacts and values.
-    **axes : (low, high, count) or array
+    **axes : (low, high, count), or a list or array of starts
         Two states, the range of each [SI or text with a unit] and the number of starts, ends included:
         ``x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)``.
     at : mapping, optional

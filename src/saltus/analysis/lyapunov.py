@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.along import whole
 from saltus.analysis.answers import gap_unit, provenance, shared_values
 from saltus.analysis.exponents import Exponents
 from saltus.analysis.messages import warn
 from saltus.analysis.neighbour_exponents import NeighbourExponents
-from saltus.analysis.starts import Ensemble, check_system, ensemble, whole
+from saltus.analysis.starts import Ensemble, check_system, ensemble
 from saltus.errors import ParameterError, nearest
 from saltus.flow.engine import Interrupted
 from saltus.flow.family import Family

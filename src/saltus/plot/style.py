@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -46,7 +47,8 @@ def style() -> Iterator[None]:
 
 # -- display units -------------------------------------------------------------------------------------------------------------
 _PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
-_SCALABLE = re.compile(r"(m|s|Hz|N|Pa|J|W|V|A|rad)(?=$|[*/])")
+_SCALABLE = re.compile(r"(m|s|Hz|N|Pa|J|W|V|A)(?=$|[*/])")
+_ANGLE = re.compile(r"rad(?=$|[*/])")
 #: The prefix is the largest with which the largest value is at least this: 0.43 m/s stays, 0.03 m/s becomes 30 mm/s.
 _AT_LEAST = 0.1
 
@@ -76,9 +78,10 @@ def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale
     unit : str
         SI unit of the numbers, ``""`` if unknown.
     largest : float
-        Largest absolute value to show [unit]. Lengths below 1 m are shown in mm, as is the custom of this field.
+        Largest absolute value to show [unit]. Lengths below 1 m are shown in mm, as is the custom of this field; angles in rad, whatever
+        their size, so that one angle has one unit in all pictures.
     wanted : str, optional
-        Unit to use instead, such as ``"mm"``.
+        Unit to use instead, such as ``"mm"``; ``"deg"`` or ``"deg/s"`` for an angle or its rate.
 
     Returns
     -------
@@ -91,10 +94,12 @@ def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale
     """
     known = _PREFIXES if _SCALABLE.match(unit) else {"": 1.0}
     if wanted is not None:
-        for prefix, size in known.items():
-            if prefix + unit == wanted:
-                return Scale(1 / size, wanted)
-        choice = ", ".join(prefix + unit for prefix in known)
+        sizes = {prefix + unit: size for prefix, size in known.items()}
+        if _ANGLE.match(unit):
+            sizes |= {f"m{unit}": 1e-3, _ANGLE.sub("deg", unit): math.pi / 180}
+        if wanted in sizes:
+            return Scale(1 / sizes[wanted], wanted)
+        choice = ", ".join(sizes)
         raise ParameterError(f"values in {unit or 'an unknown unit'} can't be shown in {wanted!r}. Known: {choice}.")
     for prefix, size in known.items():
         limit = 1.0 if prefix + unit == "m" else _AT_LEAST

@@ -77,9 +77,7 @@ def jobs_of_setting(table: Basins, setting: Setting) -> list[MapJob]:
 
 
 def _plan(table: Basins, system: System, method: Any) -> BasinPlan:
-    first = quantities.states(system, {name: axis.first for name, axis in table.axes.items()}, "basins.axes")
-    last = quantities.states(system, {name: axis.last for name, axis in table.axes.items()}, "basins.axes")
-    axes = {name: (first[name], last[name], axis.count) for name, axis in table.axes.items()}
+    axes = quantities.axes(system, table.axes, "basins.axes")
     at = quantities.states(system, table.at, "basins.at")
     every = None if table.every is None else quantities.number(table.every, "s", "basins", "every")
     return basin_plan(system, axes, at, method, table.periods, every)

@@ -8,23 +8,22 @@ from __future__ import annotations
 import inspect
 import sysconfig
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from saltus.errors import ParameterError, TraceError, UnitError, nearest
+from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest
 from saltus.system import checks
-from saltus.system.expression import TIME, Expr, as_expr, parameter, state
+from saltus.system.expression import TIME, Expr, as_expr, parameter, state, walk
+from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
 _HERE = str(Path(__file__).parent.parent)
 _LIBRARIES = tuple({sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None})
-_HOW_TO = (
-    "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and saltus's own functions: sl.sqrt, sl.exp, sl.log, "
-    "sl.sin, sl.cos, sl.tan, sl.atan, sl.tanh, sl.min, sl.max, sl.abs. Functions of numpy, math, scipy and sympy can't be traced."
-)
+_HOW_TO = "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and functions that can be traced. " + OWN_FUNCTIONS
 
 
 def system(
@@ -91,6 +90,7 @@ def system(
             )
         values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
         field, guards = _traced(function, names, tuple(defaults), title)
+        _warn_of_unused(field, guards, defaults, forced_at, title)
         return System(
             name=title,
             states=names,
@@ -180,6 +180,19 @@ def _traced(function: Callable[..., Any], states: tuple[str, ...], parameters: t
         raise TraceError(f"{title} ({place(function)}): {error}") from error
 
 
+def _warn_of_unused(field: Any, guards: Any, parameters: Iterable[str], forced_at: str | None, title: str) -> None:
+    """Warn of parameters on which nothing depends: a name forgotten in the equation."""
+    used = {node.payload for node in walk(*field, *(guard.gap for guard in guards)) if node.op == "param"} | {forced_at}
+    if unused := [name for name in parameters if name not in used]:
+        one = len(unused) == 1
+        warnings.warn(
+            f"{title}: {', '.join(unused)} {'is' if one else 'are'} declared but the equations don't use {'it' if one else 'them'}: "
+            f"another value changes nothing. Use {'it' if one else 'them'}, or leave {'it' if one else 'them'} out.",
+            UnusedParameterWarning,
+            stacklevel=3,
+        )
+
+
 def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
     """What the function returned, as one expression per state."""
     if returned is None:
@@ -213,7 +226,9 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
         where += f": {frames[-1].line}" if frames[-1].line else ""
     if isinstance(error, TraceError):
         return f"{title} ({where}): {error}"
-    return f"{title} ({where}) can't be traced: {type(error).__name__}: {error}. {_HOW_TO}"
+    if isinstance(error, AttributeError) and str(error).startswith("saltus has no "):
+        return f"{title} ({where}): {error}"
+    return f"{title} ({where}) can't be traced: {type(error).__name__}: {str(error).rstrip('.?! ')}. {_HOW_TO}"
 
 
 def place(function: Callable[..., Any]) -> str:
