@@ -15,13 +15,14 @@ from saltus.flow import polynomials
 from saltus.flow.engine import Outcome
 from saltus.flow.family import Family
 from saltus.flow.motion_series import Pieces
-from saltus.flow.pieces import NODES, pieces
+from saltus.flow.pieces import nodes_of, pieces
+from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 
 #: Forcing periods of a motion that never repeats from which its numbers are taken, where there are many such motions.
 WANDERED = 64
-#: Nodes held at a time: some 200 MB.
-HELD = 100_000
+#: Nodes that a thread holds at a time: some 20 MB.
+HELD = 8192
 #: Places of Gauss's rule on a piece: exact for the square of a polynomial of degree 20.
 PLACES = 21
 #: Turning points closer than this are one [forcing periods].
@@ -106,13 +107,18 @@ def measure(family: Family, start: np.ndarray, periods: np.ndarray, window: int 
     window : int
         Forcing periods of such a motion that are looked at.
     """
-    result = unknown(*start.shape)
+    result, parts = unknown(*start.shape), []
     for n in np.unique(periods):
         rows = np.flatnonzero(periods == n)
-        step = max(1, HELD // (NODES * int(n or window)))
-        for first in range(0, len(rows), step):
-            some = rows[first : first + step]
-            result.put(some, _measured(family.rows(some), start[some], int(n or window), n > 0))
+        step = max(1, HELD // (nodes_of(family) * int(n or window)))
+        parts += [rows[first : first + step] for first in range(0, len(rows), step)]
+
+    def work(part: np.ndarray) -> Measures:
+        n, some = int(periods[part[0]]), family.rows(part)
+        some.threads = 1
+        return _measured(some, start[part], n or window, n > 0)
+
+    on_threads(work, parts, result.put, family.threads)
     return result
 
 
@@ -200,7 +206,7 @@ def _means(family: Family, whole: Pieces, first: np.ndarray, state: int, result:
     motion, count = whole.motion, np.diff(np.append(first, len(whole.motion)))
     places, weights = polynomials.gauss(PLACES)
     total = np.add.reduceat(whole.length, first)
-    values = np.stack([polynomials.value(whole.terms[:, state], np.asarray(place)) for place in places])
+    values = places[:, None] ** np.arange(len(whole.terms)) @ whole.terms[:, state]
     share = weights[:, None] * (whole.length / np.repeat(total, count))
     origin = np.repeat(whole.terms[0, state, first], count)  # a small motion about a large mean keeps its digits
     mean = np.add.reduceat((share * (values - origin)).sum(axis=0), first)

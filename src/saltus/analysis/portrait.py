@@ -30,8 +30,7 @@ def portraits(map_: Map, found: Found) -> AttractorTable:
     period = np.array([*(orbit.period for orbit in found.orbits), *(0 for _ in found.wandering)], np.int64)
     start = np.array([*(orbit.points[0] for orbit in found.orbits), *(one.points[-1] for one in found.wandering)]).reshape(-1, size)
     points = [*(orbit.points for orbit in found.orbits), *(one.points[:WANDERED] for one in found.wandering)]
-    flows = isinstance(map_, Stroboscope)
-    numbers = measure(map_.family(len(start)), start, period, WANDERED) if flows else _of_points(points, size)
+    numbers = _numbers(map_, start, period, points)
     nothing = np.full(size, np.nan + 0j)
     return AttractorTable(
         kind=[*("periodic" for _ in found.orbits), *(one.kind for one in found.wandering)],
@@ -52,6 +51,13 @@ def _orbit_exponent(orbit: Orbit) -> float:
     """Largest Lyapunov exponent per iterate."""
     largest = abs(orbit.multipliers[0])
     return math.log(largest) / orbit.period if largest > 0 else -math.inf
+
+
+def _numbers(map_: Map, start: np.ndarray, period: np.ndarray, points: list[np.ndarray]) -> Measures:
+    """The numbers of attractors from a point on each."""
+    if isinstance(map_, Stroboscope):
+        return measure(map_.family(len(start)), start, period, WANDERED)
+    return _of_points(points, start.shape[1])
 
 
 def _of_points(points: list[np.ndarray], size: int) -> Measures:

@@ -22,8 +22,8 @@ from saltus.system.expression import Expr
 from saltus.system.guards import Guard
 from saltus.system.system import System
 
-#: Samples of a period besides the contacts: for series, and for cubics.
-NODES, SAMPLES = 32, 1000
+#: Samples of a period besides the contacts: an exact flow leaves the rest to the series, another one is followed closely; and for cubics.
+NODES, NODES_INEXACT, SAMPLES = 8, 64, 1000
 #: Nodes whose series are worked out at a time: some thousand rows of them fill a few ten megabytes.
 WIDTH = 2048
 #: A sample that lies less than this behind a contact is the contact [forcing periods].
@@ -65,9 +65,16 @@ def pieces(family: Family, start: np.ndarray, periods: int, quantities: Sequence
     return whole, outcome
 
 
+def nodes_of(family: Family, cubic: bool = False) -> int:
+    """Samples of a period."""
+    if cubic or not family.method.records_contacts:
+        return SAMPLES
+    return NODES if family.exact else NODES_INEXACT
+
+
 def _pieces(family: Family, start: np.ndarray, periods: int, watched: System, guards: int, cubic: bool) -> tuple[Pieces, Outcome]:
     """The pieces by Taylor series, or by cubics, and what the flow computed."""
-    count = SAMPLES if cubic else NODES
+    count = nodes_of(family, cubic)
     index = np.arange(periods * count + cubic)
     schedule = Schedule(index // count, (index % count) / count)
     outcome = family.run(start, periods, schedule, record=0)

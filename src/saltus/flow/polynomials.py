@@ -14,8 +14,8 @@ import numpy as np
 
 #: Halvings after which the roots left in an interval are one.
 DEEPEST = 40
-#: Newton steps and bisections of an isolated root.
-MOST_STEPS = 80
+#: Newton steps and bisections of an isolated root; a step that changes it by less is the last.
+MOST_STEPS, CONVERGED = 80, 4e-16
 
 
 def value(terms: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -103,9 +103,9 @@ def _refined(terms: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
         with np.errstate(all="ignore"):
             new = x - here / value(rates, x)
         new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
-        still = np.abs(new - x) > 2e-16 * np.abs(x)
+        still = (np.abs(new - x) > CONVERGED) & (here != 0.0)
         x = np.where(here == 0.0, x, new)
-        if not (still & (here != 0.0)).any():
+        if not still.any():
             break
     return x
 
