@@ -11,7 +11,7 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 
-from saltus.codegen.module import series_module
+from saltus.codegen.plain_series import series_module
 from saltus.flow import polynomials
 from saltus.flow.family import Family
 from saltus.kernels.isolation import ROUNDING
