@@ -243,8 +243,6 @@ def test_any_damaged_file_is_found_and_computed_again(memory):
             if name == "store.json":
                 with pytest.raises(StoreError, match="not a store" if damage is None else "is damaged"):
                     Store.open(store.path)
-                file.write_bytes(data)
-                continue
             if index is not None:
                 with pytest.raises(StoreError, match="isn't computed yet" if gone else "is damaged"):
                     store.read(index)
@@ -266,6 +264,52 @@ def test_a_swapped_chunk_is_found(tmp_path):
     one.write_bytes(other.read_bytes())
     assert store.damaged() == [3]
     assert store.damaged(checksums=False) == []
+
+
+def test_whole_pairs_in_the_wrong_place_are_found_and_computed_again(memory):
+    """What a careless merge of folders does: files and record of a chunk, all intact, at another number or in another store."""
+    (memory / "other").mkdir()
+    other = Store.create(memory / "other" / "map", IDENTITY | {"study": "another"}, **SMALL)
+    with other.lock():
+        other.put("attractors", [[3.0]])
+        for index in other.missing():
+            other.commit(index, {name: part[::-1].copy() for name, part in values(other, index).items()})
+    (memory / "own").mkdir()
+    store = compute(memory / "own" / "map", make=SMALL)
+    undisturbed = contents(store.path)
+    carried = {(path, i, j) for path in (store.path, other.path) for i in range(3) for j in range(3)}
+    for path, i, j in sorted(carried - {(store.path, i, i) for i in range(3)}):
+        if (store.chunks.extent(i).stop - store.chunks.extent(i).start) == (store.chunks.extent(j).stop - store.chunks.extent(j).start):
+            carry(path, i, store.path, j)
+            assert store.damaged(checksums=False) == [j], "seen without reading the chunk"
+            with pytest.raises(StoreError, match="is damaged"):
+                store.read(j)
+            compute(store.path, make=SMALL)
+            assert contents(store.path) == undisturbed, (path, i, j)
+    (store.path / "artifacts/attractors.json").write_bytes((other.path / "artifacts/attractors.json").read_bytes())
+    compute(store.path, make=SMALL)
+    assert contents(store.path) == undisturbed
+
+
+def test_all_chunks_permuted_are_all_found(tmp_path):
+    store = compute(tmp_path / "map", make=FINE)
+    intact = store.chunks.count - (store.chunks.cells % 2)
+    for i in range(intact):
+        carry(store.path, i, tmp_path / "shuffled", (i + 7) % intact)
+    for array in store.chunks.arrays:
+        for file in (tmp_path / "shuffled" / "data.zarr" / array / "c").iterdir():
+            file.replace(store.path / "data.zarr" / array / "c" / file.name)
+    for file in (tmp_path / "shuffled" / "done").iterdir():
+        file.replace(store.path / "done" / file.name)
+    assert store.damaged() == list(range(intact))
+
+
+def carry(source, i, target, j):
+    """Copy files and record of chunk i of one store to where another one has its chunk j."""
+    for name in [f"data.zarr/{array.name}/c/{{}}" for array in (source / "data.zarr").iterdir() if array.is_dir()] + ["done/{}.json"]:
+        place = target / name.format(j)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes((source / name.format(i)).read_bytes())
 
 
 # -- more than one process -------------------------------------------------------------------------------------------------------

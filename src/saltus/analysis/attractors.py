@@ -11,12 +11,13 @@ import xarray as xr
 from scipy.stats import qmc
 
 from saltus.analysis import uncertainty
+from saltus.analysis.along import whole
 from saltus.analysis.answers import gap_unit, provenance
 from saltus.analysis.plan import SCOUTS
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import find
 from saltus.analysis.settling import UNCONVERGED, complete, settle_all
-from saltus.analysis.starts import check_system, ensemble, fill, fixed_states, whole
+from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method

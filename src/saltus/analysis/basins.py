@@ -10,10 +10,10 @@ import xarray as xr
 from saltus.analysis.plan import BasinPlan, basin_plan
 from saltus.analysis.recurrence import Found
 from saltus.analysis.settling import Settling
-from saltus.flow.engine import Interrupted
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.flow.threads import on_threads
+from saltus.interrupt import Interrupted
 from saltus.system.system import System
 
 #: Share of the progress that the search for attractors takes.
@@ -41,7 +41,7 @@ def basins(
     ----------
     system : System
         Equations, contacts and values.
-    **axes : (low, high, count) or array
+    **axes : (low, high, count), or a list or array of starts
         Two states, the range of each [SI or text with a unit] and the number of starts, ends included:
         ``x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)``.
     at : mapping, optional

@@ -37,8 +37,8 @@ def bifurcation_diagram(
     system : System
         A forced system.
     vary : mapping
-        One parameter, or two for a map of types: ``{"contact_stiffness": ("1e3 N/m", "1e9 N/m", 2000, "log")}``, or an array of
-        values [SI].
+        One parameter, or two for a map of types: a range, such as ``{"contact_stiffness": ("1e3 N/m", "1e9 N/m", 2000, "log")}``, or a
+        list or array of values.
     start : sequence, mapping, array or str
         As for :func:`saltus.frequency_response`.
     sample : str

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.along import whole
 from saltus.analysis.messages import warn
-from saltus.analysis.starts import check_system, whole
+from saltus.analysis.starts import check_system
 from saltus.analysis.stretch import Stretch, common, computed, stretch, with_each
 from saltus.errors import ParameterError
 from saltus.flow.engine import Outcome, Schedule

@@ -39,7 +39,7 @@ def frequency_response(
     ----------
     system : System
         A forced system.
-    frequency : (first, last, count), (first, last, count, "log") or array
+    frequency : (first, last, count), (first, last, count, "log"), or a list or array of values
         Forcing frequencies: text with a unit, or numbers in the unit of the system's parameter [Hz, or rad/s where it says so].
     start : sequence, mapping, array or str
         Starts as for :func:`saltus.simulate`, one or many, the same at every frequency; ``"random 20"`` with ``box``; ``"sweep_up"`` or

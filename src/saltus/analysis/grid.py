@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.starts import MOST_TRAJECTORIES, check_system, ensemble, whole
+from saltus.analysis.along import along, whole
+from saltus.analysis.starts import MOST_TRAJECTORIES, check_system, ensemble
 from saltus.errors import ParameterError, nearest
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
@@ -17,8 +18,6 @@ from saltus.units import to_si
 
 #: Directions of a sweep by what users write.
 SWEEPS = {"sweep_up": "up", "sweep_down": "down"}
-#: Values along an axis, by what users write for the scale.
-SCALES = ("linear", "log")
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def grid_of(system: System, axes: Mapping[str, Any], start: Any, box: Any, value
     system : System
         Its values, but for those in ``values``, are those of the parameters that don't vary.
     axes : mapping
-        (first, last, count), (first, last, count, "log") or an array for each parameter.
+        For each parameter a range (first, last, count) or (first, last, count, "log"), or a list or array of values.
     start : sequence, mapping, array or str
         As for :func:`saltus.simulate`; ``"random 20"``; ``"sweep_up"`` or ``"sweep_down"``.
     box : mapping or None
@@ -123,26 +122,12 @@ def grid_of(system: System, axes: Mapping[str, Any], start: Any, box: Any, value
 
 
 def axis(system: System, name: str, given: Any) -> np.ndarray:
-    """Values along one parameter [SI], ascending, from (first, last, count[, scale]) or an array."""
+    """Values along one parameter [SI], ascending, from (first, last, count[, scale]) or a list or array of values."""
     if name not in system.values:
         raise ParameterError(f"{system.name} has no parameter {name!r}. {nearest(name, system.values)}")
     example = f'{name}=("{system.parameter_text(name)}", ..., 200) or (..., 200, "log")'
-    if isinstance(given, np.ndarray):
-        values = np.atleast_1d(system.resolve(name, given)).astype(float)
-    else:
-        try:
-            first, last, count, *rest = given
-        except (TypeError, ValueError):
-            raise ParameterError(f"{name} must be (first, last, number of values), such as {example}, or an array.") from None
-        scale = rest[0] if rest else "linear"
-        if scale not in SCALES or len(rest) > 1:
-            raise ParameterError(f"the scale of {name} is {scale!r}. {nearest(str(scale), SCALES)}")
-        count = whole(count, f"the number of values of {name}")
-        low, high = (float(system.resolve(name, end)) for end in (first, last))
-        if scale == "log" and min(low, high) <= 0:
-            raise ParameterError(f"{name} from {first} to {last} can't have a log scale: give ends above zero.")
-        values = np.geomspace(low, high, count) if scale == "log" else np.linspace(low, high, count)
-    if values.ndim != 1 or not len(values) or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
+    values = along(name, given, lambda value: float(system.resolve(name, value)), "values", example)
+    if not len(values) or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
         raise ParameterError(f"the values of {name} must ascend and be finite, such as {example}.")
     return values
 

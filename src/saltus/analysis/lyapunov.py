@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.along import whole
 from saltus.analysis.answers import gap_unit, provenance, shared_values
 from saltus.analysis.exponents import Exponents
 from saltus.analysis.messages import warn
 from saltus.analysis.neighbour_exponents import NeighbourExponents
-from saltus.analysis.starts import Ensemble, check_system, ensemble, whole
+from saltus.analysis.starts import Ensemble, check_system, ensemble
 from saltus.errors import ParameterError, nearest
-from saltus.flow.engine import Interrupted
 from saltus.flow.family import Family
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.interrupt import Interrupted
 from saltus.results import exponents_dataset
 from saltus.system.system import System
 from saltus.units import to_si

@@ -14,7 +14,7 @@ from saltus.units import from_si
 
 #: Statuses after which a trajectory's end is missing, each with advice.
 _ADVICE = {
-    st.SLIDING: "Sliding and sticking aren't followed yet; make the force continuous where the contact is met.",
+    st.SLIDING: "Sliding and sticking aren't followed yet. Make the force continuous there: friction as mu*N*sl.tanh(v/eps), eps small.",
     st.BUDGET_STEPS: "Raise max_steps of the method, say Taylor(max_steps=10**10); if steps shrink towards one place, the equations are "
     "singular there.",
     st.BUDGET_EVENTS: "Contacts accumulate; give the contact a finite stiffness or damping, or raise max_events of the method.",

@@ -15,11 +15,12 @@ import xarray as xr
 from scipy.stats import qmc
 
 from saltus.analysis import uncertainty
+from saltus.analysis.along import along, whole
 from saltus.analysis.answers import gap_unit, provenance
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import Found, find
 from saltus.analysis.settling import OPEN, UNCONVERGED, Settling, complete, settle
-from saltus.analysis.starts import check_system, fill, fixed_states, whole
+from saltus.analysis.starts import check_system, fill, fixed_states
 from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -188,23 +189,9 @@ def basin_plan(
 
 
 def _axis(system: System, name: str, given: Any) -> np.ndarray:
-    """Starts along one state from (low, high, count) or an array."""
-    if isinstance(given, np.ndarray):
-        if given.dtype.kind not in "fiu":
-            raise ParameterError(f"the starts along {name} must be numbers, not {given.dtype}.")
-        values = given.astype(float)
-    else:
-        try:
-            low, high, count = given
-        except (TypeError, ValueError):
-            raise ParameterError(
-                f'{name} must be (low, high, number of starts), such as {name}=("-5 mm", "5 mm", 400), or an array.'
-            ) from None
-        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 2:
-            raise ParameterError(f"the number of starts along {name} must be a whole number of at least 2, not {count!r}.")
-        if count > MOST_CELLS:
-            raise ParameterError(f"{count} cells are more than {MOST_CELLS:.0e}. Take a coarser grid, or sl.basin_fractions.")
-        values = np.linspace(to_si(low, system.units[name], name), to_si(high, system.units[name], name), int(count))
-    if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
-        raise ParameterError(f"the starts along {name} must ascend and be finite, at least two of them.")
+    """Starts along one state from (low, high, count) or a list or array of starts."""
+    example = f'{name}=("-5 mm", "5 mm", 400)'
+    values = along(name, given, lambda value: to_si(value, system.units[name], name), "starts", example, 2)
+    if len(values) < 2 or not (np.diff(values) > 0).all():
+        raise ParameterError(f"the starts along {name} must ascend, at least two of them.")
     return values

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.along import whole
 from saltus.analysis.batch_means import LEAST
-from saltus.analysis.starts import whole
 from saltus.errors import ParameterError
 from saltus.units import to_si
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.along import along
 from saltus.errors import ParameterError, SaltusError, nearest
 from saltus.system import expression as ex
 from saltus.system.system import System
@@ -70,7 +71,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     if values is not None and not isinstance(values, Mapping):
         raise ParameterError('values must be a mapping, such as values={"frequency": [5.0, 10.0]}.')
     columns = _columns(system, start)
-    given = {name: system.resolve(name, value) for name, value in (values or {}).items()}
+    given = {name: _values(system, name, value) for name, value in (values or {}).items()}
     deep = [name for name, value in given.items() if np.ndim(value) > 1]
     if deep:
         raise ParameterError(f"values of {deep[0]} must be one number or a one-dimensional array, one for each trajectory.")
@@ -125,19 +126,6 @@ def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, fl
     return {name: to_si(given.get(name, 0.0), system.units[name], name) for name in system.states if name not in moving}
 
 
-def whole(value: Any, name: str, least: int = 1) -> int:
-    """A whole number. Raises ParameterError for anything else, or one below ``least``."""
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float | np.number)
-        or not math.isfinite(value)
-        or value != int(value)
-        or value < least
-    ):
-        raise ParameterError(f"{name} must be a whole number of at least {least}, not {value!r}.")
-    return int(value)
-
-
 def _check_period_of_each(system: System, shared: Mapping[str, float], varied: Mapping[str, np.ndarray], count: int) -> None:
     """The time dependence must repeat with the forcing period for every trajectory, not only for the system's own values.
 
@@ -158,6 +146,14 @@ def _check_period_of_each(system: System, shared: Mapping[str, float], varied: M
             system.with_values(**{**shared, **dict(zip(columns, key, strict=True))})
         except SaltusError as error:
             raise ParameterError(f"trajectory {i}: {error}") from None
+
+
+def _values(system: System, name: str, value: Any) -> Any:
+    """One value of a parameter [SI], or many: a list or array, or a range (first, last, number)."""
+    if not isinstance(value, tuple):
+        return system.resolve(name, value)
+    example = f'values={{"{name}": ("{system.parameter_text(name)}", ..., 20)}}'
+    return along(name, value, lambda one: float(system.resolve(name, one)), "values", example)
 
 
 def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
@@ -189,6 +185,9 @@ def _as_array(start: Any) -> np.ndarray:
 
 
 def _numbers(system: System, name: str, value: Any) -> np.ndarray:
+    if isinstance(value, tuple):
+        example = f'start={{"{name}": (0.0, 1.0, 20), ...}}'
+        return along(name, value, lambda one: to_si(one, system.units[name], name), "starts", example)
     array = np.asarray(value) if isinstance(value, np.ndarray) else _as_array(value)
     if array.size == 0:
         raise ParameterError(f"the start of {name} is empty. Give at least one number.")

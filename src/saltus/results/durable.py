@@ -6,18 +6,12 @@ import errno
 import hashlib
 import json
 import os
-import shutil
-import time
-import uuid
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from saltus.errors import ParameterError, SaltusError
-
-#: A folder takes a moment to make: a draft of one that is older than this [s] was left by a process that was killed.
-_DRAFT_AGE = 60.0
 
 
 class StoreError(SaltusError, OSError):
@@ -64,49 +58,6 @@ def write_together(parts: Path, prefix: str, files: Mapping[Path, bytes]) -> Non
         for draft in drafts.values():
             with suppress(OSError):  # swept away at the next start
                 draft.unlink(missing_ok=True)
-
-
-def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str]) -> None:
-    """Make a folder that appears under its name with everything in it, or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        Its name, not taken yet.
-    files : mapping of str to bytes
-        What is in it, by path in the folder.
-    folders : iterable of str
-        Folders in it.
-
-    Raises
-    ------
-    StoreError
-        If something stands under the name, or the disk is full.
-    """
-    remove_old_drafts(path)
-    draft = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part")
-    try:
-        for name in folders:
-            (draft / name).mkdir(parents=True)
-        for name, data in files.items():
-            write(draft / name, data)
-        for place in [draft, *(place for place in draft.rglob("*") if place.is_dir())]:
-            flush_names(place)
-        os.rename(draft, path)
-        flush_names(path.parent)
-    except OSError as error:
-        raise StoreError(
-            f"{path} can't be made: {error.strerror or error}. Nothing was left behind; make room or choose another folder."
-        ) from error
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
-
-
-def remove_old_drafts(path: Path) -> None:
-    """Remove what processes left that were killed within :func:`write_folder`."""
-    for draft in path.parent.iterdir():
-        if draft.name.startswith(f".{path.name}.") and draft.name.endswith(".part") and time.time() - draft.stat().st_mtime > _DRAFT_AGE:
-            shutil.rmtree(draft, ignore_errors=True)
 
 
 def write(path: Path, data: bytes) -> None:

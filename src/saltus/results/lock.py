@@ -84,7 +84,7 @@ def exclusive(file: Path, patience: float = _PATIENCE) -> Iterator[int]:
 
 def holders(folder: Path) -> list[str]:
     """Who holds a lock: a text each, in the order of the shards."""
-    return [_holder(file) for _, file in sorted(_locks(folder).items()) if _is_held(file, patience=0.0)]
+    return [_holder(file) for _, file in sorted(_locks(folder).items()) if is_held(file, patience=0.0)]
 
 
 def overlap(one: tuple[int, int], other: tuple[int, int]) -> bool:
@@ -101,11 +101,12 @@ def _locks(folder: Path) -> dict[tuple[int, int], Path]:
 
 def _refuse_if_held(folder: Path, shard: tuple[int, int], *, others_only: bool) -> None:
     for other, file in _locks(folder).items():
-        if overlap(other, shard) and not (others_only and other == shard) and _is_held(file, _PATIENCE):
+        if overlap(other, shard) and not (others_only and other == shard) and is_held(file, _PATIENCE):
             raise StoreError(_refusal(file))
 
 
-def _is_held(file: Path, patience: float) -> bool:
+def is_held(file: Path, patience: float = 0.0) -> bool:
+    """Whether somebody holds the lock on a file, and goes on holding it for ``patience`` seconds."""
     handle = _open(file, os.O_RDONLY)  # so that anyone who may read the store may ask
     try:
         return not _wait(handle, shared=True, patience=patience)

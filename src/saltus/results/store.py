@@ -4,10 +4,11 @@
 
     store.json          identity, shape, what is kept                         written once, at creation
     data.zarr/          a zarr 3 group, one flat array of cells per variable  one file per chunk and array
-    done/7.json         chunk 7 is complete: SHA-256 of its files             written last
+    done/7.json         chunk 7 of this store is complete: SHA-256 of files   written last
     artifacts/          small values that all chunks share                    a checksum inside
     locks/, parts/      who is writing; drafts that a kill left behind        no part of the outcome
 
+Records and artifacts hold their number or name and the hash of ``store.json``: in another place, or another store, they count as damaged.
 No file holds a time, a host or an order, so a finished store is the same bit by bit however it came about.
 """
 
@@ -25,27 +26,24 @@ from typing import Any, Literal
 import numpy as np
 
 from saltus.errors import ParameterError
+from saltus.results.draft_folder import remove_old_drafts, write_folder
 from saltus.results.durable import (
     StoreError,
     flush_names,
     read,
-    remove_old_drafts,
     seal,
     sha256,
     size,
     unseal,
-    write_folder,
     write_together,
 )
 from saltus.results.lock import WHOLE, exclusive, holders, locked
 from saltus.results.store_artifacts import get_artifact, has_artifact, put_artifact
 from saltus.results.store_chunks import Chunks, Codec
+from saltus.results.store_head import HEAD, fingerprint, head_of, mend_head, read_head
 from saltus.results.store_identity import agree, texts
 
 __all__ = ["Store", "StoreError", "StoreStatus"]
-
-#: Layout of the files. A store of a later one is refused, not guessed at.
-_FORMAT = 1
 
 
 @dataclass(frozen=True)
@@ -96,6 +94,7 @@ class Store:
         self.identity: dict[str, str] = head["identity"]
         self.note: dict[str, Any] = head["note"]
         self.chunks = Chunks.checked(tuple(head["shape"]), head["chunk"], head["arrays"])
+        self._made_under = fingerprint(head)
         self._codec = Codec(self.chunks, {"identity": self.identity, "shape": list(self.chunks.shape)})
         self._shard: tuple[int, int] | None = None
         self._process = 0
@@ -138,16 +137,13 @@ class Store:
         """
         path = Path(path).resolve()
         chunks = Chunks.checked(shape, chunk, arrays)
-        head = {
-            "format": _FORMAT, "identity": texts(identity), "note": dict(note or {}), "shape": list(chunks.shape), "chunk": chunks.chunk,
-            "arrays": {name: dtype.name for name, dtype in chunks.arrays.items()},
-        }  # fmt: skip
+        head = head_of(texts(identity), note or {}, chunks)
         if not path.parent.is_dir():
             raise StoreError(f"{path} can't be made: there is no folder {path.parent}. Make it first.")
         if path.exists():
             raise StoreError(f"{path} is there already. Resume it if it is a store, or choose another path; nothing is overwritten.")
         store = cls(path, head)
-        files = {f"data.zarr/{name}": data for name, data in store._codec.metadata.items()} | {"store.json": seal(head)}
+        files = {f"data.zarr/{name}": data for name, data in store._codec.metadata.items()} | {HEAD: seal(head)}
         write_folder(path, files, folders=("done", "artifacts", "locks", "parts", *(f"data.zarr/{array}/c" for array in chunks.arrays)))
         return store
 
@@ -168,16 +164,7 @@ class Store:
             If there is no store, its head is damaged, or the identity differs: names each value that does.
         """
         path = Path(path).resolve()
-        data = read(path / "store.json")
-        if data is None:
-            what = "there is no store" if not path.exists() else "this is not a store of saltus, and it was left alone"
-            raise StoreError(f"{path}: {what}. Choose another path.")
-        head = unseal(data)
-        if head is None:
-            raise StoreError(f"{path / 'store.json'} is damaged. Restore it from a copy, or delete the folder and compute it again.")
-        if head["format"] != _FORMAT:
-            raise StoreError(f"{path} was made by a later saltus (layout {head['format']}, known: {_FORMAT}). Update saltus.")
-        store = cls(path, head)
+        store = cls(path, read_head(path))
         if identity is not None:
             agree(path, store.identity, texts(identity))
         return store
@@ -193,15 +180,19 @@ class Store:
         arrays: Mapping[str, Any],
         note: Mapping[str, Any] | None = None,
     ) -> Store:
-        """:meth:`create` if there is nothing yet, else :meth:`open`; ``shape``, ``chunk`` and ``arrays`` must agree too."""
+        """:meth:`create` if there is nothing yet, else :meth:`open`; ``shape``, ``chunk`` and ``arrays`` must agree too.
+
+        A ``store.json`` that is damaged is written again if the chunks beside it were made from the same.
+        """
         if not Path(path).exists():
             try:
                 return cls.create(path, identity, shape=shape, chunk=chunk, arrays=arrays, note=note)
             except StoreError:
                 if not Path(path).exists():  # else another process was faster
                     raise
-        store = cls.open(path)
         wanted = Chunks.checked(shape, chunk, arrays)
+        mend_head(Path(path).resolve(), head_of(texts(identity), note or {}, wanted))
+        store = cls.open(path)
         agree(store.path, store.identity | store.chunks.as_text(), texts(identity) | wanted.as_text())
         return store
 
@@ -271,7 +262,8 @@ class Store:
         if set(values) != set(self.chunks.arrays):
             raise ParameterError(f"chunk {index} has the arrays {sorted(values)}, the store keeps {sorted(self.chunks.arrays)}.")
         data = {name: self._codec.encode(index, name, values[name]) for name in self.chunks.arrays}
-        record = seal({"files": {name: {"bytes": len(file), "sha256": sha256(file)} for name, file in data.items()}})
+        told = {name: {"bytes": len(file), "sha256": sha256(file)} for name, file in data.items()}
+        record = seal({"index": index, "store": self._made_under, "files": told})
         earlier = read(self._record(index))
         if earlier == record:
             return
@@ -358,9 +350,9 @@ class Store:
         return [int(index) for index in np.flatnonzero(self.done()) if self._intact(int(index), checksums=checksums) is None]
 
     def _intact(self, index: int, *, checksums: bool = True) -> dict[str, bytes] | None:
-        """The files of a chunk, by array; None if one of them, or the record, is missing or isn't what was committed."""
+        """The files of a chunk, by array; None if one is missing or isn't what was committed, or the record isn't this chunk's."""
         record = unseal(read(self._record(index)) or b"")
-        if record is None:
+        if record is None or record.get("index") != index or record.get("store") != self._made_under:
             return None
         if not checksums:
             sizes = {name: size(self._file(index, name)) for name in self.chunks.arrays}
@@ -399,16 +391,16 @@ class Store:
         StoreError
             If the lock isn't held, the disk is full, or another value is kept.
         """
-        put_artifact(self.path, name, value, existing=existing, shard=self._held())
+        put_artifact(self.path, self._made_under, name, value, existing=existing, shard=self._held())
         return self.get(name)
 
     def get(self, name: str) -> Any:
         """What :meth:`put` kept, lists where tuples were put; :class:`StoreError` if there is none, or it is damaged."""
-        return get_artifact(self.path, name)
+        return get_artifact(self.path, self._made_under, name)
 
     def has(self, name: str) -> bool:
         """Whether :meth:`get` would return something: kept, and not damaged."""
-        return has_artifact(self.path, name)
+        return has_artifact(self.path, self._made_under, name)
 
     # -- for people --------------------------------------------------------------------------------------------------------
     def status(self, *, checksums: bool = False) -> StoreStatus:

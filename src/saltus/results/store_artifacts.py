@@ -1,4 +1,4 @@
-"""Small values that belong to all chunks of a store: one file each, with a checksum inside."""
+"""Small values that belong to all chunks of a store: one file each, with its name, the hash of its store and a checksum inside."""
 
 from __future__ import annotations
 
@@ -13,14 +13,24 @@ from saltus.results.lock import WHOLE, exclusive
 
 
 def put_artifact(
-    store: Path, name: str, value: Any, *, existing: Literal["same", "keep", "replace"] = "same", shard: tuple[int, int] = WHOLE
+    store: Path,
+    made_under: str,
+    name: str,
+    value: Any,
+    *,
+    existing: Literal["same", "keep", "replace"] = "same",
+    shard: tuple[int, int] = WHOLE,
 ) -> None:
-    """Keep a value: see :meth:`saltus.results.store.Store.put`. ``shard`` is the lock that this process holds."""
-    data = seal({"base64": base64.b64encode(value).decode()} if isinstance(value, bytes) else {"value": value})
+    """Keep a value: see :meth:`saltus.results.store.Store.put`.
+
+    ``made_under`` is the hash of the store's head, ``shard`` the lock that this process holds.
+    """
+    content = {"base64": base64.b64encode(value).decode()} if isinstance(value, bytes) else {"value": value}
+    data = seal({"name": name, "store": made_under, **content})
     file = _file(store, name)
     with exclusive(store / "locks" / "artifacts", patience=10.0):  # shards may put at the same moment
         earlier = read(file)
-        intact = earlier is not None and unseal(earlier) is not None
+        intact = _opened(earlier, made_under, name) is not None
         if intact and earlier == data:
             return
         if intact and existing == "same":
@@ -31,19 +41,25 @@ def put_artifact(
             write_together(store / "parts", "artifact", {file: data})
 
 
-def get_artifact(store: Path, name: str) -> Any:
+def get_artifact(store: Path, made_under: str, name: str) -> Any:
     """The value; :class:`StoreError` if there is none, or it is damaged."""
     data = read(_file(store, name))
-    values = unseal(data or b"")
+    values = _opened(data, made_under, name)
     if values is None:
         state = "has no" if data is None else "has a damaged"
         raise StoreError(f"{store} {state} {name!r}. Compute it again: put() takes its place.")
     return base64.b64decode(values["base64"]) if "base64" in values else values["value"]
 
 
-def has_artifact(store: Path, name: str) -> bool:
+def has_artifact(store: Path, made_under: str, name: str) -> bool:
     """Whether there is one that isn't damaged."""
-    return unseal(read(_file(store, name)) or b"") is not None
+    return _opened(read(_file(store, name)), made_under, name) is not None
+
+
+def _opened(data: bytes | None, made_under: str, name: str) -> dict[str, Any] | None:
+    """What an artifact holds; None if it is damaged, or is another one, or another store's."""
+    values = unseal(data or b"")
+    return values if values is not None and (values.get("name"), values.get("store")) == (name, made_under) else None
 
 
 def _file(store: Path, name: str) -> Path:

@@ -36,7 +36,7 @@ def agree(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None
         both = [(name, _near(there.get(name), here.get(name)), _near(here.get(name), there.get(name))) for name in differ]
         raise StoreError(
             f"{path} was made from something else: {'; '.join(f'{name} was {old}, is {new}' for name, old, new in both)}. "
-            "Choose another path, or go back to what made it; to start over, delete the folder yourself."
+            "Nothing was changed. Choose another path, or go back to what made it."
         )
 
 

@@ -76,8 +76,16 @@ def box(system: System, given: Mapping[str, list[Quantity]] | None, place: str) 
 
 
 def grid(system: System, name: str, given: Range, place: str) -> tuple[Any, ...] | list[float]:
-    """Values of a parameter in SI: (first, last, count, scale), or the values themselves."""
-    unit = _unit(system, name, system.values, place)
+    """Values of a parameter in SI: (first, last, count, scale), or a list of the values themselves."""
+    return _values(given, _unit(system, name, system.values, place), name, place)
+
+
+def axes(system: System, table: Mapping[str, Range], place: str) -> dict[str, tuple[Any, ...] | list[float]]:
+    """Starts along some states in SI: (first, last, count, scale), or a list of the starts themselves."""
+    return {name: _values(given, _unit(system, name, system.states, place), name, place) for name, given in table.items()}
+
+
+def _values(given: Range, unit: str, name: str, place: str) -> tuple[Any, ...] | list[float]:
     if given.values is not None:
         return [number(value, unit, place, name) for value in given.values]
     assert given.first is not None

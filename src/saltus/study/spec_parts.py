@@ -80,11 +80,20 @@ class Range(Table):
     scale: Literal["linear", "log"] = Field("linear", description="Evenly spaced in the values, or in their logarithms.", examples=["log"])
     values: list[Quantity] | None = Field(None, min_length=1, description="The values themselves, ascending.", examples=[["5 Hz", "17 Hz"]])
 
+    @model_validator(mode="before")
+    @classmethod
+    def _listed(cls, given: Any) -> Any:
+        """An array holds the values: ``frequency = ["5 Hz", "17 Hz"]``."""
+        return {"values": given} if isinstance(given, list) else given
+
     @model_validator(mode="after")
     def _either(self) -> Range:
         ends = (self.first, self.last, self.count)
         if self.values is None and None in ends:
-            raise ValueError('needs first, last and count, such as { first = "2 Hz", last = "30 Hz", count = 281 }, or values = [...]')
+            raise ValueError(
+                'needs first, last and count, such as { first = "2 Hz", last = "30 Hz", count = 281 }, '
+                'or an array of values, such as ["5 Hz", "17 Hz"]'
+            )
         if self.values is not None and (ends != (None, None, None) or self.scale != "linear"):
             raise ValueError("has values one by one: leave first, last, count and scale out")
         return self

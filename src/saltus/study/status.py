@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,27 +34,42 @@ def status_tables(folder: Path) -> list[TextTable]:
     return maps + ([TextTable("Questions", ("question", "file", "state", "last written"), tuple(others))] if others else [])
 
 
-def stores(folder: Path) -> list[StoreStatus]:
+@dataclass(frozen=True)
+class DamagedStore:
+    """A store that can't be opened, and why."""
+
+    name: str
+    why: str
+
+
+def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
     """How far the stores of an output folder are, or a store itself; empty if there are none."""
-    from saltus.results.store import Store
+    from saltus.results.store import Store, StoreError
 
-    found = [folder] if (folder / "store.json").exists() else sorted(path.parent for path in (folder / STORES).glob("*/store.json"))
-    return [Store.open(path).status() for path in found]
+    found: list[StoreStatus | DamagedStore] = []
+    alone = (folder / "store.json").exists()
+    for path in [folder] if alone else sorted(done.parent for done in (folder / STORES).glob("*/done") if done.parent.name[0] != "."):
+        try:
+            found.append(Store.open(path).status())
+        except StoreError as error:
+            found.append(DamagedStore(path.name, str(error)))
+    return found
 
 
-def status_table(found: list[StoreStatus]) -> TextTable:
-    """A row for each store."""
-    rows = tuple(
-        (
-            str(one.note.get("name", one.path.name)),
-            f"{one.done} of {one.total}", f"{100 * one.done / max(one.total, 1):.0f} %", str(one.damaged),
-            f"{one.bytes / 1e6:.1f}", one.last_written.strftime(_TIME) if one.last_written else "never",
-            ", ".join(one.writers) or "-",
-        )
-        for one in found
-    )  # fmt: skip
+def status_table(found: list[StoreStatus | DamagedStore]) -> TextTable:
+    """A row for each store; what is wrong with one that can't be opened stands below."""
     columns = ("map", "chunks", "done", "damaged", "MB", "last written", "at work")
-    return TextTable("Maps", columns, rows)
+    return TextTable("Maps", columns, tuple(map(_row, found)), tuple(one.why for one in found if isinstance(one, DamagedStore)))
+
+
+def _row(one: StoreStatus | DamagedStore) -> tuple[str, ...]:
+    if isinstance(one, DamagedStore):
+        return one.name, "damaged", "-", "-", "-", "-", "-"
+    return (
+        str(one.note.get("name", one.path.name)), f"{one.done} of {one.total}", f"{100 * one.done / max(one.total, 1):.0f} %",
+        str(one.damaged), f"{one.bytes / 1e6:.1f}", one.last_written.strftime(_TIME) if one.last_written else "never",
+        ", ".join(one.writers) or "-",
+    )  # fmt: skip
 
 
 def question_rows(folder: Path) -> list[tuple[str, ...]]:

@@ -14,6 +14,8 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, Union
 
@@ -25,6 +27,7 @@ ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
 _MATH = {name: getattr(math, name) for name in ELEMENTARY}
 _INTERNED: weakref.WeakValueDictionary[tuple, Expr] = weakref.WeakValueDictionary()
 _LOCK = threading.RLock()  # two nodes for one state would make a derivative silently zero
+_OBSERVER: ContextVar[Callable[[Expr], None] | None] = ContextVar("observer", default=None)
 Number = int | float
 Operand = Union["Expr", int, float]
 
@@ -44,7 +47,6 @@ class Expr:
     """
 
     __slots__ = ("__weakref__", "args", "op", "payload")
-    __array_ufunc__ = None  # a NumPy scalar on the left defers to our reflected operators
 
     op: str
     args: tuple[Expr, ...]
@@ -60,6 +62,9 @@ class Expr:
                 node = object.__new__(cls)
                 node.op, node.args, node.payload = op, args, payload
                 _INTERNED[key] = node
+        observer = _OBSERVER.get()
+        if observer is not None:
+            observer(node)
         return node
 
     # -- arithmetic -------------------------------------------------------------------------------------------------------------
@@ -102,6 +107,28 @@ class Expr:
     def __abs__(self) -> Expr:
         return absolute(self)
 
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **keywords: Any) -> Any:
+        """A NumPy function of traced values is saltus's own."""
+        from saltus.system.foreign import traced_ufunc  # foreign.py builds on this module
+
+        return traced_ufunc(ufunc, method, inputs, keywords)
+
+    # -- what has no meaning here -----------------------------------------------------------------------------------------------
+    def __mod__(self, other: object) -> Expr:
+        raise TraceError(
+            f"an equation took the remainder {self!r} % {other!r}, which has no end of boundaries. A drive that repeats is written with "
+            f"sl.sin and sl.cos."
+        )
+
+    __rmod__ = __floordiv__ = __rfloordiv__ = __mod__
+
+    def __call__(self, *_arguments: object) -> Expr:
+        """Refused: the value of a state at another time."""
+        raise TraceError(
+            f"an equation called {self!r} as a function. There are no delays, x(t - tau): a rate depends on the states at the time t only. "
+            f"A product is written with *."
+        )
+
     # -- comparisons make guards ------------------------------------------------------------------------------------------------
     def __lt__(self, other: Operand) -> Relation:
         return Relation(sub(other, self))
@@ -135,8 +162,8 @@ class Expr:
 
     def __float__(self) -> float:
         raise TraceError(
-            "an equation passed a traced value to a function that needs a plain number (math.cos, float, numpy on arrays, ...). "
-            "Use saltus's own: sl.cos, sl.sin, sl.exp, sl.sqrt, sl.log, sl.tan, sl.atan, sl.tanh, sl.min, sl.max, abs."
+            "an equation passed a traced value to a function that needs a plain number (math.cos, float, int, np.interp, a spline, ...). "
+            "Write sl.cos in place of math.cos, sl.atan2 in place of math.atan2, and so on. " + _no_number()
         )
 
     __int__ = __float__
@@ -155,6 +182,28 @@ class Expr:
 
     def __deepcopy__(self, memo: dict) -> Expr:
         return self
+
+
+def _no_number() -> str:
+    from saltus.system.foreign import OWN_FUNCTIONS  # foreign.py builds on this module
+
+    return OWN_FUNCTIONS
+
+
+def _rebound() -> str:
+    from saltus.system.foreign import ADVICE  # foreign.py builds on this module
+
+    return ADVICE["impact"].partition(": ")[2]
+
+
+@contextmanager
+def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
+    """Every node that is asked for inside is shown to the observer, which may raise: the error then has the line of the user's function."""
+    token = _OBSERVER.set(observer)
+    try:
+        yield
+    finally:
+        _OBSERVER.reset(token)
 
 
 # -- conditions ----------------------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ def unforced(t, x, v):
     return v, -x - 0.1 * v
 
 
-@sl.system(states="a b c", forced_at="f", units={"a": "m", "b": "m", "c": "m/s"})
+@sl.system(states="a b c", forced_at="f", units={"a": "m", "b": "m", "c": "m/s"}, check_units=False)
 def three(t, a, b, c, *, f=1.0):
     """Three states, two of a kind."""
     return -a, -b, sl.cos(2 * sl.pi * f * t) - c
@@ -79,6 +79,12 @@ def test_whole_periods_may_be_written_as_a_float():
     assert isinstance(plan(periods=np.int64(7)).periods, int)
 
 
+def test_a_list_holds_the_starts_and_a_tuple_is_a_range():
+    rows = plan({"x": ["0 mm", "1 mm", "5 mm"], "v": (0, 1, 2.0)})
+    assert rows.axes["x"].tolist() == [0.0, 1e-3, 5e-3]
+    assert rows.axes["v"].tolist() == [0.0, 1.0]
+
+
 # -- what is refused, in words --------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("axes", "message"),
@@ -92,11 +98,13 @@ def test_whole_periods_may_be_written_as_a_float():
         ({"x": (math.nan, 1, 4), "v": V}, "x = nan is not a finite number"),
         ({"x": (-math.inf, 1, 4), "v": V}, "x = -inf is not a finite number"),
         ({"x": (0, 1, 1), "v": V}, "number of starts along x must be a whole number of at least 2, not 1"),
-        ({"x": (0, 1, 2.0), "v": V}, r"at least 2, not 2\.0"),
+        ({"x": (0, 1, 2.5), "v": V}, r"at least 2, not 2\.5"),
+        ({"x": (0, 1), "v": V}, "A tuple is a range; a list holds the starts themselves"),
         ({"x": (0, 1, True), "v": V}, "at least 2, not True"),
-        ({"x": "5 mm", "v": V}, r"x must be \(low, high, number of starts\)"),
-        ({"x": 3.0, "v": V}, r"x must be \(low, high, number of starts\)"),
+        ({"x": "5 mm", "v": V}, r"must be a range \(first, last, number of starts\)"),
+        ({"x": 3.0, "v": V}, r"must be a range \(first, last, number of starts\)"),
         ({"x": (0, 1, 100_000), "v": (0, 1, 100_000)}, "coarser grid, or sl.basin_fractions"),
+        ({"x": (0, 1, 10**12), "v": V}, "Take a coarser grid"),
     ],
     ids=[
         "unknown",
@@ -108,11 +116,13 @@ def test_whole_periods_may_be_written_as_a_float():
         "nan",
         "inf",
         "count 1",
-        "count float",
+        "count not whole",
+        "two",
         "count bool",
         "text",
         "number",
         "huge",
+        "huge axis",
     ],
 )
 def test_axes_that_are_refused(axes, message):

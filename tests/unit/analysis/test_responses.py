@@ -5,7 +5,7 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.grid import axis, grid_of
-from saltus.analysis.samples import _turn
+from saltus.analysis.starts import ensemble
 from saltus.errors import ParameterError, UnitError
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
@@ -19,12 +19,26 @@ def test_an_axis_is_linear_or_logarithmic_or_an_array():
 
 
 @pytest.mark.parametrize(
+    "given", [[2, 3, 4], [2.0, 3, "4 Hz"], ["2 Hz", "3 Hz", "0.004 kHz"], (2, 4, 3), ("2 Hz", 4.0, 3.0), np.array([2, 3, 4])]
+)
+def test_a_list_holds_the_values_and_a_tuple_is_a_range(given):
+    np.testing.assert_allclose(axis(RIG, "frequency", given), [2, 3, 4])
+    values = ensemble(RIG, (0.0, 0.0), {"frequency": given}).varied["frequency"]
+    np.testing.assert_allclose(values, [2, 3, 4])
+
+
+def test_a_tuple_of_starts_is_a_range_too():
+    group = ensemble(RIG, {"x": (0.0, "2 mm", 3), "v": [0.0, 1.0, 2.0]}, None)
+    np.testing.assert_allclose(group.start, [[0.0, 0.0], [1e-3, 1.0], [2e-3, 2.0]])
+
+
+@pytest.mark.parametrize(
     ("name", "given", "words"),
     [
         ("frequenzy", ("1 Hz", "2 Hz", 3), "Did you mean 'frequency'"),
         ("frequency", ("2 Hz", "1 Hz", 3), "must ascend"),
         ("frequency", ("1 Hz", "2 Hz", 3, "logarithmic"), "Known: linear, log"),
-        ("frequency", ("1 Hz", "2 Hz"), "must be \\(first, last, number of values\\)"),
+        ("frequency", ("1 Hz", "2 Hz"), "must be a range \\(first, last, number of values\\)"),
         ("frequency", ("1 Hz", "2 Hz", 2.5), "whole number"),
         ("frequency", np.array([1.0, np.nan]), "nan|finite"),
         ("force", ("-1 N", "1 N", 3, "log"), "can't have a log scale"),
@@ -158,27 +172,6 @@ def test_a_chaotic_response_is_typed_and_shown():
     assert ds.type.item() == "chaotic"
     assert ds.response_exponent.item() > 4 * ds.response_exponent_error.item() > 0
     assert np.isfinite(ds.sample_x.values).sum() > 100
-
-
-def test_cubics_turn_where_they_turn():
-    """Cubics with a root of the slope at a known place, from their values and slopes at both ends."""
-    rng = np.random.default_rng(3)
-    at, other, size, offset = (
-        rng.random(200),
-        rng.uniform(1.1, 4.0, 200) * rng.choice([-1, 1], 200),
-        rng.normal(size=200),
-        rng.normal(size=200),
-    )
-
-    def value(s):
-        return offset + size * (s**3 / 3 - (at + other) * s**2 / 2 + at * other * s)
-
-    def slope(s):
-        return size * (s - at) * (s - other)
-
-    found = _turn(value(0.0), value(1.0), slope(0.0), slope(1.0))
-    np.testing.assert_allclose(found, at, atol=1e-9)
-    assert _turn(np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([-1.0])).item() == 0.5  # a parabola
 
 
 @pytest.mark.parametrize("axes", [{"frequency": ("14 Hz", "16 Hz", 2)}, {"frequency": ("14 Hz", "16 Hz", 2), "force": ("1 N", "2 N", 2)}])

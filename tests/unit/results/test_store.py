@@ -13,7 +13,7 @@ import xarray as xr
 import zarr
 
 from saltus.errors import ParameterError
-from saltus.results import lock
+from saltus.results import draft_folder, durable, lock
 from saltus.results.durable import seal, unseal
 from saltus.results.lock import overlap
 from saltus.results.store import Store, StoreError
@@ -217,12 +217,64 @@ def test_what_cannot_be_stored_is_refused_first(change, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_later_layout_is_refused(store):
+@pytest.mark.parametrize(("layout", "age"), [(1, "an earlier"), (3, "a later")])
+def test_another_layout_is_refused(store, layout, age):
     head = json.loads((store.path / "store.json").read_bytes())
     del head["checksum"]
-    (store.path / "store.json").write_bytes(seal(head | {"format": 2}))
-    with pytest.raises(StoreError, match="made by a later saltus"):
+    (store.path / "store.json").write_bytes(seal(head | {"format": layout}))
+    for again in (lambda: Store.open(store.path), lambda: Store.create_or_resume(store.path, IDENTITY, **MAKE)):
+        with pytest.raises(StoreError, match=f"made by {age} saltus"):
+            again()
+
+
+@pytest.mark.parametrize("damage", [lambda data: data[:40], lambda data: data.replace(b"rig", b"gir"), lambda _: b"", None])
+def test_a_damaged_head_is_written_again(store, damage):
+    """It follows from the study; what is computed stays, whatever happens to it."""
+    fill(store, [0, 3])
+    head = store.path / "store.json"
+    before = head.read_bytes()
+    head.write_bytes(damage(before)) if damage else head.unlink()
+    with pytest.raises(StoreError) as told:
         Store.open(store.path)
+    assert "delete" not in str(told.value)
+    again = Store.create_or_resume(store.path, IDENTITY, **MAKE)
+    assert head.read_bytes() == before
+    assert (again.missing(), again.damaged()) == ([1, 2, 4, 5], [])
+
+
+def test_a_damaged_head_is_not_written_over_chunks_of_something_else(store):
+    fill(store, [0])
+    (store.path / "store.json").write_bytes(b"?")
+    with pytest.raises(StoreError, match=r"made from something else.*Nothing was changed"):
+        Store.create_or_resume(store.path, IDENTITY | {"system": "another"}, **MAKE)
+    assert (store.path / "store.json").read_bytes() == b"?"
+
+
+def test_the_head_of_another_store_is_put_right(store, tmp_path):
+    """An intact file in the wrong place: the chunks say whose it should be."""
+    fill(store)
+    other = Store.create(tmp_path / "other", IDENTITY | {"system": "another"}, **MAKE)
+    (store.path / "store.json").write_bytes((other.path / "store.json").read_bytes())
+    assert len(Store.open(store.path).damaged()) == 6, "none of the chunks is taken for another store's"
+    again = Store.create_or_resume(store.path, IDENTITY, **MAKE)
+    assert again.identity == IDENTITY
+    assert again.damaged() == []
+
+
+def test_a_young_draft_that_looks_old_is_left_alone_while_it_is_filled(tmp_path, monkeypatch):
+    """The clock jumps ahead by an hour while another process makes its store."""
+    looked = []
+
+    def write_slowly(path, data):
+        os.utime(path.parents[len(path.relative_to(tmp_path).parts) - 2], (time.time() - 3600,) * 2)
+        draft_folder.remove_old_drafts(tmp_path / "map")
+        looked.append(path.parent.is_dir())
+        durable.write(path, data)
+
+    monkeypatch.setattr(draft_folder, "write", write_slowly)
+    Store.create(tmp_path / "map", IDENTITY, **MAKE)
+    assert looked
+    assert all(looked)
 
 
 def test_old_drafts_go_young_ones_stay(tmp_path):
@@ -354,6 +406,22 @@ def test_a_damaged_artifact_counts_as_none(store):
         store.get("other")
     with pytest.raises(ParameterError, match="use letters"):
         store.get("../store")
+
+
+def test_an_artifact_in_the_wrong_place_counts_as_none(store, tmp_path):
+    """Another one of this store, and the same one of another store: intact, and not it."""
+    other = Store.create(tmp_path / "other", IDENTITY | {"system": "another"}, **MAKE)
+    for one, value in (store, [1]), (other, [2]):
+        with one.lock():
+            one.put("table", value)
+            one.put("second", [3])
+    for strange in store.path / "artifacts/second.json", other.path / "artifacts/table.json":
+        (store.path / "artifacts/table.json").write_bytes(strange.read_bytes())
+        assert not store.has("table")
+        with pytest.raises(StoreError, match="damaged 'table'"):
+            store.get("table")
+        with store.lock():
+            assert store.put("table", [1]) == [1]
 
 
 def test_a_seal_sees_every_bit():

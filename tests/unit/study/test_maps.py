@@ -92,7 +92,7 @@ def test_at_for_an_axis_is_refused():
         (MAPS + 'compare = "frist"\n', "map 'second' is compared with 'frist', which is no other map of this study"),
         (MAPS + 'compare = "second"\n', "which is no other map of this study"),
         (replaced("axes.v", "axes.w"), r"\[basins\.axes\] 'w' is unknown to delangre\. Known: v, x\."),
-        (replaced('"-5 mm"', "-5"), r"\[basins\.axes\] x = -5 has no unit\."),
+        (replaced('"-5 mm"', "-5"), r"\[basins\.axes\] x\.first = -5 has no unit\."),
         (BASE + "every = 1\n", r'\[basins\] every = 1 has no unit.*every = "1 s"'),
         (BASE + 'every = "1 s"\n', r"delangre is forced: leave every= out"),
         (BASE + 'at = { y = "1 mm" }\n', r"\[basins\.at\] 'y' is unknown to delangre"),
@@ -113,7 +113,7 @@ def test_faults_say_where_and_what_to_write(text, told, tmp_path):
 
 
 def test_a_grid_beyond_memory_is_refused():
-    with pytest.raises(SaltusError, match="cells are more than"):
+    with pytest.raises(SaltusError, match="are more than"):
         job(replaced("count = 6", "count = 1000000000000000"))
 
 

@@ -290,6 +290,32 @@ def test_status_of_a_store_at_work(whole, tmp_path):
     assert "shard 1 of 2" in row[-1]
 
 
+def test_a_damaged_store_is_a_row_of_the_status_and_is_mended(whole, tmp_path):
+    """Its head can't be read: the others are told all the same, and going on writes it again and computes nothing."""
+    folder = copied(whole, tmp_path / "run")
+    copied(whole, tmp_path / "second")
+    (tmp_path / "second" / "stores" / "basins").rename(folder / "stores" / "second")
+    head = folder / "stores" / "basins" / "store.json"
+    head.write_bytes(head.read_bytes()[:-9])
+    table = status_tables(folder)[0]
+    assert [row[:2] for row in table.rows] == [("basins", "damaged"), ("small", "12 of 12")]
+    assert "all chunks stay" in table.notes[0]
+    assert Run(folder).computed == 0
+    assert [row[1] for row in status_tables(folder)[0].rows] == ["12 of 12", "12 of 12"]
+
+
+def test_chunks_of_another_study_are_not_taken_for_own(whole, tmp_path):
+    """The map at 3 N and that at 4 N have the same size; a chunk of one, with its record, is put into the other."""
+    other = Run(tmp_path / "other", STUDY.replace('"4 N"', '"3 N"'))
+    folder = copied(whole, tmp_path / "run")
+    for file in ("done/5.json", *(f"data.zarr/{array}/c/5" for array in Store.open(folder / "stores" / "basins").chunks.arrays)):
+        (folder / "stores" / "basins" / file).write_bytes((other.folder / "stores" / "basins" / file).read_bytes())
+    again = Run(folder)
+    assert again.computed == 1
+    assert any("damaged chunks that are computed again: 1" in text for text in again.said)
+    assert contents(folder) == contents(whole.folder)
+
+
 def test_no_study_here(tmp_path):
     with pytest.raises(StudyError, match="holds no store"):
         status_tables(tmp_path)

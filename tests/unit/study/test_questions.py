@@ -38,7 +38,7 @@ name = "soft"
 vary.contact_stiffness = { first = "1e3 N/m", last = "1e5 N/m", count = 3, scale = "log" }
 [[bifurcation_diagram]]
 name = "A map"
-vary.contact_stiffness = { values = ["1e4 N/m", "2e4 N/m"] }
+vary.contact_stiffness = ["1e4 N/m", "2e4 N/m"]
 vary.frequency = { first = "14 Hz", last = "16 Hz", count = 2 }
 values = { force = "1.5 N" }
 method = { name = "ODE45", rtol = 1e-6, atol = 1e-9 }

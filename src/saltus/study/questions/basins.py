@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from saltus.study.kept import save_picture
 from saltus.study.questions.question import Question
 from saltus.study.running import Outcome, Running
-from saltus.study.spec_parts import Method, Quantity, Table
+from saltus.study.spec_parts import Method, Quantity, Range, Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,12 +25,13 @@ GALLERY, PERIODS = 8, 24
 ATTRACTORS, AGREEMENT = "-attractors", "-agreement"
 
 
-class Axis(Table):
-    """An axis of a basin map: starts from one value to another, ends included."""
+class Axis(Range):
+    """An axis of a basin map: starts from one value to another, ends included, or given one by one."""
 
-    first: Quantity = Field(description="The first start.", examples=["-5 mm"])
-    last: Quantity = Field(description="The last start.", examples=["5 mm"])
-    count: int = Field(ge=2, description="How many starts.", examples=[400])
+    first: Quantity | None = Field(None, description="The first start.", examples=["-5 mm"])
+    last: Quantity | None = Field(None, description="The last start.", examples=["5 mm"])
+    count: int | None = Field(None, ge=2, description="How many starts.", examples=[400])
+    values: list[Quantity] | None = Field(None, min_length=2, description="The starts themselves, ascending.", examples=[["-1 mm", "1 mm"]])
 
 
 class Map(Table):

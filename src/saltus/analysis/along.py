@@ -1,0 +1,90 @@
+"""Values along an axis, from what users write: a tuple is a range, a list or array holds the values. One rule for all verbs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, nearest
+
+#: Values along a range, by what users write for the scale.
+SCALES = ("linear", "log")
+#: Values along one axis beyond which a range is refused before it fills memory.
+MOST_VALUES = 100_000_000
+
+
+def whole(value: Any, name: str, least: int = 1) -> int:
+    """A whole number. Raises ParameterError for anything else, or one below ``least``."""
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float | np.number)
+        or not math.isfinite(value)
+        or value != int(value)
+        or value < least
+    ):
+        raise ParameterError(f"{name} must be a whole number of at least {least}, not {value!r}.")
+    return int(value)
+
+
+def along(name: str, given: Any, number: Callable[[Any], float], what: str, example: str, least: int = 1) -> np.ndarray:
+    """Values along an axis [SI], in the order in which they are written.
+
+    Parameters
+    ----------
+    name : str
+        The parameter or state.
+    given : tuple, list or array
+        ``(first, last, number)`` or ``(first, last, number, "log")``, ends included; or a list or array of the values.
+    number : callable
+        One value [SI] from a number or a text with a unit.
+    what : str
+        What the values are, for messages: ``"values"``, ``"starts"``.
+    example : str
+        A range as one would write it.
+    least : int
+        Least number of values of a range.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If it is neither, a value isn't finite, the number isn't whole, or a log scale doesn't begin above zero.
+    """
+    if not isinstance(given, tuple):
+        return _listed(name, given, number, what, example)
+    if len(given) not in (3, 4):
+        raise ParameterError(
+            f"{name} = {given!r} must be a range (first, last, number of {what}), such as {example}. A tuple is a range; "
+            f"a list holds the {what} themselves: {list(given)!r}."
+        )
+    first, last, count, *rest = given
+    scale = rest[0] if rest else "linear"
+    if scale not in SCALES:
+        raise ParameterError(f"the scale of {name} is {scale!r}. {nearest(str(scale), SCALES)}")
+    count = whole(count, f"the number of {what} along {name}", least)
+    if count > MOST_VALUES:
+        raise ParameterError(f"{count} {what} along {name} are more than {MOST_VALUES:.0e}. Take a coarser grid.")
+    low, high = number(first), number(last)
+    if scale == "log" and min(low, high) <= 0:
+        raise ParameterError(f"{name} from {first} to {last} can't have a log scale: give ends above zero.")
+    return np.geomspace(low, high, count) if scale == "log" else np.linspace(low, high, count)
+
+
+def _listed(name: str, given: Any, number: Callable[[Any], float], what: str, example: str) -> np.ndarray:
+    """The values of a list or array, each a number or a text with a unit."""
+    if isinstance(given, str | bytes | dict | set | frozenset) or not hasattr(given, "__len__") or np.ndim(given) != 1:
+        raise ParameterError(
+            f"{name} = {given!r} must be a range (first, last, number of {what}), such as {example}, or a list or array of {what}."
+        )
+    values = np.asarray(given)
+    if values.dtype.kind in "fiu":
+        values = values.astype(float)
+        where = np.flatnonzero(~np.isfinite(values))
+        if len(where):
+            raise ParameterError(f"{name} is {values[where[0]]} at index {where[0]}. Give finite {what}.")
+        for value in (values.min(), values.max()) if len(values) else ():
+            number(float(value))  # what the name allows is checked there
+        return values
+    return np.array([number(value) for value in list(given)], float)
