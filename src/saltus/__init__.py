@@ -78,16 +78,17 @@ _HOMES = {
         ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan", "tanh"),
         "saltus.system",
     ),
-    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "sign", "sinh", "where"), "saltus.system"),
+    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign", "sinh"), "saltus.system"),
+    **dict.fromkeys(("table", "where"), "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 
 __all__ = [
     "ODE45", "Interrupted", "System", "Taylor", "abs", "acos", "asin", "atan", "atan2", "attractors", "basin_fractions", "basins",
     "bifurcation_diagram", "clip", "compare", "compare_methods", "cos", "cosh", "describe", "energy_balance", "exp", "freeplay",
-    "frequency_response", "heaviside", "hypot", "impact_statistics", "load", "log", "lyapunov", "max", "min", "models", "pi", "piecewise",
-    "plot", "poincare", "save", "settled", "sign", "simulate", "sin", "sinh", "spectrum", "sqrt", "stroboscope", "system", "tan", "tanh",
-    "to_csv", "to_mat", "where", "wolf",
+    "frequency_response", "heaviside", "hypot", "impact_statistics", "load", "log", "lyapunov", "max", "min", "mod", "models", "pi",
+    "piecewise", "plot", "poincare", "save", "settled", "sign", "simulate", "sin", "sinh", "spectrum", "sqrt", "stroboscope", "system",
+    "table", "tan", "tanh", "to_csv", "to_mat", "where", "wolf",
 ]  # fmt: skip
 
 

@@ -25,11 +25,11 @@ _I1, _I2 = "int64[::1]", "int64[:, ::1]"
 #: Types of a batch, the first arguments of every `propagate`, in order; flow/engine.py says what they are.
 BATCH = (
     _F1, _F1, _F2, "int64", _F2, _I1, _F1, _I1, _I1, _F2, _I1, _I1, _F1, _I2, _F2,
-    _I1, _F1, _I1, _F3, _I2, _I1, _I2, _F2, _I1, _F1, "int64",
+    _I1, _F1, _I1, _F3, _I2, _I1, _I2, _F2, _I1, _F1, _F1, "int64",
 )  # fmt: skip
 
 #: Types of the arrays that kernels/taylor_lanes.py:workspace returns.
-TAYLOR_WORKSPACE = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2)
+TAYLOR_WORKSPACE = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2, _F1, _F1)
 #: Types of the arrays that kernels/dormand_prince.py:workspace returns.
 ODE45_WORKSPACE = (_F1,)
 
@@ -66,7 +66,7 @@ def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
     return _module(
         title,
         taylor_head(system, order, lanes),
-        ("taylor_layout.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"),
+        ("clocks.py", "taylor_layout.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"),
         BATCH + TAYLOR_WORKSPACE,
     )
 
@@ -74,7 +74,9 @@ def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
 @lru_cache(maxsize=64)
 def ode45_module(system: System) -> ModuleType:
     """The compiled ode45 of a system."""
-    return _module(f"{system.name}, ode45", ode45_head(system), ("dormand_prince.py", "odezero.py", "ode45.py"), BATCH + ODE45_WORKSPACE)
+    return _module(
+        f"{system.name}, ode45", ode45_head(system), ("clocks.py", "dormand_prince.py", "odezero.py", "ode45.py"), BATCH + ODE45_WORKSPACE
+    )
 
 
 def capture_module() -> ModuleType:
