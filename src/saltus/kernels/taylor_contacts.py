@@ -163,10 +163,11 @@ def follow_clocks(lanes, lane, batch, slow, known):
 @inner
 def show_clocks(lanes, lane, slow):
     """What the clocks of a lane hold to slow.held, for code that reads the time as one number."""
-    for row in range(HELD * NCLOCKS):
-        slow.held[row] = lanes.clock[CLOCK_ROW + row, lane]
-    for j in range(NCLOCKS):
-        slow.held[HELD * j + REF] += lanes.clock[BASE, lane]
+    if NCLOCKS > 0:
+        for row in range(HELD * NCLOCKS):
+            slow.held[row] = lanes.clock[CLOCK_ROW + row, lane]
+        for j in range(NCLOCKS):
+            slow.held[HELD * j + REF] += lanes.clock[BASE, lane]
 
 
 # -- landing -------------------------------------------------------------------------------------------------------------------
