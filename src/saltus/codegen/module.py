@@ -141,7 +141,9 @@ def _environment() -> str:
     import llvmlite
     import numpy
 
-    inlined = "".join(_template(name) for name in ("lanes.py", "trigonometry.py", "isolation.py", "status.py", "batch.py", "parts.py"))
+    inlined = "".join(
+        _template(name) for name in ("lanes.py", "trigonometry.py", "isolation.py", "status.py", "batch.py", "parts.py", "clocks_layout.py")
+    )
     versions = (sys.version, numba.__version__, llvmlite.__version__, numpy.__version__)
     settings = [f"{name}={getattr(numba.config, name, None)}" for name in _SETTINGS]
     return "\n".join([inlined, *versions, platform.machine(), *_target(), *settings])

@@ -170,7 +170,9 @@ def mod(a: Operand, cycle: Operand) -> Any:
         raise TraceError(f"the cycle of sl.mod must be a number or a parameter, not {length!r}.")
     if length.op == "const" and length.payload == 0:
         raise TraceError("the cycle of sl.mod is zero.")
-    if affine(value) is None or not ex.depends_on(value, ("time",)):
+    with ex.observed(None):
+        line = affine(value)
+    if line is None or not ex.depends_on(value, ("time",)):
         raise TraceError(
             f"sl.mod of {value!r}: a remainder is for rate*t + offset with numbers and parameters. Of a state it has no end of boundaries; "
             f"write a law that repeats in x with sl.sin and sl.cos."

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any, Union
+from typing import Any, Protocol, Union, runtime_checkable
 
 from saltus.errors import TraceError
 
@@ -211,6 +211,24 @@ def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
         yield
     finally:
         _OBSERVER.reset(token)
+
+
+def with_own_unit(make: Callable[[], Any]) -> Any:
+    """What ``make`` returns, made unobserved and of a unit that the observer can't know: numbers in it carry units of their own."""
+    observer = _OBSERVER.get()
+    with observed(None):
+        made = make()
+    if isinstance(observer, _LeavesOpen) and isinstance(made, Expr):
+        observer.leave_open(made)
+    return made
+
+
+@runtime_checkable
+class _LeavesOpen(Protocol):
+    """An observer that can be told to ask nothing about a node."""
+
+    def leave_open(self, node: Expr) -> None:
+        """Take the node as it is."""
 
 
 # -- conditions ----------------------------------------------------------------------------------------------------------------

@@ -135,8 +135,10 @@ def table(
     if not isinstance(x, Expr):
         return float(data(x))
     if ex.depends_on(x, ("state",)):
-        return _of_state(x, data)
-    if affine(x) is None or not ex.depends_on(x, ("time",)):
+        return ex.with_own_unit(lambda: _of_state(x, data))
+    with ex.observed(None):
+        line = affine(x)
+    if line is None or not ex.depends_on(x, ("time",)):
         raise TraceError(f"sl.table in {x!r}: look up at a state, or at rate*t + offset with numbers and parameters for the rest.")
     return Expr("table", (x,), data)
 
