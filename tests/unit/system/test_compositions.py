@@ -166,7 +166,7 @@ def test_measured_numbers_bring_their_own_units():
 @pytest.mark.parametrize("kind", ["linear", "pchip", "spline"])
 @pytest.mark.parametrize("outside", ["hold", "extend"])
 def test_a_table_in_a_state_is_the_same_curve_in_pieces(kind, outside):
-    points, values = [-1.0, -0.2, 0.5, 0.9, 2.0], [0.3, 0.3, 1.0, -2.0, 0.7]
+    points, values = [-1.0, -0.2, 0.5, 0.9, 2.0], [0.3, 0.4, 1.0, -2.0, 0.7]
     law = sl.system(states="x")(lambda t, x: -sl.table(x, points, values, kind, outside=outside))
     x = np.linspace(-2, 3, 301)
     by_guards = field(law, 0.0, [x])[0]
