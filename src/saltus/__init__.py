@@ -38,7 +38,34 @@ if TYPE_CHECKING:
     )
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import describe, load, save, to_csv, to_mat
-    from saltus.system import System, abs, atan, cos, exp, freeplay, log, max, min, pi, piecewise, sin, sqrt, system, tan, tanh
+    from saltus.system import (
+        System,
+        abs,
+        acos,
+        asin,
+        atan,
+        atan2,
+        clip,
+        cos,
+        cosh,
+        exp,
+        freeplay,
+        heaviside,
+        hypot,
+        log,
+        max,
+        min,
+        pi,
+        piecewise,
+        sign,
+        sin,
+        sinh,
+        sqrt,
+        system,
+        tan,
+        tanh,
+        where,
+    )
 
 #: Public name: module that holds it.
 _HOMES = {
@@ -51,14 +78,16 @@ _HOMES = {
         ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan", "tanh"),
         "saltus.system",
     ),
+    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "sign", "sinh", "where"), "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 
 __all__ = [
-    "ODE45", "Interrupted", "System", "Taylor", "abs", "atan", "attractors", "basin_fractions", "basins", "bifurcation_diagram",
-    "compare", "compare_methods", "cos", "describe", "energy_balance", "exp", "freeplay", "frequency_response",
-    "impact_statistics", "load", "log", "lyapunov", "max", "min", "models", "pi", "piecewise", "plot", "poincare", "save",
-    "settled", "simulate", "sin", "spectrum", "sqrt", "stroboscope", "system", "tan", "tanh", "to_csv", "to_mat", "wolf",
+    "ODE45", "Interrupted", "System", "Taylor", "abs", "acos", "asin", "atan", "atan2", "attractors", "basin_fractions", "basins",
+    "bifurcation_diagram", "clip", "compare", "compare_methods", "cos", "cosh", "describe", "energy_balance", "exp", "freeplay",
+    "frequency_response", "heaviside", "hypot", "impact_statistics", "load", "log", "lyapunov", "max", "min", "models", "pi", "piecewise",
+    "plot", "poincare", "save", "settled", "sign", "simulate", "sin", "sinh", "spectrum", "sqrt", "stroboscope", "system", "tan", "tanh",
+    "to_csv", "to_mat", "where", "wolf",
 ]  # fmt: skip
 
 
@@ -67,8 +96,9 @@ def __getattr__(name: str) -> Any:
         return importlib.import_module(f"saltus.{name}")
     if name not in _HOMES:
         from saltus.errors import nearest
+        from saltus.system.foreign import ADVICE
 
-        raise AttributeError(f"saltus has no {name!r}. {nearest(name, __all__)}")
+        raise AttributeError(f"saltus has no {name!r}. {ADVICE.get(name) or nearest(name, __all__)}")
     value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value
     return value

@@ -34,6 +34,16 @@ class SaltusWarning(UserWarning):
     """Something that doesn't stop the work but should be known: trajectories that ended early, a cache that can't be used."""
 
 
+class UnusedParameterWarning(SaltusWarning):
+    """A parameter of a system stands in none of its equations."""
+
+
+def shown(value: object, limit: int = 80) -> str:
+    """A value as a message shows it: at most so many characters of it."""
+    text = repr(value)
+    return text if len(text) <= limit else f"{text[: limit - 4]}...{text[-1]}"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """A sentence that offers the nearest known name, or lists all of them."""
     known = list(known)

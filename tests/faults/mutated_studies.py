@@ -56,10 +56,10 @@ TABLES_AND_LISTS = [
 ]  # fmt: skip
 VALUES = [f'"{text}"' for text in TEXTS] + NUMBERS + TABLES_AND_LISTS
 KEYS = [
-    "name", "model", "case", "force", "x", "v", "start", "periods", "keep", "samples", "t_end", "values", "map", "compare", "axes",
-    "axes.x", "axes.y", "count", "first", "scale", "order", "__class__", "model_config", "self", "__pydantic_extra__", "box", "seed", "every",
-    "at", "vary.gap", "sample", '""', '"a b"', r'"\u0000"', "ζ", "values.force", "forced_at", "__init__", "with_values", "system", "start.x",
-    "method", "flow", "printed", "measured", "exact",
+    "name", "model", "case", "force", "x", "v", "start", "periods", "keep", "samples", "t_end", "values", "map", "compare",
+    "axes", "axes.x", "axes.y", "count", "first", "scale", "order", "__class__", "model_config", "self", "__pydantic_extra__",
+    "box", "seed", "every", "at", "vary.gap", "sample", '""', '"a b"', r'"\u0000"', "ζ", "values.force", "forced_at", "__init__",
+    "with_values", "system", "start.x", "method", "flow", "printed", "measured", "exact",
 ]  # fmt: skip
 TABLES = [
     "study", "system", "method", "simulate", "compare", "lyapunov", "frequency_response", "bifurcation_diagram", "basins", "basins.map",

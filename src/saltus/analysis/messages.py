@@ -13,7 +13,7 @@ from saltus.units import from_si
 
 #: Statuses after which a trajectory's end is missing, each with advice.
 _ADVICE = {
-    st.SLIDING: "Sliding and sticking aren't followed yet; make the force continuous where the contact is met.",
+    st.SLIDING: "Sliding and sticking aren't followed yet. Make the force continuous there: friction as mu*N*sl.tanh(v/eps), eps small.",
     st.BUDGET_STEPS: "Raise max_steps of the method; if steps shrink towards one place, the equations are singular there.",
     st.BUDGET_EVENTS: "Contacts accumulate; give the contact a finite stiffness or damping, or raise max_events of the method.",
     st.NONFINITE: "The motion left the range of numbers, or a piece isn't analytic where it is entered (x**1.5 at x = 0: use sl.ODE45).",

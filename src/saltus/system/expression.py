@@ -44,7 +44,6 @@ class Expr:
     """
 
     __slots__ = ("__weakref__", "args", "op", "payload")
-    __array_ufunc__ = None  # a NumPy scalar on the left defers to our reflected operators
 
     op: str
     args: tuple[Expr, ...]
@@ -102,6 +101,28 @@ class Expr:
     def __abs__(self) -> Expr:
         return absolute(self)
 
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **keywords: Any) -> Any:
+        """A NumPy function of traced values is saltus's own."""
+        from saltus.system.foreign import traced_ufunc  # foreign.py builds on this module
+
+        return traced_ufunc(ufunc, method, inputs, keywords)
+
+    # -- what has no meaning here -----------------------------------------------------------------------------------------------
+    def __mod__(self, other: object) -> Expr:
+        raise TraceError(
+            f"an equation took the remainder {self!r} % {other!r}, which has no end of boundaries. A drive that repeats is written with "
+            f"sl.sin and sl.cos."
+        )
+
+    __rmod__ = __floordiv__ = __rfloordiv__ = __mod__
+
+    def __call__(self, *_arguments: object) -> Expr:
+        """Refused: the value of a state at another time."""
+        raise TraceError(
+            f"an equation called {self!r} as a function. There are no delays, x(t - tau): a rate depends on the states at the time t only. "
+            f"A product is written with *."
+        )
+
     # -- comparisons make guards ------------------------------------------------------------------------------------------------
     def __lt__(self, other: Operand) -> Relation:
         return Relation(sub(other, self))
@@ -135,8 +156,8 @@ class Expr:
 
     def __float__(self) -> float:
         raise TraceError(
-            "an equation passed a traced value to a function that needs a plain number (math.cos, float, numpy on arrays, ...). "
-            "Use saltus's own: sl.cos, sl.sin, sl.exp, sl.sqrt, sl.log, sl.tan, sl.atan, sl.tanh, sl.min, sl.max, abs."
+            "an equation passed a traced value to a function that needs a plain number (math.cos, float, int, np.interp, a spline, ...). "
+            "Write sl.cos in place of math.cos, sl.atan2 in place of math.atan2, and so on. " + _no_number()
         )
 
     __int__ = __float__
@@ -155,6 +176,18 @@ class Expr:
 
     def __deepcopy__(self, memo: dict) -> Expr:
         return self
+
+
+def _no_number() -> str:
+    from saltus.system.foreign import OWN_FUNCTIONS  # foreign.py builds on this module
+
+    return OWN_FUNCTIONS
+
+
+def _rebound() -> str:
+    from saltus.system.foreign import ADVICE  # foreign.py builds on this module
+
+    return ADVICE["impact"].partition(": ")[2]
 
 
 # -- conditions ----------------------------------------------------------------------------------------------------------------

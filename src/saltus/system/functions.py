@@ -62,7 +62,7 @@ def _extreme(first: Operand, others: tuple[Operand, ...], on_numbers: Callable, 
     return result
 
 
-def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand) -> Any:
+def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand | None = None) -> Any:
     """A value that differs from region to region: each comparison in a condition is a boundary where a contact can begin or end.
 
     Parameters
@@ -81,13 +81,17 @@ def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand) -> 
     Raises
     ------
     TraceError
-        If a piece isn't a pair of a value and a condition.
+        If a piece isn't a pair of a value and a condition, or ``otherwise`` is missing.
 
     Examples
     --------
     >>> piecewise((1.4e4 * (0.5e-3 - 0.4e-3), 0.5e-3 > 0.4e-3), otherwise=0.0)  # doctest: +ELLIPSIS
     1.4...
     """
+    if otherwise is None:
+        raise TraceError(
+            "sl.piecewise needs otherwise=, the value where no condition holds: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
+        )
     result: Any = otherwise
     for piece in reversed(pieces):
         value, condition = _pair(piece)

@@ -8,23 +8,23 @@ from __future__ import annotations
 import inspect
 import sysconfig
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from saltus.errors import ParameterError, TraceError, UnitError, nearest
+from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest
 from saltus.system import checks
-from saltus.system.expression import TIME, Expr, as_expr, parameter, state
+from saltus.system.expression import TIME, Expr, as_expr, parameter, state, walk
+from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
+from saltus.system.names import why_no_name, why_no_text, why_no_title
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
 _HERE = str(Path(__file__).parent.parent)
 _LIBRARIES = tuple({sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None})
-_HOW_TO = (
-    "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and saltus's own functions: sl.sqrt, sl.exp, sl.log, "
-    "sl.sin, sl.cos, sl.tan, sl.atan, sl.tanh, sl.min, sl.max, sl.abs. Functions of numpy, math, scipy and sympy can't be traced."
-)
+_HOW_TO = "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and functions that can be traced. " + OWN_FUNCTIONS
 
 
 def system(
@@ -82,7 +82,10 @@ def system(
     names = tuple(states.replace(",", " ").split()) if isinstance(states, str) else tuple(states)
 
     def decorate(function: Callable[..., Any]) -> System:
-        title = name or function.__name__
+        title, told = name or function.__name__.strip("<>"), inspect.getdoc(function) or ""
+        for what, text, why in (("name", title, why_no_title), ("source", source, why_no_text), ("docstring", told, why_no_text)):
+            if why(text) is not None:
+                raise TraceError(f"the {what} of a system can't be {text!r:.80}: {why(text)}.")
         defaults = _parameters(function, names, title)
         known_units = _units(names, defaults, forced_at, dict(units or {}), title)
         if forced_at is not None and known_units[forced_at] not in ("Hz", "rad/s"):
@@ -91,6 +94,7 @@ def system(
             )
         values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
         field, guards = _traced(function, names, tuple(defaults), title)
+        _warn_of_unused(field, guards, defaults, forced_at, title)
         return System(
             name=title,
             states=names,
@@ -100,7 +104,7 @@ def system(
             units=known_units,
             forced_at=forced_at,
             source=source,
-            description=inspect.getdoc(function) or "",
+            description=told,
         )
 
     return decorate
@@ -121,6 +125,8 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
             raise TraceError(
                 f"{title}: parameter {argument.name!r} has no default. Give it a value: {argument.name}=1.0, or text with a unit."
             )
+        elif (why := why_no_name(argument.name)) is not None:
+            raise TraceError(f"{title}: {argument.name!r} can't be the name of a parameter: {why}.")
         else:
             parameters[argument.name] = argument.default
     names = [argument.name for argument in positional]
@@ -137,8 +143,8 @@ def _check_states(states: tuple[str, ...], title: str) -> None:
     if not states:
         raise TraceError(f'{title}: states="" names no state. Write states="x v".')
     for name in states:
-        if not (isinstance(name, str) and name.isidentifier()):
-            raise TraceError(f"{title}: {name!r} can't be the name of a state. Use letters, digits and _.")
+        if (why := why_no_name(name)) is not None:
+            raise TraceError(f"{title}: {name!r} can't be the name of a state: {why}.")
     if len(set(states)) < len(states):
         raise TraceError(f"{title}: states={' '.join(states)!r} names a state twice.")
 
@@ -180,6 +186,19 @@ def _traced(function: Callable[..., Any], states: tuple[str, ...], parameters: t
         raise TraceError(f"{title} ({place(function)}): {error}") from error
 
 
+def _warn_of_unused(field: Any, guards: Any, parameters: Iterable[str], forced_at: str | None, title: str) -> None:
+    """Warn of parameters on which nothing depends: a name forgotten in the equation."""
+    used = {node.payload for node in walk(*field, *(guard.gap for guard in guards)) if node.op == "param"} | {forced_at}
+    if unused := [name for name in parameters if name not in used]:
+        one = len(unused) == 1
+        warnings.warn(
+            f"{title}: {', '.join(unused)} {'is' if one else 'are'} declared but the equations don't use {'it' if one else 'them'}: "
+            f"another value changes nothing. Use {'it' if one else 'them'}, or leave {'it' if one else 'them'} out.",
+            UnusedParameterWarning,
+            stacklevel=3,
+        )
+
+
 def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
     """What the function returned, as one expression per state."""
     if returned is None:
@@ -213,7 +232,9 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
         where += f": {frames[-1].line}" if frames[-1].line else ""
     if isinstance(error, TraceError):
         return f"{title} ({where}): {error}"
-    return f"{title} ({where}) can't be traced: {type(error).__name__}: {error}. {_HOW_TO}"
+    if isinstance(error, AttributeError) and str(error).startswith("saltus has no "):
+        return f"{title} ({where}): {error}"
+    return f"{title} ({where}) can't be traced: {type(error).__name__}: {str(error).rstrip('.?! ')}. {_HOW_TO}"
 
 
 def place(function: Callable[..., Any]) -> str:

@@ -6,6 +6,7 @@ import csv
 import re
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -15,7 +16,7 @@ from typer.testing import CliRunner
 
 from saltus.cli.app import app
 from saltus.errors import ParameterError
-from saltus.replication import claims_table, reproduce, run
+from saltus.replication import Check, Finding, claims_table, reproduce, run
 from saltus.replication.job import JobError
 from saltus.replication.verdict import HOLDS, UNDECIDED
 from saltus.results.durable import StoreError
@@ -150,8 +151,13 @@ def test_a_run_holds_the_folder_while_it_computes(tmp_path):
     assert len(refused) == 1
 
 
-# -- some figures ----------------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("figure", ["10", "fig10", "Fig. 10", "FIG.10", "figure 10"])
+def test_claims_that_fail_come_first(tmp_path):
+    paper = small_paper(judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite"))
+    failing, holding = paper.claims
+    text = page(reproduce(replace(paper, claims=(holding, failing)), tmp_path))
+    assert text.index(f'href="#{failing.id}"') < text.index(f'href="#{holding.id}"')
+
+
 def test_a_figure_has_a_report_of_its_own(tmp_path, figure):
     result = reproduce(small_paper(), tmp_path, [figure])
     assert result.figures == ("10",)

@@ -1,0 +1,73 @@
+"""Functions of other packages in an equation: what saltus calls them, and what to write for those that it hasn't."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from saltus.errors import TraceError
+from saltus.system import compositions as made
+from saltus.system import functions as own
+from saltus.system.expression import as_expr
+
+#: NumPy's ufuncs that an equation may call, by their names: the traced function that each stands for.
+UFUNCS: dict[str, Callable[..., Any]] = {
+    "add": operator.add, "subtract": operator.sub, "multiply": operator.mul, "divide": operator.truediv, "power": operator.pow,
+    "float_power": operator.pow, "negative": operator.neg, "positive": operator.pos, "absolute": abs, "fabs": abs,
+    "square": lambda a: a * a, "reciprocal": lambda a: 1.0 / a,
+    "greater": operator.gt, "greater_equal": operator.ge, "less": operator.lt, "less_equal": operator.le,
+    "equal": operator.eq, "not_equal": operator.ne, "maximum": own.max, "minimum": own.min, "fmax": own.max, "fmin": own.min,
+    "sqrt": own.sqrt, "exp": own.exp, "log": own.log, "sin": own.sin, "cos": own.cos, "tan": own.tan, "tanh": own.tanh,
+    "arctan": own.atan, "arcsin": made.asin, "arccos": made.acos, "arctan2": made.atan2, "sinh": made.sinh, "cosh": made.cosh,
+    "hypot": made.hypot, "sign": made.sign, "heaviside": made.heaviside, "deg2rad": lambda a: a * (own.pi / 180),
+    "radians": lambda a: a * (own.pi / 180), "rad2deg": lambda a: a * (180 / own.pi), "degrees": lambda a: a * (180 / own.pi),
+}  # fmt: skip
+
+_STOP = (
+    "a stiff spring and damper, stop = sl.piecewise((k*(x - gap) + c*v, x > gap), otherwise=0), with c = 2*z*sqrt(k*mass) and "
+    "z = -log(e)/sqrt(pi**2 + log(e)**2) rebounds with e"
+)
+#: Names that people look for in saltus, and what to write in their place.
+ADVICE: dict[str, str] = {
+    "arctan2": "Write sl.atan2(y, x).", "arctan": "Write sl.atan.", "arcsin": "Write sl.asin.", "arccos": "Write sl.acos.",
+    "absolute": "Write sl.abs or abs.", "fabs": "Write sl.abs or abs.", "maximum": "Write sl.max.", "minimum": "Write sl.min.",
+    "square": "Write x**2.", "pow": "Write x**2.", "power": "Write x**2.", "signum": "Write sl.sign.",
+    "step": "Write sl.heaviside(t - t0).",
+    "select": "Write sl.where or sl.piecewise.", "Piecewise": "Write sl.piecewise((value, condition), otherwise=...).",
+    "erf": "There is none; sl.tanh is the nearest smooth step.", "log10": "Write sl.log(x)/math.log(10).",
+    "expm1": "Write sl.exp(x) - 1.", "log1p": "Write sl.log(1 + x).",
+    "impact": f"An instantaneous impact isn't supported yet: {_STOP}.",
+    "restitution": f"An instantaneous impact isn't supported yet: {_STOP}.",
+    "delay": "There are no delays: a rate depends on the states at the time t only.",
+    "friction": "Write mu*normal*sl.tanh(v/eps), with eps small against the sliding speed: it sticks by creeping.",
+    "continuation": "There is no continuation by arc length; sl.frequency_response and sl.bifurcation_diagram follow branches.",
+    "solve": "Write sl.simulate(system, start, t_end=...).", "solve_ivp": "Write sl.simulate(system, start, t_end=...).",
+    "integrate": "Write sl.simulate(system, start, t_end=...).",
+}  # fmt: skip
+
+
+def traced_ufunc(ufunc: Any, method: str, inputs: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
+    """What a NumPy ufunc gives for traced values.
+
+    Raises
+    ------
+    TraceError
+        If saltus has no such function, or the call asks for more than the function of its operands.
+    """
+    name = ufunc.__name__
+    if method != "__call__" or keywords or name not in UFUNCS:
+        raise TraceError(
+            f"an equation called np.{name}{'' if method == '__call__' else '.' + method} on a traced value, which can't be traced. "
+            f"{ADVICE.get(name, OWN_FUNCTIONS)}"
+        )
+    if name == "heaviside":
+        inputs = inputs[:1]
+    return UFUNCS[name](*map(as_expr, inputs))
+
+
+#: The functions that an equation may call, as a sentence.
+OWN_FUNCTIONS = (
+    "Use saltus's own: sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.asin, sl.acos, sl.atan, sl.atan2, sl.sinh, sl.cosh, sl.tanh, "
+    "sl.hypot, sl.abs, sl.sign, sl.heaviside, sl.min, sl.max, sl.clip, sl.where, sl.piecewise."
+)
