@@ -104,6 +104,13 @@ def test_a_failed_job_is_an_error_of_ours(tmp_path):
         assert isinstance(workers.wait_for("2", lambda _: None)["fig2/second"], JobError)
 
 
+def test_claims_that_fail_come_first(tmp_path):
+    paper = small_paper(judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite"))
+    failing, holding = paper.claims
+    text = page(reproduce(replace(paper, claims=(holding, failing)), tmp_path))
+    assert text.index(f'href="#{failing.id}"') < text.index(f'href="#{holding.id}"')
+
+
 # -- it is stopped ---------------------------------------------------------------------------------------------------------------
 def test_ctrl_c_stops_the_other_threads_and_keeps_what_is_done(tmp_path):
     ended = []
@@ -151,13 +158,8 @@ def test_a_run_holds_the_folder_while_it_computes(tmp_path):
     assert len(refused) == 1
 
 
-def test_claims_that_fail_come_first(tmp_path):
-    paper = small_paper(judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite"))
-    failing, holding = paper.claims
-    text = page(reproduce(replace(paper, claims=(holding, failing)), tmp_path))
-    assert text.index(f'href="#{failing.id}"') < text.index(f'href="#{holding.id}"')
-
-
+# -- some figures ----------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("figure", ["10", "fig10", "Fig. 10", "FIG.10", "figure 10"])
 def test_a_figure_has_a_report_of_its_own(tmp_path, figure):
     result = reproduce(small_paper(), tmp_path, [figure])
     assert result.figures == ("10",)
