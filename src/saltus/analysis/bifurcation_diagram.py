@@ -9,7 +9,7 @@ import xarray as xr
 
 from saltus.analysis.grid import grid_of
 from saltus.analysis.response_table import respond
-from saltus.analysis.samples import check_sample
+from saltus.analysis.samples import check_sample, check_unforced_sample
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method, check_method
 from saltus.system.system import System
@@ -26,6 +26,7 @@ def bifurcation_diagram(
     values: Mapping[str, Any] | None = None,
     method: Method | None = None,
     periods: int = 2000,
+    every: float | str | None = None,
     seed: int = 1,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
@@ -66,5 +67,6 @@ def bifurcation_diagram(
         raise ParameterError('vary must be a mapping, such as vary={"contact_stiffness": ("1e3 N/m", "1e9 N/m", 200, "log")}.')
     method = check_method(method)
     check_sample(sample, method)
-    grid = grid_of(system, vary, start, box, values, seed, follow)
+    grid = grid_of(system, vary, start, box, values, seed, follow, every)
+    check_unforced_sample(sample, grid.system)
     return respond(grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "")

@@ -63,6 +63,20 @@ def _look(family: Family, start: np.ndarray, rows: np.ndarray, n: int, samples: 
         result.contacts[rows] = outcome.counters[:, st.EVENTS] / n
 
 
+def at_rest(family: Family, place: np.ndarray, rows: np.ndarray, result: Looks) -> None:
+    """Fill in the rows of equilibria: their size, no contacts, and the distance to the nearest boundary."""
+    result.peak[rows] = result.rms[rows] = np.abs(place[:, 0])
+    if family.method.records_contacts:
+        result.contacts[rows] = 0.0
+    states, values = dict(zip(family.system.states, place.T, strict=True)), family.values
+    nearest, bits = np.full(len(rows), np.inf), []
+    for guard in family.system.guards:
+        (gap,) = evaluate([guard.gap], states=states, values=values, bits=bits)
+        bits.append(np.broadcast_to(gap, len(rows)) > 0)
+        nearest = np.minimum(nearest, np.abs(gap))
+    result.margin[rows] = nearest
+
+
 def margin(system: System, time: np.ndarray, motion: np.ndarray, values: Mapping[str, Any]) -> np.ndarray:
     """Smallest size of a gap where it turns, on either side of the boundary: how far a motion is from a graze.
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.grid import Grid
-from saltus.analysis.looks import looks
+from saltus.analysis.looks import at_rest, looks
 from saltus.analysis.recurrence import SAME
-from saltus.analysis.steady import CHAOTIC, PERIODIC, QUASI_PERIODIC, Steady, settle_each
+from saltus.analysis.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE, PERIODIC, QUASI_PERIODIC, Steady, settle_each
+from saltus.analysis.unforced import multipliers_and_eigenvalues
 from saltus.analysis.wandering import Wandering, alike
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
@@ -18,7 +19,9 @@ from saltus.results import AttractorTable
 from saltus.results.intervals import wilson
 
 #: Words for the kinds of motion.
-KINDS = {PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic"}
+KINDS = {
+    PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic", EQUILIBRIUM: "equilibrium", LIMIT_CYCLE: "limit_cycle",
+}  # fmt: skip
 #: Samples of a period from which peaks and margins are taken, and periods of a motion that never repeats.
 SAMPLES, WANDERED = 256, 64
 
@@ -56,8 +59,13 @@ class Found:
 
     @property
     def period(self) -> np.ndarray:
-        """n of its nT, 0 if it doesn't repeat, int64[m]."""
+        """Points by which each is known: n of an nT, 1 of an equilibrium, 0 if it doesn't repeat, int64[m]."""
         return self.steady.orbits.period[self.row]
+
+    @property
+    def time(self) -> np.ndarray:
+        """Period of each limit cycle [s], 0 of an equilibrium, NaN of what follows a forcing, float64[m]."""
+        return self.steady.orbits.time[self.row]
 
     def points(self, response: int) -> np.ndarray:
         """Its stroboscopic points, float64[n, D]."""
@@ -123,7 +131,9 @@ def _same(result: Steady, a: int, b: int, tolerance: float) -> bool:
     """Whether two trajectories at one value settled to the same response."""
     if result.kind[a] != result.kind[b] or result.orbits.period[a] != result.orbits.period[b]:
         return False
-    if result.kind[a] == PERIODIC:
+    if result.kind[a] == LIMIT_CYCLE and abs(result.orbits.time[a] / result.orbits.time[b] - 1.0) > tolerance:
+        return False
+    if result.kind[a] in CLOSED:
         return bool(result.orbits.distance(result.orbits.points[[b], 0], result.scale[[a]], [a])[0] < tolerance)
     first, second = (Wandering("", 0.0, 0.0, result.trail[row], result.scale[a]) for row in (a, b))
     return alike(first, second)
@@ -139,10 +149,15 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
 
 def table_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> AttractorTable:
     """What is known of each response."""
-    family = grid.family(method, threads).rows(found.place)
-    period, kind, s = found.period, found.kind, found.steady
-    spans = np.where(period > 0, period, WANDERED)
+    looked = grid.family(method, threads).rows(found.place)
+    family = looked if grid.every is None else looked.every(own_times(found, grid))
+    kind, s, spans = found.kind, found.steady, spans_of(found)
+    period = np.where(kind == PERIODIC, found.period, 0)
     look = looks(family, found.start(), spans, SAMPLES)
+    rests = kind == EQUILIBRIUM
+    if rests.any():
+        at_rest(looked.rows(rests), found.start()[rests], np.flatnonzero(rests), look)
+    multipliers, eigenvalues = multipliers_and_eigenvalues(s.orbits.multipliers[found.row], rests)
     hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
     low, high = wilson(hits, len(grid.starts))
     shares = (hits / len(grid.starts), low, high) if grid.drawn else None
@@ -154,9 +169,20 @@ def table_of(found: Found, grid: Grid, method: Method, threads: int | None = Non
         peak=look.peak,
         rms=look.rms,
         margin=look.margin,
-        multipliers=s.orbits.multipliers[found.row],
-        exponent=s.exponent[found.row] / family.period,
-        exponent_error=s.exponent_error[found.row] / family.period,
-        points=[found.points(i)[:span] for i, span in enumerate(spans)],
+        multipliers=multipliers,
+        exponent=s.exponent[found.row] / looked.period,
+        exponent_error=s.exponent_error[found.row] / looked.period,
+        points=[found.points(i)[: int(known)] for i, known in enumerate(np.where(found.period > 0, found.period, WANDERED))],
         fractions=shares,
+        **({} if grid.every is None else {"cycle": np.where(kind == LIMIT_CYCLE, found.time, np.nan), "eigenvalues": eigenvalues}),
     )
+
+
+def spans_of(found: Found) -> np.ndarray:
+    """Periods over which each response is looked at, int64[m]: a whole response; one cycle; many of one that never repeats."""
+    return np.where(found.kind == PERIODIC, found.period, np.where(found.period > 0, 1, WANDERED))
+
+
+def own_times(found: Found, grid: Grid) -> np.ndarray | None:
+    """Time of one of these periods [s], of a system without forcing: that of the limit cycle, else that between two looks."""
+    return None if grid.every is None else np.where(found.time > 0, found.time, grid.every)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.analysis.grid import Grid
-from saltus.analysis.responses import WANDERED, Found
+from saltus.analysis.responses import Found, own_times, spans_of
+from saltus.analysis.steady import EQUILIBRIUM
 from saltus.errors import ParameterError, nearest
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.family import Family
@@ -32,22 +33,31 @@ def check_sample(sample: str, method: Method) -> str:
     return sample
 
 
+def check_unforced_sample(sample: str, system: System) -> None:
+    """Raises ParameterError if a system without forcing can't show it."""
+    if sample == "stroboscope" and system.forced_at is None:
+        raise ParameterError(f'{system.name} has no forcing period: it has no stroboscope. Take sample="turning_points" or "contacts".')
+
+
 def sampled(sample: str, grid: Grid, method: Method, found: Found, threads: int | None = None) -> list[np.ndarray]:
     """The sampled states of each response, float64[n, D], over one period of a response, or many of one that never repeats.
 
     Turning points are crossings of the surface on which the first state's rate is zero, located by the Taylor flow as contacts are; those
     of ode45, whose steps an extra event would change, are interpolated between its samples by cubics.
     """
-    spans = np.where(found.period > 0, found.period, WANDERED)
+    spans = spans_of(found)
     if sample == "stroboscope":
         return [found.points(i)[:span] for i, span in enumerate(spans)]
     turning = sample == "turning_points"
     located = not isinstance(method, ODE45)
     system = turning_surface(grid.system, grid.system.states[0]) if turning and located else grid.system
     start, result = found.start(), [np.zeros((0, len(system.states)))] * len(found)
-    everything = Family(system, method, grid.rows[found.place], threads=threads)
-    for span in np.unique(spans):
-        rows = np.flatnonzero(spans == span)
+    everything = Family(system, method, grid.rows[found.place], own_times(found, grid), threads)
+    moves = found.kind != EQUILIBRIUM
+    for rest in np.flatnonzero(~moves):
+        result[rest] = found.points(int(rest))[:1]
+    for span in np.unique(spans[moves]):
+        rows = np.flatnonzero(moves & (spans == span))
         for first in range(0, len(rows), PIECE):
             some = rows[first : first + PIECE]
             family = everything.rows(some)
