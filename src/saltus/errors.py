@@ -38,6 +38,12 @@ class UnusedParameterWarning(SaltusWarning):
     """A parameter of a system stands in none of its equations."""
 
 
+def shown(value: object, limit: int = 80) -> str:
+    """A value as a message shows it: at most so many characters of it."""
+    text = repr(value)
+    return text if len(text) <= limit else f"{text[: limit - 4]}...{text[-1]}"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """A sentence that offers the nearest known name, or lists all of them."""
     known = list(known)

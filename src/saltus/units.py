@@ -4,8 +4,8 @@ A declared unit is a product of coherent SI units (``"m"``, ``"N/m^3"``, ``"Hz"`
 SI. The angle is kept as a dimension of its own where it decides between a frequency [Hz] and an angular frequency [rad/s]: ``"94.2 rad/s"``
 given to a parameter in Hz is divided by 2 pi, and a bare rate in 1/s, which could mean either, is refused.
 
-pint is imported when the first text arrives, not before. Its arithmetic runs on decimals: ``"0.4 mm"`` is the double nearest to 0.0004,
-``"900 rpm"`` is 15 Hz exactly.
+Which units can be read is told by a table of our own (unit_table.py, docs/decisions/0020). Its arithmetic runs on decimals: ``"0.4 mm"`` is
+the double nearest to 0.0004, ``"900 rpm"`` is 15 Hz exactly.
 """
 
 from __future__ import annotations
@@ -16,21 +16,17 @@ import numbers
 import re
 from collections.abc import Mapping
 from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
-from saltus.errors import ParameterError, UnitError
+from saltus.errors import ParameterError, UnitError, shown
+from saltus.unit_table import COHERENT, DOUBTFUL, Unit, read_unit
 
-#: Symbols that a declared unit may be made of: the coherent SI units, whose conversion factors are all 1.
-COHERENT = ("m", "kg", "s", "rad", "Hz", "N", "Pa", "J", "W", "K", "A", "V", "C", "F", "H", "T", "Wb", "ohm")
-
-_LONG_NAMES = {
-    "meter": "m", "kilogram": "kg", "second": "s", "radian": "rad", "hertz": "Hz", "newton": "N", "pascal": "Pa", "joule": "J", "watt": "W",
-    "kelvin": "K", "ampere": "A", "volt": "V", "coulomb": "C", "farad": "F", "henry": "H", "tesla": "T", "weber": "Wb", "ohm": "ohm",
-}  # fmt: skip
-_TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*((?:1/|[^\d\s.,]).*?)?\s*", re.DOTALL)
-_DECLARED = re.compile(r"(?:1|[A-Za-z]+)(?:(?:\^|\*\*)-?\d)?(?:[*/ ](?:1|[A-Za-z]+)(?:(?:\^|\*\*)-?\d)?)*")
-_HEAD = re.compile(r"(?:m|s|Hz|N|Pa|J|W|V|A)(?=$|[*/])")
+_NUMBER = re.compile(r"\s*(?P<number>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?(?P<tens>[0-9]+))?)(?P<unit>.*)", re.DOTALL)
+_HEAD = re.compile(r"(?:m|s|Hz|Nms|Nm|Ns|N|Pa|J|W|V|A)(?=$|[*/])")
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+#: The longest text that is read as a quantity: the longest that anybody writes has some 30 characters.
+LONGEST = 100
 
 
 # -- declared units ------------------------------------------------------------------------------------------------------------
@@ -40,7 +36,7 @@ def check_declared(unit: str, name: str) -> str:
     Parameters
     ----------
     unit : str
-        Such as ``"N/m"``, ``"kg*m^2"``, ``"1"`` (a plain number) or ``""`` (not known).
+        Such as ``"N/m"``, ``"kg*m^2"``, ``"N/m^1.5"``, ``"1"`` (a plain number) or ``""`` (not known).
     name : str
         What carries the unit; used in the message.
 
@@ -55,52 +51,52 @@ def check_declared(unit: str, name: str) -> str:
         If it can't be read, or isn't coherent (``"mm"``): numbers inside equations are in SI.
     """
     if not isinstance(unit, str):
-        raise UnitError(f"the unit of {name!r} is {unit!r}; write it as text, such as 'N/m'.")
+        raise UnitError(f"the unit of {name!r} is {shown(unit)}; write it as text, such as 'N/m'.")
     unit = re.sub(r"\s*([*/])\s*", r"\1", unit.strip())
     unit = "1" if unit == "dimensionless" else unit
     if not unit:
         return unit
-    strange = [symbol for symbol in re.findall(r"[^\W\d]+|[µΩ%°]", unit) if symbol not in COHERENT]
-    if strange:
+    try:
+        parsed = _parsed(unit)
+    except UnitError as error:
+        raise UnitError(f"the unit {shown(unit)} of {name!r} can't be read: {error}. Write it like {_LIKE_DECLARED}.") from None
+    if parsed.factor != 1 or parsed.pi:
         raise UnitError(
-            f"{name!r} is declared in {unit!r}, but {strange[0]!r} isn't a coherent SI unit. Numbers inside equations are in SI: declare "
-            f"it by {', '.join(COHERENT[:8])}, ..., and give values as text, such as '0.4 mm', which is converted."
+            f"{name!r} is declared in {shown(unit)}, which isn't a coherent SI unit. Numbers inside equations are in SI: declare it by "
+            f"{', '.join(list(COHERENT)[:8])}, ..., such as {_join(parsed.parts)!r}, and give values as text, such as '0.4 mm', which is "
+            "converted."
         )
-    if not _DECLARED.fullmatch(unit):
-        raise UnitError(f"the unit {unit!r} of {name!r} can't be read. Write it like 'N/m', 'N*s/m', 'kg*m^2/s^2' or '1'.")
-    return unit
+    own = all(symbol in COHERENT or symbol in ("Nm", "Ns", "Nms") for symbol in re.findall(r"[^\W\d_]+", unit))
+    return unit if own else _join(parsed.parts)
+
+
+_LIKE_DECLARED = "'N/m', 'N*s/m', 'kg*m^2/s^2' or '1'"
 
 
 def coherent_unit(text: str, name: str) -> str:
-    """The coherent SI unit in which a text value is kept: ``"14 kN/m"`` gives ``"N/m"``, ``"0.4 mm"`` gives ``"m"``, ``"900 rpm"``
-    gives ``"rad/s"``.
+    """The coherent SI unit in which a text value is kept: ``"14 kN/m"`` gives ``"N/m"``, ``"0.4 mm"`` gives ``"m"``, ``"2 lbf/in"`` gives
+    ``"N/m"``, ``"900 rpm"`` gives ``"rad/s"``.
 
     Raises
     ------
     UnitError
-        If the text can't be read.
+        If the text can't be read, or its unit has several meanings and nothing says which: ``"2 g"``.
     """
     number, unit = _split(text, name)
-    if not unit:
+    if unit is None:
         return "1"
-    registry = _registry()
-    parts: dict[str, int | float] = {}
-    for symbol, exponent in _read(unit, text, name, number).unit_items():
-        bare = registry.parse_unit_name(symbol)[0][1]
-        known = _LONG_NAMES.get(bare if bare != "gram" else "kilogram")
-        roots = {known: 1} if known else {
-            _LONG_NAMES[root]: power for root, power in registry.Quantity(1, symbol).to_base_units().unit_items() if root in _LONG_NAMES
-        }  # fmt: skip
-        for root, power in roots.items():
-            parts[root] = parts.get(root, 0) + int(power * exponent)
-    return _join(parts)
+    _refuse_doubtful(unit, number, text, name)
+    return _join(unit.parts)
 
 
-def _join(parts: Mapping[str, int | float]) -> str:
+def _join(parts: Mapping[str, Fraction]) -> str:
     """A unit written from exponents: ``{"N": 1, "m": -3}`` gives ``"N/m^3"``."""
 
-    def power(symbol: str, exponent: int | float) -> str:
-        return symbol if exponent == 1 else f"{symbol}^{exponent}"
+    def power(symbol: str, exponent: Fraction) -> str:
+        if exponent == 1:
+            return symbol
+        exact = exponent.denominator == 1 or 10**6 % exponent.denominator == 0
+        return f"{symbol}^{_plain(Decimal(exponent.numerator) / exponent.denominator)}" if exact else f"{symbol}^({exponent})"
 
     above = "*".join(power(symbol, exponent) for symbol, exponent in parts.items() if exponent > 0)
     below = "".join("/" + power(symbol, -exponent) for symbol, exponent in parts.items() if exponent < 0)
@@ -114,7 +110,8 @@ def to_si(value: Any, unit: str, name: str) -> float:
     Parameters
     ----------
     value : float or str or pint.Quantity
-        A bare number is in the declared unit already. Text holds number and unit: ``"0.4 mm"``, ``"14 kN/m"``, ``"900 rpm"``.
+        A bare number is in the declared unit already. Text holds number and unit: ``"0.4 mm"``, ``"14 kN/m"``, ``"900 rpm"``; it has at
+        most 100 characters.
     unit : str
         The declared unit (coherent SI), ``"1"`` for a plain number, ``""`` if not known: text is then taken to SI base units, except
         frequencies, which need a declaration.
@@ -129,102 +126,106 @@ def to_si(value: Any, unit: str, name: str) -> float:
     Raises
     ------
     UnitError
-        If the unit is missing, unknown, of another dimension, or may mean Hz as well as rad/s.
+        If the unit is missing, unknown, of another dimension, or has several meanings.
     ParameterError
         If the value isn't a finite real number.
     """
-    if hasattr(value, "magnitude") and hasattr(value, "units"):
+    if hasattr(value, "magnitude") and hasattr(value, "units"):  # a Quantity of pint
         value = f"{value.magnitude} {value.units}"
     if isinstance(value, str):
         number = _convert(value, unit, name)
     elif isinstance(value, bool) or not (isinstance(value, numbers.Real | Decimal) or getattr(value, "shape", None) == ()):
-        raise ParameterError(f"{name} = {value!r} is not a number. Write a number in SI, or text with a unit, such as {_example(unit)!r}.")
+        raise ParameterError(
+            f"{name} = {shown(value)} is not a number. Write a number in SI, or text with a unit, such as {_example(unit)!r}."
+        )
     else:
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
     if not math.isfinite(number):
-        raise ParameterError(f"{name} = {value!r} is not a finite number.")
+        raise ParameterError(f"{name} = {shown(value)} is not a finite number.")
     return number
 
 
 def _convert(text: str, unit: str, name: str) -> float:
     """Text to the number in the declared unit."""
     number, given = _split(text, name)
-    if not given:
+    if given is None:
         if unit not in ("", "1"):
             raise UnitError(
-                f"{name} = {text!r} has no unit; it is measured in {unit}. Write {f'{text.strip()} {unit}'!r}, or the bare number "
-                f"{text.strip()} if it is in {unit} already."
+                f"{name} = {shown(text)} has no unit; it is measured in {unit}. Write {shown(f'{text.strip()} {unit}')}, or the bare "
+                f"number {text.strip()} if it is in {unit} already."
             )
-        return float(number)
-    factor, dimension, angle, turns = _root(_read(given, text, name, number))
+        return _double(number, text, name)
+    dimension, angle = _without_angle(given)
     if unit == "":
-        if set(dimension) == {"second"}:
+        if set(dimension) == {"s"}:
             raise UnitError(
-                f"{name} = {text!r}, but the unit of {name} isn't known, and a frequency in Hz and an angular one in rad/s are different "
-                f"numbers. Declare it: units={{{name!r}: 'Hz'}} or 'rad/s'; or give the bare number that the equation uses."
+                f"{name} = {shown(text)}, but the unit of {name} isn't known, and a frequency in Hz and an angular one in rad/s are "
+                f"different numbers. Declare it: units={{{name!r}: 'Hz'}} or 'rad/s'; or give the bare number that the equation uses."
             )
-        return float(factor * Decimal(1000) ** -int(dimension.get("gram", 0)))
-    own_factor, own_dimension, own_angle, own_turns = _root(_registry().Quantity(Decimal(1), "dimensionless" if unit == "1" else unit))
+        _refuse_doubtful(given, number, text, name)
+        return _double(given.convert(number, Unit({"Hz": given.turns})), text, name)
+    own = _parsed(unit)
+    own_dimension, own_angle = _without_angle(own)
     if dimension != own_dimension:
+        _refuse_doubtful(given, number, text, name)
         expected = "a plain number" if unit == "1" else f"measured in {unit}"
-        raise UnitError(f"{name} = {text!r} has the wrong unit: {name} is {expected}. Write it like {_example(unit)!r}.")
-    if angle != own_angle and set(dimension) <= {"second"}:
+        raise UnitError(f"{name} = {shown(text)} has the wrong unit: {name} is {expected}. Write it like {_example(unit)!r}.")
+    if angle != own_angle and set(dimension) <= {"s"}:
         raise UnitError(
-            f"{name} = {text!r} can't be told apart: {name} is {f'measured in {unit}' if unit != '1' else 'a plain number'}, and an angle "
-            f"(rad, turns, Hz = turns per second) isn't a plain number here. Say Hz, rpm, rad/s or rad where you mean it, or give the bare "
-            f"number{f' in {unit}' if unit != '1' else ''}."
+            f"{name} = {shown(text)} can't be told apart: {name} is {f'measured in {unit}' if unit != '1' else 'a plain number'}, and an "
+            f"angle (rad, turns, Hz = turns per second) isn't a plain number here. Say Hz, rpm, rad/s or rad where you mean it, or give "
+            f"the bare number{f' in {unit}' if unit != '1' else ''}."
         )
-    if turns != own_turns:
-        factor *= _turn() ** (turns - own_turns)
-    return float(factor / own_factor)
+    return _double(given.convert(number, own), text, name)
 
 
-def _split(text: str, name: str) -> tuple[Decimal, str]:
-    """Number and unit of a text value."""
-    match = _TEXT.fullmatch(text.replace("\N{MINUS SIGN}", "-"))
-    if match is None:
+def _double(number: Decimal, text: str, name: str) -> float:
+    """The number as a double; neither overflow nor underflow goes unsaid."""
+    double = float(number)
+    if math.isinf(double) or (number and not double):
+        raise UnitError(f"{name} = {shown(text)} is too {'large' if double else 'small'} for a number of the computer.")
+    return double
+
+
+def _split(text: str, name: str) -> tuple[Decimal, Unit | None]:
+    """Number and unit of a text value; None where no unit is written."""
+    match = _NUMBER.fullmatch(text.replace("\N{MINUS SIGN}", "-")) if len(text) <= LONGEST else None
+    if match is None or match["unit"].startswith(","):
         hint = " Write a decimal point, not a comma." if re.match(r"\s*[+-]?\d+,\d", text) else ""
-        raise UnitError(f"{name} = {text!r} can't be read as a number and a unit, such as '0.4 mm' or '1.4e4 N/m'.{hint}")
-    return Decimal(match[1]), match[2] or ""
-
-
-def _read(unit: str, text: str, name: str, number: Decimal) -> Any:
-    """A pint quantity, or a UnitError that teaches."""
-    registry = _registry()
+        raise UnitError(f"{name} = {shown(text)} can't be read as a number and a unit, such as '0.4 mm' or '1.4e4 N/m'.{hint}")
+    if len((match["tens"] or "").lstrip("0")) > 4:
+        raise UnitError(f"{name} = {shown(text)} has an exponent beyond the numbers of the computer.")
+    number, unit = Decimal(match["number"]), match["unit"].strip()
+    if not unit:
+        return number, None
     try:
-        return registry.Quantity(number, registry.parse_units(unit))
-    except Exception as error:  # pint raises a dozen types, tokenize's among them, for text that it can't read
+        return number, _parsed(unit)
+    except UnitError as error:
         raise UnitError(
-            f"{name} = {text!r}: the unit {unit!r} can't be read ({error}). Write it like mm, N/m, kN/mm, N*s/m, kg*m^2, Hz, rpm or rad/s."
+            f"{name} = {shown(text)}: the unit {shown(unit)} can't be read: {error}. Write it like mm, N/m, kN/mm, N*s/m, kg*m^2, Hz, rpm "
+            "or rad/s."
         ) from None
 
 
-def _root(quantity: Any) -> tuple[Decimal, dict[str, Any], int, int]:
-    """Value in root units but for turns, exponents of the root units without the angle, exponent of the angle, turns (2 pi) to multiply.
-
-    A hertz is one turn a second.
-    """
-    root = quantity.to_root_units()
-    dimension = dict(root.unit_items())
-    turns = int(sum(exponent for symbol, exponent in quantity.unit_items() if symbol.endswith("hertz")))
-    return root.magnitude, dimension, int(dimension.pop("radian", 0)) + turns, turns
+@functools.lru_cache(maxsize=1024)
+def _parsed(unit: str) -> Unit:
+    return Unit() if unit == "1" else read_unit(unit)
 
 
-@functools.cache
-def _registry() -> Any:
-    """The private pint registry, on decimals."""
-    import pint
-
-    return pint.UnitRegistry(non_int_type=Decimal)
+def _refuse_doubtful(unit: Unit, number: Decimal, text: str, name: str) -> None:
+    """Raise if a symbol of the unit has several meanings."""
+    for symbol in unit.doubtful:
+        raise UnitError(f"{name} = {shown(text)}: {symbol!r} {DOUBTFUL[symbol].format(number)}.")
 
 
-@functools.cache
-def _turn() -> Decimal:
-    """One turn in radians."""
-    return _registry().Quantity(Decimal(1), "turn").to_root_units().magnitude
+def _without_angle(unit: Unit) -> tuple[dict[str, Fraction], Fraction]:
+    """Exponents of the base units but the angle; that of the angle."""
+    dimension = unit.dimension
+    angle = dimension.pop("rad", Fraction(0))
+    return dimension, angle
 
 
 # -- SI to text ----------------------------------------------------------------------------------------------------------------

@@ -13,9 +13,9 @@ from saltus.analysis.answers import gap_unit, guards_over, provenance
 from saltus.analysis.grid import Grid
 from saltus.analysis.responses import Found, find, table_of
 from saltus.analysis.samples import sampled
-from saltus.flow.engine import Interrupted
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.interrupt import Interrupted
 from saltus.results import Events, Responses, Starts, responses_dataset
 
 

@@ -70,7 +70,7 @@ def fail(text: str) -> None:
 def working() -> Iterator[Callable[[float], None]]:
     """Show that something is being computed, and afterwards how long it took; yields what to call with the share done."""
     begin = time.perf_counter()
-    with console(stderr=True).status("compiling the equations, if they are new here (about 20 s) ...") as status:
+    with console(stderr=True).status("working ...") as status:
         yield lambda share: status.update(f"integrating, {share:.0%} ...")
     say(f"computed in {time.perf_counter() - begin:.1f} s")
 
@@ -83,7 +83,7 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
     """
     begin, shown = time.perf_counter(), [0.0]
     if kind == "bar":
-        with console(stderr=True).status("compiling the equations, if they are new here (about 20 s) ...") as status:
+        with console(stderr=True).status("working ...") as status:
             yield lambda report: status.update(_progress_text(report)), say
         say(f"computed in {time.perf_counter() - begin:.1f} s")
         return
@@ -96,7 +96,14 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
             told = {"question": report.name, "done": report.done, "total": report.total, "seconds": report.seconds, "seconds_left": left}
             print(json.dumps(told), file=sys.stderr, flush=True)  # noqa: T201
 
-    yield report_json, say if kind != "json" else lambda _: None
+    def tell_json(text: str) -> None:
+        if kind == "json":
+            print(json.dumps({"note": text}), file=sys.stderr, flush=True)  # noqa: T201
+
+    from saltus.codegen.announce import telling
+
+    with telling(tell_json):
+        yield report_json, say if kind != "json" else lambda _: None
 
 
 @contextmanager
@@ -111,7 +118,7 @@ def replicating() -> Iterator[Callable[[Progress], None]]:
             f"{time.perf_counter() - begin:.0f} s"
         )
 
-    with console(stderr=True).status("compiling the equations, if they are new here (about a minute) ...") as status:
+    with console(stderr=True).status("working ...") as status:
         yield lambda progress: status.update(text(progress))
     say(f"computed in {time.perf_counter() - begin:.1f} s")
 

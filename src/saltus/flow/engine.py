@@ -15,22 +15,17 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.flow.threads import on_threads, usable_processors
+from saltus.interrupt import Interrupted, Stop
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.system.system import System
 
 #: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show progress.
 CHUNK = 1024
-#: Steps of the lanes between two looks at the keyboard: some ten milliseconds.
+#: Steps of the lanes between two looks at the keyboard, for two states: some ten milliseconds.
 SLICE = 50_000
 #: Contacts that a chunk's table holds before it is emptied, besides room for those of one step.
 RECORDS = 8192
-
-
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a computation. ``partial`` holds what was finished; the rest has status ``interrupted`` or ``not_computed``."""
-
-    partial: object = None
 
 
 @dataclass(frozen=True)
@@ -144,7 +139,7 @@ def run(
     options = method.numbers(periods)
     chunks = [_cut(request, whole, first, options) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
-    stop = threading.Event()
+    stop = Stop()
     try:
         _run_chunks(chunks, module, stop, progress, workers)
     except KeyboardInterrupt:
@@ -233,11 +228,17 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
 
 
 # -- work ----------------------------------------------------------------------------------------------------------------------
-def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: threading.Event) -> None:
+def slice_of(states: int) -> int:
+    """Steps of the lanes between two looks at the keyboard: those of many states take longer."""
+    return max(SLICE * 4 // max(states, 2) ** 2, 1)
+
+
+def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: Stop) -> None:
     """Move a chunk to its end in slices; empties its table of contacts after each."""
     arrays = chunk.arrays
+    steps = slice_of(arrays["state"].shape[1])
     while not stop.is_set():
-        outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), SLICE, *workspace)
+        outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), steps, *workspace)
         _empty_table(chunk)
         if outcome == st.FINISHED:
             return
@@ -255,9 +256,7 @@ def _behind(arrays: dict[str, np.ndarray]) -> float:
     return float(np.sum(np.where(arrays["status"] == st.RUNNING, at, 1.0)))
 
 
-def _run_chunks(
-    chunks: list[_Chunk], module: ModuleType, stop: threading.Event, progress: Callable[[float], None] | None, workers: int
-) -> None:
+def _run_chunks(chunks: list[_Chunk], module: ModuleType, stop: Stop, progress: Callable[[float], None] | None, workers: int) -> None:
     """All chunks, on threads even if it is one: Python raises Ctrl-C in the main thread, which would cut a table of contacts in two."""
     local = threading.local()
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+from matplotlib.font_manager import fontManager
 
 from saltus.errors import ParameterError
 
@@ -30,6 +34,7 @@ QUIET = "#555555"
 #: Above this many points a marker layer is stored as pixels in vector files: they would otherwise grow to megabytes.
 RASTERISE_ABOVE = 500
 
+_MARK = "saltus"
 _STYLE_FILE = Path(__file__).with_name("saltus.mplstyle")
 
 
@@ -37,16 +42,51 @@ _STYLE_FILE = Path(__file__).with_name("saltus.mplstyle")
 def style() -> Iterator[None]:
     """Context in which figures get saltus's look: ``with sl.plot.style(): fig, axes = plt.subplots(2, 2)``.
 
-    The functions of this package use it themselves when they make the figure.
+    The functions of this package use it themselves when they make the figure. A figure keeps its fonts and sizes when it is drawn or
+    saved after the context has ended.
     """
     plt.draw_if_interactive()  # loads the backend, which may switch interaction on: inside the context that would be undone at its end
     with plt.style.context(_STYLE_FILE):
-        yield
+        # A generic family is resolved when a figure is saved, by the settings of that moment; a font's own name stays.
+        plt.rcParams["font.family"] = _fonts(plt.rcParams["font.sans-serif"])
+        before = set(plt.get_fignums())
+        try:
+            yield
+        finally:
+            for number in set(plt.get_fignums()) - before:
+                figure = plt.figure(number)
+                figure.set_gid(_MARK)
+                _keep_ticks(figure)
+
+
+def styled(figure: Figure | None) -> bool:
+    """Whether a figure was made in the style, so that what is drawn into it later should be drawn in the style too."""
+    return figure is not None and figure.get_gid() == _MARK
+
+
+def _fonts(wanted: list[str]) -> list[str]:
+    """The fonts of a list that this machine has; Matplotlib brings the last one."""
+    known = {font.name for font in fontManager.ttflist}
+    return [name for name in wanted if name in known]
+
+
+def _keep_ticks(figure: Figure) -> None:
+    """Ticks are made as they are needed, by the settings of that moment: write the present ones into the axes."""
+    now: dict[str, Any] = {str(name): value for name, value in plt.rcParams.items()}
+    for ax in figure.axes:
+        for one in (ax, *ax.child_axes):
+            for direction in ("x", "y"):
+                look = {name: now[f"{direction}tick.{name}"] for name in ("labelsize", "direction", "color")}
+                one.tick_params(axis=direction, which="both", labelfontfamily=now["font.family"], **look)
+                for which in ("major", "minor"):
+                    sizes = {name: now[f"{direction}tick.{which}.{name}"] for name in ("size", "width", "pad")}
+                    one.tick_params(axis=direction, which=which, **sizes)
 
 
 # -- display units -------------------------------------------------------------------------------------------------------------
 _PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
-_SCALABLE = re.compile(r"(m|s|Hz|N|Pa|J|W|V|A|rad)(?=$|[*/])")
+_SCALABLE = re.compile(r"(m|s|Hz|N|Pa|J|W|V|A)(?=$|[*/])")
+_ANGLE = re.compile(r"rad(?=$|[*/])")
 #: The prefix is the largest with which the largest value is at least this: 0.43 m/s stays, 0.03 m/s becomes 30 mm/s.
 _AT_LEAST = 0.1
 
@@ -76,9 +116,10 @@ def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale
     unit : str
         SI unit of the numbers, ``""`` if unknown.
     largest : float
-        Largest absolute value to show [unit]. Lengths below 1 m are shown in mm, as is the custom of this field.
+        Largest absolute value to show [unit]. Lengths below 1 m are shown in mm, as is the custom of this field; angles in rad, whatever
+        their size, so that one angle has one unit in all pictures.
     wanted : str, optional
-        Unit to use instead, such as ``"mm"``.
+        Unit to use instead, such as ``"mm"``; ``"deg"`` or ``"deg/s"`` for an angle or its rate.
 
     Returns
     -------
@@ -91,10 +132,12 @@ def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale
     """
     known = _PREFIXES if _SCALABLE.match(unit) else {"": 1.0}
     if wanted is not None:
-        for prefix, size in known.items():
-            if prefix + unit == wanted:
-                return Scale(1 / size, wanted)
-        choice = ", ".join(prefix + unit for prefix in known)
+        sizes = {prefix + unit: size for prefix, size in known.items()}
+        if _ANGLE.match(unit):
+            sizes |= {f"m{unit}": 1e-3, _ANGLE.sub("deg", unit): math.pi / 180}
+        if wanted in sizes:
+            return Scale(1 / sizes[wanted], wanted)
+        choice = ", ".join(sizes)
         raise ParameterError(f"values in {unit or 'an unknown unit'} can't be shown in {wanted!r}. Known: {choice}.")
     for prefix, size in known.items():
         limit = 1.0 if prefix + unit == "m" else _AT_LEAST

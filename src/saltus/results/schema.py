@@ -18,6 +18,7 @@ values), ``multiplier``, ``phase``, ``sample`` (sampled values of a bifurcation 
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -259,6 +260,11 @@ def kind_text(kind: str, n: int) -> str:
 def states_of(ds: xr.Dataset) -> tuple[str, ...]:
     """Names of the states, in the order of the system."""
     return tuple(ds.attrs["states"].split())
+
+
+def equations_of(ds: xr.Dataset) -> list[str]:
+    """The equations that made a result, one text each, such as ``dx/dt = v``; none if they aren't known."""
+    return list(json.loads(ds.attrs.get("equations", "[]")))
 
 
 def axes_of(ds: xr.Dataset) -> tuple[str, str]:

@@ -91,7 +91,8 @@ class Range(Table):
         ends = (self.first, self.last, self.count)
         if self.values is None and None in ends:
             raise ValueError(
-                'needs first, last and count, such as { first = "2 Hz", last = "30 Hz", count = 281 }, or an array of values, such as ["5 Hz", "17 Hz"]'
+                'needs first, last and count, such as { first = "2 Hz", last = "30 Hz", count = 281 }, '
+                'or an array of values, such as ["5 Hz", "17 Hz"]'
             )
         if self.values is not None and (ends != (None, None, None) or self.scale != "linear"):
             raise ValueError("has values one by one: leave first, last, count and scale out")

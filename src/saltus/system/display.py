@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -36,7 +37,7 @@ def system_text(system: System) -> str:
     if system.guards:
         blocks.append(_labelled("guards", _aligned(_guard_rows(system))))
     if system.values:
-        blocks.append(_labelled("parameters", _aligned([(name, system.parameter_text(name)) for name in system.values])))
+        blocks.append(_labelled("parameters", _aligned(_parameter_rows(system))))
     if system.source:
         blocks.append([f"source      {system.source}"])
     return "\n".join(line for block in blocks for line in block)
@@ -61,6 +62,13 @@ def _guard_rows(system: System) -> list[tuple[str, str]]:
             place += f"  ({from_si(float(value) + 0.0, system.units[guard.state])})" if guard.boundary.op != "const" else ""
         rows.append((guard.name, place))
     return rows
+
+
+def _parameter_rows(system: System) -> list[tuple[str, str]]:
+    """Name and value of each parameter; an angle in degrees too."""
+    texts = {name: system.parameter_text(name) for name in system.values}
+    degrees = {name: from_si(math.degrees(value), "") for name, value in system.values.items() if system.units[name] == "rad"}
+    return [(name, f"{text} ({degrees[name]} deg)" if name in degrees else text) for name, text in texts.items()]
 
 
 def _writer(kind: type, system: System) -> Writer:
@@ -173,7 +181,7 @@ def system_html(system: System) -> str:
     if system.guards:
         parts.append(_table(("guard", "boundary"), _guard_rows(system)))
     if system.values:
-        parts.append(_table(("parameter", "value"), [(name, system.parameter_text(name)) for name in system.values]))
+        parts.append(_table(("parameter", "value"), _parameter_rows(system)))
     return "<div>" + "".join(parts) + "</div>"
 
 

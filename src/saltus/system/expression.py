@@ -117,6 +117,7 @@ class Expr:
     __rmod__ = __floordiv__ = __rfloordiv__ = __mod__
 
     def __call__(self, *_arguments: object) -> Expr:
+        """Refused: the value of a state at another time."""
         raise TraceError(
             f"an equation called {self!r} as a function. There are no delays, x(t - tau): a rate depends on the states at the time t only. "
             f"A product is written with *."

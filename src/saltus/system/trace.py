@@ -18,6 +18,7 @@ from saltus.system import checks
 from saltus.system.expression import TIME, Expr, as_expr, parameter, state, walk
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
+from saltus.system.names import why_no_name, why_no_text, why_no_title
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
@@ -81,7 +82,10 @@ def system(
     names = tuple(states.replace(",", " ").split()) if isinstance(states, str) else tuple(states)
 
     def decorate(function: Callable[..., Any]) -> System:
-        title = name or function.__name__
+        title, told = name or function.__name__.strip("<>"), inspect.getdoc(function) or ""
+        for what, text, why in (("name", title, why_no_title), ("source", source, why_no_text), ("docstring", told, why_no_text)):
+            if why(text) is not None:
+                raise TraceError(f"the {what} of a system can't be {text!r:.80}: {why(text)}.")
         defaults = _parameters(function, names, title)
         known_units = _units(names, defaults, forced_at, dict(units or {}), title)
         if forced_at is not None and known_units[forced_at] not in ("Hz", "rad/s"):
@@ -100,7 +104,7 @@ def system(
             units=known_units,
             forced_at=forced_at,
             source=source,
-            description=inspect.getdoc(function) or "",
+            description=told,
         )
 
     return decorate
@@ -121,6 +125,8 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
             raise TraceError(
                 f"{title}: parameter {argument.name!r} has no default. Give it a value: {argument.name}=1.0, or text with a unit."
             )
+        elif (why := why_no_name(argument.name)) is not None:
+            raise TraceError(f"{title}: {argument.name!r} can't be the name of a parameter: {why}.")
         else:
             parameters[argument.name] = argument.default
     names = [argument.name for argument in positional]
@@ -137,8 +143,8 @@ def _check_states(states: tuple[str, ...], title: str) -> None:
     if not states:
         raise TraceError(f'{title}: states="" names no state. Write states="x v".')
     for name in states:
-        if not (isinstance(name, str) and name.isidentifier()):
-            raise TraceError(f"{title}: {name!r} can't be the name of a state. Use letters, digits and _.")
+        if (why := why_no_name(name)) is not None:
+            raise TraceError(f"{title}: {name!r} can't be the name of a state: {why}.")
     if len(set(states)) < len(states):
         raise TraceError(f"{title}: states={' '.join(states)!r} names a state twice.")
 

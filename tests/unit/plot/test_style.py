@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from saltus.errors import ParameterError
 from saltus.plot import regions
 from saltus.plot.style import OKABE_ITO, display_scale
 
@@ -26,7 +27,8 @@ from saltus.plot.style import OKABE_ITO, display_scale
         ("s", 4000.0, "s", 1.0),
         ("s", 0.03, "ms", 1e3),
         ("N", 1.4e4, "kN", 1e-3),
-        ("rad", 0.01, "mrad", 1e3),
+        ("rad", 0.01, "rad", 1.0),
+        ("rad/s", 1e-5, "rad/s", 1.0),
         ("kg", 1e-3, "kg", 1.0),
         ("", 1e-3, "", 1.0),
         ("1", 1e-9, "1", 1.0),
@@ -37,6 +39,13 @@ def test_units_suit_the_numbers(unit, largest, shown, factor):
     scale = display_scale(unit, largest)
     assert scale.unit == shown
     assert math.isclose(scale.factor, factor)
+
+
+@pytest.mark.parametrize(("unit", "wanted"), [("rad", "deg"), ("rad/s", "deg/s")])
+def test_angles_are_shown_in_degrees_if_asked(unit, wanted):
+    assert math.isclose(display_scale(unit, 0.01, wanted).factor, 180 / math.pi)
+    with pytest.raises(ParameterError, match=f"Known: {unit}, m{unit}, {wanted}"):
+        display_scale(unit, 0.01, "turn")
 
 
 def test_texts():

@@ -33,6 +33,15 @@ def test_repr_of_the_rig():
     assert repr(delangre()).startswith(TEXT)
 
 
+def test_an_angle_is_shown_in_degrees_too():
+    @system(states="a", units={"a": "rad"})
+    def pendulum(t, a, *, stop="2 deg", slope=1.0):
+        return -slope * (a - stop)
+
+    assert "stop   0.0349066 rad (2 deg)" in repr(pendulum)
+    assert "0.0349066 rad (2 deg)" in pendulum._repr_html_()
+
+
 def test_equations_are_the_lines_of_repr():
     assert delangre().equations()[0] == "dx/dt = v"
     assert delangre().equations()[1] in TEXT

@@ -121,7 +121,7 @@ def test_the_public_name_is_the_decorator_whatever_was_imported_before(first):
     ("options", "error", "teaches"),
     [
         ({"units": {"mas": "kg"}}, ParameterError, "Did you mean 'mass'"),
-        ({"units": {"mass": "g"}}, UnitError, "'g' isn't a coherent SI unit"),
+        ({"units": {"mass": "g"}}, UnitError, "'g', which isn't a coherent SI unit"),
         ({"forced_at": "frequenzy"}, ParameterError, "Did you mean 'frequency'"),
         ({"forced_at": "frequency", "units": {"frequency": "s"}}, UnitError, "in 'Hz' or 'rad/s'"),
     ],
@@ -294,3 +294,29 @@ class TestPeriodicity:
         assert self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t + x) ** 3 + a * sin(200 * pi * f * t)).period() == 1 / 15
         assert self.forced(lambda t, x, a, f, g: 0.0).period() == 1 / 15
         assert self.forced(lambda t, x, a, f, g: a * cos(f * t), forced_at=None).period() is None
+
+
+@pytest.mark.parametrize(
+    ("default", "teaches"),
+    [
+        ("2 g", "'2 g0' for gravity .* or '2 gram'"),
+        ("2 mil", "a length or an angle"),
+        ("4 N!", "'!' can't stand in a unit"),
+        ("3 dB", "logarithmic"),
+    ],
+)
+def test_a_default_whose_unit_has_several_meanings_or_none_is_refused(default, teaches):
+    with pytest.raises(UnitError, match=f"shaking = {default!r}.*{teaches}"):
+
+        @system(states="x")
+        def shaken(t, x, *, shaking=default):
+            return shaking - x
+
+
+def test_defaults_in_torques_and_half_powers_are_read():
+    @system(states="x")
+    def geared(t, x, *, torque="2.82 Nm", twist="40 kNm/rad", hertz="1e9 N/m^1.5"):
+        return torque * x + twist * x + hertz * x
+
+    assert dict(geared.values) == {"torque": 2.82, "twist": 4e4, "hertz": 1e9}
+    assert [geared.units[name] for name in geared.values] == ["N*m", "N*m/rad", "N/m^1.5"]
