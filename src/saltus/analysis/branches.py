@@ -3,33 +3,26 @@
 Two responses at neighbouring values belong to one branch if Newton's method, started on the one, arrives at the other (natural parameter
 continuation); so do those some values apart, if no start led to what it finds in between. Where Newton's method arrives nowhere near, they
 do if their orbits are near each other, point by point at the best phase shift: by identity, never by amplitude, which crossing branches
-share. Names of bifurcations: di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapter 2.
+share.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from saltus.analysis.bifurcations import LINK, Event, closed_again, middle, orbit_distance, why_they_end
 from saltus.analysis.grid import Grid
-from saltus.analysis.polish import Closed, close
-from saltus.analysis.recurrence import LONGEST, SAME
+from saltus.analysis.recurrence import SAME
 from saltus.analysis.responses import Found
-from saltus.analysis.steady import CHAOTIC, CLOSED, PERIODIC
-from saltus.analysis.unforced import close_again
-from saltus.flow.family import Family
+from saltus.analysis.steady import CLOSED
 from saltus.flow.methods import Method
 from saltus.results import AttractorTable
 
-#: Farthest that an orbit moves between two values, in units of its own range; twice and more as far only if Newton's method went with it.
-LINK, FARTHEST = 0.35, 1.0
+#: Farthest that an orbit moves between two values, in units of its own range, if Newton's method went with it; else LINK.
+FARTHEST = 1.0
 #: Values over which a branch may be missing: followed by Newton's method, or not.
 FOLLOWED, MISSED = 16, 3
-#: A branch that ends folds if its leading multiplier is real and beyond this (it moves to 1 as the root of the distance), and sheds a torus
-#: if it is complex and beyond that.
-FOLDING, TURNING = 0.5, 0.95
 #: What is farther apart than any two responses.
 _NEVER = 1e6
 

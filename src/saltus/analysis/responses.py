@@ -22,6 +22,8 @@ from saltus.results.intervals import wilson
 KINDS = {
     PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic", EQUILIBRIUM: "equilibrium", LIMIT_CYCLE: "limit_cycle",
 }  # fmt: skip
+#: Point of a limit cycle that is no turning point of the first state, which is least at point 0.
+ASIDE = 23
 #: Samples of a period from which peaks and margins are taken, and periods of a motion that never repeats.
 SAMPLES, WANDERED = 256, 64
 
@@ -72,9 +74,10 @@ class Found:
         row = int(self.row[response])
         return self.steady.trail[row] if row in self.steady.trail else self.steady.orbits.points[row, : self.steady.orbits.period[row]]
 
-    def start(self) -> np.ndarray:
-        """A state on each, float64[m, D]."""
-        return np.array([self.points(i)[0] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
+    def start(self, aside: bool = False) -> np.ndarray:
+        """A state on each, float64[m, D]; ``aside``: not where a limit cycle turns."""
+        index = np.where(aside & (self.kind == LIMIT_CYCLE), ASIDE, 0)
+        return np.array([self.points(i)[index[i]] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
 
 
 def find(grid: Grid, method: Method, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:

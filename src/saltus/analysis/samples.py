@@ -51,7 +51,7 @@ def sampled(sample: str, grid: Grid, method: Method, found: Found, threads: int 
     turning = sample == "turning_points"
     located = not isinstance(method, ODE45)
     system = turning_surface(grid.system, grid.system.states[0]) if turning and located else grid.system
-    start, result = found.start(), [np.zeros((0, len(system.states)))] * len(found)
+    start, result = found.start(aside=True), [np.zeros((0, len(system.states)))] * len(found)
     everything = Family(system, method, grid.rows[found.place], own_times(found, grid), threads)
     moves = found.kind != EQUILIBRIUM
     for rest in np.flatnonzero(~moves):

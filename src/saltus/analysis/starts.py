@@ -114,7 +114,7 @@ def looks_every(system: System, every: Any) -> float | None:
         return None
     if every is None:
         raise ParameterError(
-            f"{system.name} has no forcing period. Give every=, the time between two looks at the motion, such as every=\"0.1 s\": "
+            f'{system.name} has no forcing period. Give every=, the time between two looks at the motion, such as every="0.1 s": '
             f"about a turn of it. Answers don't depend on it."
         )
     seconds = to_si(every, "s", "every")

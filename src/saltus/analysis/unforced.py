@@ -56,6 +56,7 @@ def attracted(family: Family, state: np.ndarray, scale: np.ndarray, window: floa
     rest = find_equilibria(family, state, scale)
     here = np.flatnonzero(rest.stable & rest.holds(state))
     _put_equilibria(result.orbits, here, rest.place[here], rest.eigenvalues[here])
+    result.scale[here] = np.maximum(scale[here], np.abs(rest.place[here]))
     rows = np.flatnonzero(result.orbits.period == 0)
     if not len(rows):
         return result
