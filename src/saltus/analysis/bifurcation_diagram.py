@@ -36,7 +36,7 @@ def bifurcation_diagram(
     Parameters
     ----------
     system : System
-        A forced system.
+        Any system; one without forcing with ``every``.
     vary : mapping
         One parameter, or two for a map of types: a range, such as ``{"contact_stiffness": ("1e3 N/m", "1e9 N/m", 2000, "log")}``, or a
         list or array of values.
@@ -47,6 +47,9 @@ def bifurcation_diagram(
         ``"stroboscope"`` (at whole forcing periods) or ``"contacts"``. Not with two parameters.
     follow : bool
         Whether each start goes on, from the lowest value upwards, where it stood at the value before; otherwise each value starts afresh.
+    every : float or str, optional
+        Time between two looks at the motion of a system without forcing [s], about a turn of it. Equilibria, limit cycles, their periods,
+        sizes and stability don't depend on it.
     box, values, method, periods, seed, threads, progress
         As for :func:`saltus.frequency_response`.
 
@@ -54,7 +57,9 @@ def bifurcation_diagram(
     -------
     Dataset
         As :func:`saltus.frequency_response` over the parameters in ``vary``, and ``sample_<state>`` on (response, sample), filled up with
-        NaN.
+        NaN. Without forcing responses are of type ``equilibrium`` (with ``response_eigenvalue_real`` and ``_imag`` of the Jacobian [1/s]),
+        ``limit_cycle`` (with its period ``response_cycle`` [s] and multipliers, one of which is 1), ``quasi_periodic`` or ``chaotic``;
+        ``response_<state>`` then has points of a limit cycle in equal steps of its time.
 
     Raises
     ------

@@ -20,7 +20,6 @@ from saltus.analysis.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE
 from saltus.analysis.unforced import close_again
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
-from saltus.results import AttractorTable
 
 #: Farthest that an orbit moves between two values, in units of its own range.
 LINK = 0.35
@@ -71,7 +70,6 @@ def orbit_distance(p: np.ndarray, q: np.ndarray, scale: np.ndarray) -> float:
 
 def why_they_end(
     found: Found,
-    table: AttractorTable,
     grid: Grid,
     method: Method,
     ends: np.ndarray,
@@ -83,7 +81,7 @@ def why_they_end(
 
     Parameters
     ----------
-    found, table : Found, AttractorTable
+    found : Found
         The responses.
     grid, method, threads
         As they were computed.
@@ -120,7 +118,7 @@ def _leading(found: Found, response: int) -> complex:
 
 
 def _told_by_neighbours(found: Found, last: int, beyond: int, multiplier: complex) -> str:
-    """What the responses at the next value say: ``period_doubling``, ``chaos``, ``neimark_sacker``; ``end`` if nothing, "" if told elsewhere."""
+    """What the responses at the next value say, ``end`` if nothing; "" if it is told by another branch."""
     here = int(found.place[last])
     neighbours = np.flatnonzero(found.place == beyond)
     doubled = [j for j in neighbours if _is_twice(found, int(j), last) and _covers(found, int(j), last)]
@@ -177,7 +175,7 @@ class _Follower:
         self.time = found.time[ends].copy()
 
     def at(self, value: np.ndarray) -> tuple[Closed, np.ndarray]:
-        """What Newton's method finds at values float64[k], from where the responses stand; which of it is the same orbit, moved, bool[k]."""
+        """What Newton's method finds at values float64[k], and which of it is the same orbit, moved, bool[k]."""
         system = self._grid.system
         rows = self._grid.rows[self._found.place[self._ends]]
         rows[:, list(system.values).index(self._name)] = value

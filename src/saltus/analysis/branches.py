@@ -111,7 +111,7 @@ def events(found: Found, table: AttractorTable, branch: np.ndarray, grid: Grid, 
     for way, side in ((+1, -1), (-1, 0)):
         ends = np.array([members[side] for members in groups], np.int64)
         over = np.flatnonzero(~_goes_on(found, grid, method, ends, way, threads))
-        result += why_they_end(found, table, grid, method, ends[over], over, way, threads)
+        result += why_they_end(found, grid, method, ends[over], over, way, threads)
     return sorted(result, key=lambda event: (event.value, event.branch, event.kind))
 
 

@@ -2,8 +2,8 @@
 
 A motion comes back to the plane through one of its states, across the flow, near that state: state and time are the first guess. Newton's
 method then solves phi_T(x) = x with x on that plane, for x and T; the derivative is the tangent flow, jumps at contacts included. Parker &
-Chua, Practical Numerical Algorithms for Chaotic Systems (1989), chapter 5. Of the multipliers one is 1, along the flow; the others are those
-of the monodromy matrix across it, so that none is mistaken for the trivial one.
+Chua, Practical Numerical Algorithms for Chaotic Systems (1989), chapter 5. Of the multipliers one is 1, along the flow; the
+others are those of the monodromy matrix across it, so that none is mistaken for the trivial one.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Equilibria of systems without forcing: where the field vanishes, by Newton's method on the field itself, and what they are known to attract.
+"""Equilibria of systems without forcing: where the field vanishes, by Newton's method on the field itself, and where they capture.
 
-Stability is that of the linear part: the eigenvalues of the Jacobian, which are the exponents. An equilibrium captures inside an ellipsoid
-(x - c)'P(x - c) <= r^2, P from the Lyapunov equation of the Jacobian, in which the field was seen to point inwards at points on many shells:
-a check at points, not a proof. Khalil, Nonlinear Systems (2002), chapter 4.
+Stability is that of the linear part: the eigenvalues of the Jacobian, which are the exponents. An equilibrium captures inside an
+ellipsoid (x - c)'P(x - c) <= r^2, P from the Lyapunov equation of the Jacobian, in which the field was seen to point inwards at points on
+many shells: a check at points, not a proof. Khalil, Nonlinear Systems (2002), chapter 4.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _evaluated(system: System, entries: tuple, states: np.ndarray, values: Mappi
 
 
 def find_equilibria(family: Family, start: np.ndarray, scale: np.ndarray) -> Equilibria:
-    """The equilibria near states float64[k, D], row i with the parameter values of row i; scale float64[k, D] is the range of each state."""
+    """The equilibria near states float64[k, D] at the parameter values of each row; float64[k, D] is the range of each state."""
     system, values = family.system, family.values
     x, found = _newton(system, values, np.array(start, float), scale)
     place = np.where(found[:, None], x, np.nan)

@@ -69,7 +69,8 @@ def at_rest(family: Family, place: np.ndarray, rows: np.ndarray, result: Looks) 
     if family.method.records_contacts:
         result.contacts[rows] = 0.0
     states, values = dict(zip(family.system.states, place.T, strict=True)), family.values
-    nearest, bits = np.full(len(rows), np.inf), []
+    nearest = np.full(len(rows), np.inf)
+    bits: list[np.ndarray] = []
     for guard in family.system.guards:
         (gap,) = evaluate([guard.gap], states=states, values=values, bits=bits)
         bits.append(np.broadcast_to(gap, len(rows)) > 0)

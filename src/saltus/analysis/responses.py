@@ -153,7 +153,8 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
 def table_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> AttractorTable:
     """What is known of each response."""
     looked = grid.family(method, threads).rows(found.place)
-    family = looked if grid.every is None else looked.every(own_times(found, grid))
+    times = own_times(found, grid)
+    family = looked if times is None else looked.every(times)
     kind, s, spans = found.kind, found.steady, spans_of(found)
     period = np.where(kind == PERIODIC, found.period, 0)
     look = looks(family, found.start(), spans, SAMPLES)

@@ -125,8 +125,9 @@ def _put(result: Closed, rows: np.ndarray, other: Closed) -> None:
 def close_again(family: Family, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
     """Equilibria (time 0) and limit cycles (their period) from those at other parameter values."""
     result = Closed.none(len(start), LONGEST, start.shape[1])
-    for mine, find in ((time == 0, lambda f, x, t, s: closed_equilibria(f, x, s)), (time > 0, closed_cycles)):
-        rows = np.flatnonzero(mine)
-        if len(rows):
-            _put(result, rows, find(family.rows(rows), start[rows], time[rows], scale[rows]))
+    rests, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)
+    if len(rests):
+        _put(result, rests, closed_equilibria(family.rows(rests), start[rests], scale[rests]))
+    if len(turns):
+        _put(result, turns, closed_cycles(family.rows(turns), start[turns], time[turns], scale[turns]))
     return result
