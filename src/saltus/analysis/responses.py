@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.grid import Grid
-from saltus.analysis.looks import at_rest, looks
+from saltus.analysis.orbit_measures import Measures, measure
 from saltus.analysis.recurrence import SAME
 from saltus.analysis.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE, PERIODIC, QUASI_PERIODIC, Steady, settle_each
 from saltus.analysis.unforced import multipliers_and_eigenvalues
@@ -22,10 +22,8 @@ from saltus.results.intervals import wilson
 KINDS = {
     PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic", EQUILIBRIUM: "equilibrium", LIMIT_CYCLE: "limit_cycle",
 }  # fmt: skip
-#: Point of a limit cycle that is no turning point of the first state, which is least at point 0.
-ASIDE = 23
-#: Samples of a period from which peaks and margins are taken, and periods of a motion that never repeats.
-SAMPLES, WANDERED = 256, 64
+#: Points kept of a motion that never repeats.
+WANDERED = 64
 
 
 @dataclass
@@ -74,10 +72,9 @@ class Found:
         row = int(self.row[response])
         return self.steady.trail[row] if row in self.steady.trail else self.steady.orbits.points[row, : self.steady.orbits.period[row]]
 
-    def start(self, aside: bool = False) -> np.ndarray:
-        """A state on each, float64[m, D]; ``aside``: not where a limit cycle turns."""
-        index = np.where(aside & (self.kind == LIMIT_CYCLE), ASIDE, 0)
-        return np.array([self.points(i)[index[i]] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
+    def start(self) -> np.ndarray:
+        """A state on each, float64[m, D]."""
+        return np.array([self.points(i)[0] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
 
 
 def find(grid: Grid, method: Method, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
@@ -150,32 +147,32 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
     return (int(result.kind[row]), int(period), *(float(size) for size in sizes))
 
 
-def table_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> AttractorTable:
+def numbers_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> Measures:
+    """The numbers of each response."""
+    family, times = grid.family(method, threads).rows(found.place), own_times(found, grid)
+    return measure(family if times is None else family.every(times), found.start(), spans_of(found))
+
+
+def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
     """What is known of each response."""
-    looked = grid.family(method, threads).rows(found.place)
-    times = own_times(found, grid)
-    family = looked if times is None else looked.every(times)
-    kind, s, spans = found.kind, found.steady, spans_of(found)
+    family = grid.family(method).rows(found.place)
+    kind, s = found.kind, found.steady
     period = np.where(kind == PERIODIC, found.period, 0)
-    look = looks(family, found.start(), spans, SAMPLES)
-    rests = kind == EQUILIBRIUM
-    if rests.any():
-        at_rest(looked.rows(rests), found.start()[rests], np.flatnonzero(rests), look)
-    multipliers, eigenvalues = multipliers_and_eigenvalues(s.orbits.multipliers[found.row], rests)
+    multipliers, eigenvalues = multipliers_and_eigenvalues(s.orbits.multipliers[found.row], kind == EQUILIBRIUM)
     hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
     low, high = wilson(hits, len(grid.starts))
     shares = (hits / len(grid.starts), low, high) if grid.drawn else None
     return AttractorTable(
         kind=[KINDS[int(code)] for code in kind],
         period=period,
-        contacts=look.contacts * np.maximum(period, 1),
+        contacts=numbers.contacts * np.maximum(period, 1),
         itinerary=[""] * len(found),
-        peak=look.peak,
-        rms=look.rms,
-        margin=look.margin,
+        peak=numbers.peak[:, 0],
+        rms=numbers.rms[:, 0],
+        margin=numbers.margin,
         multipliers=multipliers,
-        exponent=s.exponent[found.row] / looked.period,
-        exponent_error=s.exponent_error[found.row] / looked.period,
+        exponent=s.exponent[found.row] / family.period,
+        exponent_error=s.exponent_error[found.row] / family.period,
         points=[found.points(i)[: int(known)] for i, known in enumerate(np.where(found.period > 0, found.period, WANDERED))],
         fractions=shares,
         **({} if grid.every is None else {"cycle": np.where(kind == LIMIT_CYCLE, found.time, np.nan), "eigenvalues": eigenvalues}),
@@ -183,8 +180,8 @@ def table_of(found: Found, grid: Grid, method: Method, threads: int | None = Non
 
 
 def spans_of(found: Found) -> np.ndarray:
-    """Periods over which each response is looked at, int64[m]: a whole response; one cycle; many of one that never repeats."""
-    return np.where(found.kind == PERIODIC, found.period, np.where(found.period > 0, 1, WANDERED))
+    """Periods of each response, int64[m]: n of an nT, 1 of a limit cycle or an equilibrium, 0 of one that never repeats."""
+    return np.where(found.kind == PERIODIC, found.period, np.where(found.period > 0, 1, 0))
 
 
 def own_times(found: Found, grid: Grid) -> np.ndarray | None:
