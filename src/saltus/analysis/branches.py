@@ -112,6 +112,9 @@ def events(found: Found, table: AttractorTable, branch: np.ndarray, grid: Grid, 
         ends = np.array([members[side] for members in groups], np.int64)
         over = np.flatnonzero(~_goes_on(found, grid, method, ends, way, threads))
         result += why_they_end(found, grid, method, ends[over], over, way, threads)
+    step = float(np.diff(values).max(initial=0.0))  # a limit cycle begins where an equilibrium begins to oscillate: told once
+    born = [event.value for event in result if event.kind == "hopf"]
+    result = [event for event in result if event.kind != "end" or not any(abs(event.value - value) <= step for value in born)]
     return sorted(result, key=lambda event: (event.value, event.branch, event.kind))
 
 

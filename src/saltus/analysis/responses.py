@@ -11,7 +11,7 @@ from saltus.analysis.grid import Grid
 from saltus.analysis.orbit_measures import Measures, measure
 from saltus.analysis.recurrence import SAME
 from saltus.analysis.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE, PERIODIC, QUASI_PERIODIC, Steady, settle_each
-from saltus.analysis.unforced import multipliers_and_eigenvalues
+from saltus.analysis.unforced import multipliers_and_eigenvalues, rest
 from saltus.analysis.wandering import Wandering, alike
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
@@ -22,6 +22,8 @@ from saltus.results.intervals import wilson
 KINDS = {
     PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic", EQUILIBRIUM: "equilibrium", LIMIT_CYCLE: "limit_cycle",
 }  # fmt: skip
+#: Point of a limit cycle at which the first state doesn't turn: it is least at point 0.
+ASIDE = 23
 #: Points kept of a motion that never repeats.
 WANDERED = 64
 
@@ -72,9 +74,10 @@ class Found:
         row = int(self.row[response])
         return self.steady.trail[row] if row in self.steady.trail else self.steady.orbits.points[row, : self.steady.orbits.period[row]]
 
-    def start(self) -> np.ndarray:
-        """A state on each, float64[m, D]."""
-        return np.array([self.points(i)[0] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
+    def start(self, aside: bool = False) -> np.ndarray:
+        """A state on each, float64[m, D]; ``aside``: not where a limit cycle turns."""
+        index = np.where(aside & (self.kind == LIMIT_CYCLE), ASIDE, 0)
+        return np.array([self.points(i)[index[i]] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
 
 
 def find(grid: Grid, method: Method, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
@@ -150,7 +153,11 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
 def numbers_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> Measures:
     """The numbers of each response."""
     family, times = grid.family(method, threads).rows(found.place), own_times(found, grid)
-    return measure(family if times is None else family.every(times), found.start(), spans_of(found))
+    numbers = measure(family if times is None else family.every(times), found.start(aside=True), spans_of(found))
+    rests = np.flatnonzero(found.kind == EQUILIBRIUM)
+    if len(rests):
+        rest(family.rows(rests), found.start()[rests], rests, numbers)
+    return numbers
 
 
 def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:

@@ -7,7 +7,6 @@ import numpy as np
 from saltus.analysis.grid import Grid
 from saltus.analysis.orbit_measures import Measures
 from saltus.analysis.responses import WANDERED, Found, own_times, spans_of
-from saltus.analysis.steady import EQUILIBRIUM
 from saltus.errors import ParameterError, nearest
 from saltus.flow.engine import Outcome
 from saltus.flow.family import Family
@@ -41,8 +40,8 @@ def sampled(sample: str, numbers: Measures, grid: Grid, method: Method, found: F
     spans = np.where(found.period > 0, spans_of(found), WANDERED)
     if sample == "stroboscope":
         return [found.points(i)[:span] for i, span in enumerate(spans)]
-    if sample == "turning_points":  # an equilibrium is drawn where it is
-        return [found.points(i)[:1] if found.kind[i] == EQUILIBRIUM else one for i, one in enumerate(numbers.turning)]
+    if sample == "turning_points":
+        return numbers.turning
     start, result = found.start(), [np.zeros((0, len(grid.system.states)))] * len(found)
     everything = Family(grid.system, method, grid.rows[found.place], own_times(found, grid), threads)
     for span in np.unique(spans):

@@ -206,14 +206,20 @@ def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) 
     unclear = np.ones(len(who), bool)
     if autonomous(family.system):  # a limit cycle that is reached slowly, and no torus
         recurs |= unforced.nearly_recurs(maps, flight.state, ROUND * float(family.period[0]))
+        away = unforced.runs_away(trail)
+        result.kind[who[away]] = ESCAPED
     for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2))):
         kind = kind_of_growth(blocks[:, [i]])
-        if kind is not None and not (recurs[i] and (kind[0] != "chaotic" or not autonomous(family.system))):
+        if (
+            result.kind[who[i]] != ESCAPED
+            and kind is not None
+            and not (recurs[i] and (kind[0] != "chaotic" or not autonomous(family.system)))
+        ):
             unclear[i], row = False, who[i]
             result.kind[row] = CHAOTIC if kind[0] == "chaotic" else QUASI_PERIODIC
             result.exponent[row], result.exponent_error[row] = kind[1:]
             result.trail[int(row)], result.settled[row] = trail[i], -1
-    return who[unclear]
+    return who[unclear & (result.kind[who] != ESCAPED)]
 
 
 def motion_range(family: Family, state: np.ndarray) -> np.ndarray:

@@ -8,14 +8,18 @@ import numpy as np
 
 from saltus.analysis.cycles import POINTS, Cycles, find_cycles, returns
 from saltus.analysis.equilibria import find_equilibria
+from saltus.analysis.orbit_measures import Measures
 from saltus.analysis.polish import Closed
 from saltus.analysis.recurrence import LONGEST
 from saltus.flow.family import Family
+from saltus.system.evaluate import evaluate
 
 #: A limit cycle is that of a trajectory that lies so many times closer than its return: 1/(1 - multiplier) is the ratio of the two.
 BESIDE = 30.0
 #: Distance that rounding can make.
 ROUNDING = 1e-9
+#: Parts of a trail that must each be larger than the one before, and how much the last must be larger than the first, to run away.
+EIGHTHS, GROWN = 8, 3.0
 #: Returns farther than this, in units of the range, are no sign of a limit cycle.
 TORUS = 1e-2
 
@@ -76,6 +80,29 @@ def attracted(family: Family, state: np.ndarray, scale: np.ndarray, window: floa
 def nearly_recurs(family: Family, state: np.ndarray, window: float) -> np.ndarray:
     """Which motions come back so near to where they were that they may be on their way to a limit cycle, bool[k]."""
     return np.asarray(returns(family, state, window).apart < TORUS)
+
+
+def runs_away(trail: np.ndarray) -> np.ndarray:
+    """Which trails float64[k, m, D] only grow: in each eighth of them more than before, and much in all, bool[k]."""
+    sizes = np.stack([np.abs(part).max(axis=(1, 2)) for part in np.array_split(trail, EIGHTHS, axis=1)])
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.diff(sizes, axis=0) > 0).all(axis=0) & (sizes[-1] > GROWN * sizes[0]))
+
+
+def rest(family: Family, place: np.ndarray, rows: np.ndarray, numbers: Measures) -> None:
+    """Fill in the rows int64[m] of equilibria float64[m, D]: their size, no contacts, and the distance to the nearest boundary."""
+    numbers.maximum[rows] = numbers.minimum[rows] = numbers.mean[rows] = place
+    numbers.deviation[rows], numbers.harmonic[rows], numbers.span[rows] = 0.0, 0.0, 0.0
+    states, values = dict(zip(family.system.states, place.T, strict=True)), family.values
+    bits: list[np.ndarray] = []
+    nearest = np.full(len(rows), np.inf)
+    for guard in family.system.guards:
+        (gap,) = evaluate([guard.gap], states=states, values=values, bits=bits)
+        bits.append(np.broadcast_to(gap, len(rows)) > 0)
+        nearest = np.minimum(nearest, np.abs(gap))
+    numbers.margin[rows] = nearest
+    for row, one in zip(rows, place, strict=True):
+        numbers.turning[row] = one[None]
 
 
 def closed_cycles(family: Family, state: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:

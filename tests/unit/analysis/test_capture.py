@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from saltus.analysis.capture import Neighbourhoods, _alike, sphere, neighbourhoods
+from saltus.analysis.capture import Neighbourhoods, _alike, neighbourhoods, sphere
 from saltus.analysis.orbits import polish
 from saltus.analysis.recurrence import Found, find
 from saltus.analysis.settling import settle
