@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         stroboscope,
         wolf,
     )
+    from saltus.errors import SaltusError
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import describe, load, save, to_csv, to_mat
     from saltus.system import (
@@ -72,6 +73,7 @@ _HOMES = {
     **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
     **dict.fromkeys(("compare_methods", "energy_balance", "frequency_response", "impact_statistics", "poincare"), "saltus.analysis"),
     **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "wolf"), "saltus.analysis"),
+    "SaltusError": "saltus.errors",
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("describe", "load", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
@@ -83,8 +85,8 @@ _HOMES = {
 _MODULES = ("models", "plot")
 
 __all__ = [
-    "ODE45", "Interrupted", "System", "Taylor", "abs", "acos", "asin", "atan", "atan2", "attractors", "basin_fractions", "basins",
-    "bifurcation_diagram", "clip", "compare", "compare_methods", "cos", "cosh", "describe", "energy_balance", "exp", "freeplay",
+    "ODE45", "Interrupted", "SaltusError", "System", "Taylor", "abs", "acos", "asin", "atan", "atan2", "attractors", "basin_fractions",
+    "basins", "bifurcation_diagram", "clip", "compare", "compare_methods", "cos", "cosh", "describe", "energy_balance", "exp", "freeplay",
     "frequency_response", "heaviside", "hypot", "impact_statistics", "load", "log", "lyapunov", "max", "min", "models", "pi", "piecewise",
     "plot", "poincare", "save", "settled", "sign", "simulate", "sin", "sinh", "spectrum", "sqrt", "stroboscope", "system", "tan", "tanh",
     "to_csv", "to_mat", "where", "wolf",
