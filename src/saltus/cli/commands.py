@@ -53,8 +53,8 @@ class Progress(StrEnum):
 
 Only = Annotated[list[str] | None, typer.Option(help="Answer this question only, by its table or its name; may be given again.")]
 Threads = Annotated[int | None, typer.Option(min=1, help="Threads; by default one for each usable core.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Basins: processes of a dask cluster on this machine, in place of threads.")]
-Scheduler = Annotated[str, typer.Option(help="Basins: a dask scheduler, tcp://HOST:PORT, or local.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Basins: processes of this machine, in place of threads.")]
+Scheduler = Annotated[str, typer.Option(help="Basins: a dask scheduler, tcp://HOST:PORT. Whoever can reach it can run code as you.")]
 Shard = Annotated[str, typer.Option(help="Basins: K/N, the K-th of N jobs that share the folder; K from 0.")]
 ProgressKind = Annotated[Progress, typer.Option(help="bar; json: a line of JSON on standard error each second; none.")]
 

@@ -15,7 +15,8 @@ from typing import Any
 
 from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest
 from saltus.system import checks
-from saltus.system.expression import TIME, Expr, as_expr, parameter, state, walk
+from saltus.system.dimensions import DimensionCheck
+from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
 from saltus.system.names import why_no_name, why_no_text, why_no_title
@@ -34,6 +35,7 @@ def system(
     units: Mapping[str, str] | None = None,
     name: str | None = None,
     source: str = "",
+    check_units: bool = True,
 ) -> Callable[[Callable[..., Any]], System]:
     """Decorator that turns an equation of motion into a :class:`System`.
 
@@ -54,6 +56,9 @@ def system(
         What to call the system; the function's name if not given.
     source : str, optional
         Where the equations were published.
+    check_units : bool, optional
+        Whether to check that what is added or compared has one unit, and each rate that of its state per second, as far as units are known.
+        False for equations whose numbers have units of their own.
 
     Returns
     -------
@@ -65,7 +70,7 @@ def system(
     TraceError
         If the function can't be traced; the message names file and line.
     ParameterError, UnitError
-        If a default value is out of range or a unit is wrong.
+        If a default value is out of range or a unit is wrong, or terms of different units are added.
 
     Examples
     --------
@@ -93,7 +98,8 @@ def system(
                 f"{title}: forced_at={forced_at!r} is in {known_units[forced_at]!r}, but a forcing frequency is in 'Hz' or 'rad/s'."
             )
         values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
-        field, guards = _traced(function, names, tuple(defaults), title)
+        dimensions = DimensionCheck(names, known_units) if check_units else None
+        field, guards = _traced(function, names, tuple(defaults), title, dimensions)
         _warn_of_unused(field, guards, defaults, forced_at, title)
         return System(
             name=title,
@@ -173,13 +179,19 @@ def _units(
 
 
 # -- the call ------------------------------------------------------------------------------------------------------------------
-def _traced(function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...], title: str) -> tuple[Any, Any]:
+def _traced(
+    function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...], title: str, dimensions: DimensionCheck | None
+) -> tuple[Any, Any]:
     """Field and guards."""
     try:
-        returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
-        derivatives = _as_derivatives(returned, states)
+        with observed(dimensions):
+            returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
+            derivatives = _as_derivatives(returned, states)
+        if dimensions is not None:
+            dimensions.check_rates(derivatives)
     except Exception as error:
-        raise TraceError(explained(error, function, title)) from error
+        kind = UnitError if isinstance(error, UnitError) else TraceError
+        raise kind(explained(error, function, title)) from error
     try:
         return find_guards(derivatives)
     except TraceError as error:
@@ -230,7 +242,7 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
     if frames:
         where = f"{frames[-1].filename}, line {frames[-1].lineno}"
         where += f": {frames[-1].line}" if frames[-1].line else ""
-    if isinstance(error, TraceError):
+    if isinstance(error, TraceError | UnitError):
         return f"{title} ({where}): {error}"
     if isinstance(error, AttributeError) and str(error).startswith("saltus has no "):
         return f"{title} ({where}): {error}"

@@ -315,7 +315,9 @@ def test_a_scheduler_is_asked_for_before_anything_is_computed(study, tmp_path, m
 
 def test_a_cluster_without_dask(stopped, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    refused(saltus("resume", stopped, "--workers", 2, "--progress", "none"), 'Install "saltus[cluster]"')
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        address = f"tcp://127.0.0.1:{listening.getsockname()[1]}"
+        refused(saltus("resume", stopped, "--scheduler", address, "--progress", "none"), 'Install "saltus[cluster]"')
 
 
 def test_options_of_basins_for_a_study_of_motions(study, tmp_path):
