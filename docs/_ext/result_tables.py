@@ -21,7 +21,8 @@ _BESIDE = {
     schema.BASINS: "The two states of the map as dims, and the points of the attractors as `attractor_<state>` (attractor, phase).",
     schema.ATTRACTORS: "The starts as `start_<state>`, and the points of the attractors as `attractor_<state>` (attractor, phase).",
     schema.RESPONSES: "The parameters as dims, of each response as `response_<parameter>`; its points as `response_<state>` (response, "
-    "phase); a diagram's sampled values as `sample_<state>` (response, sample). What has no dim below has those of the parameters and `start`.",
+    "phase); a diagram's sampled values as `sample_<state>` (response, sample). What has no dim below has those of the parameters and "
+    "`start`.",
     schema.SPECTRUM: "`<state>_amplitude` and `<state>_phase` of each state along `frequency`.",
     schema.AGREEMENT: "The two states of the maps as dims.",
 }
@@ -42,7 +43,12 @@ def _section(kind: str, table: dict[str, Variable]) -> Iterator[str]:
     yield "|---|---|---|---|"
     for name, one in table.items():
         unit = {"": "text" if one.dtype == "str" else "", "1": ""}.get(one.units, one.units)
-        yield f"| `{name}` | {', '.join(one.dims)} | {unit.replace('<', '&lt;')} | {one.long_name.replace('|', '\N{DIVIDES}')} |"
+        yield f"| `{name}` | {', '.join(one.dims)} | {_cell(unit)} | {_cell(one.long_name)} |"
+
+
+def _cell(text: str) -> str:
+    """A text that neither ends a cell nor begins a tag."""
+    return text.replace("<", "&lt;").replace("|", "\N{DIVIDES}")
 
 
 def _batch(kind: str) -> str:
