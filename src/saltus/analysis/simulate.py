@@ -115,7 +115,7 @@ def simulate(
     finally:
         close()
     result = _dataset(system, method, group, length, plan, outcome, errors)
-    warn(result)
+    warn(result, length)
     return result
 
 
@@ -132,7 +132,8 @@ class _Plan:
     first: int
 
     def request(self, group: Ensemble, length: Span) -> Request:
-        return Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, self.schedule, self.first)
+        begin, end = length.t_start, length.t_end
+        return Request(group.start, group.parameters, length.period, begin, length.count, length.phase, self.schedule, self.first, end)
 
     def contacts_only(self, group: Ensemble, length: Span) -> Request:
         return replace(self.request(group, length), schedule=Schedule.none())
@@ -168,7 +169,7 @@ def _dataset(
     forced = system.forced_at is not None
     own_periods = forced and bool(np.ptp(length.period) > 0)
     scale = length.period[:, None] if own_periods else length.period[0]
-    time = length.t_start + (plan.schedule.count * scale + plan.schedule.fraction * scale)
+    time = np.minimum(length.t_start + (plan.schedule.count * scale + plan.schedule.fraction * scale), length.t_end)
     return trajectory_dataset(
         time=time,
         values={name: outcome.samples[:, :, i] for i, name in enumerate(system.states)},

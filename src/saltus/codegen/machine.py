@@ -13,6 +13,7 @@ import os
 import pickle
 import subprocess
 import sys
+import tempfile
 import weakref
 from collections.abc import Callable
 from functools import partial
@@ -114,15 +115,18 @@ def compiled_elsewhere(name: str, source: str, title: str) -> bytes | None:
     path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-P", "-m", "saltus.codegen.build_one"]  # -P: not what lies in the working folder
     try:
-        process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path},
-            start_new_session=True,  # Ctrl-C is for this process
-        )  # fmt: skip
+        with tempfile.TemporaryFile() as order:  # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
+            order.write(json.dumps({"name": name, "source": source}).encode())
+            order.seek(0)
+            process = subprocess.Popen(
+                command, stdin=order, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path},
+                start_new_session=True,  # Ctrl-C is for this process
+            )  # fmt: skip
     except OSError:  # no processes here
         return None
     _COMPILING.add(process)
     try:
-        data = _wait(process, json.dumps({"name": name, "source": source}).encode())
+        data = _wait(process)
     finally:
         _end(process)
     if process.returncode < 0:
@@ -132,12 +136,11 @@ def compiled_elsewhere(name: str, source: str, title: str) -> bytes | None:
     return data if process.returncode == 0 and data else None
 
 
-def _wait(process: subprocess.Popen, order: bytes | None) -> bytes:
+def _wait(process: subprocess.Popen) -> bytes:
     while True:
         try:
-            return process.communicate(order, timeout=LOOK)[0]
+            return process.communicate(timeout=LOOK)[0]
         except subprocess.TimeoutExpired:
-            order = None
             check_stop()
 
 
@@ -146,10 +149,9 @@ def _end(process: subprocess.Popen) -> None:
     if process.poll() is None:
         process.kill()
         process.wait()
-    for pipe in (process.stdin, process.stdout):
-        if pipe is not None:
-            with contextlib.suppress(OSError):
-                pipe.close()
+    if process.stdout is not None:
+        with contextlib.suppress(OSError):
+            process.stdout.close()
     _COMPILING.discard(process)
 
 

@@ -69,6 +69,8 @@ class Request:
         When samples are taken.
     record_from : int or None
         First period since the start whose contacts are kept; None keeps none.
+    t_end : float
+        Time that was asked for [s]: what adding up periods rounds beyond it is cut off.
     """
 
     start: np.ndarray
@@ -79,6 +81,7 @@ class Request:
     end_phase: np.ndarray
     schedule: Schedule
     record_from: int | None
+    t_end: float = np.inf
 
 
 @dataclass
@@ -145,9 +148,9 @@ def run(
     except KeyboardInterrupt:
         outcome.complete = False
         interrupted = Interrupted()
-        interrupted.partial = _finish(outcome, whole, chunks)
+        interrupted.partial = _finish(outcome, whole, chunks, request.t_end)
         raise interrupted from None
-    return _finish(outcome, whole, chunks)
+    return _finish(outcome, whole, chunks, request.t_end)
 
 
 # -- arrays --------------------------------------------------------------------------------------------------------------------
@@ -215,16 +218,27 @@ def _empty_table(chunk: _Chunk) -> None:
         arrays["rec_used"][0] = 0
 
 
-def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]) -> Outcome:
-    """Times at the end, and the contacts of all chunks in one sorted table."""
-    outcome.time = whole["origin"] + whole["count"] * whole["period"] + whole["phase"]
+def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], t_end: float) -> Outcome:
+    """Times at the end, and the contacts of all chunks in one sorted table; none is later than the end, not by rounding either."""
+    outcome.time = np.minimum(whole["origin"] + whole["count"] * whole["period"] + whole["phase"], t_end)
     running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if contacts := [part for chunk in chunks for part in chunk.contacts]:
         table, numbers = (np.concatenate(half) for half in zip(*contacts, strict=True))
         order = np.lexsort((np.arange(len(table)), table[:, st.REC_TRAJECTORY]))
+        order = order[~_returns_where_sliding_begins(table[order], numbers[order], outcome.status)]
         outcome.record_integers, outcome.record_floats = table[order], numbers[order]
+        times = outcome.record_floats[:, -1]
+        np.minimum(times, outcome.time[outcome.record_integers[:, st.REC_TRAJECTORY]], out=times)
     return outcome
+
+
+def _returns_where_sliding_begins(table: np.ndarray, numbers: np.ndarray, status: np.ndarray) -> np.ndarray:
+    """The last contact of a trajectory that slides, where it is the return from the one before it at the same instant: bool[contacts]."""
+    who, guard, direction = (table[:, column] for column in (st.REC_TRAJECTORY, st.REC_GUARD, st.REC_DIRECTION))
+    last = (status[who] == st.SLIDING) & (np.append(who[1:], -1) != who)
+    back = (who[1:] == who[:-1]) & (guard[1:] == guard[:-1]) & (direction[1:] == -direction[:-1]) & (numbers[1:, -1] == numbers[:-1, -1])
+    return last & np.append(False, back)
 
 
 # -- work ----------------------------------------------------------------------------------------------------------------------

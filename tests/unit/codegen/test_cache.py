@@ -340,7 +340,7 @@ def test_what_does_not_compile_says_so_and_leaves_nothing_behind(folder, in_a_th
 
 
 def test_a_process_that_is_killed_is_told(folder, monkeypatch):
-    monkeypatch.setattr(machine, "_wait", lambda process, order: process.kill() or process.wait())
+    monkeypatch.setattr(machine, "_wait", lambda process: process.kill() or process.wait())
     with pytest.raises(CacheError, match="ended by signal 9"):
         load()
     assert list(folder.iterdir()) == []
