@@ -210,3 +210,19 @@ class System:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return System.from_dict, (self.to_dict(),)
+
+    # -- what it isn't ----------------------------------------------------------------------------------------------------------
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        """Refuse: a System is no function. Raises ParameterError."""
+        raise ParameterError(
+            f"{self.name} is a System, not a function. Run it with sl.simulate({self.name}, ...); "
+            f"other values are {self.name}.with_values(...)."
+        )
+
+
+def _refuse_change(self: System, name: str, _value: Any) -> None:
+    change = f"system.with_values({name}=...)" if name in self.values else "system.with_values(...)"
+    raise ParameterError(f"a System is never changed. Write system = {change}, a copy with other values.")
+
+
+System.__setattr__ = _refuse_change  # type: ignore[assignment]  # in place of dataclass's own refusal, which doesn't say what to do
