@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         stroboscope,
         wolf,
     )
+    from saltus.errors import SaltusError
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import contacts, describe, load, samples, save, to_csv, to_mat
     from saltus.system import (
@@ -72,6 +73,7 @@ _HOMES = {
     **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
     **dict.fromkeys(("compare_methods", "energy_balance", "frequency_response", "impact_statistics", "poincare"), "saltus.analysis"),
     **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "wolf"), "saltus.analysis"),
+    "SaltusError": "saltus.errors",
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
@@ -85,6 +87,7 @@ _MODULES = ("models", "plot")
 __all__ = [
     "ODE45",
     "Interrupted",
+    "SaltusError",
     "System",
     "Taylor",
     "abs",

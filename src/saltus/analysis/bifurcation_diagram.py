@@ -10,11 +10,13 @@ import xarray as xr
 from saltus.analysis.grid import grid_of
 from saltus.analysis.response_table import respond
 from saltus.analysis.samples import check_sample
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method, check_method
 from saltus.system.system import System
 
 
+@verb
 def bifurcation_diagram(
     system: System,
     vary: Mapping[str, Any],

@@ -10,11 +10,13 @@ import xarray as xr
 from saltus.analysis.grid import grid_of
 from saltus.analysis.response_table import respond
 from saltus.analysis.starts import check_system
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.system.system import System
 
 
+@verb
 def frequency_response(
     system: System,
     frequency: Any,

@@ -12,6 +12,7 @@ import numpy as np
 from saltus.analysis.along import along
 from saltus.errors import ParameterError, SaltusError, nearest
 from saltus.system import expression as ex
+from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -88,6 +89,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     varied = {name: np.broadcast_to(np.ravel(value), count).astype(float) for name, value in given.items() if np.ndim(value)}
     shared = system.with_values(**{name: value for name, value in given.items() if not np.ndim(value)}).values
     if varied:
+        check_overlaps(system, {**shared, **varied})
         _check_period_of_each(system, shared, varied, count)
         rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
         return Ensemble(states, np.stack(rows, axis=1), varied, True)

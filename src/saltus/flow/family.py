@@ -12,6 +12,7 @@ from saltus.flow.engine import Request, Schedule
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
+from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System
 from saltus.system.tangent import tangent_system
 
@@ -46,6 +47,7 @@ class Family:
         self.system, self.method, self.threads = system, method, threads
         self.parameters, self._every = np.ascontiguousarray(parameters, float), every
         self.states = system.states
+        check_overlaps(system, self.values)
         period = np.full(len(self), every) if every is not None else system.period(self.values)
         self.period = np.broadcast_to(np.asarray(period, float), len(self)).copy()
 

@@ -88,6 +88,7 @@ class Flight:
         float64[k, periods, D]
             States at each of them; NaN from where a trajectory has ended on.
         """
+        check_stop()
         arrays = self._arrays
         k, states = arrays["state"].shape
         arrays["status"][self.going] = st.RUNNING
