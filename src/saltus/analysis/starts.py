@@ -102,6 +102,29 @@ def check_system(system: Any) -> None:
         raise ParameterError(f"the system must be a System, not {type(system).__name__}. Put @sl.system(states=...) above the function.")
 
 
+def looks_every(system: System, every: Any) -> float | None:
+    """Time between two looks [s] at a system without forcing; None for a forced one.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If it is missing, isn't a positive time, or the system is forced.
+    """
+    if system.forced_at is not None:
+        if every is not None:
+            raise ParameterError(f"{system.name} is forced: it is looked at once a forcing period. Leave every= out.")
+        return None
+    if every is None:
+        raise ParameterError(
+            f'{system.name} has no forcing period. Give every=, the time between two looks at the motion, such as every="0.1 s": '
+            f"about a turn of it. Answers don't depend on it."
+        )
+    seconds = to_si(every, "s", "every")
+    if not 0 < seconds < math.inf:
+        raise ParameterError(f"every must be a positive time, not {every!r}.")
+    return seconds
+
+
 def fill(system: System, columns: Mapping[str, np.ndarray], fixed: Mapping[str, float]) -> np.ndarray:
     """States float64[k, D] from float64[k] for some of them; the others are fixed, at zero if nothing is said."""
     count = len(next(iter(columns.values())))
