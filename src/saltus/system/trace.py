@@ -122,7 +122,9 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
     """Names and defaults of the parameters; checks the signature."""
     _check_states(states, title)
     wanted = f"def {title}(t, {', '.join(states)}, *, ...)"
-    positional, parameters, together = [], {}, False
+    positional: list[inspect.Parameter] = []
+    parameters: dict[str, Any] = {}
+    together = False
     for argument in inspect.signature(function).parameters.values():
         if argument.kind == argument.VAR_POSITIONAL and len(positional) == 1:
             together = True
