@@ -14,7 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from saltus import fence
+from saltus.fence import printable, shown
 from saltus.results.files import ResultFileError
 
 _ENDING = re.compile(rb"\nsaltus-sha256:([0-9a-f]{64})\n")
@@ -81,4 +81,4 @@ def try_elsewhere(path: Path, engine: str) -> None:
         raise ResultFileError(f"{path} can't be tried: {error.strerror or error}. Compute it again.") from error
     if done.returncode:
         why = (done.stderr.decode(errors="replace").strip().splitlines() or ["the reader crashed"])[-1]
-        raise ResultFileError(f"{path} is damaged: {fence.shown(fence.printable(why), 200)}. Restore it from a copy or compute it again.")
+        raise ResultFileError(f"{path} is damaged: {shown(printable(why), 200)}. Restore it from a copy or compute it again.")

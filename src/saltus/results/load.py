@@ -8,7 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from saltus import fence
+from saltus.fence import RefusedError, regular
 from saltus.results.ending import is_whole, try_elsewhere
 from saltus.results.files import ResultFileError, path_of
 from saltus.results.provenance import file_hash
@@ -53,7 +53,7 @@ def _read(path: Path) -> xr.Dataset:
     if path.suffix in (".csv", ".mat"):
         raise ResultFileError(f"{path}: only .nc files hold everything that a result is made of. Save it as {path.stem}.nc too.")
     try:
-        fence.regular(path)
+        regular(path)
         engine = _engine(path)
         whole = is_whole(path)
         if whole is False:
@@ -66,7 +66,7 @@ def _read(path: Path) -> xr.Dataset:
         return restore(ds)
     except ResultFileError:
         raise
-    except fence.RefusedError as refused:
+    except RefusedError as refused:
         if not path.exists():
             raise ResultFileError(f"there is no file {path} (looked in {path.parent.resolve()}).") from None
         raise ResultFileError(f"{path} {refused} Name a .nc file that saltus.save wrote.") from None
