@@ -66,7 +66,7 @@ def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
     return _module(
         title,
         taylor_head(system, order, lanes),
-        ("taylor_layout.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"),
+        ("taylor_layout.py", "taylor_singular.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"),
         BATCH + TAYLOR_WORKSPACE,
     )
 

@@ -198,7 +198,7 @@ def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
     name, factor = canonical.level_of(gap)
     if name is None:
         return Guard("", gap), positive
-    state, at_zero = ex.state(name), _substituted(gap, ex.state(name), ex.constant(0.0))
+    state, at_zero = ex.state(name), substituted(gap, ex.state(name), ex.constant(0.0))
     boundary = ex.div(_negated(at_zero) if factor > 0 else at_zero, abs(factor))
     if ex.varies(boundary):
         return Guard("", gap), positive
@@ -220,7 +220,7 @@ def _without_factor(gap: Expr) -> tuple[Expr, bool]:
                 return gap, positive
 
 
-def _substituted(root: Expr, old: Expr, new: Expr) -> Expr:
+def substituted(root: Expr, old: Expr, new: Expr) -> Expr:
     memo: dict[Expr, Expr] = {}
     for node in ex.walk(root):
         memo[node] = new if node is old else ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)

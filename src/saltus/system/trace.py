@@ -18,6 +18,7 @@ from saltus.system import checks
 from saltus.system.expression import TIME, Expr, as_expr, parameter, state, walk
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
+from saltus.system.singular import check_finite, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
@@ -175,7 +176,10 @@ def _traced(function: Callable[..., Any], states: tuple[str, ...], parameters: t
     except Exception as error:
         raise TraceError(explained(error, function, title)) from error
     try:
-        return find_guards(derivatives)
+        field, guards = find_guards(derivatives)
+        field = lifted(field, guards)
+        check_finite(field, guards, states)
+        return field, guards
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
 
