@@ -63,12 +63,17 @@ MOST_HALVINGS = 40
 NEGLIGIBLE = 2.0**-50
 #: Share of the way to the boundary that other steps may go.
 REACH = 0.9
+#: Those steps are shorter by this factor, as if the tolerance were 2**-8 of itself: at the edge of its disc a series converges so slowly
+#: that its last terms are a small part of what follows them.
+FINER = 2.0 ** (-8.0 / ORDER)
 #: A gap that is so many rounding errors wide can be told from zero.
 TOLD = 64.0
 #: Way to the boundary [s] below which coefficients of the last order could overflow.
 SHORTEST = 2.0 ** (-950.0 / ORDER)
 #: Exponent of time that the search for a negligible step begins with: force d**1.5, and one for its integral.
 USUAL_POWER = 2.5
+#: Steps that this search tries.
+MOST_TRIALS = 12
 
 Lanes = namedtuple("Lanes", "y side fresh clock c work bounds prior poly run found probe_y probe_clock probe_rate memo")
 Slow = namedtuple("Slow", "q b bounds rates out gaps state touches")

@@ -95,7 +95,7 @@ def away_from_boundaries(lanes, h):
     """h, shortened: to a share of the way to a boundary whose terms act; where they are set aside, until leaving them out is negligible."""
     for j in range(NSINGULAR):
         aside = load(lanes.side, NGUARDS + j, LANES) > 0.0
-        h = select(acts(lanes, j) & (~aside), smaller(REACH * way(lanes, SINGULAR_GUARD[j]), h), h)
+        h = select(acts(lanes, j) & (~aside), smaller(REACH * way(lanes, SINGULAR_GUARD[j]), FINER * h), h)
         aside = aside & (load(lanes.run, ACTIVE, LANES) > 0.5)
         if any_lane(aside):
             h = select(aside, negligible_step(lanes, h, j, aside), h)
@@ -103,8 +103,21 @@ def away_from_boundaries(lanes, h):
 
 
 @inner
+def rounding_of_gaps(lanes, i):
+    """Rounding error of rate i by that of the gaps: beside its boundary a gap has few digits."""
+    total = splat(0.0, LANES)
+    if i < NMOVED:
+        for j in range(NSINGULAR):
+            gap = magnitude(load(lanes.work, GAP_ROW + SINGULAR_GUARD[j], LANES))
+            force = magnitude(load(lanes.work, i * (ORDER + 1) + 1, LANES) - load(lanes.work, CALM_ROW + j * NMOVED + i, LANES))
+            part = force * ROUNDING * load(lanes.work, SCALE_ROW + SINGULAR_GUARD[j], LANES) / gap
+            total = total + select(part < HUGE, part, 0.0)
+    return total
+
+
+@inner
 def negligible_step(lanes, h, j, wanted):
-    """The longest step up to h, about, over which the terms of boundary j may be left out; by the secant rule on the logarithms.
+    """The longest step up to h, about, over which the terms of boundary j may be left out; by the secant rule on the logarithms, in a bracket.
 
     Not shorter than the gap needs to be told from zero, nor than SHORTEST.
     """
@@ -114,19 +127,22 @@ def negligible_step(lanes, h, j, wanted):
         magnitude(load(lanes.work, GUARD_ROW[g] + 1, LANES)),
         magnitude(load(lanes.work, GUARD_ROW[g] + 2, LANES)),
     )
-    floor = smaller(larger(2.0 * goal / (rate + root(rate * rate + 4.0 * bend * goal)), SHORTEST), h)
-    power, size, length = splat(USUAL_POWER, LANES), splat(0.0, LANES), splat(0.0, LANES)
-    open_lanes, tries = wanted, 0
-    while tries < MOST_HALVINGS and any_lane(open_lanes):
-        effect = coarse_log2(left_out(lanes, h, j))
-        log_h = coarse_log2(h)
-        open_lanes = open_lanes & (~(effect <= 0.0)) & (h > floor)
-        known = (effect < 900.0) & (size > 0.0)
-        measured = (size - effect) / (length - log_h)
-        power = select(known, larger(smaller(measured, 8.0), 0.25), power)
-        shrink = select(effect < 900.0, effect / power + 0.5, 4.0)
-        size, length = select(effect < 900.0, effect, 0.0), log_h
-        h = select(open_lanes, larger(coarse_exp2(log_h - shrink), floor), h)
+    longest = h
+    floor = smaller(larger(2.0 * goal / (rate + root(rate * rate + 4.0 * bend * goal)), SHORTEST), longest)
+    power, before, log_before = splat(USUAL_POWER, LANES), splat(2000.0, LANES), splat(0.0, LANES)
+    low, high = coarse_log2(floor), coarse_log2(longest)  # logs of a step short enough, and of one too long
+    tries = 0
+    while tries < MOST_TRIALS and any_lane(wanted):
+        effect, log_h = coarse_log2(left_out(lanes, h, j)), coarse_log2(h)
+        fits, useful = effect <= 0.0, magnitude(effect) < 900.0
+        low, high = select(fits & wanted, log_h, low), select(fits | (~wanted), high, log_h)
+        wanted = wanted & (high - low > 1.0) & ((~fits) | ((effect < -4.0) & (h < longest)))
+        measured = (effect - before) / (log_h - log_before)
+        power = select(useful & (before < 900.0), larger(smaller(measured, 8.0), 1.0), power)
+        guess = log_h - (effect + 1.0) / power
+        guess = select(useful & (guess > low) & (guess < high), guess, 0.5 * (low + high))
+        before, log_before = select(useful, effect, 2000.0), log_h
+        h = select(wanted, coarse_exp2(guess), select(fits, h, coarse_exp2(low)))
         tries += 1
     return h
 

@@ -67,6 +67,8 @@ def disagrees(lanes, h, share, log2_tolerance):
         rate, slope = load(lanes.probe_rate, i, LANES), load(lanes.probe_rate, NSTATES + i, LANES)
         size = magnitude(load(work, base, LANES)) + h * (magnitude(load(work, base + 1, LANES)) + magnitude(rate))
         rounding = ROUNDING * load(lanes.probe_rate, 2 * NSTATES + i, LANES)
+        if NSINGULAR > 0:
+            rounding = rounding + rounding_of_gaps(lanes, i)
         allowed = DEFECT * (coarse_exp2(splat(log2_tolerance, LANES)) * size + h * rounding)
         wrong = wrong | (h * magnitude(rate - slope) > allowed)
     return wrong
