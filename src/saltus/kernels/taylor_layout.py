@@ -63,9 +63,10 @@ MOST_HALVINGS = 40
 NEGLIGIBLE = 2.0**-50
 #: Share of the way to the boundary that other steps may go.
 REACH = 0.9
-#: Those steps are shorter by this factor, as if the tolerance were 2**-8 of itself: at the edge of its disc a series converges so slowly
-#: that its last terms are a small part of what follows them.
-FINER = 2.0 ** (-8.0 / ORDER)
+#: All steps behind such a boundary are shorter by this factor, as if the tolerance were 2**-13 of itself: near the edge of its disc a
+#: series converges so slowly that its last terms are a small part of what follows them (with 2**-8 a Hertz contact takes 1e-15 of the
+#: energy away, each time).
+FINER = 2.0 ** (-13.0 / ORDER)
 #: A gap that is so many rounding errors wide can be told from zero.
 TOLD = 64.0
 #: Way to the boundary [s] below which coefficients of the last order could overflow.

@@ -221,6 +221,7 @@ def _without_factor(gap: Expr) -> tuple[Expr, bool]:
 
 
 def substituted(root: Expr, old: Expr, new: Expr) -> Expr:
+    """The expression with another in place of one of its nodes."""
     memo: dict[Expr, Expr] = {}
     for node in ex.walk(root):
         memo[node] = new if node is old else ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)

@@ -54,8 +54,7 @@ class SetAside(NamedTuple):
 
 
 def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
-    """Find the terms of a field and of its gaps that have no Taylor series on a boundary, and give each boundary a bit that is to switch
-    its terms off."""
+    """Find the terms of a field and of its gaps that have no Taylor series on a boundary; a bit for each such boundary switches them off."""
     boundaries = _Boundaries(guards)
     roots = (*field, *(guard.gap for guard in guards))
     broken = {number: nodes for number in range(len(guards)) if (nodes := boundaries.singular_terms(roots, number))}
@@ -205,7 +204,7 @@ class _Boundaries:
         guard = self._guards[number]
         if not self._states[number] & _states_in(node):
             return False
-        if is_multiple(self._canonical.polynomial(node), self._gaps[number]):
+        if self._is_gap(node, number):
             return True
         if guard.state is None or guard.boundary is None:
             return False
@@ -214,6 +213,10 @@ class _Boundaries:
         except TraceError:  # something in it is no number there
             return False
         return not self._canonical.polynomial(there)
+
+    def _is_gap(self, node: Expr, number: int) -> bool:
+        """Whether a node is the gap of a guard times a factor."""
+        return is_multiple(self._canonical.polynomial(node), self._gaps[number])
 
     def lifted(self, node: Expr) -> Expr:
         """A function of a piece as a piece of functions, if that shows a zero on a boundary."""
@@ -228,7 +231,7 @@ class _Boundaries:
 
     def _spread(self, node: Expr) -> Expr:
         operand = node.args[0]
-        if any(self._vanishes(operand, number) for number in range(len(self._gaps))):
+        if any(self._is_gap(operand, number) for number in range(len(self._gaps))):
             return node
         outer = _outermost_bit(operand)
         if outer is None:
