@@ -16,7 +16,7 @@ version = release = saltus.__version__
 
 extensions = [
     "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "myst_nb",
-    "glossary_terms", "decision_notes", "study_tables", "measured", "claims", "offline",
+    "glossary_terms", "decision_notes", "study_tables", "result_tables", "measured", "claims", "offline",
 ]  # fmt: skip
 # pictures/ holds those of the README, comparison/ and replication/ data that pages read.
 exclude_patterns = ["_build", "_ext", "pictures", "comparison", "replication"]
@@ -44,6 +44,7 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 600
 nb_execution_show_tb = True
 nb_merge_streams = True
+nb_output_stderr = "remove"  # what is being compiled, and how far it is, belongs on a terminal
 # A caller's backend for files would leave the notebooks without pictures; the notebooks' own has a sharp 150 dots an inch from the style.
 os.environ.pop("MPLBACKEND", None)
 os.environ["MATPLOTLIBRC"] = str(HERE / "matplotlibrc")

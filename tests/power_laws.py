@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import log1p
+
 from scipy.optimize import brentq
 from scipy.special import beta
 
@@ -19,12 +21,6 @@ def power_stop(
     return v, lift + force * drive - spring * x - damping * v - stop
 
 
-@sl.system(states="x v")
-def hertz(t, x, v, *, stiffness=1e6, gap=0.0, lift=0.0):
-    """The same with the half power written as a root, and nothing else: the boundary is a level of x."""
-    return v, lift - sl.piecewise((stiffness * (x - gap) * sl.sqrt(x - gap), x > gap), otherwise=0)
-
-
 def depth_of(speed, stiffness, p):
     """Largest depth: v^2/2 = K d^(p+1)/(p+1)."""
     return ((p + 1) * speed**2 / (2 * stiffness)) ** (1 / (p + 1))
@@ -36,14 +32,13 @@ def duration_of(speed, stiffness, p):
 
 
 def pressed_period(lift, stiffness, p):
-    """Time from rest on the boundary, pressed by a constant force, until it is back: 2 (x/2a)^(1/2) B(1/2p, 1/2)/p, x = ((p+1)a/K)^(1/p)."""
+    """Time from rest on the boundary, pressed by a force a, until it is back: 2 (x/2a)^(1/2) B(1/2p, 1/2)/p with x = ((p+1)a/K)^(1/p)."""
     deepest = ((p + 1) * lift / stiffness) ** (1 / p)
     return 2 * (deepest / (2 * lift)) ** 0.5 * beta(1 / (2 * p), 0.5) / p
 
 
 def rebound_of(speed, dashpot):
     """Speed after a contact with the force K d^p (1 + c v), whatever K and p: v/c - log(1 + c v)/c^2 is the same before and after."""
-    from math import log1p
 
     def level(v):
         return v / dashpot - log1p(dashpot * v) / dashpot**2

@@ -89,6 +89,27 @@ def coherent_unit(text: str, name: str) -> str:
     return _join(unit.parts)
 
 
+def dimension(unit: str) -> dict[str, Fraction]:
+    """Exponents of m, kg, s, A and K in a declared unit; the angle counts as a plain number. ``"N/m"`` gives ``{"kg": 1, "s": -2}``."""
+    return _without_angle(_parsed(unit))[0]
+
+
+def unit_text(exponents: Mapping[str, Fraction]) -> str:
+    """A dimension as the unit that people know it by: ``{"kg": 1, "s": -2}`` gives ``"N/m"``."""
+    for unit in _USUAL:
+        if dimension(unit) == exponents:
+            return unit
+    order = ("kg", "m", "s", "A", "K")
+    return _join({base: exponents[base] for base in order if base in exponents})
+
+
+#: Units that messages call a dimension by, the first that fits.
+_USUAL = (
+    "1", "m", "m/s", "m/s^2", "kg", "s", "1/s", "1/s^2", "N", "N/m", "N*s/m", "N/m^2", "N/m^3", "N/m^1.5", "N*m", "N*m*s", "N*s", "kg*m^2",
+    "W", "V", "ohm", "N*s/m^2", "N*s", "kg/m^3", "m^2", "m^3", "N/kg", "N*m/s^2", "N*m^2", "N/s",
+)  # fmt: skip
+
+
 def _join(parts: Mapping[str, Fraction]) -> str:
     """A unit written from exponents: ``{"N": 1, "m": -3}`` gives ``"N/m^3"``."""
 

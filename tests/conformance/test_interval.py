@@ -39,6 +39,21 @@ def test_event_just_beyond_the_end_is_not_reported():
     assert (contacts(run), float(run.end_x)) == ([], 1.0 - np.nextafter(1.0, 2.0))
 
 
+def test_no_contact_is_later_than_the_end():
+    """t_start + (t_end - t_start) rounds beyond t_end: a contact there, the end of the run and its last sample are at t_end."""
+    rng = np.random.default_rng(5)
+    begin, end = rng.uniform(0, 1, 400), rng.uniform(1, 5, 400)
+    late = np.flatnonzero(begin + (end - begin) > end)
+    assert len(late) >= 5
+    for i in late[:5]:
+        for system in (FLIGHT, pair.with_values(stop1=0.0, stop2=9.0, gap=99.0)):
+            still = [0.0] * (len(system.states) - 2)
+            run = sl.simulate(system, (-(end[i] - begin[i]), 1.0, *still), t_start=begin[i], t_end=end[i], samples=4)
+            assert [c.time for c in contacts(run)] == [end[i]]
+            assert float(run.end_time) == end[i]
+            assert run.time.values.max() <= end[i]
+
+
 @pytest.mark.parametrize("whole", [1, 2, 5])
 def test_event_exactly_at_a_whole_period_is_reported_once(whole):
     """The clock turns over at every period; an event exactly there is reported in one of the two, at the end of a run too."""

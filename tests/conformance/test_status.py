@@ -50,6 +50,23 @@ def test_numbers_near_the_end_of_the_range():
     assert float(run.end_x[2]) == pytest.approx(2e-200, rel=1e-12)
 
 
+@sl.system(states="x")
+def pole(t, x, *, gain=-1.0):
+    """x' = gain / x: x = sqrt(x0^2 + 2 gain t), a pole of the right-hand side at x = 0; a guard that isn't a number below x = 0."""
+    return (gain / x + sl.piecewise((1.0, sl.sqrt(x) > 9.0), otherwise=0),)
+
+
+def test_a_step_that_was_never_valid_takes_no_time():
+    """A start in a pole ends at the start; one that runs into it, at the last node before it; so does one whose gap isn't a number."""
+    run = sl.simulate(pole, {"x": [0.0, 0.5, -0.5]}, t_end=2.0, samples=4, method=sl.Taylor(order=12, lanes=2))
+    assert run.status.values.tolist() == ["nonfinite"] * 3
+    assert run.end_time.values[[0, 2]].tolist() == [0.0, 0.0]
+    assert run.end_x.values[[0, 2]].tolist() == [0.0, -0.5]
+    assert run.steps.values[[0, 2]].tolist() == [0, 0]
+    assert float(run.end_time[1]) == pytest.approx(0.125, abs=1e-12)
+    assert float(run.end_x[1]) ** 2 == pytest.approx(0.25 - 2 * float(run.end_time[1]), abs=1e-14)
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_start_that_is_no_number_is_refused(bad):
     """Refused before anything runs, with the place of the bad number."""
@@ -94,6 +111,27 @@ def test_budget_of_events(most):
     assert int(run.events) == most
     assert [c.time for c in contacts(run)] == [c.time for c in contacts(free)][:most]
     assert float(run.end_time) == contacts(free)[most - 1].time
+
+
+SLOW = lab.with_values(spring=1e6, damping=0.02, force=1e6, frequency=2.5e-4, boundary=9.0)
+
+
+def test_a_slow_drive_takes_the_steps_it_needs():
+    """A drive 640 000 times slower than the oscillator: millions of steps in a period, and the steady motion of the closed form."""
+    run = sl.simulate(SLOW, (2.0, 0.0), periods=1, samples=1, time_errors="local")
+    assert str(run.status.values) == "ok"
+    assert int(run.steps) > 1_000_000
+    w = 2 * math.pi * 2.5e-4
+    exact = 1e6 * (1e6 - w**2) / ((1e6 - w**2) ** 2 + (0.02 * w) ** 2)
+    assert float(run.end_x) == pytest.approx(exact, rel=1e-9)  # e^-40 is left of the start
+
+
+def test_a_run_that_would_never_end_says_how_long_it_takes():
+    """A drive of 1e-6 Hz on the rig, whose force is then 2e12 N: stopped after a million steps, with what the whole would take."""
+    rig = sl.models.delangre("b", frequency=1e-6)
+    with pytest.warns(sl.errors.SaltusWarning, match=r"of 1e\+06 s far in 1000001 steps: at this pace .* steps \(some .* days\)"):
+        run = sl.simulate(rig, (0.0, 0.0), periods=1, samples=1, time_errors="local")
+    assert str(run.status.values) == "budget_steps"
 
 
 def test_budgets_are_those_of_each_trajectory():

@@ -6,7 +6,9 @@ Everything here is the command itself, in processes of its own, on the rig at 16
 import json
 import os
 import random
+import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -38,7 +40,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and for
 
 STUDY = small_study(36)
 CHUNKS = 27
-#: The command with small chunks (in a worker of dask too, which imports this file first), and a moment between two commits, so that
+#: The command with small chunks (in a process of --workers too, which imports this file first), and a moment between two commits, so that
 #: there is one to be killed in. With `serve` it loads everything once and forks a child for each line, which starts within milliseconds.
 COMMAND = """
 import json, os, signal, sys, time
@@ -156,7 +158,7 @@ def as_if_undisturbed(folder, undisturbed):
     assert load(folder / "basins.nc").drop_attrs().identical(undisturbed[1])
 
 
-def wait_for(condition, seconds=60):
+def wait_for(condition, seconds=300):
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end
@@ -208,13 +210,13 @@ def test_shards_at_the_same_time_one_of_them_killed(server, undisturbed, tmp_pat
     assert server.end()[0] == -signal.SIGKILL
     code, text = server.run(*arguments(server, folder, "--shard", "0/2"))
     assert code == 0, text
-    assert other.wait(60) == 0, other.stdout.read()
+    assert other.wait(300) == 0, other.stdout.read()
     code, text = server.run("resume", folder, "--threads", 1, "--progress", "none")
     assert code == 0, text
     as_if_undisturbed(folder, undisturbed)
 
 
-# -- dask ------------------------------------------------------------------------------------------------------------------------
+# -- processes -------------------------------------------------------------------------------------------------------------------
 def workers_of(process):
     """The workers that a run has started."""
     found = []
@@ -227,7 +229,6 @@ def workers_of(process):
 
 
 def with_workers(server, folder, count, pause):
-    pytest.importorskip("distributed")
     words = ["run", server.study, "--out", folder, "--workers", count, "--progress", "none"]
     return subprocess.Popen(
         [sys.executable, str(server.command), *map(str, words)],
@@ -243,7 +244,7 @@ def test_two_workers_and_one_of_them_killed(server, undisturbed, tmp_path):
     assert len(workers) == 2
     os.kill(workers[0], signal.SIGKILL)
     at = committed(tmp_path / "out")
-    text = run.communicate(timeout=90)[0]
+    text = run.communicate(timeout=300)[0]
     assert run.returncode == 0, text
     assert at < CHUNKS - 4, "it was killed while there was work to do"
     as_if_undisturbed(tmp_path / "out", undisturbed)
@@ -251,7 +252,7 @@ def test_two_workers_and_one_of_them_killed(server, undisturbed, tmp_path):
 
 def test_two_workers_give_the_bits_of_one_thread(server, undisturbed, tmp_path):
     run = with_workers(server, tmp_path / "out", 2, 0.0)
-    text = run.communicate(timeout=90)[0]
+    text = run.communicate(timeout=300)[0]
     assert run.returncode == 0, text
     assert "Traceback" not in text
     as_if_undisturbed(tmp_path / "out", undisturbed)
@@ -262,10 +263,73 @@ def test_the_only_worker_killed(server, undisturbed, tmp_path):
     run = with_workers(server, tmp_path / "out", 1, 0.05)
     wait_for(lambda: committed(tmp_path / "out") >= 3)
     os.kill(*workers_of(run), signal.SIGKILL)
-    text = run.communicate(timeout=90)[0]
+    text = run.communicate(timeout=300)[0]
     assert "Traceback" not in text
     assert run.returncode == 0, text
     as_if_undisturbed(tmp_path / "out", undisturbed)
+
+
+def family(process):
+    """The process and all that descend from it."""
+    parents = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            parents[int(stat.parent.name)] = int(stat.read_text().rsplit(")", 1)[1].split()[1])
+    found, more = {process.pid}, True
+    while more:
+        more = {child for child, parent in parents.items() if parent in found} - found
+        found |= more
+    return found
+
+
+def sockets_of(processes):
+    """Numbers of the sockets that processes hold."""
+    found = set()
+    for process in processes:
+        for link in Path(f"/proc/{process}/fd").glob("*"):
+            with suppress(OSError):
+                found |= set(re.findall(r"^socket:\[(\d+)\]$", os.readlink(link)))
+    return found
+
+
+def listening(sockets):
+    """Those of the sockets that wait for connections, by any protocol."""
+    tcp = [line.split() for name in ("tcp", "tcp6") for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]]
+    local = [line.split() for line in Path("/proc/net/unix").read_text().splitlines()[1:]]
+    udp = [line.split() for name in ("udp", "udp6") for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]]
+    waiting = {row[9] for row in tcp if row[3] == "0A"} | {row[6] for row in local if row[3] == "00010000"} | {row[9] for row in udp}
+    return waiting & sockets
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="looks into /proc")
+def test_workers_listen_nowhere(server, tmp_path):
+    """Nobody else can hand them work: no socket of the run waits for a connection, on any port or path."""
+    with socket.create_server(("127.0.0.1", 0)):
+        assert listening(sockets_of([os.getpid()])), "it would be seen"
+    run = with_workers(server, tmp_path / "out", 2, 0.05)
+    wait_for(lambda: committed(tmp_path / "out") >= 3)
+    processes = family(run)
+    assert len(processes) >= 3
+    assert listening(sockets_of(processes)) == set()
+    text = run.communicate(timeout=300)[0]
+    assert run.returncode == 0, text
+
+
+def test_ctrl_c_with_workers(server, undisturbed, tmp_path):
+    """As a terminal sends it, to all of them: one message, no process left behind, nothing lost."""
+    folder = tmp_path / "out"
+    run = with_workers(server, folder, 2, 0.05)
+    wait_for(lambda: committed(folder) >= 3)
+    processes = family(run)
+    os.killpg(run.pid, signal.SIGINT)
+    text = run.communicate(timeout=300)[0]
+    assert run.returncode == 130, text
+    assert text.count("saltus: stopped") == 2, text  # what to type; and that files are whole
+    assert "Traceback" not in text
+    wait_for(lambda: not [one for one in processes if Path(f"/proc/{one}").exists() and not ended(one)])
+    code, text = server.run("resume", folder, "--threads", 1, "--progress", "none")
+    assert code == 0, text
+    as_if_undisturbed(folder, undisturbed)
 
 
 # -- Ctrl-C ----------------------------------------------------------------------------------------------------------------------

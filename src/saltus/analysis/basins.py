@@ -10,10 +10,10 @@ import xarray as xr
 from saltus.analysis.plan import BasinPlan, basin_plan
 from saltus.analysis.recurrence import Found
 from saltus.analysis.settling import Settling
-from saltus.flow.engine import Interrupted
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.flow.threads import on_threads
+from saltus.interrupt import Interrupted
 from saltus.system.system import System
 
 #: Share of the progress that the search for attractors takes.

@@ -9,15 +9,12 @@ import numpy as np
 
 from saltus.analysis.batch_means import CONFIDENCE
 from saltus.analysis.growth import GOOD, STRETCH
-from saltus.analysis.looks import margin
 from saltus.analysis.lyapunov_spectrum import Spectrum, running_ends, spectrum
+from saltus.analysis.orbit_measures import measure
 from saltus.analysis.orbits import Orbit
-from saltus.analysis.portrait import SAMPLES
 from saltus.analysis.walks import FlowWalk
 from saltus.flow.family import Family
-from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
-from saltus.system.evaluate import evaluate
 
 #: Numbers that the tangents of one stretch of a group may hold: 32 MB, and some copies of it.
 GROUP = 4_000_000
@@ -94,8 +91,9 @@ class Exponents:
         """Grazes and margin of the orbit alone, in place of those on the way to it."""
         stretch = walk.move(orbit.points[:1], orbit.period)
         self._grazes[row], self._unresolved[row] = stretch.grazes[0], stretch.unresolved[0]
-        self._margin[row], size = margin_and_range(walk.map_of(0), orbit)
-        self._near[row] = self._margin[row] < NEAR_GRAZE * size
+        numbers = measure(walk.family, orbit.points[:1], np.array([orbit.period]))
+        self._margin[row] = numbers.margin[0]
+        self._near[row] = numbers.margin[0] < NEAR_GRAZE * numbers.span[0]
 
     def columns(self, factor: np.ndarray) -> dict[str, Any]:
         """The columns of the result; exponents times a factor for each trajectory, float64[k]."""
@@ -142,16 +140,3 @@ def _with_phase(exponents: np.ndarray) -> np.ndarray:
     """Exponents float64[k, D] and the zero of the phase, in descending order."""
     zero = np.where(np.isnan(exponents[:, :1]), np.nan, 0.0)
     return -np.sort(-np.concatenate([exponents, zero], axis=1), axis=1)
-
-
-def margin_and_range(map_: Stroboscope, orbit: Orbit) -> tuple[float, float]:
-    """Smallest distance by which an orbit misses or overshoots a boundary, and the largest range of a gap on it."""
-    system, motion = map_.system, map_.trajectory(orbit.points[:1], orbit.period, SAMPLES)[0]
-    states, time = motion[0].T, map_.period * np.arange(orbit.period * SAMPLES) / SAMPLES
-    named, ranges = dict(zip(system.states, states, strict=True)), [0.0]
-    bits: list[np.ndarray] = []
-    for guard in system.guards:
-        (gap,) = evaluate([guard.gap], t=time, states=named, values=system.values, bits=bits)
-        bits.append(np.broadcast_to(gap, time.shape) > 0)
-        ranges.append(float(np.ptp(gap)))
-    return float(margin(system, time, states, system.values)), max(ranges)

@@ -16,10 +16,10 @@ from saltus.analysis.messages import warn
 from saltus.analysis.neighbour_exponents import NeighbourExponents
 from saltus.analysis.starts import Ensemble, check_system, ensemble
 from saltus.errors import ParameterError, nearest
-from saltus.flow.engine import Interrupted
 from saltus.flow.family import Family
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.interrupt import Interrupted
 from saltus.results import exponents_dataset
 from saltus.system.system import System
 from saltus.units import to_si

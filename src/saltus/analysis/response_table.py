@@ -11,11 +11,11 @@ from saltus.analysis import branches
 from saltus.analysis.along import whole
 from saltus.analysis.answers import gap_unit, guards_over, provenance
 from saltus.analysis.grid import Grid
-from saltus.analysis.responses import Found, find, table_of
+from saltus.analysis.responses import Found, find, numbers_of, table_of
 from saltus.analysis.samples import sampled
-from saltus.flow.engine import Interrupted
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.interrupt import Interrupted
 from saltus.results import Events, Responses, Starts, responses_dataset
 
 
@@ -43,7 +43,8 @@ def respond(
 
 
 def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: int | None, sample: str) -> xr.Dataset:
-    table = table_of(found, grid, method, threads)
+    numbers = numbers_of(found, grid, method, threads)
+    table = table_of(found, numbers, grid, method)
     branch, happened = np.full(len(found), -1, np.int64), []
     if len(grid.axes) == 1:
         branch = branches.follow(found, grid, method, threads)
@@ -60,7 +61,7 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
         response_of=found.of.reshape(*grid.shape, len(grid.starts)),
         responses=Responses(
             table, np.stack(np.unravel_index(found.place, grid.shape), axis=1), branch,
-            sampled(sample, grid, method, found, threads) if sample else None,
+            sampled(sample, numbers, grid, method, found, threads) if sample else None,
         ),
         events=Events(
             {name: np.array([event.value for event in happened])}, [event.kind for event in happened],

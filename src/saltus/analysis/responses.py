@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.grid import Grid
-from saltus.analysis.looks import looks
+from saltus.analysis.orbit_measures import Measures, measure
 from saltus.analysis.recurrence import SAME
 from saltus.analysis.steady import CHAOTIC, PERIODIC, QUASI_PERIODIC, Steady, settle_each
 from saltus.analysis.wandering import Wandering, alike
@@ -19,8 +19,8 @@ from saltus.results.intervals import wilson
 
 #: Words for the kinds of motion.
 KINDS = {PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic"}
-#: Samples of a period from which peaks and margins are taken, and periods of a motion that never repeats.
-SAMPLES, WANDERED = 256, 64
+#: Points kept of a motion that never repeats.
+WANDERED = 64
 
 
 @dataclass
@@ -137,23 +137,27 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
     return (int(result.kind[row]), int(period), *(float(size) for size in sizes))
 
 
-def table_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> AttractorTable:
+def numbers_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> Measures:
+    """The numbers of each response."""
+    return measure(grid.family(method, threads).rows(found.place), found.start(), found.period)
+
+
+def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
     """What is known of each response."""
-    family = grid.family(method, threads).rows(found.place)
+    family = grid.family(method).rows(found.place)
     period, kind, s = found.period, found.kind, found.steady
     spans = np.where(period > 0, period, WANDERED)
-    look = looks(family, found.start(), spans, SAMPLES)
     hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
     low, high = wilson(hits, len(grid.starts))
     shares = (hits / len(grid.starts), low, high) if grid.drawn else None
     return AttractorTable(
         kind=[KINDS[int(code)] for code in kind],
         period=period,
-        contacts=look.contacts * np.maximum(period, 1),
+        contacts=numbers.contacts * np.maximum(period, 1),
         itinerary=[""] * len(found),
-        peak=look.peak,
-        rms=look.rms,
-        margin=look.margin,
+        peak=numbers.peak[:, 0],
+        rms=numbers.rms[:, 0],
+        margin=numbers.margin,
         multipliers=s.orbits.multipliers[found.row],
         exponent=s.exponent[found.row] / family.period,
         exponent_error=s.exponent_error[found.row] / family.period,

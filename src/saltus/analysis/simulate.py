@@ -15,9 +15,10 @@ from saltus.analysis.messages import warn
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.errors import ParameterError
 from saltus.flow import engine
-from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
+from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.interrupt import Interrupted
 from saltus.results import trajectory_dataset
 from saltus.system.system import System
 
@@ -112,7 +113,7 @@ def simulate(
     finally:
         close()
     result = _dataset(system, method, group, length, plan, outcome, errors)
-    warn(result)
+    warn(result, length)
     return result
 
 
@@ -129,7 +130,8 @@ class _Plan:
     first: int
 
     def request(self, group: Ensemble, length: Span) -> Request:
-        return Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, self.schedule, self.first)
+        begin, end = length.t_start, length.t_end
+        return Request(group.start, group.parameters, length.period, begin, length.count, length.phase, self.schedule, self.first, end)
 
     def contacts_only(self, group: Ensemble, length: Span) -> Request:
         return replace(self.request(group, length), schedule=Schedule.none())
@@ -165,7 +167,7 @@ def _dataset(
     forced = system.forced_at is not None
     own_periods = forced and bool(np.ptp(length.period) > 0)
     scale = length.period[:, None] if own_periods else length.period[0]
-    time = length.t_start + (plan.schedule.count * scale + plan.schedule.fraction * scale)
+    time = np.minimum(length.t_start + (plan.schedule.count * scale + plan.schedule.fraction * scale), length.t_end)
     return trajectory_dataset(
         time=time,
         values={name: outcome.samples[:, :, i] for i, name in enumerate(system.states)},

@@ -205,13 +205,14 @@ def _numbers(system: System, name: str, value: Any) -> np.ndarray:
 class Span:
     """How long to run: a period for each trajectory, whole periods and the time after them, all since t_start.
 
-    For an unforced system the whole span is one period.
+    For an unforced system the whole span is one period. ``t_end`` is the time that was asked for [s], infinite if periods were.
     """
 
     t_start: float
     period: np.ndarray
     count: np.ndarray
     phase: np.ndarray
+    t_end: float = math.inf
 
 
 def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any) -> Span:
@@ -234,14 +235,15 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
         if isinstance(periods, bool) or not isinstance(periods, int | float | np.integer) or periods != int(periods) or periods < 1:
             raise ParameterError(f"periods must be a whole number of at least 1, not {periods!r}. For a part of a period give t_end=.")
         return Span(begin, _periods(system, group), np.full(n, int(periods), np.int64), np.zeros(n))
-    length = _time(t_end, "t_end") - begin
+    end = _time(t_end, "t_end")
+    length = end - begin
     if not length > 0:
         raise ParameterError(f"t_end = {t_end!r} must be after t_start = {t_start!r}.")
     if system.forced_at is None:
-        return Span(begin, np.full(n, length), np.ones(n, np.int64), np.zeros(n))
+        return Span(begin, np.full(n, length), np.ones(n, np.int64), np.zeros(n), end)
     period = _periods(system, group)
     count = np.floor(length / period).astype(np.int64)
-    return Span(begin, period, count, np.maximum(length - count * period, 0.0))
+    return Span(begin, period, count, np.maximum(length - count * period, 0.0), end)
 
 
 def _time(value: Any, name: str) -> float:

@@ -14,9 +14,10 @@ from saltus.analysis.along import whole
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.errors import ParameterError
 from saltus.flow import engine
-from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
+from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method
 from saltus.flow.progress import reporter
+from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
 from saltus.results import Guards
 from saltus.system.system import System

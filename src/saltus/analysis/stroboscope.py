@@ -13,9 +13,10 @@ from saltus.analysis.messages import warn
 from saltus.analysis.starts import ensemble, span
 from saltus.errors import ParameterError
 from saltus.flow import engine
-from saltus.flow.engine import Interrupted, Outcome, Request, Schedule
+from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.interrupt import Interrupted
 from saltus.results import stroboscope_dataset
 from saltus.system.system import System
 

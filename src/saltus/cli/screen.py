@@ -15,6 +15,8 @@ from rich.markup import escape
 from rich.measure import Measurement
 from rich.table import Table
 
+from saltus.fence import printable
+
 if TYPE_CHECKING:
     from saltus.replication import Progress
     from saltus.study.running import Report
@@ -33,26 +35,26 @@ def console(stderr: bool = False) -> Console:
 def show(table: TextTable) -> None:
     """Print a table and its notes; row by row where the terminal is too narrow for it."""
     screen = console()
-    screen.print(escape(table.title), style="bold")
+    screen.print(_plain(table.title), style="bold")
     grid = Table(show_header=any(table.columns), header_style="dim", box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for number, column in enumerate(table.columns):
         numeric = all(_is_number(row[number]) for row in table.rows if row[number])
-        grid.add_column(escape(column), justify="right" if numeric else "left", no_wrap=True)
+        grid.add_column(_plain(column), justify="right" if numeric else "left", no_wrap=True)
     for row in table.rows:
-        grid.add_row(*map(escape, row))
+        grid.add_row(*map(_plain, row))
     if Measurement.get(screen, screen.options.update(max_width=10 * LOG_WIDTH), grid).maximum <= screen.width:
         screen.print(grid)
     else:
         for row in table.rows:
             lines = [f"{column:>{max(map(len, table.columns))}}  {text}" for column, text in zip(table.columns, row, strict=True) if text]
-            screen.print(escape("\n".join(lines)), end="\n\n")
+            screen.print(_plain("\n".join(lines)), end="\n\n")
     for note in table.notes:
-        screen.print(escape(note), style="dim")
+        screen.print(_plain(note), style="dim")
 
 
 def say(text: str) -> None:
     """Print a line as it is."""
-    console().print(escape(text))
+    console().print(_plain(text))
 
 
 def files(paths: Iterable[Path]) -> None:
@@ -63,14 +65,14 @@ def files(paths: Iterable[Path]) -> None:
 
 def fail(text: str) -> None:
     """Print a message of what went wrong to standard error."""
-    console(stderr=True).print(f"[bold red]saltus:[/] {escape(text)}")
+    console(stderr=True).print(f"[bold red]saltus:[/] {_plain(text)}")
 
 
 @contextmanager
 def working() -> Iterator[Callable[[float], None]]:
     """Show that something is being computed, and afterwards how long it took; yields what to call with the share done."""
     begin = time.perf_counter()
-    with console(stderr=True).status("compiling the equations, if they are new here (about 20 s) ...") as status:
+    with console(stderr=True).status("working ...") as status:
         yield lambda share: status.update(f"integrating, {share:.0%} ...")
     say(f"computed in {time.perf_counter() - begin:.1f} s")
 
@@ -83,7 +85,7 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
     """
     begin, shown = time.perf_counter(), [0.0]
     if kind == "bar":
-        with console(stderr=True).status("compiling the equations, if they are new here (about 20 s) ...") as status:
+        with console(stderr=True).status("working ...") as status:
             yield lambda report: status.update(_progress_text(report)), say
         say(f"computed in {time.perf_counter() - begin:.1f} s")
         return
@@ -96,7 +98,14 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
             told = {"question": report.name, "done": report.done, "total": report.total, "seconds": report.seconds, "seconds_left": left}
             print(json.dumps(told), file=sys.stderr, flush=True)  # noqa: T201
 
-    yield report_json, say if kind != "json" else lambda _: None
+    def tell_json(text: str) -> None:
+        if kind == "json":
+            print(json.dumps({"note": text}), file=sys.stderr, flush=True)  # noqa: T201
+
+    from saltus.codegen.announce import telling
+
+    with telling(tell_json):
+        yield report_json, say if kind != "json" else lambda _: None
 
 
 @contextmanager
@@ -106,12 +115,12 @@ def replicating() -> Iterator[Callable[[Progress], None]]:
 
     def text(progress: Progress) -> str:
         running = f"; computing {', '.join(progress.running)}" if progress.running else ""
-        return escape(
+        return _plain(
             f"figure {progress.figure}: {progress.jobs_done} of {progress.jobs}{running}. In all {progress.done} of {progress.total}, "
             f"{time.perf_counter() - begin:.0f} s"
         )
 
-    with console(stderr=True).status("compiling the equations, if they are new here (about a minute) ...") as status:
+    with console(stderr=True).status("working ...") as status:
         yield lambda progress: status.update(text(progress))
     say(f"computed in {time.perf_counter() - begin:.1f} s")
 
@@ -119,9 +128,14 @@ def replicating() -> Iterator[Callable[[Progress], None]]:
 def _progress_text(report: Report) -> str:
     left = report.seconds_left
     if report.what == "%":
-        return escape(f"{report.name}: {report.done} %{f', {left:.0f} s left' if left is not None else ''}")
+        return _plain(f"{report.name}: {report.done} %{f', {left:.0f} s left' if left is not None else ''}")
     rate = f", {report.computed / report.seconds:.1f} chunks a second, {left:.0f} s left" if left is not None and report.seconds > 0 else ""
-    return escape(f"{report.name}: {report.done} of {report.total} chunks{rate}")
+    return _plain(f"{report.name}: {report.done} of {report.total} chunks{rate}")
+
+
+def _plain(text: str) -> str:
+    """A text that is shown as it is: no markup, and nothing that a terminal would obey."""
+    return escape(printable(text))
 
 
 def _is_number(text: str) -> bool:

@@ -1,17 +1,19 @@
-"""Make one entry of the kernel cache: what a process does that another one started to compile for it.
+"""Compile one module: what a process does that another one started for it (machine.py).
 
-Reads the entry from standard input, as JSON with key, source and title.
+Reads ``{"name": ..., "source": ...}`` as JSON from standard input; writes the bytes that stand for the module to standard output.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import sys
-import warnings
 
-from saltus.codegen.cache import load
-from saltus.errors import SaltusWarning
+from saltus.codegen.machine import compiled
 
 if __name__ == "__main__":
-    warnings.simplefilter("error", SaltusWarning)  # a folder that can't be written: end before anything is compiled in vain
-    load(**json.load(sys.stdin))
+    answer = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what anything prints is no part of the answer
+    _, data = compiled(**json.load(sys.stdin))
+    with answer:
+        answer.write(data or b"")

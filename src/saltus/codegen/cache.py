@@ -1,45 +1,43 @@
-"""The folder of generated kernels: one entry per (equations, templates, versions, processor), safe to share and to lose.
+"""The folder of generated kernels: one file per (equations, templates, versions, processor); safe to lose, and this user's alone.
 
-An entry is built in a private folder and renamed into place, so processes that start cold at once can't disturb each other. A manifest of
-checksums is verified before anything is loaded; an entry that doesn't match is thrown away and built again.
-
-Numba compiles one function at a time and holds the interpreter meanwhile. The main thread compiles where it is; other threads compile in
-processes of their own (build_one.py), so that they neither wait for each other nor keep those that compute from going on.
+An entry holds code, so a folder or a file that others could have written to is never used: kernels are then compiled for this process
+only, and kept in its memory. An entry is written beside the others and renamed into place, so processes that start cold at once can't
+disturb each other; its checksum is verified before anything of it is used, and a damaged one is built again.
 """
 
 from __future__ import annotations
 
 import atexit
-import contextlib
-import hashlib
-import importlib.util
-import json
 import os
 import shutil
-import subprocess
 import sys
-import tempfile
 import threading
+import time
 import warnings
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
 import platformdirs
 
-from saltus.errors import CacheError, SaltusWarning
+from saltus.codegen import entry, machine
+from saltus.codegen.announce import announce
+from saltus.errors import SaltusWarning
+from saltus.interrupt import check_stop
 
-MANIFEST = "manifest.json"
-MODULE = "kernels.py"
-_BUILDING = ".building-"
+#: Age from which an unfinished entry belongs to a process that was killed [s].
+_ABANDONED = 86_400.0
 #: One thread at a time sees to an entry: a module stands in sys.modules before it is complete.
 _LOCKS: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
+atexit.register(machine.end_all)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One cached module: its key, the system it was made for, its size [bytes] and its folder."""
+    """One cached module: its key, the system it was made for, its size [bytes] and its file."""
 
     name: str
     system: str
@@ -54,155 +52,138 @@ def folder() -> Path:
 
 
 def entries() -> list[Entry]:
-    """Every complete entry, by name."""
-    found = []
-    for manifest in sorted(folder().glob(f"*/{MANIFEST}")):
-        path = manifest.parent
-        if path.name.startswith(_BUILDING):
-            continue
-        try:
-            title = json.loads(manifest.read_text())["title"]
-        except (OSError, ValueError, KeyError, TypeError):
-            title = "(damaged)"
-        size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
-        found.append(Entry(path.name, title, size, path))
-    return found
+    """Every entry, by name."""
+    paths = sorted(folder().glob(f"*{entry.SUFFIX}"))
+    return [Entry(path.stem, entry.title_of(path), path.lstat().st_size, path) for path in paths if not path.name.startswith(entry.DRAFT)]
 
 
 def clear() -> int:
     """Delete every entry and every unfinished one; returns how many entries there were."""
-    count = len(entries())
-    if folder().exists():
+    found = entries()
+    for one in found:
+        entry.remove(one.path)
+    if folder().is_dir():
         for path in folder().iterdir():
-            if path.name.startswith(_BUILDING) or (path / MANIFEST).exists() or (path / MODULE).exists():
-                shutil.rmtree(path, ignore_errors=True)
-    return count
+            if path.name.startswith(entry.DRAFT) or ((path / "kernels.py").exists() and (path / "manifest.json").exists()):
+                _delete(path)
+    return len(found)
 
 
-def load(key: str, source: str, title: str) -> ModuleType:
+def _delete(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        entry.remove(path)
+
+
+def load(key: str, source: str, title: str, what: str | None = None, seconds: float = 20.0) -> ModuleType:
     """The module with this source, from the cache or compiled now.
 
     Parameters
     ----------
     key : str
-        Name of the entry: a hash of everything that its machine code depends on.
+        Name of the entry: a hash of everything that its machine code depends on, the source included.
     source : str
-        Text of the module.
+        Text of the module. Its one function for Python is decorated with ``kept(signature, **options of numba.njit)``.
     title : str
         What `saltus cache` shows for it.
+    what : str, optional
+        What is said to be compiled, if it must be; default the title.
+    seconds : float
+        How long that takes on a quiet machine [s], for people who wait.
 
     Raises
     ------
     CacheError
-        If no folder at all can be written.
+        If the process that compiles is killed.
+    Interrupted
+        If the work that this thread does a part of was asked to stop.
     """
-    with _LOCKS[key]:
-        return _load(f"saltus_kernels_{key}", folder() / key, source, title)
+    name = f"saltus_kernels_{key}"
+    with _held(_LOCKS[key]):
+        if name in sys.modules:
+            return sys.modules[name]
+        usable = _usable()
+        final = folder() / (key + entry.SUFFIX)
+        found = _from_cache(name, final) if usable else None
+        return found or _build(name, final if usable else None, source, title, what or title, seconds)
 
 
-def _load(name: str, final: Path, source: str, title: str) -> ModuleType:
-    if name in sys.modules:
-        return sys.modules[name]
-    if not (final / MANIFEST).exists() and threading.current_thread() is not threading.main_thread():
-        _build_in_a_process(final.name, source, title)
-    if _intact(final, source):
-        try:
-            return _import(name, final / MODULE)
-        except Exception as error:  # whatever a damaged file makes Numba raise: the entry is ours, so build it again
-            warnings.warn(
-                f"saltus: the cached kernel {final} could not be loaded ({error!r}); building it again.", SaltusWarning, stacklevel=2
-            )
-            shutil.rmtree(final, ignore_errors=True)
-    elif (final / MANIFEST).exists():
-        warnings.warn(f"saltus: the cached kernel {final} is damaged; building it again.", SaltusWarning, stacklevel=2)
-    return _build(name, final, source, title)
-
-
-def _checksums(path: Path) -> dict[str, str]:
-    files = sorted(f for f in path.rglob("*") if f.is_file() and f.name != MANIFEST and f.suffix != ".pyc")
-    return {str(f.relative_to(path)): hashlib.sha256(f.read_bytes()).hexdigest() for f in files}
-
-
-def _intact(path: Path, source: str) -> bool:
-    """Whether an entry is whole: every file as it was when it was built, and made from this source."""
+@contextmanager
+def _held(lock: threading.Lock) -> Iterator[None]:
+    """Hold a lock; who is asked to stop while it waits for one stops."""
+    while not lock.acquire(timeout=machine.LOOK):
+        check_stop()
     try:
-        manifest = json.loads((path / MANIFEST).read_text())
-        return manifest["files"] == _checksums(path) and (path / MODULE).read_text() == source
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
+        yield
+    finally:
+        lock.release()
 
 
-def _import(name: str, file: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # Numba looks a cached function's module up by name
+def _usable() -> bool:
+    """Whether the folder can be used, made if it isn't there; a warning says why not."""
+    place = folder()
     try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
-
-
-def _build_in_a_process(key: str, source: str, title: str) -> None:
-    """Let another process make the entry. Whether it did shows in the folder; if not, this process builds it, and says why it can't."""
-    order = json.dumps({"key": key, "source": source, "title": title}).encode()
-    here = str(Path(__file__).parents[2])
-    path = os.pathsep.join([here, *filter(None, [os.environ.get("PYTHONPATH")])])
-    command = [sys.executable, "-P", "-m", "saltus.codegen.build_one"]  # -P: not what lies in the working folder
-    with contextlib.suppress(OSError):  # no processes here
-        subprocess.run(
-            command, input=order, env={**os.environ, "PYTHONPATH": path}, capture_output=True, check=False,
-            start_new_session=True,  # Ctrl-C is for this process
-        )  # fmt: skip
-
-
-def _build(name: str, final: Path, source: str, title: str) -> ModuleType:
-    """Compile beside the entries and publish; where that can't be written or is full, in a folder that goes with this process."""
-    try:
-        folder().mkdir(parents=True, exist_ok=True)
-        building, module = _compile(name, tempfile.mkdtemp(prefix=f"{_BUILDING}{final.name[:12]}-", dir=folder()), source, title)
-    except OSError as error:
-        warnings.warn(
-            f"saltus: {folder()} can't be written ({error.strerror or error}); kernels are compiled for this process only. "
-            "Set SALTUS_CACHE to a folder of yours with free space.",
-            SaltusWarning,
-            stacklevel=5,
+        place.mkdir(parents=True, exist_ok=True, mode=0o700)
+        entry.check_folder(place)
+    except entry.NotOurs as why:
+        _warn(
+            f"saltus: the folder of compiled kernels {place} {why}, so whoever writes there could run code as you. It isn't used: kernels "
+            "are compiled for this process only. Close it (chmod go-w), or set SALTUS_CACHE to a folder of yours."
         )
-        return _build_for_this_process(name, source, title)
-    _publish(building, final, source)
-    return module
-
-
-def _build_for_this_process(name: str, source: str, title: str) -> ModuleType:
-    try:
-        building, module = _compile(name, tempfile.mkdtemp(prefix="saltus-"), source, title)
+        return False
     except OSError as error:
-        raise CacheError(f"no folder for generated kernels: {error}. Set SALTUS_CACHE to a folder with free space.") from error
-    atexit.register(shutil.rmtree, building, ignore_errors=True)
+        _cannot_write(place, error)
+        return False
+    return True
+
+
+def _from_cache(name: str, final: Path) -> ModuleType | None:
+    """The module, if its entry can be used; a warning says why not."""
+    try:
+        return machine.rebuilt(name, entry.read(final))
+    except FileNotFoundError:
+        return None
+    except (entry.NotOurs, entry.Damaged) as why:
+        _warn(f"saltus: the compiled kernel {final} {why}; building it again.")
+    except Exception as error:  # whatever makes Numba raise: the entry is ours, so build it again
+        _warn(f"saltus: the compiled kernel {final} could not be loaded ({error!r}); building it again.")
+    return None
+
+
+def _build(name: str, final: Path | None, source: str, title: str, what: str, seconds: float) -> ModuleType:
+    """Compile, and publish where that can be done. If no other process can compile, this one does, and tells what is wrong."""
+    announce(what, seconds)
+    data = machine.compiled_elsewhere(name, source, title)
+    module = None if data is None else machine.rebuilt(name, data)
+    if module is None:
+        module, data = machine.compiled(name, source)
+    if data is not None and final is not None:
+        try:
+            _sweep(final.parent)
+            entry.write(final, title, data)
+        except OSError as error:
+            if not final.exists():  # no other process has done it
+                _cannot_write(final.parent, error)
     return module
 
 
-def _compile(name: str, building: str, source: str, title: str) -> tuple[Path, ModuleType]:
-    """The module, compiled and with its manifest in a private folder, which is removed if anything goes wrong."""
-    path = Path(building)
-    try:
-        (path / MODULE).write_text(source)
-        module = _import(name, path / MODULE)
-        (path / MANIFEST).write_text(json.dumps({"title": title, "files": _checksums(path)}, indent=1))
-    except BaseException:
-        shutil.rmtree(path, ignore_errors=True)
-        raise
-    return path, module
+def _sweep(place: Path) -> None:
+    """Delete what processes left unfinished that were killed long ago."""
+    for path in place.glob(f"{entry.DRAFT}*"):
+        try:
+            if time.time() - path.lstat().st_mtime > _ABANDONED:
+                _delete(path)
+        except OSError:  # its process has finished it
+            continue
 
 
-def _publish(building: Path, final: Path, source: str) -> None:
-    """Rename a finished entry into place; a whole one that came first stays, a damaged one gives way."""
-    if final.exists() and not _intact(final, source):
-        shutil.rmtree(final, ignore_errors=True)
-    try:
-        os.replace(building, final)
-    except OSError:  # another process was first
-        shutil.rmtree(building, ignore_errors=True)
+def _cannot_write(place: Path, error: OSError) -> None:
+    _warn(
+        f"saltus: {place} can't be written ({error.strerror or error}); kernels are compiled for this process only. "
+        "Set SALTUS_CACHE to a folder of yours with free space."
+    )
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, SaltusWarning, stacklevel=6)

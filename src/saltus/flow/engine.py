@@ -15,22 +15,17 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.flow.threads import on_threads, usable_processors
+from saltus.interrupt import Interrupted, Stop
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.system.system import System
 
 #: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show progress.
 CHUNK = 1024
-#: Steps of the lanes between two looks at the keyboard: some ten milliseconds.
+#: Steps of the lanes between two looks at the keyboard, for two states: some ten milliseconds.
 SLICE = 50_000
 #: Contacts that a chunk's table holds before it is emptied, besides room for those of one step.
 RECORDS = 8192
-
-
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a computation. ``partial`` holds what was finished; the rest has status ``interrupted`` or ``not_computed``."""
-
-    partial: object = None
 
 
 @dataclass(frozen=True)
@@ -74,6 +69,8 @@ class Request:
         When samples are taken.
     record_from : int or None
         First period since the start whose contacts are kept; None keeps none.
+    t_end : float
+        Time that was asked for [s]: what adding up periods rounds beyond it is cut off.
     """
 
     start: np.ndarray
@@ -84,6 +81,7 @@ class Request:
     end_phase: np.ndarray
     schedule: Schedule
     record_from: int | None
+    t_end: float = np.inf
 
 
 @dataclass
@@ -144,15 +142,15 @@ def run(
     options = method.numbers(periods)
     chunks = [_cut(request, whole, first, options) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
-    stop = threading.Event()
+    stop = Stop()
     try:
         _run_chunks(chunks, module, stop, progress, workers)
     except KeyboardInterrupt:
         outcome.complete = False
         interrupted = Interrupted()
-        interrupted.partial = _finish(outcome, whole, chunks)
+        interrupted.partial = _finish(outcome, whole, chunks, request.t_end)
         raise interrupted from None
-    return _finish(outcome, whole, chunks)
+    return _finish(outcome, whole, chunks, request.t_end)
 
 
 # -- arrays --------------------------------------------------------------------------------------------------------------------
@@ -220,24 +218,41 @@ def _empty_table(chunk: _Chunk) -> None:
         arrays["rec_used"][0] = 0
 
 
-def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]) -> Outcome:
-    """Times at the end, and the contacts of all chunks in one sorted table."""
-    outcome.time = whole["origin"] + whole["count"] * whole["period"] + whole["phase"]
+def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], t_end: float) -> Outcome:
+    """Times at the end, and the contacts of all chunks in one sorted table; none is later than the end, not by rounding either."""
+    outcome.time = np.minimum(whole["origin"] + whole["count"] * whole["period"] + whole["phase"], t_end)
     running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if contacts := [part for chunk in chunks for part in chunk.contacts]:
         table, numbers = (np.concatenate(half) for half in zip(*contacts, strict=True))
         order = np.lexsort((np.arange(len(table)), table[:, st.REC_TRAJECTORY]))
+        order = order[~_returns_where_sliding_begins(table[order], numbers[order], outcome.status)]
         outcome.record_integers, outcome.record_floats = table[order], numbers[order]
+        times = outcome.record_floats[:, -1]
+        np.minimum(times, outcome.time[outcome.record_integers[:, st.REC_TRAJECTORY]], out=times)
     return outcome
 
 
+def _returns_where_sliding_begins(table: np.ndarray, numbers: np.ndarray, status: np.ndarray) -> np.ndarray:
+    """The last contact of a trajectory that slides, where it is the return from the one before it at the same instant: bool[contacts]."""
+    who, guard, direction = (table[:, column] for column in (st.REC_TRAJECTORY, st.REC_GUARD, st.REC_DIRECTION))
+    last = (status[who] == st.SLIDING) & (np.append(who[1:], -1) != who)
+    back = (who[1:] == who[:-1]) & (guard[1:] == guard[:-1]) & (direction[1:] == -direction[:-1]) & (numbers[1:, -1] == numbers[:-1, -1])
+    return last & np.append(False, back)
+
+
 # -- work ----------------------------------------------------------------------------------------------------------------------
-def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: threading.Event) -> None:
+def slice_of(states: int) -> int:
+    """Steps of the lanes between two looks at the keyboard: those of many states take longer."""
+    return max(SLICE * 4 // max(states, 2) ** 2, 1)
+
+
+def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: Stop) -> None:
     """Move a chunk to its end in slices; empties its table of contacts after each."""
     arrays = chunk.arrays
+    steps = slice_of(arrays["state"].shape[1])
     while not stop.is_set():
-        outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), SLICE, *workspace)
+        outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), steps, *workspace)
         _empty_table(chunk)
         if outcome == st.FINISHED:
             return
@@ -255,9 +270,7 @@ def _behind(arrays: dict[str, np.ndarray]) -> float:
     return float(np.sum(np.where(arrays["status"] == st.RUNNING, at, 1.0)))
 
 
-def _run_chunks(
-    chunks: list[_Chunk], module: ModuleType, stop: threading.Event, progress: Callable[[float], None] | None, workers: int
-) -> None:
+def _run_chunks(chunks: list[_Chunk], module: ModuleType, stop: Stop, progress: Callable[[float], None] | None, workers: int) -> None:
     """All chunks, on threads even if it is one: Python raises Ctrl-C in the main thread, which would cut a table of contacts in two."""
     local = threading.local()
 

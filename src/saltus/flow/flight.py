@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate
+from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate, slice_of
 from saltus.flow.methods import Method
+from saltus.interrupt import check_stop
 from saltus.kernels import status as st
 from saltus.system.system import System
 
-#: Steps of the lanes in one call of the kernel.
-SLICE = 1_000_000
 #: Per-trajectory arrays of a batch that follow a trajectory when others leave.
 _FOLLOW = (
     "period",
@@ -101,8 +100,9 @@ class Flight:
             rec_i=np.zeros((0, st.RECORD_INTEGERS), np.int64),
             rec_f=np.zeros((0, st.RECORD_FLOATS + states + 1)), rec_used=np.zeros(1, np.int64), options=self._options,
         )  # fmt: skip
-        while self._module.propagate(*(call[name] for name in ARGUMENTS), SLICE, *self._workspace) == st.PAUSED:
-            pass
+        steps = slice_of(states)
+        while self._module.propagate(*(call[name] for name in ARGUMENTS), steps, *self._workspace) == st.PAUSED:
+            check_stop()
         self.age += periods
         return samples
 

@@ -11,6 +11,7 @@ import numpy as np
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.engine import Request, Schedule
+from saltus.flow.family import Family
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
@@ -105,6 +106,11 @@ class Stroboscope:
         self._tangent = tangent_system(system)
         method.begin_kernels(self._tangent)
         self.noise = method.noise
+
+    def family(self, count: int) -> Family:
+        """The same map for so many trajectories."""
+        every = self.period if self.system.forced_at is None else None
+        return Family(self.system, self.method, np.repeat(self._parameters, count, axis=0), every, self._threads)
 
     def launch(self, start: np.ndarray, longest: float) -> Flight:
         """See :class:`Map`."""

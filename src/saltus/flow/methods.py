@@ -17,10 +17,19 @@ from saltus.system.system import System
 STEPS_PER_PERIOD = 10_000
 #: Steps that any trajectory may take.
 STEPS_AT_LEAST = 1_000_000
+#: Share of its span that these steps must bring a trajectory further: one that needs a thousand million steps, minutes, is run to its end.
+SLOWEST_SHARE = 1e-3
 
 
 def _step_budget(given: int | None, periods: float) -> float:
     return float(given) if given is not None else STEPS_AT_LEAST + STEPS_PER_PERIOD * math.ceil(periods)
+
+
+def _pace(given: int | None, periods: float) -> tuple[float, float]:
+    """Steps after which a trajectory is looked at, and the periods that they must have brought it further."""
+    if given is not None:
+        return float(given), math.inf
+    return float(STEPS_AT_LEAST), min(SLOWEST_SHARE * periods, STEPS_AT_LEAST / STEPS_PER_PERIOD)
 
 
 def _check_count(name: str, value: Any, low: int, high: float = math.inf) -> None:
@@ -97,8 +106,8 @@ class Taylor(Method):
     lanes : int, optional
         Trajectories moved at once: 2, 4, 8 or 16. Default: what suits the processor. Results don't depend on it.
     max_steps, max_events : int, optional
-        Budgets of one trajectory; beyond them it stops with status ``budget_steps`` or ``budget_events``. Default: 10 000 steps per period
-        and a million more; 10 million contacts.
+        Budgets of one trajectory; beyond them it stops with status ``budget_steps`` or ``budget_events``. Default: any number of steps as
+        long as each million brings it a thousandth of the run further, or 100 periods; 10 million contacts.
 
     References
     ----------
@@ -124,8 +133,9 @@ class Taylor(Method):
         return taylor_module(system, self.order, self.lanes or lane_width())
 
     def numbers(self, periods: float) -> np.ndarray:
-        """log2 of the tolerance, step budget, event budget."""
-        return np.array([math.log2(self.tolerance), _step_budget(self.max_steps, periods), float(self.max_events)])
+        """log2 of the tolerance, steps between two looks at the pace, event budget, periods that they must bring."""
+        steps, pace = _pace(self.max_steps, periods)
+        return np.array([math.log2(self.tolerance), steps, float(self.max_events), pace])
 
     @property
     def noise(self) -> float:
@@ -154,7 +164,7 @@ class ODE45(Method):
         ``"locate"``: integration stops at each contact and starts afresh, as with MATLAB's Events option. ``"ignore"``: contacts are
         stepped over and the right-hand side picks its side from the state, as without it.
     max_steps, max_events : int, optional
-        Budgets, as for :class:`Taylor`.
+        Budgets of one trajectory. Default: 10 000 steps per period and a million more; 10 million contacts.
 
     References
     ----------

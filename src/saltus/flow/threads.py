@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextvars import copy_context
 from typing import TypeVar
+
+from saltus.interrupt import Stop, check_stop
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -24,16 +25,18 @@ def on_threads(
     done: Callable[[Item, Result], None],
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
-    stop: threading.Event | None = None,
+    stop: Stop | None = None,
 ) -> None:
     """Call ``work(item)`` for every item, and ``done(item, result)`` from this thread as each is ready, in any order.
 
-    Raises whatever a piece raises. On that, and on Ctrl-C, ``stop`` is set, pieces under way are waited for and the rest is left. The
-    caller's context holds in the threads too, such as its settings of NumPy.
+    Raises whatever a piece raises. On that, and on Ctrl-C, ``stop`` is set, pieces under way are waited for and the rest is left. What a
+    piece calls asks ``stop`` too, threads of its own included, so that pieces end at once; they raise Interrupted then. The caller's
+    context holds in the threads too, such as its settings of NumPy.
     """
-    stop = stop or threading.Event()
+    stop = stop or Stop()
 
     def one(item: Item) -> tuple[Item, Result] | None:
+        stop.hold()
         return None if stop.is_set() else (item, work(item))
 
     with ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool:
@@ -42,10 +45,12 @@ def on_threads(
             waiting |= {pool.submit(copy_context().run, one, item) for item in items}
             while waiting:
                 ready, waiting = wait(waiting, timeout=0.1, return_when=FIRST_COMPLETED)
-                for future in ready:
-                    done(*future.result())
+                for result in (future.result() for future in ready):
+                    if result is not None:  # None: left, because it is to stop
+                        done(*result)
                 if progress:
                     progress(1.0 - len(waiting) / len(items))
+                check_stop()
         except BaseException:
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)

@@ -2,7 +2,18 @@
 
 import math
 
-from saltus.kernels.isolation import AT, MARGIN, MOST_TOUCHES, ROUNDING, TOUCH_AT, TOUCH_GUARD, first_crossing, is_exact_zero, leading_sign
+from saltus.kernels.isolation import (
+    AT,
+    MARGIN,
+    MOST_TOUCHES,
+    ROUNDING,
+    TOUCH_AT,
+    TOUCH_GUARD,
+    first_crossing,
+    is_exact_zero,
+    leading_sign,
+    polynomial,
+)
 from saltus.kernels.status import (
     BUDGET_EVENTS,
     CROSSING,
@@ -82,7 +93,10 @@ def decide(lanes, lane, batch, slow):
     h = lanes.run[STEP, lane]
     now = abs(lanes.clock[TAU, lane] + lanes.clock[BASE, lane])
     first, hits, count = h, 0, 0
-    lanes.memo[lane, DECIDED], lanes.memo[lane, RESTS] = 1, 0
+    lanes.memo[lane, DECIDED], lanes.memo[lane, RESTS], lanes.memo[lane, HITS] = 1, 0, 0
+    if is_broken(lanes, lane, h, slow):
+        lanes.memo[lane, BROKEN] = 1
+        return
     for g in range(NGUARDS):
         at, count = first_place(lanes, lane, g, h, slow, count)
         if at <= h:
@@ -93,6 +107,20 @@ def decide(lanes, lane, batch, slow):
     lanes.found[DELTA, lane] = first
     lanes.memo[lane, HITS] = hits
     note_touches(lanes, lane, batch, slow, first, count)
+
+
+@kernel
+def is_broken(lanes, lane, h, slow):
+    """Whether a state at the end of the step, or a term of a gap, isn't a number."""
+    state_at(lanes, lane, h, slow.state)
+    total = 0.0
+    for i in range(NSTATES):
+        total += abs(slow.state[i])
+    for g in range(NGUARDS):
+        scaled_gap(lanes, lane, g, h, slow)
+        for k in range(ORDER + 1):
+            total += abs(slow.q[k])
+    return not total < HUGE
 
 
 @kernel
@@ -126,6 +154,25 @@ def touches_exactly(lanes, lane, g, d, slow):
 
 
 @kernel
+def touch_error(lanes, lane, g, d, slow):
+    """Error of the time of a touch: how far around it the gap stays within its rounding error, up to the ends of the step."""
+    h = lanes.run[STEP, lane]
+    noise = 2.0 * scaled_gap(lanes, lane, g, h, slow)
+    fresh, place = lanes.fresh[g, lane] > 0.5, d / h
+    for k in range(ORDER + 1):
+        noise += ROUNDING * abs(slow.q[k])
+    reach = 2.0**-48
+    while reach < 1.0:
+        left, right = place - reach, place + reach
+        before = polynomial(slow.q, ORDER, left) * (left if fresh else 1.0)
+        after = polynomial(slow.q, ORDER, right) * (right if fresh else 1.0)
+        if (left <= 0.0 or abs(before) > noise) and (right >= 1.0 or abs(after) > noise):
+            break
+        reach *= 2.0
+    return reach * h
+
+
+@kernel
 def note_touch(lanes, lane, batch, slow, g, d, start):
     """Count and record one tangency at time d into the step that began at phase `start`: exact, or within the gap's rounding error."""
     who, kind = lanes.memo[lane, WHO], GRAZE if touches_exactly(lanes, lane, g, d, slow) else GRAZE_SHALLOW
@@ -137,9 +184,7 @@ def note_touch(lanes, lane, batch, slow, g, d, start):
         lanes.run[SHALLOW, lane] += 1.0
     if not recorded(lanes, lane, batch):
         return
-    curve = 2.0 * abs(lanes.work[GUARD_ROW[g] + 2, lane])
-    noise = ROUNDING * lanes.work[SCALE_ROW + g, lane]
-    error = math.sqrt(2.0 * noise / curve) if curve > 0.0 else math.inf
+    error = touch_error(lanes, lane, g, d, slow)
     velocity = gap_rate(lanes, lane, g, d) * side
     record(lanes, lane, batch, start + d, g, side, velocity, kind, mode, mode, error, slow.state)
 
@@ -199,7 +244,7 @@ def time_error(lanes, lane, batch, g, rate, tau):
     if rate == 0.0:
         return math.inf
     size = lanes.prior[PRIOR_ROWS * g + NEW, lane]
-    return (ROUNDING + 2.0 ** batch.options[0]) * size / abs(rate) + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
+    return (ROUNDING + 2.0 ** batch.options[LOG2_TOLERANCE]) * size / abs(rate) + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
 
 
 @inner
@@ -235,6 +280,8 @@ def change_side(lanes, lane, batch, g, rate, before, slow):
         saltate(lanes, lane, batch, g, before, slow)
     if lanes.run[BOUNCES, lane] > 1.5:
         return  # a return with no time passed was recorded when it came first
+    flipped = int(lanes.run[FLIPPED, lane])
+    lanes.run[FLIPPED, lane] = flipped | (1 << g) | (((flipped >> g) & 1) << NGUARDS)
     shallow = is_shallow(lanes, lane, g, rate)
     lanes.run[MET, lane] += 1.0
     if shallow:
@@ -268,6 +315,7 @@ def note_arrival(lanes, lane):
     arrived = lanes.found[DELTA, lane] > 0.0 or now != lanes.run[LANDED, lane]
     if arrived:
         lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[LANDED, lane] = 0.0, 0.0, now
+        lanes.run[FLIPPED, lane] = 0.0
     else:
         lanes.run[BOUNCES, lane] += 1.0
     return arrived
@@ -291,6 +339,7 @@ def land_all(lanes, lane, batch, hits, slow):
                 change_side(lanes, lane, batch, g, rate, mode_of(lanes, lane), slow)
             else:
                 land(lanes, lane, batch, g, rate, slow)
-    if lanes.run[BOUNCES, lane] > MOST_BOUNCES:
+    if lanes.run[BOUNCES, lane] >= MOST_BOUNCES:
+        lanes.run[MET, lane] -= (int(lanes.run[FLIPPED, lane]) >> NGUARDS) & 1  # there and back where sliding begins is one contact
         return SLIDING
-    return BUDGET_EVENTS if lanes.run[MET, lane] >= batch.options[2] else RUNNING
+    return BUDGET_EVENTS if lanes.run[MET, lane] >= batch.options[MOST_CONTACTS] else RUNNING

@@ -110,14 +110,33 @@ def end_stretch(lanes, lane, batch, slow):
 
 @inner
 def overflowed(lanes, lane):
-    """Whether the step left the range of numbers; the lane then keeps the state at the start of the step."""
-    bad = False
+    """Whether the step left the range of numbers; the lane then keeps the state and the time at the start of the step."""
+    bad = lanes.memo[lane, BROKEN] == 1
     for i in range(NSTATES):
         bad = bad or not abs(lanes.y[i, lane]) < HUGE
     if bad:
         for i in range(NSTATES):
             lanes.y[i, lane] = lanes.work[i * (ORDER + 1), lane]
+        lanes.clock[TAU, lane] = lanes.run[START, lane]
+        lanes.run[TAKEN, lane] -= 1.0
     return bad
+
+
+@inner
+def is_slow(lanes, lane, batch):
+    """Whether the trajectory has gained less than it must since its pace was looked at last."""
+    if lanes.run[TAKEN, lane] <= lanes.run[LIMIT, lane]:
+        return False
+    behind = periods_behind(lanes, lane, batch)
+    slow = not behind - lanes.run[MARK, lane] >= batch.options[PACE]
+    lanes.run[LIMIT, lane], lanes.run[MARK, lane] = lanes.run[TAKEN, lane] + batch.options[MOST_STEPS], behind
+    return slow
+
+
+@inner
+def periods_behind(lanes, lane, batch):
+    """Periods, and parts of one, since the start."""
+    return lanes.memo[lane, COUNT] + lanes.clock[TAU, lane] / batch.period[lanes.memo[lane, WHO]]
 
 
 @inner
@@ -144,9 +163,9 @@ def attend(lanes, lane, batch, slow):
             lanes.fresh[g, lane] = 1.0
     if status == RUNNING and lanes.clock[TAU, lane] >= lanes.run[END, lane]:
         status = end_stretch(lanes, lane, batch, slow)
-    if status == RUNNING and lanes.run[TAKEN, lane] > batch.options[1]:
+    if status == RUNNING and is_slow(lanes, lane, batch):
         status = BUDGET_STEPS
-    if status == RUNNING and lanes.run[MET, lane] >= batch.options[2]:
+    if status == RUNNING and lanes.run[MET, lane] >= batch.options[MOST_CONTACTS]:
         status = BUDGET_EVENTS
     lanes.memo[lane, DECIDED] = 0
     return status
@@ -177,7 +196,7 @@ def fill(lanes, lane, who, batch, slow):
     lanes.run[TAKEN, lane] = batch.counters[who, STEPS]
     lanes.run[MET, lane], lanes.run[SHALLOW, lane] = batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED]
     lanes.run[LEAST, lane], lanes.run[SLOWEST, lane] = batch.minima[who, GAP_MARGIN], batch.minima[who, CONTACT_SPEED]
-    lanes.run[BOUNCES, lane], lanes.run[STARTING, lane] = 0.0, 0.0
+    lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[FLIPPED, lane] = 0.0, 0.0, 0.0
     lanes.run[ACTIVE, lane] = 1.0
     for i in range(NSTATES):
         lanes.y[i, lane] = batch.state[who, i]
@@ -185,6 +204,7 @@ def fill(lanes, lane, who, batch, slow):
     for g in range(NGUARDS):
         lanes.prior[PRIOR_ROWS * g + NEW, lane] = batch.carry[who, CARRIED + g]
     if batch.mode[who] < 0:
+        lanes.run[LIMIT, lane], lanes.run[MARK, lane] = batch.options[MOST_STEPS], periods_behind(lanes, lane, batch)
         start_sides(lanes, lane, batch, slow)
         if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
             write_samples(lanes, lane, batch, lanes.clock[TAU, lane], slow)
@@ -194,6 +214,7 @@ def fill(lanes, lane, who, batch, slow):
         lanes.fresh[g, lane] = 1.0 if (batch.fresh[who] >> g) & 1 else 0.0
     lanes.run[LANDED, lane] = batch.carry[who, 0]
     lanes.run[BOUNCES, lane], lanes.run[STARTING, lane] = batch.carry[who, 1], batch.carry[who, 2]
+    lanes.run[FLIPPED, lane], lanes.run[LIMIT, lane], lanes.run[MARK, lane] = batch.carry[who, 3], batch.carry[who, 4], batch.carry[who, 5]
 
 
 @kernel
@@ -213,6 +234,7 @@ def empty(lanes, lane, batch, status):
         batch.carry[who, CARRIED + g] = lanes.prior[PRIOR_ROWS * g + NEW, lane]
     batch.carry[who, 0] = lanes.run[LANDED, lane]
     batch.carry[who, 1], batch.carry[who, 2] = lanes.run[BOUNCES, lane], lanes.run[STARTING, lane]
+    batch.carry[who, 3], batch.carry[who, 4], batch.carry[who, 5] = lanes.run[FLIPPED, lane], lanes.run[LIMIT, lane], lanes.run[MARK, lane]
     batch.counters[who, STEPS] = int(lanes.run[TAKEN, lane])
     batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED] = int(lanes.run[MET, lane]), int(lanes.run[SHALLOW, lane])
     batch.minima[who, GAP_MARGIN], batch.minima[who, CONTACT_SPEED] = lanes.run[LEAST, lane], lanes.run[SLOWEST, lane]

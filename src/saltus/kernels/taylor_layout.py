@@ -25,23 +25,28 @@ from saltus.kernels.isolation import MOST_TOUCHES
 TAU, BASE, TURN = 0, 1, 2
 # Rows of `run`: the phase at which the current stretch ends, the next sample's phase, steps taken, smallest gap margin, active (0/1), the
 # step length, the phase at its start, time of the last landing, contacts in a row without time passing, whether the mode at the start is
-# still being settled (0/1); contacts so far, those too shallow to be sure of, the slowest.
-END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED, BOUNCES, STARTING, MET, SHALLOW, SLOWEST = range(13)
-RUN_ROWS = 13
+# still being settled (0/1); contacts so far, those too shallow to be sure of, the slowest; the guards that changed sides at the last
+# landing's instant (bits; bit NGUARDS: one of them changed back and was counted again); the number of steps
+# at which its pace is looked at next, and the periods behind it when that was done last.
+END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED, BOUNCES, STARTING, MET, SHALLOW, SLOWEST, FLIPPED, LIMIT, MARK = range(16)
+RUN_ROWS = 16
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
 # Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when;
 # of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1).
 DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, FOUND_ROWS = range(9)
 # Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that it found to cross (bits), guards on
-# which the state rests (bits), whether a harmonic of time has another phase in every period.
-WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS = range(6)
-MEMO = 6
+# which the state rests (bits), whether a harmonic of time has another phase in every period, whether this step isn't made of numbers.
+WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN = range(7)
+MEMO = 7
+# Columns of `options`: log2 of the tolerance; steps after which a trajectory's pace is looked at; contacts that it may make; periods that
+# it must have gained by then, infinite if the steps are all that it may take.
+LOG2_TOLERANCE, MOST_STEPS, MOST_CONTACTS, PACE = range(4)
 # Rows of `prior`, for each guard: the size of the terms of its gap up to the step before, and up to this one, each step counting half of
 # the one after it; their rounding is inherited.
 OLD, NEW, PRIOR_ROWS = range(3)
-# Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING, then NEW for each guard.
-CARRIED = 3
+# Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING, FLIPPED, LIMIT, MARK, then NEW for each guard.
+CARRIED = 6
 CARRY = CARRIED + NGUARDS
 #: Records that one step may write at most: contacts and touches of all lanes, in the step and at the end of the run.
 STEP_RECORDS = 2 * LANES * (NGUARDS + MOST_TOUCHES)

@@ -315,13 +315,13 @@ def advance(lanes, room, options, records):
     store(run, START, start)
     taken = load(run, TAKEN, LANES) + 1.0
     store(run, TAKEN, taken)
-    due = (tau >= end) | (tau >= load(run, DUE, LANES)) | (~(total < HUGE)) | (taken > options[1])
+    due = (tau >= end) | (tau >= load(run, DUE, LANES)) | (~(total < HUGE)) | (taken > load(run, LIMIT, LANES))
     crosses = load(lanes.found, WHICH, LANES) >= 0.0
     if TANGENT or records:
         due = due | crosses
     else:
         land_simply(lanes, crosses & (~due), tau)
-        due = due | (load(run, MET, LANES) >= options[2]) | (load(lanes.found, WHICH, LANES) >= 0.0)
+        due = due | (load(run, MET, LANES) >= options[MOST_CONTACTS]) | (load(lanes.found, WHICH, LANES) >= 0.0)
     return (load(run, ACTIVE, LANES) > 0.5) & due
 
 
@@ -331,19 +331,21 @@ def land_simply(lanes, simple, tau):
     run, found, prior = lanes.run, lanes.found, lanes.prior
     which, rate, h = load(found, WHICH, LANES), magnitude(load(found, RATE, LANES)), load(run, STEP, LANES)
     depth = rate * rate * h * h
-    shallow = load(run, SHALLOW, LANES)
+    shallow, flipped = load(run, SHALLOW, LANES), load(run, FLIPPED, LANES)
     for g in range(NGUARDS):
         here = simple & (magnitude(which - g) < 0.5)
         j = BOUNDS * GUARD_SERIES[g]
         curvature = 2.0 * (magnitude(load(lanes.bounds, j + QUADRATIC, LANES)) + 3.0 * magnitude(load(lanes.bounds, j + CUBIC, LANES)))
         size = load(prior, PRIOR_ROWS * g + NEW, LANES) + load(prior, PRIOR_ROWS * g + OLD, LANES)
         shallow = shallow + select(here & (depth <= 2.0 * ROUNDING * size * curvature), splat(1.0, LANES), 0.0)
+        flipped = select(here, float(1 << g), flipped)
         side = load(lanes.side, g, LANES)
         store(lanes.side, g, select(here, -side, side))
         store(lanes.fresh, g, select(here, 1.0, load(lanes.fresh, g, LANES)))
         if SNAP_STATE[g] >= 0:
             store(lanes.y, SNAP_STATE[g], select(here, load(lanes.c, SNAP_CONST[g], LANES), load(lanes.y, SNAP_STATE[g], LANES)))
     store(run, SHALLOW, shallow)
+    store(run, FLIPPED, flipped)
     met, slowest = load(run, MET, LANES), load(run, SLOWEST, LANES)
     store(run, MET, select(simple, met + 1.0, met))
     store(run, SLOWEST, select(simple, smaller(rate, slowest), slowest))
@@ -358,11 +360,15 @@ def step_all(lanes, batch, slow):
     """One step of every lane; returns the bit set of lanes that need attention."""
     coefficients(lanes)
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
+<<<<<<< HEAD
     h = smaller(step_length(lanes.work, batch.options[0]), room)
     if NSINGULAR > 0:
         h = away_from_boundaries(lanes, h)
+=======
+    h = smaller(step_length(lanes.work, batch.options[LOG2_TOLERANCE]), room)
+>>>>>>> main
     if PROBED:
-        h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), batch.options[0])
+        h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), batch.options[LOG2_TOLERANCE])
     store(lanes.run, STEP, h)
     undecided = refine_crossings(lanes, h, locate(lanes, h))
     open_lanes = bits(undecided)

@@ -24,22 +24,22 @@ def aeroelastic(**values: Any) -> System:
     """Typical wing section with freeplay in pitch, quasi-steady flow.
 
     States are ``plunge`` [m], ``pitch`` [rad] and their rates ``plunge_rate`` [m/s], ``pitch_rate`` [rad/s]. It isn't forced: in a
-    range of airspeeds it oscillates by itself.
+    range of airspeeds it oscillates by itself. Masses, springs, dampers and loads are per unit span.
 
     ==================  =========  =================  =================================================
     parameter           symbol     default            meaning
     ==================  =========  =================  =================================================
     airspeed            U          12 m/s
-    mass                m          12.4 kg
-    inertia             I_alpha    0.065 kg*m^2       about the elastic axis
+    mass                m          12.4 kg/m
+    inertia             I_alpha    0.065 kg*m         about the elastic axis
     imbalance           x_alpha    0.25               centre of mass behind the elastic axis, in b
     half_chord          b          0.135 m
     elastic_axis        a          -0.6               position behind mid-chord, in b
-    plunge_stiffness    k_h        2840 N/m
-    pitch_stiffness     k_alpha    40 N*m/rad         beyond the freeplay
+    plunge_stiffness    k_h        2840 N/m^2
+    pitch_stiffness     k_alpha    40 N/rad           beyond the freeplay
     pitch_gap           delta      0.01 rad           half of the freeplay
-    plunge_damping      c_h        27.4 N*s/m
-    pitch_damping       c_alpha    0.036 N*m*s/rad
+    plunge_damping      c_h        27.4 N*s/m^2
+    pitch_damping       c_alpha    0.036 N*s/rad
     air_density         rho        1.225 kg/m^3
     lift_slope          c_l        6.28 /rad
     ==================  =========  =================  =================================================
@@ -76,9 +76,9 @@ def _section() -> System:
         states="plunge pitch plunge_rate pitch_rate",
         source="Typical section; values after the Texas A&M pitch-and-plunge apparatus (O'Neil, Strganac); pitch spring with freeplay.",
         units={
-            "plunge": "m", "pitch": "rad", "plunge_rate": "m/s", "pitch_rate": "rad/s", "airspeed": "m/s", "mass": "kg",
-            "inertia": "kg*m^2", "imbalance": "1", "half_chord": "m", "elastic_axis": "1", "plunge_stiffness": "N/m",
-            "pitch_stiffness": "N*m/rad", "pitch_gap": "rad", "plunge_damping": "N*s/m", "pitch_damping": "N*m*s/rad",
+            "plunge": "m", "pitch": "rad", "plunge_rate": "m/s", "pitch_rate": "rad/s", "airspeed": "m/s", "mass": "kg/m",
+            "inertia": "kg*m", "imbalance": "1", "half_chord": "m", "elastic_axis": "1", "plunge_stiffness": "N/m^2",
+            "pitch_stiffness": "N/rad", "pitch_gap": "rad", "plunge_damping": "N*s/m^2", "pitch_damping": "N*s/rad",
             "air_density": "kg/m^3", "lift_slope": "1/rad",
         },
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any, Literal
 
 import matplotlib.pyplot as plt
@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 
 from saltus.errors import ParameterError
 from saltus.plot.regions import Regions
-from saltus.plot.style import QUIET, RASTERISE_ABOVE, Scale, style
+from saltus.plot.style import QUIET, RASTERISE_ABOVE, Scale, style, styled
 
 Direction = Literal["x", "y"]
 #: A gap is drawn into the limits if the axis grows by no more than this: an orbit far inside its gap must stay visible.
@@ -25,7 +25,9 @@ _WIDEN = 2.0
 def panels(ax: Any, count: int, size: tuple[float, float], caller: str) -> Iterator[list[Axes]]:
     """The Axes to draw into: those that the user handed over, or a new figure of panels, one above the other, in saltus's style."""
     if ax is not None:
-        yield _given(ax, count, caller)
+        given = _given(ax, count, caller)
+        with style() if all(styled(one.get_figure(root=True)) for one in given) else nullcontext():
+            yield given
         return
     with style():
         _, grid = plt.subplots(count, 1, figsize=(size[0], size[1] * count), squeeze=False)
@@ -96,22 +98,35 @@ def draw_gaps(ax: Axes, direction: Direction, regions: Regions, scale: Scale, la
             corner, size = ((a, 0), (b - a, 1)) if direction == "x" else ((0, a), (1, b - a))
             ax.add_artist(Rectangle(corner, *size, transform=transform, fc=region.color, alpha=0.07, ec="none", zorder=0, gid=tag))
     line = ax.axvline if direction == "x" else ax.axhline
+    names: list[tuple[float, str, bool]] = []
     for i, boundary in enumerate(regions.boundaries):
         place = boundary.value * scale.factor
         line(place, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid=tag)
         if label and low <= place <= high:
             lower = i == 0 and len(regions.boundaries) > 1 and place - low > 0.12 * (high - low)  # else it meets the ticks
             high_up = direction == "y" and high - place < 0.12 * (high - low)  # else it meets the title
-            _name_gap(ax, direction, place, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up)
+            names.append((place, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up))
+    if names:
+        _name_gaps(ax, direction, names, tag)
 
 
-def _name_gap(ax: Axes, direction: Direction, place: float, text: str, below: bool) -> None:
-    """Name a gap line outside the axes, on its lower (left) side if asked to."""
-    look: dict[str, Any] = {"color": QUIET, "fontsize": 7, "linespacing": 1.1}
+def _name_gaps(ax: Axes, direction: Direction, names: list[tuple[float, str, bool]], tag: str) -> None:
+    """Name gap lines outside the axes: place, text, and whether it stands on the lower (left) side.
+
+    Above the picture they are labels of an axis of its own, which a title keeps clear of.
+    """
     if direction == "y":
-        ax.text(1.01, place, text, transform=ax.get_yaxis_transform(), va="top" if below else "bottom", ha="left", **look)
-    else:
-        ax.text(place, 1.01, text, transform=ax.get_xaxis_transform(), va="bottom", ha="right" if below else "left", **look)
+        for place, text, below in names:
+            ax.text(1.01, place, text, transform=ax.get_yaxis_transform(), va="top" if below else "bottom", ha="left", color=QUIET,
+                    fontsize=7, linespacing=1.1)  # fmt: skip
+        return
+    top = ax.secondary_xaxis("top")
+    top.set_gid(tag)
+    top.spines[:].set_visible(False)
+    top.tick_params(length=0, pad=1, labelsize=7, labelcolor=QUIET)
+    top.set_xticks([place for place, _, _ in names], [text for _, text, _ in names], linespacing=1.1)
+    for tick, (_, _, left) in zip(top.xaxis.get_major_ticks(), names, strict=True):
+        tick.label2.set_horizontalalignment("right" if left else "left")
 
 
 def legend(ax: Axes, regions: Regions, **place: Any) -> None:

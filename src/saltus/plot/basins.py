@@ -153,13 +153,18 @@ def _points(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], scales: tuple[Scale
         cloud = clouds[key]
         if not len(cloud):
             continue
-        size = 5.5 if len(cloud) <= 12 else 4.2 if len(cloud) <= 40 else 2.2
+        size = _size(len(cloud), sum(map(len, clouds.values())))
         at = cloud[:, 0] * scales[0].factor, cloud[:, 1] * scales[1].factor
         edge = 1.0 if size > 4 else 0.3
         draw.draw_points(
             ax, *at, marker="o", ms=size + edge + 0.9, mfc="#222222", mec="none", zorder=4
         )  # white alone is lost on light tints
         draw.draw_points(ax, *at, marker="o", ms=size, mfc=colors[key], mec="white", mew=edge, zorder=4, gid=f"attractor {key}")
+
+
+def _size(own: int, total: int) -> float:
+    """Diameter of the points of an attractor [pt]: smaller where they are many, its own or those of all, so that they hide no basin."""
+    return min(5.5 if own <= 12 else 4.2 if own <= 40 else 2.0, 5.5 if total <= 16 else 3.2 if total <= 60 else 2.0)
 
 
 # -- legend --------------------------------------------------------------------------------------------------------------------
@@ -226,7 +231,7 @@ def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int
             texts.append(f"{look.label}, {maps.share_text(shares[code])}")
     if points and colors and any(len(_stroboscopic(ds, pair, key)) for key in colors):
         handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="#BBBBBB", mec="#222222", mew=0.7))
-        texts.append("attractor at whole periods")
+        texts.append("Poincaré points of the attractors")
     if handles:
         small = len(handles) > _LONG_LEGEND
         drawing = {_Ramp: _DrawRamp(), _Ruler: _DrawRuler()}

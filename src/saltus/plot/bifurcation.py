@@ -18,7 +18,7 @@ from saltus.results.schema import response_name, sample_name, states_of
 _CALLER = "plot.bifurcation_diagram"
 #: What the vertical axis shows, by what was sampled.
 _SHOWN = {
-    "turning_points": "{} at rest", "contacts": "{} at the contacts", "stroboscope": "{} at whole periods",
+    "turning_points": "{} at turning points", "contacts": "{} at the contacts", "stroboscope": "{} at the Poincaré points",
 }  # fmt: skip
 #: Where the legend begins, in widths of the Axes, if the names of the gaps stand beside it.
 _BESIDE_GAPS = 1.16
@@ -37,7 +37,7 @@ def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: 
     state : str, optional
         Which state; by default the first.
     events : bool
-        Whether to mark grazes, period doublings and the onset of chaos on the axis.
+        Whether to mark grazes, period doublings and the onset of chaos above the picture.
     legend : bool
         Whether to name the colours, beside the picture.
     ax : Axes, optional
@@ -123,7 +123,10 @@ def _frame(ax: Axes, datasets: list[points.Shown], variables: list[str], state: 
     draw.set_limits(ax, "y", values, marks)
     if fixed:
         draw.draw_gaps(ax, "y", fixed, scale)
-    for row in varied:  # a gap that the parameter itself moves
+    names = ds["guard"].values[ds["guard_state"].values == state].tolist() if len(varied) else []
+    for row, name in zip(varied, names, strict=True):  # a gap that the parameter itself moves
+        text = str(name).replace("_", " ")
+        ax.text(1.01, row[-1] * scale.factor, text, transform=ax.get_yaxis_transform(), va="center", color=QUIET, fontsize=7, clip_on=False)
         ax.plot(ds[datasets[0].axis].values * across.factor, row * scale.factor, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid="gap")
     shown = str(ds.attrs.get("sample", "stroboscope")) if variables[0] == sample_name(state) else "stroboscope"
     ax.set_ylabel(scale.label(_SHOWN.get(shown, "{}").format(state)))

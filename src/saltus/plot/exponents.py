@@ -15,13 +15,14 @@ from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.schema import EXPONENTS, check, kind_text
 
 _CALLER = "plot.exponents"
-#: Share of the time at the beginning whose running means don't set the limits: they start anywhere.
+#: Share of the time at the beginning whose running means aren't shown: they start anywhere, with intervals beyond any frame.
 _EARLY = 0.1
 
 
 def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax: Any = None, *, legend: bool = True) -> Any:
     """Lyapunov exponents as they converge: mean so far and its 95 % interval, against the time since the transient.
 
+    The first tenth of the time isn't shown.
     The values at the end stand in the legend; where the motion settled to an orbit, they are those of the orbit, drawn as dashed lines.
 
     Parameters
@@ -63,32 +64,34 @@ def _panel(ax: Axes, one: xr.Dataset, legend: bool) -> None:
     x = display_scale("s", float(finite.max(initial=0.0)))
     settled = int(one["response_period"]) > 0 or one["kind"].item() == "equilibrium"
     late = one.isel(running=np.flatnonzero(time >= _EARLY * finite.max(initial=0.0)))
-    shown = [late["running_exponent"].values.ravel(), one["lyapunov_low"].values, one["lyapunov_high"].values, np.zeros(1)]
+    time = late["running_time"].values
+    shown = [late[f"running_{name}"].values.ravel() for name in ("low", "exponent", "high")]
+    shown += [one["lyapunov_low"].values, one["lyapunov_high"].values, np.zeros(1)]
     draw.set_limits(ax, "y", np.concatenate(shown), margin=0.12)
     draw.set_limits(ax, "x", np.concatenate([[0.0], finite * x.factor]), margin=0.0)
     ax.axhline(0.0, color=QUIET, lw=0.7, zorder=1)
     for i in range(one.sizes["exponent"]):
         color = CYCLE[i % len(CYCLE)]
-        low, mean, high = (one[f"running_{name}"].values[i] for name in ("low", "exponent", "high"))
+        low, mean, high = (late[f"running_{name}"].values[i] for name in ("low", "exponent", "high"))
         ax.fill_between(time * x.factor, low, high, color=color, alpha=0.18, lw=0, zorder=1)
         ax.plot(time * x.factor, mean, color=color, lw=1.1, zorder=2, label=_value(one, i, unit))
         if settled:
             ax.axhline(float(one["lyapunov_exponent"][i]), color=color, lw=0.9, ls=(0, (4, 3)), zorder=3)
     ax.set_xlabel(x.label("time after the transient"))
     ax.set_ylabel(Scale(1.0, unit).label("Lyapunov exponent"))
-    ax.set_title(kind_text(str(one["kind"].item()), int(one["response_period"])))
+    ax.set_title("motion: " + kind_text(str(one["kind"].item()), int(one["response_period"])))
     draw.note_status(ax, one)
     if legend:
         ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
 
 
 def _value(one: xr.Dataset, i: int, unit: str) -> str:
-    """An exponent with half of its interval, to the digits that it gives: ``5.98 ± 0.26 1/s``."""
+    """An exponent with half of its interval, to the digits that it gives, six at most: ``5.98 ± 0.26 1/s``."""
     value = float(one["lyapunov_exponent"][i])
     half = float(one["lyapunov_high"][i]) - value
     if not np.isfinite(value):
         return "not known"
-    if not half > 1e-9 * max(abs(value), 1e-300):
-        return f"{value:.9g} {unit}".replace("-", "\N{MINUS SIGN}")
+    if not half > 1e-6 * max(abs(value), 1e-300):
+        return f"{value:.6g} {unit}".replace("-", "\N{MINUS SIGN}")
     digits = max(1 - int(np.floor(np.log10(half))), 0)
     return f"{value:.{digits}f} ± {half:.{digits}f} {unit}".replace("-", "\N{MINUS SIGN}")

@@ -46,7 +46,7 @@ def frequency_response(
         Measured points to draw with it: a CSV with the columns ``frequency [Hz]`` and ``amplitude [mm]``, any units, or a Dataset with
         these two variables and their attribute ``units``.
     events : bool
-        Whether to mark grazes, period doublings and folds on the axis.
+        Whether to mark grazes, period doublings and folds above the picture.
     legend : bool
         Whether to name the colours, beside the picture.
     ax : Axes, optional
@@ -98,10 +98,9 @@ def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[st
             line = points.branch_lines(one, y, mine)
             ax.plot(line[0] * across.factor, line[1], color=color, lw=0.8, zorder=2, gid=f"branches {code}")
         size = _size(mine.sum()) * (0.7 if code == kinds.CHAOTIC else 1.0)
-        draw.draw_points(
-            ax, one.values[mine] * across.factor, y[mine], marker="o", ms=size, mfc=color, mec="none", zorder=3, gid=f"kind {code}"
-        )
-    return points.kind_handles(one, of)
+        look = {"marker": kinds.marker(code), "mfc": color, "mec": "none"}
+        draw.draw_points(ax, one.values[mine] * across.factor, y[mine], ms=size, zorder=3, gid=f"kind {code}", **look)
+    return points.kind_handles(one, of, markers=True)
 
 
 def _compare(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[str, Any]:

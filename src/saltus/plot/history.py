@@ -14,8 +14,8 @@ from matplotlib.transforms import ScaledTranslation
 from saltus.errors import ParameterError
 from saltus.plot import axes as draw
 from saltus.plot import regions, selection
-from saltus.plot.style import OKABE_ITO, Scale, display_scale
-from saltus.results.schema import TRAJECTORY, check, contact_name, forcing_period, states_of
+from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
+from saltus.results.schema import TRAJECTORY, check, contact_name, equations_of, forcing_period, states_of
 
 _CALLER = "plot.history"
 #: Marker, face and name of each kind of contact. Hollow means undecided.
@@ -105,9 +105,14 @@ def _panel(ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], tim
 
     width = 1.1 if shown[1] - shown[0] <= 40 or "period" not in ds else 0.7
     draw.draw_pieces(ax, curve.time * x.factor, values * y.factor, coloured.of(curve.mode), coloured, width)
-    _mark_contacts(ax, selection.contacts_in(ds, *shown), state, x, y)
     draw.set_limits(ax, "x", curve.time * x.factor, margin=0.0)
     draw.set_limits(ax, "y", values * y.factor, [boundary.value * y.factor for boundary in own.boundaries])
+    table = selection.contacts_in(ds, *shown)
+    owners = {str(guard): str(owner) for guard, owner in zip(ds["guard"].values, ds["guard_state"].values, strict=True)}
+    mine = {"", state, *(owner for owner in owners.values() if f"d{owner}/dt = {state}" in equations_of(ds))}
+    theirs = np.array([owners[str(guard)] not in mine for guard in table["contact_guard"].values], dtype=bool)
+    _mark_contacts(ax, table.isel(contact=~theirs), state, x, y)
+    _note_contacts(ax, table.isel(contact=theirs), owners, x)
     draw.draw_gaps(ax, "y", own, y)
     draw.note_status(ax, ds)
     ax.set_xlabel(x.label("time"))
@@ -128,6 +133,15 @@ def _period_axis(ax: Axes, period: float) -> None:
     top = ax.secondary_xaxis("top", functions=(count, place))
     top.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10], integer=True))
     top.xaxis.set_major_formatter("{x:g} T")
+
+
+def _note_contacts(ax: Axes, table: xr.Dataset, owners: Mapping[str, str], x: Scale) -> None:
+    """A stroke at the foot of the picture for each contact at a boundary of another state: on this curve it would lie on no line."""
+    if table.sizes["contact"]:
+        names = ", ".join(dict.fromkeys(owners[str(guard)] for guard in table["contact_guard"].values))
+        place = np.full(table.sizes["contact"], 0.03)
+        draw.draw_points(ax, table["contact_time"].values * x.factor, place, transform=ax.get_xaxis_transform(), marker="|", ms=6, mew=0.8,
+                         color=QUIET, label=f"contact of {names}")  # fmt: skip
 
 
 def _mark_contacts(ax: Axes, table: xr.Dataset, state: str, x: Scale, y: Scale) -> None:

@@ -16,6 +16,8 @@ OWN_HUES = 8
 LONG, QUASI_PERIODIC, CHAOTIC = OWN_HUES + 1, OWN_HUES + 2, OWN_HUES + 3
 #: Motion that never repeats is grey, so that no period is taken for it.
 _GREYS = {QUASI_PERIODIC: (0.70, 0.70, 0.70), CHAOTIC: (0.20, 0.20, 0.20)}
+#: Markers of the periods 1, 2, ..., and of longer ones.
+_MARKERS = dict(enumerate("osD^vPX*p", start=1))
 #: The shade of a hue that small dots and thin lines have on white, among so many; the hue itself is for areas.
 _DOT, _SHADES = 4, 7
 
@@ -32,6 +34,11 @@ def color(code: int, dots: bool = True) -> np.ndarray:
         return np.array(_GREYS[code])
     hue = hues(LONG)[code - 1]
     return np.asarray(shades(hue[None], _SHADES)[0, _DOT if dots else _SHADES // 2])
+
+
+def marker(code: int) -> str:
+    """The marker of a kind, for readers and printers without colours."""
+    return _MARKERS.get(code, ".")
 
 
 def label(code: int, periods: np.ndarray) -> str:

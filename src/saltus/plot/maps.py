@@ -31,9 +31,9 @@ class Unsettled:
     color: str
 
 
-#: Near-black, so that no shade of a hue is taken for them; pale where nothing is known.
+#: Without hue, so that no shade is taken for them: near-black where nothing settled, grey where a start left, pale where nothing is known.
 UNSETTLED = {
-    -1: Unsettled("escaped", "#000000"),
+    -1: Unsettled("escaped", "#BDBDBD"),
     -2: Unsettled("not settled", "#1E1E1E"),
     -3: Unsettled("failed", "#3C3C3C"),
     -4: Unsettled("not computed", "#E9E9E9"),

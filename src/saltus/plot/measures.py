@@ -49,7 +49,14 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
     width = (high - low) * scale.factor / len(names)
     with draw.panels(ax, 1, (5.2, 2.8), caller) as (panel,):
         for i, name in enumerate(names):
-            panel.bar(low * scale.factor + i * width, counts.values[i], width=width, align="edge", color=CYCLE[i % len(CYCLE)], label=name)
+            panel.bar(
+                low * scale.factor + i * width,
+                counts.values[i],
+                width=width,
+                align="edge",
+                color=CYCLE[i % len(CYCLE)],
+                label=name.replace("_", " "),
+            )
         panel.set_xlabel(scale.label("speed at contact"))
         panel.set_ylabel("contacts")
         if legend:

@@ -18,7 +18,7 @@ from saltus.results.schema import STROBOSCOPE, check, kind_of, states_of
 from saltus.units import from_si
 
 _CALLER = "plot.phase"
-#: Without `periods` the last part of the run is shown: transients of lightly damped systems have mostly gone by then (of the rig with
+#: Without `periods` the last part of a forced run is shown: transients of lightly damped systems have mostly gone by then (of the rig with
 #: 3 % damping after 40 periods, at 15 Hz), and subharmonic orbits still show several of their periods.
 SETTLED_SHARE = 0.3
 
@@ -48,7 +48,8 @@ def phase(
     states : pair of str, optional
         On the horizontal and the vertical axis; the first two by default.
     periods : int, float or pair, optional
-        The last so many forcing periods, or from one to another. The last 30 % of the run by default.
+        The last so many forcing periods, or from one to another. By default the last 30 % of a forced run,
+        as the picture says, and all of a run without forcing.
     ax : Axes, optional
         Where to draw; a new figure by default.
     poincare : bool
@@ -71,7 +72,8 @@ def phase(
     pair = _pair(run, states)
     labels = selection.chosen(run, trajectory, _CALLER)
     singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
-    windows = [selection.window(one, periods, _CALLER, SETTLED_SHARE) for one in singles]
+    share = SETTLED_SHARE if "period" in run else 1.0
+    windows = [selection.window(one, periods, _CALLER, share) for one in singles]
     curves = [_values(one, pair, shown) for one, shown in zip(singles, windows, strict=True)]
     scales = _scales(run, pair, np.concatenate(curves), selection.units_of_states(run, units, _CALLER))
     with draw.panels(ax, 1, (4.6, 3.1), _CALLER) as (panel,):
@@ -81,7 +83,8 @@ def phase(
             if kind_of(run) != STROBOSCOPE:
                 _curve(panel, one, pair, shown, scales, color, name)
             if poincare or kind_of(run) == STROBOSCOPE:
-                _dots(panel, selection.stroboscope_points(one, pair, *shown), scales, color, name)
+                part = f", {shown[0]:g} T to {shown[1]:g} T" if periods is None and shown[0] > 0 else ""
+                _dots(panel, selection.stroboscope_points(one, pair, *shown), scales, color, name or f"Poincaré points{part}")
             draw.note_status(panel, one)
         _frame(panel, singles[0], pair, np.concatenate(curves), scales)
         if legend:
@@ -129,10 +132,10 @@ def _curve(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], shown: tuple[float, 
         draw.draw_pieces(ax, x, y, coloured.of(curve.mode), coloured, width)
 
 
-def _dots(ax: Axes, points: np.ndarray, scales: tuple[Scale, Scale], color: str | None, name: str | None) -> None:
+def _dots(ax: Axes, points: np.ndarray, scales: tuple[Scale, Scale], color: str | None, name: str) -> None:
     """The Poincare points; smaller where they are many."""
     size = 4.5 if len(points) <= 60 else 2.5 if len(points) <= 500 else 1.2
-    label = "whole periods" if color is None else name if name not in ax.get_legend_handles_labels()[1] else None
+    label = name if color is None or name not in ax.get_legend_handles_labels()[1] else None
     look = {"marker": "o", "ms": size, "mfc": color or OKABE_ITO["black"], "mec": "white", "mew": 0.4 if size > 2 else 0.0}
     if color is None and size > 4:  # open circles: filled ones are contacts, in time histories
         look |= {"ms": 4.2, "mfc": "white", "mec": OKABE_ITO["black"], "mew": 1.1}

@@ -27,6 +27,8 @@ _EVENTS = {
     "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"), "neimark_sacker": ("Neimark-Sacker", "o"),
     "chaos": ("onset of chaos", "s"), "graze": ("graze", "^"),
 }  # fmt: skip
+#: Where the marks of events stand, in heights of the Axes.
+_EVENTS_AT = 1.025
 #: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
 _EVEN = 1e-6
 #: More marks than these on an axis are drawn smaller.
@@ -172,14 +174,14 @@ def dataset_color(one: Shown) -> str:
     return CYCLE[one.look % len(CYCLE)]
 
 
-def kind_handles(one: Shown, of: np.ndarray) -> dict[str, Line2D]:
-    """The kinds that occur, in the order of the legend, with their colours."""
+def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str, Line2D]:
+    """The kinds that occur, in the order of the legend, with their colours, and their markers if asked for."""
     periods = one.ds["response_period"].values
-    return {kinds.label(code, periods): dot(kinds.color(code)) for code in np.unique(of).tolist()}
+    return {kinds.label(code, periods): dot(kinds.color(code), kinds.marker(code) if markers else "o") for code in np.unique(of).tolist()}
 
 
 def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
-    """Marks on the axis where something happens to a branch; each kind is named once."""
+    """Marks above the picture, clear of its ticks, where something happens to a branch; each kind is named once."""
     for one in datasets:
         name = event_name(one.axis)
         if name not in one.ds or not one.ds.sizes.get("event"):
@@ -190,14 +192,15 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
             here = values[(words == word) & (values >= low) & (values <= high)]
             if here.size:
                 size, width = (4.5, 0.8) if values.size <= _MANY_EVENTS else (3.0, 0.5)
+                above = np.full(here.size, _EVENTS_AT)
                 ax.plot(
-                    here, np.zeros(here.size), transform=ax.get_xaxis_transform(), ls="none", marker=marker, ms=size, mfc="white",
+                    here, above, transform=ax.get_xaxis_transform(), ls="none", marker=marker, ms=size, mfc="white",
                     mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False, zorder=5, label=text, gid=f"event {word}",
                 )  # fmt: skip
 
 
 def legend(ax: Axes, named: Mapping[str, Any], left: float = 1.02) -> None:
-    """Name the colours, then the marks on the axis, beside the picture; ``left``: how far, in widths of the Axes."""
+    """Name the colours, then the marks above it, beside the picture; ``left``: how far, in widths of the Axes."""
     known = dict(named)
     for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):
         known.setdefault(text, handle)

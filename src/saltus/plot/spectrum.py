@@ -101,7 +101,7 @@ def _curve(ax: Axes, one: xr.Dataset, values: np.ndarray, floor: float, color: s
         ax.vlines(frequency[seen], floor, values[seen], color=color, lw=0.9, zorder=2)
         draw.draw_points(ax, frequency[seen], values[seen], marker="o", ms=2.6, color=color, label=name, zorder=3)
     else:
-        ax.plot(frequency, values, color=color, lw=0.8, label=name, zorder=2)
+        ax.plot(frequency, values, color=color, lw=0.4, alpha=0.8, label=name, zorder=2)
 
 
 def _top(one: xr.Dataset, values: np.ndarray, largest: float) -> float:

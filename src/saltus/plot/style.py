@@ -8,8 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+from matplotlib.font_manager import fontManager
 
 from saltus.errors import ParameterError
 
@@ -31,6 +34,7 @@ QUIET = "#555555"
 #: Above this many points a marker layer is stored as pixels in vector files: they would otherwise grow to megabytes.
 RASTERISE_ABOVE = 500
 
+_MARK = "saltus"
 _STYLE_FILE = Path(__file__).with_name("saltus.mplstyle")
 
 
@@ -38,11 +42,45 @@ _STYLE_FILE = Path(__file__).with_name("saltus.mplstyle")
 def style() -> Iterator[None]:
     """Context in which figures get saltus's look: ``with sl.plot.style(): fig, axes = plt.subplots(2, 2)``.
 
-    The functions of this package use it themselves when they make the figure.
+    The functions of this package use it themselves when they make the figure. A figure keeps its fonts and sizes when it is drawn or
+    saved after the context has ended.
     """
     plt.draw_if_interactive()  # loads the backend, which may switch interaction on: inside the context that would be undone at its end
     with plt.style.context(_STYLE_FILE):
-        yield
+        # A generic family is resolved when a figure is saved, by the settings of that moment; a font's own name stays.
+        plt.rcParams["font.family"] = _fonts(plt.rcParams["font.sans-serif"])
+        before = set(plt.get_fignums())
+        try:
+            yield
+        finally:
+            for number in set(plt.get_fignums()) - before:
+                figure = plt.figure(number)
+                figure.set_gid(_MARK)
+                _keep_ticks(figure)
+
+
+def styled(figure: Figure | None) -> bool:
+    """Whether a figure was made in the style, so that what is drawn into it later should be drawn in the style too."""
+    return figure is not None and figure.get_gid() == _MARK
+
+
+def _fonts(wanted: list[str]) -> list[str]:
+    """The fonts of a list that this machine has; Matplotlib brings the last one."""
+    known = {font.name for font in fontManager.ttflist}
+    return [name for name in wanted if name in known]
+
+
+def _keep_ticks(figure: Figure) -> None:
+    """Ticks are made as they are needed, by the settings of that moment: write the present ones into the axes."""
+    now: dict[str, Any] = {str(name): value for name, value in plt.rcParams.items()}
+    for ax in figure.axes:
+        for one in (ax, *ax.child_axes):
+            for direction in ("x", "y"):
+                look = {name: now[f"{direction}tick.{name}"] for name in ("labelsize", "direction", "color")}
+                one.tick_params(axis=direction, which="both", labelfontfamily=now["font.family"], **look)
+                for which in ("major", "minor"):
+                    sizes = {name: now[f"{direction}tick.{which}.{name}"] for name in ("size", "width", "pad")}
+                    one.tick_params(axis=direction, which=which, **sizes)
 
 
 # -- display units -------------------------------------------------------------------------------------------------------------

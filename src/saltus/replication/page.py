@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Class in the style sheet, and sign, of each verdict: colour never stands alone.
 _LOOKS = {HOLDS: ("holds", "✓"), IN_PART: ("part", "◐"), FAILS: ("fails", "✗"), UNDECIDED: ("open", "?")}
+#: Order of the claims at a glance: what is news first.
+_NEWS = (FAILS, IN_PART, UNDECIDED, HOLDS)
 _SIGNS = {True: "✓", False: "✗", None: "?"}
 #: Pictures narrower than this [pixels] aren't stretched over the page.
 _NARROW = 900
@@ -99,9 +101,11 @@ def _chip(verdict: str) -> str:
 
 
 def _glance(result: Replication) -> str:
+    """A row for each claim, those that fail first; each leads to its answers."""
+    findings = sorted(result.findings, key=lambda one: _NEWS.index(one[1].verdict))
     rows = "".join(
         f'<tr><td>{_text(claim.figure)}</td><td><a href="#{claim.id}">{_text(claim.says)}</a></td><td>{_chip(finding.verdict)}</td></tr>'
-        for claim, finding in result.findings
+        for claim, finding in findings
     )
     head = "<tr><th>Fig.</th><th>What the paper says</th><th>Verdict</th></tr>"
     return f'<div class="scroll"><table class="all"><thead>{head}</thead><tbody>{rows}</tbody></table></div>'

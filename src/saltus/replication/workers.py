@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import SaltusError
+from saltus.interrupt import Stop
 from saltus.replication.job import Job, JobError, Shelf
 from saltus.replication.papers import Paper, folder_of
 from saltus.results.files import ResultFileError
@@ -96,7 +96,7 @@ class Workers:
     def __init__(self, paper: Paper, figures: Sequence[str], quick: bool, shelf: Shelf, threads: int):
         self._jobs = {job.name: job for job in paper.jobs(folder_of(paper.name), quick)}
         self._of_figure = {figure: closure(self._jobs, wanted_by(paper, figure)) for figure in figures}
-        self._shelf, self._stop = shelf, threading.Event()
+        self._shelf, self._stop = shelf, Stop()
         self._shares: dict[str, float] = {}
         self._futures: dict[str, Future[xr.Dataset]] = {}
         self._pool = ThreadPoolExecutor(threads)
@@ -143,6 +143,7 @@ class Workers:
 
     def _one(self, job: Job) -> xr.Dataset:
         """The Dataset of a job. Raises the JobError of a job that it needs, too."""
+        self._stop.hold()
         inputs = {name: self._futures[name].result() for name in job.needs}
 
         def show(share: float) -> None:

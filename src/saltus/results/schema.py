@@ -18,6 +18,7 @@ values), ``multiplier``, ``phase``, ``sample`` (sampled values of a bifurcation 
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -29,6 +30,7 @@ from saltus.errors import ParameterError
 from saltus.results import motions
 from saltus.results.method_variables import METHODS_VARIABLES
 from saltus.results.response_variables import RESPONSES_VARIABLES
+from saltus.results.result import Result
 from saltus.results.variable import COUNTERS, FORCING_PERIOD, GUARDS, MINIMA, STATUS, TRAJECTORY_NUMBER, Variable
 
 #: Version of the tables below, kept in every result as ``schema_version``.
@@ -258,6 +260,11 @@ def states_of(ds: xr.Dataset) -> tuple[str, ...]:
     return tuple(ds.attrs["states"].split())
 
 
+def equations_of(ds: xr.Dataset) -> list[str]:
+    """The equations that made a result, one text each, such as ``dx/dt = v``; none if they aren't known."""
+    return list(json.loads(ds.attrs.get("equations", "[]")))
+
+
 def axes_of(ds: xr.Dataset) -> tuple[str, str]:
     """The two states that a map (of basins, or of the agreement of two) is drawn over."""
     a, b = ds["basin" if kind_of(ds) == BASINS else "agreement"].dims
@@ -334,7 +341,7 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
             attrs["flag_values"] = np.atleast_1d(np.asarray(attrs["flag_values"], dtype=data.dtype))
         variables[name] = xr.Variable(variable.dims, data, attrs)
     coords = {name: variables.pop(name) for name in ds.coords}
-    return xr.Dataset(variables, coords, {key: _plain(value) for key, value in ds.attrs.items()})
+    return Result(variables, coords, {key: _plain(value) for key, value in ds.attrs.items()})
 
 
 def _plain(value: Any) -> Any:

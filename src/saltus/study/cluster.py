@@ -1,8 +1,12 @@
-"""Chunks on a dask cluster: processes of this machine, or whatever a scheduler's address stands for. Needs the extra ``cluster``."""
+"""Chunks on a dask cluster, which a scheduler's address stands for. Needs the extra ``cluster``.
+
+A dask scheduler runs what it is sent: whoever can reach it can run anything as the user who started it. See docs/studies.md.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 import socket
 from collections.abc import Callable, Iterator
@@ -24,15 +28,13 @@ _SILENT = "the scheduler {} doesn't answer ({}). Start one with `dask scheduler`
 
 
 @contextmanager
-def cluster_runner(workers: int | None, scheduler: str | None) -> Iterator[Callable[..., None]]:
-    """Yields ``run(plan, found, missing, keep, show)`` on a cluster; one of this machine listens on the loopback only.
+def cluster_runner(scheduler: str) -> Iterator[Callable[..., None]]:
+    """Yields ``run(plan, found, missing, keep, show)`` on a cluster.
 
     Parameters
     ----------
-    workers : int, optional
-        Processes of a cluster on this machine; by default one for each core.
-    scheduler : str, optional
-        Address such as ``tcp://host:8786``; ``"local"`` or None for a cluster on this machine.
+    scheduler : str
+        Address such as ``tcp://host:8786``.
 
     Raises
     ------
@@ -40,14 +42,10 @@ def cluster_runner(workers: int | None, scheduler: str | None) -> Iterator[Calla
         If dask isn't installed, or the scheduler doesn't answer.
     """
     try:
-        from distributed import Client, LocalCluster
+        from distributed import Client
     except ImportError:
-        raise StudyError('a cluster needs dask. Install "saltus[cluster]", or leave --workers and --scheduler out.') from None
-    if scheduler in (None, "local"):
-        local = LocalCluster(n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None)
-        with local as cluster, Client(cluster) as client:
-            yield lambda *job: _run(client, *job)
-        return
+        raise StudyError('a cluster needs dask. Install "saltus[cluster]", or leave --scheduler out.') from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # late heartbeats and lost workers are healed here, and told if they aren't
     try:
         client = Client(scheduler, timeout=10)
     except (OSError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""The basin maps of a study: planned into chunks, computed by threads or on a cluster, kept in stores that survive anything."""
+"""The basin maps of a study: planned into chunks, computed by threads, processes or a cluster, kept in stores that survive anything."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,9 @@ from saltus.flow.threads import usable_processors
 from saltus.results.store import Store
 from saltus.study import quantities
 from saltus.study.identity import identity
+from saltus.study.inputs import Inputs
 from saltus.study.names import slug
+from saltus.study.processes import run_on_processes
 from saltus.study.questions.basins import Basins, Map
 from saltus.study.running import Report, Resources
 from saltus.study.setting import Setting, system_of
@@ -63,7 +66,7 @@ def jobs_of(study: Study, own: System | None = None) -> list[MapJob]:
         If the study doesn't fit its system.
     """
     assert study.basins is not None
-    return jobs_of_setting(study.basins, Setting(study, system_of(study.system, own), Path()))
+    return jobs_of_setting(study.basins, Setting(study, system_of(study.system, own), Inputs(Path())))
 
 
 def jobs_of_setting(table: Basins, setting: Setting) -> list[MapJob]:
@@ -130,11 +133,13 @@ def _attractors(job: MapJob, store: Store, resources_: Resources) -> Found:
 
 
 def _runner(resources_: Resources) -> AbstractContextManager[Callable[..., None]]:
-    """``run(plan, found, missing, keep, show)`` by threads, or by a dask cluster."""
-    if resources_.cluster:
+    """``run(plan, found, missing, keep, show)`` by threads, by processes, or by a dask cluster."""
+    if resources_.scheduler not in (None, "local"):
         from saltus.study.cluster import cluster_runner
 
-        return cluster_runner(resources_.workers, resources_.scheduler)
+        return cluster_runner(str(resources_.scheduler))
+    if resources_.workers is not None or resources_.scheduler == "local":
+        return nullcontext(partial(run_on_processes, resources_.workers))
 
     def run(plan: BasinPlan, found: Found, missing: list[int], keep: Callable, show: Callable) -> None:
         label_all(plan, found, missing, keep, resources_.threads, show)

@@ -20,9 +20,9 @@ class Resources:
     threads : int or None
         Threads of this process; all usable cores by default.
     workers : int or None
-        Basins: processes of a dask cluster on this machine.
+        Basins: processes of this machine.
     scheduler : str or None
-        Basins: address of a dask scheduler, or ``"local"``.
+        Basins: address of a dask scheduler, or ``"local"`` for processes of this machine.
     shard : (k, n) or None
         Basins: only the chunks i with i % n == k, one of n jobs that share the store and nothing else. All other questions are left to
         shard 0.
@@ -32,11 +32,6 @@ class Resources:
     workers: int | None = None
     scheduler: str | None = None
     shard: tuple[int, int] | None = None
-
-    @property
-    def cluster(self) -> bool:
-        """Whether dask does the work."""
-        return self.workers is not None or self.scheduler is not None
 
 
 def shard_of(text: str) -> tuple[int, int]:

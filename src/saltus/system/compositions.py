@@ -29,7 +29,7 @@ def sign(a: Operand) -> Any:
     """
     if _traced(a):
         return piecewise((1.0, a > 0), otherwise=-1.0)
-    return float((a > 0) - (a < 0))
+    return 1.0 if a > 0 else -1.0 if a < 0 else 0.0
 
 
 def heaviside(a: Operand, at_zero: float = 0.5) -> Any:

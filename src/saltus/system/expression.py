@@ -14,6 +14,8 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, Union
 
@@ -25,6 +27,7 @@ ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
 _MATH = {name: getattr(math, name) for name in ELEMENTARY}
 _INTERNED: weakref.WeakValueDictionary[tuple, Expr] = weakref.WeakValueDictionary()
 _LOCK = threading.RLock()  # two nodes for one state would make a derivative silently zero
+_OBSERVER: ContextVar[Callable[[Expr], None] | None] = ContextVar("observer", default=None)
 Number = int | float
 Operand = Union["Expr", int, float]
 
@@ -59,6 +62,9 @@ class Expr:
                 node = object.__new__(cls)
                 node.op, node.args, node.payload = op, args, payload
                 _INTERNED[key] = node
+        observer = _OBSERVER.get()
+        if observer is not None:
+            observer(node)
         return node
 
     # -- arithmetic -------------------------------------------------------------------------------------------------------------
@@ -117,6 +123,7 @@ class Expr:
     __rmod__ = __floordiv__ = __rfloordiv__ = __mod__
 
     def __call__(self, *_arguments: object) -> Expr:
+        """Refused: the value of a state at another time."""
         raise TraceError(
             f"an equation called {self!r} as a function. There are no delays, x(t - tau): a rate depends on the states at the time t only. "
             f"A product is written with *."
@@ -187,6 +194,16 @@ def _rebound() -> str:
     from saltus.system.foreign import ADVICE  # foreign.py builds on this module
 
     return ADVICE["impact"].partition(": ")[2]
+
+
+@contextmanager
+def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
+    """Every node that is asked for inside is shown to the observer, which may raise: the error then has the line of the user's function."""
+    token = _OBSERVER.set(observer)
+    try:
+        yield
+    finally:
+        _OBSERVER.reset(token)
 
 
 # -- conditions ----------------------------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from typing import Any
 from saltus.errors import ParameterError, TraceError, nearest
 from saltus.system.expression import TIME, Expr, as_expr, parameter, state, sub
 from saltus.system.guards import Guard, bits_in, join_guards, surface_guard
+from saltus.system.names import why_no_name
 from saltus.system.singular import lifted
 from saltus.system.system import System
 from saltus.system.trace import explained, place
@@ -234,7 +235,7 @@ def with_integrals(system: System, integrands: Mapping[str, Quantity], units: Ma
     new_units = {name: check_declared(unit, name) for name, unit in (units or {}).items()}
     extended = system
     for name, function in integrands.items():
-        if not name.isidentifier() or name in system.units or name == "t":
+        if why_no_name(name) is not None or name in system.units:
             raise ParameterError(f"an integral of {system.name} can't be called {name!r}: use letters, digits and _, and no name it has.")
         rate, guards = quantity(extended, function, f"the integrand {name!r}")
         extended = replace(extended, guards=guards)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from saltus.errors import SaltusError
 from saltus.system.expression import ELEMENTARY, And, Bit, Condition, Expr, Not, Or, constant, walk
 from saltus.system.guards import Guard, bits_in
+from saltus.system.names import why_no_name, why_no_text, why_no_title
 
 if TYPE_CHECKING:
     from saltus.system.system import System
@@ -93,14 +94,17 @@ def arguments(data: Mapping[str, Any]) -> dict[str, Any]:
         raise SaltusError(f"this isn't a system written by this version of saltus (format {found!r}, expected {FORMAT!r}). Trace it again.")
     try:
         return _read(data)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
         raise SaltusError(f"the data of a system is damaged ({type(error).__name__}: {error}). Trace the system again.") from error
 
 
 def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     states, parameters = tuple(data["states"]), list(data["parameters"])
     for name in (*states, *parameters):
-        _require(isinstance(name, str) and name.isidentifier(), f"{name!r} is no name")
+        _require(why_no_name(name) is None, f"{name!r} is no name: {why_no_name(name)}")
+    _require(why_no_title(data["name"]) is None, f"{data['name']!r} is no name of a system: {why_no_title(data['name'])}")
+    for name in ("description", "source"):
+        _require(why_no_text(data[name]) is None, f"its {name} can't be used: {why_no_text(data[name])}")
     _require(len({*states, *parameters}) == len(states) + len(parameters), "a name stands twice")
     names = {"state": set(states), "param": set(parameters)}
     nodes: list[Expr] = []
@@ -118,9 +122,9 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     _require(bits_in(field) <= set(range(len(guards))), "a condition names an unknown guard")
     _require(data["forced_at"] is None or data["forced_at"] in parameters, "forced_at is no parameter")
     return {
-        "name": str(data["name"]),
-        "description": str(data["description"]),
-        "source": str(data["source"]),
+        "name": data["name"],
+        "description": data["description"],
+        "source": data["source"],
         "states": states,
         "values": {name: float(data["values"][name]) for name in parameters},
         "units": {name: str(data["units"][name]) for name in (*states, *parameters)},

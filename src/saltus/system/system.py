@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from saltus.errors import ParameterError, nearest
 from saltus.system import checks, serial
 from saltus.system.derivatives import gradient
@@ -127,6 +129,35 @@ class System:
     def guard_gradients(self) -> tuple[tuple[Expr, ...], ...]:
         """Derivative of each gap (row) with respect to each state (column), in a frozen mode."""
         return tuple(gradient(guard.gap, self.states) for guard in self.guards)
+
+    def rhs(self, t: Any, y: Any) -> np.ndarray:
+        """The right-hand side as a plain function: time derivatives of the states, by NumPy.
+
+        For other integrators to be held against: ``scipy.integrate.solve_ivp(rig.rhs, (0, 1), y0)``. It knows no modes: which piece holds
+        is read off the state, and no contact is located. Trajectories of saltus are computed by generated code, some thousand times faster.
+
+        Parameters
+        ----------
+        t : float or array
+            Time [s].
+        y : array, shape (states, ...)
+            The states, in their order [SI].
+
+        Returns
+        -------
+        ndarray, shape (states, ...)
+            [SI per second].
+
+        Raises
+        ------
+        ParameterError
+            If ``y`` has another number of states.
+        """
+        from saltus.system.evaluate import field
+
+        if len(y) != len(self.states):
+            raise ParameterError(f"{self.name} has the states {', '.join(self.states)}, but y holds {len(y)} of them.")
+        return field(self, t, y)
 
     def equations(self) -> list[str]:
         """The equations as text, one line each; long parts that are used twice come first, named."""

@@ -15,9 +15,11 @@ from typing import Any
 
 from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest
 from saltus.system import checks
-from saltus.system.expression import TIME, Expr, as_expr, parameter, state, walk
+from saltus.system.dimensions import DimensionCheck
+from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
+from saltus.system.names import why_no_name, why_no_text, why_no_title
 from saltus.system.singular import check_finite, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
@@ -34,6 +36,7 @@ def system(
     units: Mapping[str, str] | None = None,
     name: str | None = None,
     source: str = "",
+    check_units: bool = True,
 ) -> Callable[[Callable[..., Any]], System]:
     """Decorator that turns an equation of motion into a :class:`System`.
 
@@ -54,6 +57,9 @@ def system(
         What to call the system; the function's name if not given.
     source : str, optional
         Where the equations were published.
+    check_units : bool, optional
+        Whether to check that what is added or compared has one unit, and each rate that of its state per second, as far as units are known.
+        False for equations whose numbers have units of their own.
 
     Returns
     -------
@@ -65,7 +71,7 @@ def system(
     TraceError
         If the function can't be traced; the message names file and line.
     ParameterError, UnitError
-        If a default value is out of range or a unit is wrong.
+        If a default value is out of range or a unit is wrong, or terms of different units are added.
 
     Examples
     --------
@@ -82,7 +88,10 @@ def system(
     names = tuple(states.replace(",", " ").split()) if isinstance(states, str) else tuple(states)
 
     def decorate(function: Callable[..., Any]) -> System:
-        title = name or function.__name__
+        title, told = name or function.__name__.strip("<>"), inspect.getdoc(function) or ""
+        for what, text, why in (("name", title, why_no_title), ("source", source, why_no_text), ("docstring", told, why_no_text)):
+            if why(text) is not None:
+                raise TraceError(f"the {what} of a system can't be {text!r:.80}: {why(text)}.")
         defaults = _parameters(function, names, title)
         known_units = _units(names, defaults, forced_at, dict(units or {}), title)
         if forced_at is not None and known_units[forced_at] not in ("Hz", "rad/s"):
@@ -90,7 +99,8 @@ def system(
                 f"{title}: forced_at={forced_at!r} is in {known_units[forced_at]!r}, but a forcing frequency is in 'Hz' or 'rad/s'."
             )
         values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
-        field, guards = _traced(function, names, tuple(defaults), title)
+        dimensions = DimensionCheck(names, known_units) if check_units else None
+        field, guards = _traced(function, names, tuple(defaults), title, dimensions)
         _warn_of_unused(field, guards, defaults, forced_at, title)
         return System(
             name=title,
@@ -101,7 +111,7 @@ def system(
             units=known_units,
             forced_at=forced_at,
             source=source,
-            description=inspect.getdoc(function) or "",
+            description=told,
         )
 
     return decorate
@@ -122,6 +132,8 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
             raise TraceError(
                 f"{title}: parameter {argument.name!r} has no default. Give it a value: {argument.name}=1.0, or text with a unit."
             )
+        elif (why := why_no_name(argument.name)) is not None:
+            raise TraceError(f"{title}: {argument.name!r} can't be the name of a parameter: {why}.")
         else:
             parameters[argument.name] = argument.default
     names = [argument.name for argument in positional]
@@ -138,8 +150,8 @@ def _check_states(states: tuple[str, ...], title: str) -> None:
     if not states:
         raise TraceError(f'{title}: states="" names no state. Write states="x v".')
     for name in states:
-        if not (isinstance(name, str) and name.isidentifier()):
-            raise TraceError(f"{title}: {name!r} can't be the name of a state. Use letters, digits and _.")
+        if (why := why_no_name(name)) is not None:
+            raise TraceError(f"{title}: {name!r} can't be the name of a state: {why}.")
     if len(set(states)) < len(states):
         raise TraceError(f"{title}: states={' '.join(states)!r} names a state twice.")
 
@@ -168,13 +180,19 @@ def _units(
 
 
 # -- the call ------------------------------------------------------------------------------------------------------------------
-def _traced(function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...], title: str) -> tuple[Any, Any]:
+def _traced(
+    function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...], title: str, dimensions: DimensionCheck | None
+) -> tuple[Any, Any]:
     """Field and guards."""
     try:
-        returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
-        derivatives = _as_derivatives(returned, states)
+        with observed(dimensions):
+            returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
+            derivatives = _as_derivatives(returned, states)
+        if dimensions is not None:
+            dimensions.check_rates(derivatives)
     except Exception as error:
-        raise TraceError(explained(error, function, title)) from error
+        kind = UnitError if isinstance(error, UnitError) else TraceError
+        raise kind(explained(error, function, title)) from error
     try:
         field, guards = find_guards(derivatives)
         field = lifted(field, guards)
@@ -228,7 +246,7 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
     if frames:
         where = f"{frames[-1].filename}, line {frames[-1].lineno}"
         where += f": {frames[-1].line}" if frames[-1].line else ""
-    if isinstance(error, TraceError):
+    if isinstance(error, TraceError | UnitError):
         return f"{title} ({where}): {error}"
     if isinstance(error, AttributeError) and str(error).startswith("saltus has no "):
         return f"{title} ({where}): {error}"

@@ -21,7 +21,7 @@ def unforced(t, x, v):
     return v, -x - 0.1 * v
 
 
-@sl.system(states="a b c", forced_at="f", units={"a": "m", "b": "m", "c": "m/s"})
+@sl.system(states="a b c", forced_at="f", units={"a": "m", "b": "m", "c": "m/s"}, check_units=False)
 def three(t, a, b, c, *, f=1.0):
     """Three states, two of a kind."""
     return -a, -b, sl.cos(2 * sl.pi * f * t) - c

@@ -5,7 +5,6 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.grid import axis, grid_of
-from saltus.analysis.samples import _turn
 from saltus.analysis.starts import ensemble
 from saltus.errors import ParameterError, UnitError
 
@@ -173,27 +172,6 @@ def test_a_chaotic_response_is_typed_and_shown():
     assert ds.type.item() == "chaotic"
     assert ds.response_exponent.item() > 4 * ds.response_exponent_error.item() > 0
     assert np.isfinite(ds.sample_x.values).sum() > 100
-
-
-def test_cubics_turn_where_they_turn():
-    """Cubics with a root of the slope at a known place, from their values and slopes at both ends."""
-    rng = np.random.default_rng(3)
-    at, other, size, offset = (
-        rng.random(200),
-        rng.uniform(1.1, 4.0, 200) * rng.choice([-1, 1], 200),
-        rng.normal(size=200),
-        rng.normal(size=200),
-    )
-
-    def value(s):
-        return offset + size * (s**3 / 3 - (at + other) * s**2 / 2 + at * other * s)
-
-    def slope(s):
-        return size * (s - at) * (s - other)
-
-    found = _turn(value(0.0), value(1.0), slope(0.0), slope(1.0))
-    np.testing.assert_allclose(found, at, atol=1e-9)
-    assert _turn(np.array([0.0]), np.array([0.0]), np.array([1.0]), np.array([-1.0])).item() == 0.5  # a parabola
 
 
 @pytest.mark.parametrize("axes", [{"frequency": ("14 Hz", "16 Hz", 2)}, {"frequency": ("14 Hz", "16 Hz", 2), "force": ("1 N", "2 N", 2)}])

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
+import pickle
+import signal
 import subprocess
 import sys
+import threading
+import time
 import warnings
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numba
 import pytest
 
-from saltus.codegen import cache
+from saltus.codegen import cache, entry, machine
+from saltus.codegen.announce import silent
 from saltus.errors import CacheError, SaltusWarning
+from saltus.interrupt import Interrupted, Stop
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is cached with the JIT off")
 
 KEY = "0123456789abcdef0123456789abcdef"
-SOURCE = """from numba import njit
-
-
-@njit("int64(int64)", cache=True)
+SOURCE = """
+@kept("int64(int64)")
 def propagate(n):
     return n + 1
 """
@@ -38,6 +39,12 @@ def folder(tmp_path, monkeypatch):
     forget()
 
 
+@pytest.fixture
+def here(monkeypatch):
+    """Compile in this process: quicker, where the other process isn't what is tested."""
+    monkeypatch.setattr(machine, "compiled_elsewhere", lambda *_: None)
+
+
 def forget():
     """As a new process would begin."""
     sys.modules.pop(f"saltus_kernels_{KEY}", None)
@@ -48,27 +55,40 @@ def load(source=SOURCE):
     return cache.load(KEY, source, "one line")
 
 
-def machine_code(folder):
-    (file,) = (folder / KEY / "__pycache__").glob("*.nbc")
+def kernel(folder):
+    return folder / f"{KEY}.kernel"
+
+
+def stamp(folder):
+    return kernel(folder).stat().st_mtime_ns
+
+
+def reopened(file):
+    """The file, which is read-only, open to its owner for a test's damage."""
+    os.chmod(file, 0o600)
     return file
 
 
-def stamps(folder):
-    return {str(file): file.stat().st_mtime_ns for file in sorted((folder / KEY).rglob("*.nb?"))}
-
-
-def test_an_entry_is_made_once_and_then_loaded(folder):
+def test_an_entry_is_made_once_and_then_loaded(folder, capfd):
     assert load().propagate(1) == 2
-    before = stamps(folder)
-    assert len(before) == 2  # Numba's index and one kernel
+    assert capfd.readouterr().err == "saltus: compiling one line: once for each new equation, about 20 s\n"
+    before = stamp(folder)
     assert load().propagate(2) == 3
-    assert stamps(folder) == before
-    (entry,) = cache.entries()
-    assert (entry.name, entry.system, entry.path) == (KEY, "one line", folder / KEY)
-    assert entry.size_bytes == sum(file.stat().st_size for file in entry.path.rglob("*") if file.is_file())
+    assert stamp(folder) == before
+    assert capfd.readouterr().err == ""
+    (one,) = cache.entries()
+    assert (one.name, one.system, one.path) == (KEY, "one line", kernel(folder))
+    assert one.size_bytes == kernel(folder).stat().st_size
+    assert [path.name for path in folder.iterdir()] == [kernel(folder).name]
 
 
-def test_within_a_process_the_module_is_the_same(folder):
+def test_nothing_is_said_where_it_is_not_wanted(folder, here, capfd):
+    with silent():
+        load()
+    assert capfd.readouterr().err == ""
+
+
+def test_within_a_process_the_module_is_the_same(folder, here):
     assert load() is cache.load(KEY, SOURCE, "one line")
 
 
@@ -83,57 +103,172 @@ def flip_a_bit(file):
 
 
 DAMAGES = {
-    "kernel truncated": lambda entry: truncate(next(entry.rglob("*.nbc"))),
-    "kernel with a bit flipped": lambda entry: flip_a_bit(next(entry.rglob("*.nbc"))),
-    "kernel lost": lambda entry: next(entry.rglob("*.nbc")).unlink(),
-    "index truncated": lambda entry: truncate(next(entry.rglob("*.nbi"))),
-    "source edited": lambda entry: (entry / cache.MODULE).write_text(SOURCE.replace("1", "2")),
-    "source lost": lambda entry: (entry / cache.MODULE).unlink(),
-    "manifest lost": lambda entry: (entry / cache.MANIFEST).unlink(),
-    "manifest truncated": lambda entry: truncate(entry / cache.MANIFEST),
-    "manifest of another kind": lambda entry: (entry / cache.MANIFEST).write_text("[1]"),
-    "everything lost": lambda entry: [shutil.rmtree(entry), entry.mkdir()],
+    "truncated": truncate,
+    "a bit flipped": flip_a_bit,
+    "lost": lambda file: file.unlink(),
+    "emptied": lambda file: file.write_bytes(b""),
+    "no header": lambda file: file.write_bytes(b"\n"),
+    "a header of another kind": lambda file: file.write_bytes(b"[1]\n" + file.read_bytes().partition(b"\n")[2]),
+    "of another format": lambda file: file.write_bytes(file.read_bytes().replace(b"saltus-kernel/1", b"saltus-kernel/9", 1)),
+    "that of another key": lambda file: file.write_bytes(file.read_bytes().replace(KEY.encode(), KEY[::-1].encode(), 1)),
+    "a folder": lambda file: (file.unlink(), file.mkdir(mode=0o700)),
 }
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_entry_is_built_again(folder, damage):
+def test_a_damaged_entry_is_built_again(folder, here, damage):
     load()
-    DAMAGES[damage](folder / KEY)
+    DAMAGES[damage](reopened(kernel(folder)))
     cache.entries()  # shows what is there without failing
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         assert load().propagate(1) == 2
-    if said:
-        assert {warning.category for warning in said} == {SaltusWarning}
+    assert {warning.category for warning in said} <= {SaltusWarning}
+    assert bool(said) == (damage != "lost")
+    if damage == "a folder":  # nothing can take its place: said each time
+        return
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        before = stamps(folder)
+        before = stamp(folder)
         assert load().propagate(1) == 2
-    assert stamps(folder) == before  # whole again: loaded, not built
-    assert [entry.system for entry in cache.entries()] == ["one line"]
+    assert stamp(folder) == before  # whole again: loaded, not built
+    assert [one.system for one in cache.entries()] == ["one line"]
     assert not list(folder.glob(".building-*"))
 
 
-def test_an_entry_damaged_before_its_checksums_were_taken_is_replaced_with_a_warning(folder):
+def test_an_entry_that_numba_cannot_read_is_replaced_with_a_warning(folder, here):
     load()
-    flip = machine_code(folder)
-    flip.write_bytes(b"not machine code")
-    manifest = folder / KEY / cache.MANIFEST
-    manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "files": cache._checksums(folder / KEY)}))
-    with pytest.warns(UserWarning, match="building it again"):
+    kernel(folder).unlink()
+    entry.write(kernel(folder), "one line", b"not machine code")
+    with pytest.warns(SaltusWarning, match="building it again"):
         assert load().propagate(1) == 2
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert load().propagate(1) == 2
 
 
-def test_another_source_under_the_same_name_is_not_taken(folder):
-    load()
+# -- what others could have written ----------------------------------------------------------------------------------------------
+class Evil:
+    """Unpickled, it makes a file."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return open, (str(self.mark), "w")
+
+
+@pytest.fixture
+def planted(folder, tmp_path):
+    """A whole entry, checksum and all, that runs a stranger's code; and the file by which it would be seen."""
+    folder.mkdir(mode=0o700)
+    mark = tmp_path / "code ran"
+    entry.write(kernel(folder), "one line", pickle.dumps(Evil(mark)))
+    return mark
+
+
+def test_the_planted_entry_would_run_if_it_were_believed(folder, here, planted):
+    with pytest.warns(SaltusWarning, match="could not be loaded"):
+        assert load().propagate(1) == 2
+    assert planted.exists()
+
+
+def given_to_somebody(path):
+    if os.geteuid():
+        pytest.skip("only root can give a file away")
+    os.lchown(path, 65534, 65534)
+
+
+def linked(path):
+    there = path.with_name("elsewhere")
+    path.rename(there)
+    path.symlink_to(there)
+
+
+OPENINGS = {
+    "writable by its group": lambda file: (os.chmod(file, 0o620), os.chown(file, -1, other_group())),
+    "writable by all": lambda file: os.chmod(file, 0o602),
+    "somebody else's": given_to_somebody,
+    "a link": linked,
+}
+
+
+def other_group():
+    """A group that isn't this user's private one."""
+    if os.geteuid() and not set(os.getgroups()) - {os.getgid()}:
+        pytest.skip("this user has no other group")
+    return 65534 if not os.geteuid() else next(iter(set(os.getgroups()) - {os.getgid()}))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="owners and modes are POSIX")
+@pytest.mark.parametrize("opening", OPENINGS)
+def test_an_entry_that_others_could_have_written_is_not_read(folder, here, planted, opening):
+    OPENINGS[opening](kernel(folder))
     with pytest.warns(SaltusWarning, match="building it again"):
-        assert load(SOURCE.replace("n + 1", "n + 5")).propagate(1) == 6
+        assert load().propagate(1) == 2
+    assert not planted.exists()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert load().propagate(1) == 2  # its place is taken by one of ours
+    assert not planted.exists()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="owners and modes are POSIX")
+@pytest.mark.parametrize("opening", [name for name in OPENINGS if name != "a link"])
+def test_a_folder_that_others_could_have_written_to_is_not_used(folder, here, planted, opening):
+    OPENINGS[opening](folder)
+    os.chmod(folder, folder.stat().st_mode | 0o500)
+    before = kernel(folder).read_bytes()
+    with pytest.warns(SaltusWarning, match="compiled for this process only"):
+        assert load().propagate(1) == 2
+    assert not planted.exists()
+    assert kernel(folder).read_bytes() == before
+    assert [path.name for path in folder.iterdir()] == [kernel(folder).name]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="owners and modes are POSIX")
+def test_a_link_of_ours_to_a_folder_of_ours_is_used(folder, here, tmp_path):
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    folder.symlink_to(tmp_path / "elsewhere")
+    load()
+    assert [path.name for path in (tmp_path / "elsewhere").iterdir()] == [kernel(folder).name]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="owners and modes are POSIX")
+def test_somebody_elses_link_to_a_folder_of_ours_is_not_used(folder, here, tmp_path):
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    folder.symlink_to(tmp_path / "elsewhere")
+    given_to_somebody(folder)
+    with pytest.warns(SaltusWarning, match="is a link that belongs to another user"):
+        load()
+    assert not list((tmp_path / "elsewhere").iterdir())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="modes are POSIX")
+def test_folder_and_entry_are_closed_whatever_the_umask(folder, here):
+    before = os.umask(0)
+    try:
+        load()
+    finally:
+        os.umask(before)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert kernel(folder).stat().st_mode & 0o777 == 0o400
+
+
+def test_files_that_python_and_numba_would_read_are_not(folder, here, planted, monkeypatch):
+    """A planted .pyc, source or index of Numba's lies there unread: nothing is imported by path."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder / "numba"))
+    kernel(folder).unlink()
+    load()
+    for name in (f"{KEY}.py", "kernels.py", "__init__.py", f"__pycache__/{KEY}.{sys.implementation.cache_tag}.pyc"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(f"open({str(planted)!r}, 'w')")
+    assert load().propagate(1) == 2
+    assert not planted.exists()
+    assert not list(folder.rglob("*.nb?"))
+
+
+# -- several at once ---------------------------------------------------------------------------------------------------------------
 CHILD = """
 import sys
 from saltus.codegen import cache
@@ -154,11 +289,11 @@ def test_four_processes_that_start_cold_at_once(folder):
         process.stdin = None
     answers = [process.communicate(timeout=120) for process in processes]
     assert [(out.strip(), process.returncode) for (out, _), process in zip(answers, processes, strict=True)] == [("2", 0)] * 4, answers
-    assert [entry.name for entry in cache.entries()] == [KEY]
-    assert [path.name for path in folder.iterdir()] == [KEY]
-    before = stamps(folder)
+    assert [one.name for one in cache.entries()] == [KEY]
+    assert [path.name for path in folder.iterdir()] == [kernel(folder).name]
+    before = stamp(folder)
     assert load().propagate(1) == 2
-    assert stamps(folder) == before
+    assert stamp(folder) == before
 
 
 def in_threads(*sources):
@@ -179,73 +314,136 @@ def in_threads(*sources):
 
 def test_threads_compile_in_processes_of_their_own(folder, monkeypatch):
     """So that they don't wait for each other: no thread of this process calls Numba's compiler."""
-    monkeypatch.setattr(cache, "_compile", lambda *_: pytest.fail("compiled here"))
+    monkeypatch.setattr(machine, "compiled", lambda *_: pytest.fail("compiled here"))
     first, second = in_threads(SOURCE, SOURCE.replace("n + 1", "n + 2"))
     assert (first.propagate(1), second.propagate(1)) == (2, 3)
     assert len(cache.entries()) == len(list(folder.iterdir())) == 2
 
 
-def test_a_thread_whose_process_fails_compiles_itself(folder, monkeypatch):
-    monkeypatch.setattr(cache.sys, "executable", "/no/such/python")
+def test_where_no_process_can_be_started_this_one_compiles(folder, monkeypatch):
+    monkeypatch.setattr(machine.sys, "executable", "/no/such/python")
     (module,) = in_threads(SOURCE)
     assert module.propagate(1) == 2
 
 
-def test_a_thread_says_what_does_not_compile(folder):
-    (error,) = in_threads(SOURCE.replace("n + 1", "n + nothing"))
-    assert isinstance(error, numba.errors.NumbaError)
+@pytest.mark.parametrize("in_a_thread", [False, True])
+def test_what_does_not_compile_says_so_and_leaves_nothing_behind(folder, in_a_thread):
+    source = SOURCE.replace("n + 1", "n + nothing")
+    if in_a_thread:
+        (error,) = in_threads(source)
+        assert isinstance(error, numba.errors.NumbaError)
+    else:
+        with pytest.raises(numba.errors.NumbaError):
+            load(source)
+    assert list(folder.iterdir()) == []
+    assert f"saltus_kernels_{KEY}" not in sys.modules
+
+
+def test_a_process_that_is_killed_is_told(folder, monkeypatch):
+    monkeypatch.setattr(machine, "_wait", lambda process: process.kill() or process.wait())
+    with pytest.raises(CacheError, match="ended by signal 9"):
+        load()
     assert list(folder.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_written_costs_time_not_the_run(tmp_path, monkeypatch):
+# -- Ctrl-C ------------------------------------------------------------------------------------------------------------------------
+SLOW = """
+import time
+time.sleep(60)
+"""
+
+
+def compiling():
+    """Processes that compile now."""
+    return [process for process in list(machine._COMPILING) if process.poll() is None]
+
+
+def wait_for(condition):
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+def test_ctrl_c_while_it_compiles_ends_at_once_and_leaves_no_process(folder):
+    """The main thread waits for a process: Ctrl-C reaches it, and cannot be lost in the compiler."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    started = []
+
+    def press():
+        wait_for(compiling)
+        started.extend(compiling())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    presser = threading.Thread(target=press)
+    presser.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            load(SLOW + SOURCE)
+    finally:
+        presser.join()
+        signal.signal(signal.SIGINT, before)
+    assert [process.poll() is not None for process in started] == [True]
+    assert list(folder.iterdir()) == []
+
+
+def test_threads_that_wait_for_a_kernel_stop_when_they_are_told(folder):
+    """Both the one that compiles and the one that waits for it: they are part of work that Ctrl-C has ended."""
+    stop = Stop()
+
+    def one():
+        stop.hold()
+        return cache.load(KEY, SLOW + SOURCE, "one line")
+
+    with ThreadPoolExecutor(2) as pool:
+        futures = [pool.submit(one) for _ in range(2)]
+        wait_for(compiling)
+        stop.set()
+        assert [type(future.exception()) for future in futures] == [Interrupted] * 2
+    assert not compiling()
+
+
+# -- a folder that can't be used ---------------------------------------------------------------------------------------------------
+def test_a_folder_that_cannot_be_written_costs_time_not_the_run(tmp_path, monkeypatch, here):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("SALTUS_CACHE", str(tmp_path / "file" / "kernels"))
-    with pytest.warns(UserWarning, match="Set SALTUS_CACHE"):
+    with pytest.warns(SaltusWarning, match="Set SALTUS_CACHE"):
         module = load()
     assert module.propagate(1) == 2
-    shutil.rmtree(Path(module.__file__).parent)
     forget()
     assert cache.entries() == []
     assert cache.clear() == 0
 
 
-def test_no_folder_at_all(folder, monkeypatch):
-    folder.parent.joinpath("kernels").write_text("")
-
+def test_a_full_disk_costs_time_not_the_run(folder, here, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(cache.tempfile, "mkdtemp", full)
-    with pytest.warns(UserWarning, match="can't be written"), pytest.raises(CacheError, match="Set SALTUS_CACHE"):
-        load()
-
-
-def test_a_full_disk_costs_time_not_the_run(folder, monkeypatch):
-    write = Path.write_text
-
-    def full_beside_the_entries(path, text, *rest, **options):
-        if folder in path.parents:
-            raise OSError(28, "No space left on device")
-        return write(path, text, *rest, **options)
-
-    monkeypatch.setattr(Path, "write_text", full_beside_the_entries)
+    monkeypatch.setattr(entry.os, "replace", full)
     with pytest.warns(SaltusWarning, match="No space left on device.*Set SALTUS_CACHE"):
         assert load().propagate(1) == 2
     assert list(folder.iterdir()) == []
 
 
-def test_a_kernel_that_does_not_compile_leaves_nothing_behind(folder):
-    with pytest.raises(numba.errors.NumbaError):
-        load(SOURCE.replace("n + 1", "n + nothing"))
-    assert list(folder.iterdir()) == []
-    assert f"saltus_kernels_{KEY}" not in sys.modules
-
-
-def test_clear_takes_entries_and_leftovers_and_nothing_else(folder):
+def test_what_processes_left_that_were_killed_is_swept_after_a_day(folder, here):
     load()
-    (folder / ".building-left-behind").mkdir()
-    (folder / ".building-left-behind" / cache.MODULE).write_text("")
-    (folder / ".building-just-begun").mkdir()
+    for name in (".building-of-old", ".building-of-now"):
+        (folder / name).write_text("")
+    (folder / ".building-folder-of-old").mkdir()
+    os.utime(folder / ".building-of-old", (0, 0))
+    os.utime(folder / ".building-folder-of-old", (0, 0))
+    kernel(folder).unlink()
+    load()
+    assert {path.name for path in folder.iterdir()} == {kernel(folder).name, ".building-of-now"}
+
+
+def test_clear_takes_entries_and_leftovers_and_nothing_else(folder, here):
+    load()
+    (folder / ".building-left-behind").write_text("")
+    (folder / "of an older version").mkdir()
+    for name in ("kernels.py", "manifest.json"):
+        (folder / "of an older version" / name).write_text("")
     (folder / "yours").mkdir()
     (folder / "yours.txt").write_text("keep")
     assert cache.clear() == 1

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
+import subprocess
+import sys
 import threading
 from importlib import resources
 
@@ -22,7 +26,7 @@ METHODS = {
 @pytest.fixture
 def key(monkeypatch):
     """A function: system -> name of its kernel, by one of the methods. Nothing is compiled."""
-    monkeypatch.setattr(module, "load", lambda key, source, title: key)
+    monkeypatch.setattr(module, "load", lambda key, *_: key)
     monkeypatch.setattr(module, "_interpreted", lambda key, head, templates: key)
     module._environment.cache_clear()
     yield lambda system, method="taylor": METHODS[method](system)
@@ -117,7 +121,7 @@ def templates_of(method):
     """Names of the templates that a method puts together."""
     names = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_module", lambda title, head, templates, arguments: names.extend(templates))
+        patch.setattr(module, "_module", lambda title, what, head, templates, arguments: names.extend(templates))
         METHODS[method](equation(3))
     return names
 
@@ -142,20 +146,70 @@ def test_versions_are_in_the_name(key, monkeypatch, owner, name):
     assert key(equation(3)) != before
 
 
-def test_the_processor_is_in_the_name(key, monkeypatch):
+@pytest.mark.parametrize("part", range(3))
+def test_what_numba_compiles_for_is_in_the_name(key, monkeypatch, part):
+    """Platform, processor, features: as Numba sees them, so NUMBA_CPU_NAME and NUMBA_CPU_FEATURES count."""
     before = key(equation(3))
-    monkeypatch.setattr(module.llvm, "get_host_cpu_name", lambda: "another processor")
+    target = list(module._target())
+    target[part] = "another"
+    monkeypatch.setattr(module, "_target", lambda: tuple(target))
     module._environment.cache_clear()
     assert key(equation(3)) != before
 
 
+@pytest.mark.parametrize(("name", "value"), [("OPT", 0), ("BOUNDSCHECK", 1), ("DEBUGINFO_DEFAULT", 1)])
+def test_settings_of_numba_that_change_the_code_are_in_the_name(key, monkeypatch, name, value):
+    before = key(equation(3))
+    monkeypatch.setattr(numba.config, name, value)
+    module._environment.cache_clear()
+    assert key(equation(3)) != before
+
+
+TARGET = "import numba; from saltus.codegen import module; print(*module._target()[1:], module.lane_width())"
+
+
+def test_overrides_of_the_processor_are_seen():
+    """In a process of its own: Numba reads them once."""
+    overrides = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": "+sse2"}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **overrides}
+    said = subprocess.run([sys.executable, "-c", TARGET], env=environment, capture_output=True, text=True, check=True).stdout
+    assert said.split() == ["x86-64", "+sse2", "2"]
+
+
 @pytest.mark.parametrize(
     ("features", "lanes"),
-    [({"avx512f": True, "avx512dq": True, "avx2": True, "fma": True}, 16), ({"avx2": True, "fma": True}, 4), ({"avx2": True}, 2), ({}, 2)],
+    [("+avx2,+avx512dq,+avx512f,+fma", 16), ("+avx2,-avx512f,+fma", 4), ("+avx2,-fma", 2), ("+avx512f,-avx512dq,-avx2", 2), ("", 2)],
 )
 def test_lane_width_is_the_processors(monkeypatch, features, lanes):
-    monkeypatch.setattr(module.llvm, "get_host_cpu_features", lambda: features)
+    monkeypatch.setattr(module, "_target", lambda: ("platform", "processor", features))
     assert module.lane_width() == lanes
+
+
+# -- nothing of the user's own words is in the code ---------------------------------------------------------------------------------
+def source_of(monkeypatch, system, method):
+    told = []
+    monkeypatch.setattr(module, "load", lambda key, source, *_: told.append(source))
+    monkeypatch.setattr(module, "_interpreted", lambda key, head, templates: told.append(head))
+    METHODS[method](system)
+    return told[0]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_word_of_a_system_is_in_its_code(monkeypatch, method):
+    """Another name, other names of states, parameters and guards, other texts: the same source."""
+    rig = sl.models.delangre("b")
+    names = {name: f"other_{i}" for i, name in enumerate((*rig.states, *rig.values))}
+    data = json.loads(json.dumps(rig.to_dict()))
+    data["name"], data["description"], data["source"] = "another", "text", "of any kind"
+    data["states"], data["parameters"] = ([names[name] for name in data[key]] for key in ("states", "parameters"))
+    data["values"], data["units"] = ({names[name]: value for name, value in data[key].items()} for key in ("values", "units"))
+    data["forced_at"] = names[data["forced_at"]]
+    data["nodes"] = [[op, args, names[word] if op in ("state", "param") else word] for op, args, word in data["nodes"]]
+    data["guards"] = [[f"guard {i}", gap, names.get(state), boundary] for i, (_, gap, state, boundary) in enumerate(data["guards"])]
+    renamed = sl.System.from_dict(data)
+    source = source_of(monkeypatch, renamed, method)
+    assert source == source_of(monkeypatch, rig, method)
+    assert not [name for name in names.values() if name in source]
 
 
 @pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is cached with the JIT off")

@@ -92,7 +92,7 @@ def rig_run(starts=STARTS[:1], periods=40, samples=100, batch=False, kinds=None,
 
 
 PROVENANCE = attributes(
-    system="deLangre b", equations=["x' = v", "v' = ..."], parameters=PARAMETERS, units=UNITS, method="DOP853",
+    system="deLangre b", equations=["dx/dt = v", "dv/dt = ..."], parameters=PARAMETERS, units=UNITS, method="DOP853",
     method_options={"rtol": 1e-10, "atol": 1e-13}, fingerprint="0" * 16,
 )  # fmt: skip
 

@@ -172,7 +172,7 @@ def test_legend_says_what_each_attractor_is():
     ax = basins(basins_map(np.array([[0, 1], [1, 1]]), np.array([[1, 3], [9, 30]]), known=known))
     assert texts(ax) == [
         "24T, 60 contacts, 31.2 %", "chaotic, 2.41 contacts per T, 68.8 %", "quasi-periodic, < 0.1 %", "periods to settle",
-        "attractor at whole periods",
+        "Poincaré points of the attractors",
     ]  # fmt: skip
     ax.figure.canvas.draw()
     assert ax.get_legend().get_window_extent().x0 > ax.get_window_extent().x1

@@ -40,7 +40,7 @@ def test_a_row_for_each_attractor(known, batch):
     assert [tuple(np.round(row[0].get_xlim(), 6)) for row in rows(figure)] == [(17, 20), (8, 20), (8, 20), (18, 20)]
     assert [one.get_xlabel() for one in rows(figure)[-1]] == ["time [T]", "x [mm]", "x [mm]"]
     named = [one.get_text() for one in figure.legends[0].get_texts()]
-    assert {"free", "contact", "whole periods", "other attractors"} <= set(named)
+    assert {"free", "contact", "Poincaré points", "other attractors"} <= set(named)
     assert len(named) == len(set(named))
 
 

@@ -59,7 +59,7 @@ def test_spectra_of_several_trajectories():
 
 def test_impacts_are_counted_by_guard():
     axes = sl.plot.impacts(data.impacts(2))
-    assert {container.get_label() for container in axes.containers} == {"lower_gap", "upper_gap"}
+    assert {container.get_label() for container in axes.containers} == {"lower gap", "upper gap"}
     assert sum(bar.get_height() for bar in axes.patches) == 12
     assert axes.get_xlabel() == "speed at contact [m/s]"
 

@@ -8,22 +8,29 @@ from saltus.errors import ParameterError
 from saltus.plot import phase
 
 from .conftest import GAPS, rig_run
-from .test_history import COLORS, ends, line
+from .test_history import COLORS, ends
+
+POINCARE = "Poincaré points"
+
+
+def line(ax, label):
+    """A line by the beginning of its label: the periods shown may follow."""
+    return next(one for one in ax.lines if str(one.get_label()).startswith(label))
 
 
 def test_poincare_points_are_the_states_at_whole_periods(run):
     ax = phase(run, periods=7)
-    x, v = line(ax, "whole periods").get_data()
+    x, v = line(ax, POINCARE).get_data()
     whole = run.isel(time=slice(3300, None, 100))
     assert np.array_equal(x, whole["x"].values * 1e3)
     assert np.array_equal(v, whole["v"].values * 1e3)
-    assert "whole periods" not in [one.get_label() for one in phase(run, poincare=False).lines]
+    assert not [one for one in phase(run, poincare=False).lines if str(one.get_label()).startswith(POINCARE)]
 
 
 def test_the_last_30_percent_are_shown(run):
-    assert len(line(phase(run), "whole periods").get_xdata()) == 12 + 1
+    assert len(line(phase(run), POINCARE).get_xdata()) == 12 + 1
     short = rig_run(periods=2)
-    assert len(line(phase(short), "whole periods").get_xdata()) == 1 + 1
+    assert len(line(phase(short), POINCARE).get_xdata()) == 1 + 1
 
 
 def test_colours_change_exactly_at_the_boundaries(run):
@@ -38,7 +45,7 @@ def test_axes_have_units_and_gap_lines(run):
     ax = phase(run)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [mm]", "v [mm/s]")
     assert [one.get_xdata()[0] for one in ax.lines if one.is_dashed()] == [gap * 1e3 for gap in GAPS]
-    assert {text.get_text() for text in ax.get_legend().get_texts()} == {*COLORS, "whole periods"}
+    assert {text.get_text() for text in ax.get_legend().get_texts()} == {*COLORS, f"{POINCARE}, 28 T to 40 T"}
 
 
 def test_states_can_be_turned(run):
@@ -66,15 +73,15 @@ def test_one_of_a_batch_is_coloured_by_region(batch):
 def test_stroboscopic_points_alone(points):
     ax = phase(points, 1, periods=(10, 20))
     assert [len(one.get_xdata()) for one in ax.lines if one.get_marker() == "o"] == [11]
-    assert np.array_equal(line(ax, "whole periods").get_xdata(), points["x"].values[1, 10:] * 1e3)
+    assert np.array_equal(line(ax, POINCARE).get_xdata(), points["x"].values[1, 10:] * 1e3)
     assert len([one for one in phase(points).lines if one.get_marker() == "o"]) == 4
 
 
 def test_many_points_become_pixels(points):
     many = rig_run(periods=2)
-    assert not line(phase(many), "whole periods").get_rasterized()
+    assert not line(phase(many), POINCARE).get_rasterized()
     cloud = points.isel(period=np.zeros(600, dtype=int), trajectory=[0]).assign_coords(period=np.arange(600))
-    assert line(phase(cloud, 0, periods=(0, 600)), "whole periods").get_rasterized()
+    assert line(phase(cloud, 0, periods=(0, 600)), POINCARE).get_rasterized()
 
 
 def test_colours_of_guards_that_bound_no_state(run):

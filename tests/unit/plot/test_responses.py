@@ -179,7 +179,7 @@ def test_every_sample_is_drawn(diagram):
     there = np.isfinite(diagram["sample_x"].values)
     x = np.broadcast_to(diagram["response_contact_stiffness"].values[:, None], there.shape)[there]
     assert np.allclose(all_points(ax), np.sort_complex(x + 1e3j * diagram["sample_x"].values[there]))
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("contact stiffness [N/m]", "x at rest [mm]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("contact stiffness [N/m]", "x at turning points [mm]")
 
 
 def test_the_axis_is_logarithmic_as_the_grid_is(diagram):
@@ -198,7 +198,7 @@ def test_grids_even_in_their_logarithms(values, log):
 
 def test_without_samples_whole_periods_are_drawn():
     ax = bifurcation_diagram(resonance())
-    assert ax.get_ylabel() == "x at whole periods [mm]"
+    assert ax.get_ylabel() == "x at the Poincaré points [mm]"
     assert layer(ax, "kind 3")[0].size % 3 == 0
 
 
@@ -216,7 +216,7 @@ def test_a_gap_that_the_parameter_moves_is_a_curve():
 
 
 def test_the_other_state(diagram):
-    assert bifurcation_diagram(diagram, state="v").get_ylabel() == "v at rest [m/s]"
+    assert bifurcation_diagram(diagram, state="v").get_ylabel() == "v at turning points [m/s]"
     with pytest.raises(ParameterError, match="no state 'vv'"):
         bifurcation_diagram(diagram, state="vv")
 

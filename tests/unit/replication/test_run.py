@@ -6,6 +6,7 @@ import csv
 import re
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -15,7 +16,7 @@ from typer.testing import CliRunner
 
 from saltus.cli.app import app
 from saltus.errors import ParameterError
-from saltus.replication import claims_table, reproduce, run
+from saltus.replication import Check, Finding, claims_table, reproduce, run
 from saltus.replication.job import JobError
 from saltus.replication.verdict import HOLDS, UNDECIDED
 from saltus.results.durable import StoreError
@@ -101,6 +102,13 @@ def test_a_failed_job_is_an_error_of_ours(tmp_path):
     paper = small_paper(compute=broken)
     with run.Workers(paper, ["2"], False, run.Shelf(tmp_path), 1) as workers:
         assert isinstance(workers.wait_for("2", lambda _: None)["fig2/second"], JobError)
+
+
+def test_claims_that_fail_come_first(tmp_path):
+    paper = small_paper(judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite"))
+    failing, holding = paper.claims
+    text = page(reproduce(replace(paper, claims=(holding, failing)), tmp_path))
+    assert text.index(f'href="#{failing.id}"') < text.index(f'href="#{holding.id}"')
 
 
 # -- it is stopped ---------------------------------------------------------------------------------------------------------------

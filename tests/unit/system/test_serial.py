@@ -1,6 +1,7 @@
 """Systems as data: nothing is lost, nothing is run, and the fingerprint knows equations only."""
 
 import copy
+import functools
 import json
 import os
 import pickle
@@ -11,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from saltus.errors import SaltusError
+from saltus.errors import SaltusError, TraceError
 from saltus.models import MODELS, delangre
 from saltus.system import System, abs, cos, max, pi, piecewise, system
 from saltus.system import expression as ex
@@ -122,6 +123,16 @@ def damaged(change):
         (damaged(lambda d: d.update(forced_at="zzz")), "forced_at"),
         (damaged(lambda d: d["parameters"].__setitem__(0, "import os")), "no name"),
         (damaged(lambda d: d["parameters"].append("x")), "twice"),
+        (damaged(lambda d: d.update(name='x"""\nopen("mark", "w")\n"""')), "one line"),
+        (damaged(lambda d: d.update(name="\x1b]0;title\x07")), "one line"),
+        (damaged(lambda d: d.update(name=7)), "must be text"),
+        (damaged(lambda d: d.update(description="a\0b")), "control characters"),
+        (damaged(lambda d: d.update(source=["a"])), "must be text"),
+        (damaged(lambda d: d["nodes"].insert(0, ["const", [], 10**400])), "damaged"),
+        (
+            damaged(lambda d: d["nodes"].append(["select", [0, 1], functools.reduce(lambda c, _: ["not", c], range(3000), ["bit", 0])])),
+            "damaged",
+        ),
         (damaged(lambda d: d["values"].update(gap="a")), "damaged"),
         (damaged(lambda d: d["values"].update(gap=-1.0)), "negative"),
     ],
@@ -132,3 +143,47 @@ def test_damaged_data_is_refused(data, teaches):
         return
     with pytest.raises(SaltusError, match=teaches):
         System.from_dict(data)
+
+
+#: Names that mean something to Python, or to generated modules.
+STRANGE = [
+    "lambda",
+    "None",
+    "import",
+    "np",
+    "math",
+    "njit",
+    "kept",
+    "kernel",
+    "__builtins__",
+    "__class__",
+    "t",
+    "a b",
+    "x;y",
+    "",
+    "x" * 201,
+]
+
+
+@pytest.mark.parametrize("name", STRANGE)
+@pytest.mark.parametrize("old", ["x", "gap"])
+def test_a_state_or_parameter_of_a_strange_name_is_refused(name, old):
+    data = json.loads(json.dumps(nested().to_dict()).replace(json.dumps(old), json.dumps(name)))
+    with pytest.raises(SaltusError, match="is no name"):
+        System.from_dict(data)
+
+
+@pytest.mark.parametrize("name", ["lambda", "np", "__builtins__"])
+def test_a_traced_state_of_a_strange_name_is_refused(name):
+    with pytest.raises(TraceError, match=f"'{name}' can't be the name of a state"):
+        system(states=f"{name} v")(lambda t, x, v: (v, -x))
+
+
+def test_text_of_a_name_is_no_code(tmp_path):
+    """The name that once closed the docstring of the generated module and went on as code is refused as data and when it is traced."""
+    name = f'x"""\nopen({str(tmp_path / "mark")!r}, "w")\n"""'
+    with pytest.raises(SaltusError, match="one line of text"):
+        System.from_dict(delangre("b").to_dict() | {"name": name})
+    with pytest.raises(TraceError, match="one line of text"):
+        system(states="x", name=name)(lambda t, x: -x)
+    assert not (tmp_path / "mark").exists()

@@ -125,3 +125,15 @@ def test_derived_equations_are_computed_once():
 def test_importing_the_layer_is_light():
     code = "import sys, saltus.system, saltus.models; print([m for m in ('sympy', 'pint', 'numba', 'scipy', 'xarray') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_the_right_hand_side_is_a_plain_function():
+    rig = delangre("b", force="4 N", frequency="7 Hz")
+    t, y = 0.123, np.array([[-1e-4, 2e-4, 1e-3], [0.1, -0.2, 0.3]])
+    wn, w, (x, v) = 2 * np.pi * 5.0, 2 * np.pi * 7.0, y
+    stop = np.where(x < 0, x, np.where(x > 0.4e-3, x - 0.4e-3, 0.0))
+    rate = -2 * 0.03 * wn * v - wn**2 * x - 7e8 / 3 * x**3 - 1.4e4 / 3 * stop + 4 * (1 - 18 / w**2) * np.cos(w * t) / 3
+    np.testing.assert_allclose(rig.rhs(t, y), [v, rate], rtol=1e-14)
+    np.testing.assert_allclose(rig.rhs(t, y[:, 2]), [v[2], rate[2]], rtol=1e-14)
+    with pytest.raises(ParameterError, match="delangre has the states x, v, but y holds 3 of them"):
+        rig.rhs(t, (1.0, 2.0, 3.0))

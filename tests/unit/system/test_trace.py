@@ -63,7 +63,7 @@ def test_states_as_a_list_and_one_state():
 
 def test_defaults_with_units():
     def rig(t, x, v, *, mass="3 kg", gap="0.4 mm", stiffness="14 kN/m", frequency="900 rpm", own="2 Hz", angle="90 deg"):
-        return v, -stiffness * x / mass * cos(2 * pi * frequency * t) + 0 * own + angle - gap
+        return v, -stiffness * x / mass * cos(2 * pi * frequency * t) + 0 * own - v * angle / gap
 
     made = make(rig, forced_at="frequency", units={"x": "m"})
     assert dict(made.values) == {"mass": 3.0, "gap": 4e-4, "stiffness": 14e3, "frequency": 15.0, "own": 2.0, "angle": math.pi / 2}

@@ -1,0 +1,135 @@
+"""One entry of the kernel cache: a file that is read whole, through one handle, and believed only if its owner and its checksum say so.
+
+What stands in it is code. So it counts only if it is a regular file of this user (or of the administrator) that nobody else may write
+to; that is asked of the opened file, so nothing can be exchanged between the question and the reading.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+#: First word of an entry; another one is another format.
+FORMAT = "saltus-kernel/1"
+#: End of the names of entries; beginning of the names of those that aren't whole yet.
+SUFFIX, DRAFT = ".kernel", ".building-"
+#: Bits of a mode with which others than the owner may write.
+_GROUP, _OTHERS = stat.S_IWGRP, stat.S_IWOTH
+
+
+class NotOurs(Exception):  # noqa: N818  (a finding about a file, not an error)
+    """A file or folder that others could have written; its text says why."""
+
+
+class Damaged(Exception):  # noqa: N818
+    """An entry that isn't as it was written."""
+
+
+def check_ours(seen: os.stat_result) -> None:
+    """Raise NotOurs unless this user or the administrator owns it and nobody else may write to it."""
+    if not hasattr(os, "geteuid"):  # Windows: a user's folders are closed to others by default
+        return
+    me = os.geteuid()
+    if seen.st_uid not in (me, 0):
+        raise NotOurs("belongs to another user")
+    if seen.st_mode & _OTHERS or (seen.st_mode & _GROUP and not _private_group(seen.st_gid, me)):
+        raise NotOurs("can be written to by other users")
+
+
+def _private_group(group: int, user: int) -> bool:
+    """Whether a group is this user's own and holds nobody else: the common default, with which users' files are writable to it."""
+    import grp
+    import pwd
+
+    try:
+        entry, person = grp.getgrgid(group), pwd.getpwuid(user)
+    except KeyError:
+        return False
+    return person.pw_gid == group and entry.gr_name == person.pw_name and not set(entry.gr_mem) - {person.pw_name}
+
+
+def check_folder(folder: Path) -> None:
+    """Raise NotOurs unless a folder, and the link that stands for it if there is one, are this user's alone; OSError if it isn't there."""
+    link = os.lstat(folder)
+    if stat.S_ISLNK(link.st_mode) and hasattr(os, "geteuid") and link.st_uid not in (os.geteuid(), 0):
+        raise NotOurs("is a link that belongs to another user")
+    check_ours(os.stat(folder))
+
+
+def write(path: Path, title: str, data: bytes) -> None:
+    """Write an entry in full, then give it its name, read-only."""
+    header = {"format": FORMAT, "key": path.name.removesuffix(SUFFIX), "title": title, "sha256": hashlib.sha256(data).hexdigest()}
+    handle, draft = tempfile.mkstemp(prefix=DRAFT, dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(json.dumps(header).encode() + b"\n" + data)
+        os.chmod(draft, 0o400)
+        os.replace(draft, path)
+    except BaseException:
+        remove(Path(draft))
+        raise
+
+
+def read(path: Path) -> bytes:
+    """The bytes of an entry.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is none.
+    NotOurs, Damaged
+        If it isn't to be used.
+    """
+    header, data = _split(_content(path))
+    try:
+        told = json.loads(header)
+        whole = told["format"] == FORMAT and told["key"] + SUFFIX == path.name and told["sha256"] == hashlib.sha256(data).hexdigest()
+    except (ValueError, KeyError, TypeError):
+        whole = False
+    if not whole:
+        raise Damaged("is damaged")
+    return data
+
+
+def title_of(path: Path) -> str:
+    """What an entry was made for, for a list of them."""
+    try:
+        return str(json.loads(_split(_content(path))[0])["title"])
+    except (OSError, NotOurs, Damaged, ValueError, KeyError, TypeError):
+        return "(damaged)"
+
+
+def _content(path: Path) -> bytes:
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    try:
+        handle = os.open(path, flags)
+    except FileNotFoundError:
+        raise
+    except OSError as error:  # a link, above all
+        raise NotOurs(f"can't be opened as a plain file ({error.strerror})") from None
+    with os.fdopen(handle, "rb") as file:
+        seen = os.fstat(file.fileno())
+        if not stat.S_ISREG(seen.st_mode):
+            raise NotOurs("is no plain file")
+        check_ours(seen)
+        return file.read()
+
+
+def _split(content: bytes) -> tuple[bytes, bytes]:
+    header, newline, data = content.partition(b"\n")
+    if not newline:
+        raise Damaged("is damaged")
+    return header, data
+
+
+def remove(path: Path) -> None:
+    """Delete a file if it can be done."""
+    with contextlib.suppress(OSError):
+        if os.name == "nt":  # read-only files can't be deleted there
+            os.chmod(path, 0o600)
+        path.unlink()

@@ -1,0 +1,193 @@
+"""The Taylor series of motions: from the places where a flow knows them, with those of any function of them.
+
+The series are those that the flow itself steps by: :mod:`saltus.codegen` writes them, NumPy evaluates them for thousands of places at once,
+and nothing is compiled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+
+from saltus.codegen.plain_series import series_module
+from saltus.flow import polynomials
+from saltus.flow.family import Family
+from saltus.kernels.isolation import ROUNDING
+from saltus.system.system import System
+
+#: Order and log2 of the tolerance of the series: their truncation is rounding.
+ORDER, LOG2_TOLERANCE = 20, -50.0
+#: Pieces between two nodes: more are a pole.
+MOST_PIECES = 1000
+#: A boundary this near to the beginning of a piece is the one at which it began [lengths of the piece].
+BEGAN = 1e-9
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """k motions in p pieces, by motion and time.
+
+    Attributes
+    ----------
+    motion : int64[p]
+        The motion that a piece belongs to.
+    period : int64[p]
+        Whole forcing periods before it, and
+    phase : float64[p]
+        the time after them at which it begins [s].
+    length : float64[p]
+        How long it lasts [s].
+    terms : float64[n + 1, q, p]
+        Polynomials on [0, 1] of the q quantities [their units].
+    noise : float64[q, p]
+        Rounding error of each quantity's terms.
+    """
+
+    motion: np.ndarray
+    period: np.ndarray
+    phase: np.ndarray
+    length: np.ndarray
+    terms: np.ndarray
+    noise: np.ndarray
+
+    def rows(self, which: np.ndarray) -> Pieces:
+        """Some of them."""
+        return Pieces(*(getattr(self, name)[..., which] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Where motions are known: row by row in the order of motion and time; each lasts until the next."""
+
+    motion: np.ndarray
+    period: np.ndarray
+    phase: np.ndarray
+    length: np.ndarray
+    state: np.ndarray
+    mode: np.ndarray
+
+    def rows(self, which: np.ndarray | slice) -> Nodes:
+        """Some of them."""
+        return Nodes(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+
+class MotionSeries:
+    """The Taylor series of a family's states, of some quantities (the last guards of ``watched``) and of its gaps."""
+
+    def __init__(self, family: Family, watched: System, guards: int):
+        self._family, self._guards, self._own = family, guards, len(family.system.guards)
+        self._asked = np.r_[guards : len(watched.guards), 0 : self._own]
+        self._module: ModuleType = series_module(watched, ORDER)
+        k, module = len(family), self._module
+        self._constants, self._turns = np.zeros((max(module.NCONST, 1), k)), np.zeros((module.TURN + module.NTURNS, k))
+        self._drifts = np.zeros(k, bool)
+        for i, row in enumerate(family.parameters):
+            module.constants(row, self._constants, i)
+            self._drifts[i] = module.turns(row, 0.0, family.period[i], 0, i, self._turns)
+
+    def none(self) -> Pieces:
+        """No pieces at all."""
+        numbers, reals = np.zeros(0, np.int64), np.zeros(0)
+        size = self._module.NSTATES + len(self._asked)
+        return Pieces(numbers, numbers, reals, reals, np.zeros((ORDER + 1, size, 0)), np.zeros((size, 0)))
+
+    def of(self, nodes: Nodes, cubic: bool) -> list[Pieces]:
+        """The pieces that begin at nodes and fill them; for cubics the first terms of each will do."""
+        result, state, left = [], nodes.state.T.copy(), nodes.length.copy()
+        side = np.where((nodes.mode[None] >> np.arange(self._guards)[:, None]) & 1 == 1, 1.0, -1.0)
+        new = np.ones(len(left), bool)
+        for _ in range(MOST_PIECES):
+            work, h = self._step(nodes, state, side, new)
+            h, flips = (left, np.zeros_like(side, bool)) if cubic else self._until_own_boundary(work, np.minimum(h, left))
+            result.append(self._piece(nodes, work, h))
+            powers = h ** np.arange(ORDER + 1)[:, None]
+            state = np.stack([(self._rows(work, i * (ORDER + 1)) * powers).sum(axis=0) for i in range(len(state))])
+            left = np.where(h < left, left - h, 0.0)
+            going = (left > 0.0) & np.isfinite(state).all(axis=0) & (not cubic)
+            if not going.any():
+                break
+            nodes = replace(nodes, phase=nodes.phase + h).rows(going)
+            state, side, left = state[:, going], np.where(flips, -side, side)[:, going], left[going]
+            new = np.zeros(len(left), bool)
+        return result
+
+    def _step(self, nodes: Nodes, state: np.ndarray, side: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """All terms at some places, and how far they reach. At new nodes the sides of guards of the quantities' own are found first."""
+        module, motion = self._module, nodes.motion
+        constants, clock = self._constants[:, motion], self._clock(nodes)
+        work = np.zeros((module.ROWS, len(motion)))
+        with np.errstate(all="ignore"):
+            module.jets(state, side, constants, clock, work)
+            for guard in range(self._own, self._guards):
+                terms = self._gap(work, guard)
+                terms[0] = np.where(np.abs(terms[0]) <= self._noise(work, guard), 0.0, terms[0])
+                side[guard] = np.where(new, np.where(polynomials.leading_signs(terms)[0] < 0.0, -1.0, 1.0), side[guard])
+            if self._own < self._guards:
+                module.jets(state, side, constants, clock, work)
+            h = module.step_length(work, LOG2_TOLERANCE)
+            if module.PROBED:
+                h = self._probed(nodes, side, constants, clock, work, h)
+        return work, h
+
+    def _clock(self, nodes: Nodes) -> np.ndarray:
+        """Phase, time at phase zero, and the phases of all harmonics there."""
+        module, motion = self._module, nodes.motion
+        clock = self._turns[:, motion]
+        clock[module.TAU], clock[module.BASE] = nodes.phase, nodes.period * self._family.period[motion]
+        for i in np.flatnonzero(self._drifts[motion]):
+            row = motion[i]
+            module.turns(self._family.parameters[row], 0.0, self._family.period[row], int(nodes.period[i]), i, clock)
+        return clock
+
+    def _probed(
+        self, nodes: Nodes, side: np.ndarray, constants: np.ndarray, clock: np.ndarray, work: np.ndarray, h: np.ndarray
+    ) -> np.ndarray:
+        """Steps cut down to where the right-hand side agrees with the series: a term may sleep at the node."""
+        module, width = self._module, len(h)
+        period = self._family.period[nodes.motion]
+        lanes = SimpleNamespace(
+            work=work, side=side, c=constants, clock=clock, probe_y=np.zeros((module.NSTATES, width)), probe_clock=np.zeros_like(clock),
+            probe_rate=np.zeros((3 * module.NSTATES, width)),
+        )  # fmt: skip
+        result: np.ndarray = module.probed(lanes, np.minimum(h, module.LONGEST_SHARE * period), LOG2_TOLERANCE)
+        return result
+
+    def _until_own_boundary(self, work: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Lengths up to the first boundary of the quantities' own, and the guards float64[guards, n] that flip there."""
+        flips = np.zeros((self._guards, len(h)), bool)
+        for guard in range(self._own, self._guards):
+            which, place = polynomials.sign_changes(self._gap(work, guard) * h ** np.arange(ORDER + 1)[:, None])
+            which, place = which[place > BEGAN], place[place > BEGAN]
+            which, first = np.unique(which, return_index=True)
+            sooner = np.ones(len(h))
+            sooner[which] = place[first]
+            nearer = sooner < 1.0
+            flips[:, nearer] = False
+            flips[guard, nearer] = True
+            h = np.where(nearer, sooner * h, h)
+        return h, flips
+
+    @staticmethod
+    def _rows(work: np.ndarray, first: int) -> np.ndarray:
+        return work[first : first + ORDER + 1]
+
+    def _gap(self, work: np.ndarray, guard: int) -> np.ndarray:
+        """Terms of a gap, or of a quantity."""
+        module = self._module
+        terms = module.GUARD_SIGN[guard] * self._rows(work, module.GUARD_ROW[guard])
+        terms[0] = work[module.GAP_ROW + guard]
+        return terms
+
+    def _noise(self, work: np.ndarray, guard: int) -> np.ndarray:
+        noise: np.ndarray = ROUNDING * work[self._module.SCALE_ROW + guard]
+        return noise
+
+    def _piece(self, nodes: Nodes, work: np.ndarray, h: np.ndarray) -> Pieces:
+        """What is asked for, over lengths h."""
+        states = [self._rows(work, i * (ORDER + 1)) for i in range(self._module.NSTATES)]
+        terms = np.stack([*states, *(self._gap(work, guard) for guard in self._asked)], axis=1)
+        terms *= (h ** np.arange(ORDER + 1)[:, None])[:, None]
+        noise = np.stack([*(ROUNDING * np.abs(one[0]) for one in states), *(self._noise(work, guard) for guard in self._asked)])
+        return Pieces(nodes.motion, nodes.period, nodes.phase, h, terms, noise)

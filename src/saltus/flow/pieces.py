@@ -1,0 +1,134 @@
+"""Motions as polynomials: what a compiled flow has computed, with everything between its samples and contacts.
+
+The flow hands over its states some times a period and at every contact, and the mode in between. From each of these nodes the motion is
+the Taylor series of the equations in that mode: :mod:`saltus.codegen` writes it, NumPy evaluates it for thousands of nodes at once. Any
+function of the motion has its series too, so turning points are roots of polynomials and means are exact sums; nothing is compiled. A
+method that locates no contacts has cubics between its samples instead, through their values and rates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from saltus.flow import polynomials
+from saltus.flow.engine import Outcome, Schedule
+from saltus.flow.family import Family
+from saltus.flow.motion_series import MotionSeries, Nodes, Pieces
+from saltus.kernels import status as st
+from saltus.system.expression import Expr
+from saltus.system.guards import Guard
+from saltus.system.system import System
+
+#: Samples of a period besides the contacts: an exact flow leaves the rest to the series, another one is followed closely; and for cubics.
+NODES, NODES_INEXACT, SAMPLES = 8, 64, 1000
+#: Nodes whose series are worked out at a time: some thousand rows of them fill a few ten megabytes.
+WIDTH = 2048
+#: A sample that lies less than this behind a contact is the contact [forcing periods].
+SAME = 1e-9
+
+
+def pieces(family: Family, start: np.ndarray, periods: int, quantities: Sequence[Expr], guards: Sequence[Guard]) -> tuple[Pieces, Outcome]:
+    """The motions from float64[k, D] over so many periods, row i by row i of the family.
+
+    Parameters
+    ----------
+    family : Family
+        The flow.
+    start : float64[k, D]
+        States at a whole period.
+    periods : int
+        How long.
+    quantities : sequence of Expr
+        What is asked about: functions of time, states and parameters, whose conditions hold bits.
+    guards : sequence of Guard
+        What these bits number: the guards of the system, then those that only the quantities need.
+
+    Returns
+    -------
+    Pieces, Outcome
+        The quantities are the states, then those asked for, then the gaps of the system. A motion that didn't reach the end has no pieces.
+    """
+    asked = tuple(Guard(f"quantity {i}", quantity) for i, quantity in enumerate(quantities))
+    watched = replace(family.system, guards=(*guards, *asked))
+    whole, outcome = _pieces(family, start, periods, watched, len(guards), not family.method.records_contacts)
+    if family.method.records_contacts:
+        without = np.setdiff1d(np.arange(len(start)), whole.motion[np.isfinite(whole.terms).all(axis=(0, 1))])
+        bad = np.union1d(without, whole.motion[~np.isfinite(whole.terms).all(axis=(0, 1))])
+        bad = bad[np.isfinite(outcome.state[bad]).all(axis=1)]
+        if len(bad):  # a law without a series where it begins, such as x**1.5 at x = 0
+            cubics = _pieces(family.rows(bad), start[bad], periods, watched, len(guards), True)[0]
+            kept = whole.rows(~np.isin(whole.motion, bad))
+            whole = _joined([[kept, replace(cubics, motion=bad[cubics.motion])]])
+    return whole, outcome
+
+
+def nodes_of(family: Family, cubic: bool = False) -> int:
+    """Samples of a period."""
+    if cubic or not family.method.records_contacts:
+        return SAMPLES
+    return NODES if family.exact else NODES_INEXACT
+
+
+def _pieces(family: Family, start: np.ndarray, periods: int, watched: System, guards: int, cubic: bool) -> tuple[Pieces, Outcome]:
+    """The pieces by Taylor series, or by cubics, and what the flow computed."""
+    count = nodes_of(family, cubic)
+    index = np.arange(periods * count + cubic)
+    schedule = Schedule(index // count, (index % count) / count)
+    outcome = family.run(start, periods, schedule, record=0)
+    nodes, series = _nodes(family, outcome, periods, schedule, cubic), MotionSeries(family, watched, guards)
+    parts = [series.of(nodes.rows(slice(first, first + WIDTH)), cubic) for first in range(0, len(nodes.motion), WIDTH)]
+    whole = _joined(parts or [[series.none()]])
+    return (_between(whole) if cubic else whole), outcome
+
+
+# -- nodes ---------------------------------------------------------------------------------------------------------------------
+def _nodes(family: Family, outcome: Outcome, periods: int, schedule: Schedule, cubic: bool) -> Nodes:
+    """Samples and contacts in one list, without what lies at one instant with the next."""
+    k, m, size = outcome.samples.shape
+    table, numbers = outcome.record_integers, outcome.record_floats
+    whole = np.isfinite(outcome.samples).all(axis=(1, 2)) & (m > 0)
+    nodes = Nodes(
+        np.concatenate([np.repeat(np.arange(k), m), table[:, st.REC_TRAJECTORY]]),
+        np.concatenate([np.tile(schedule.count, k), table[:, st.REC_PERIOD]]),
+        np.concatenate([(family.period[:, None] * schedule.fraction).ravel(), numbers[:, st.REC_PHASE]]),
+        np.repeat([0.0, 1.0], [k * m, len(table)]),  # for now: whether it is a contact
+        np.concatenate([outcome.samples.reshape(-1, size), numbers[:, st.RECORD_FLOATS : st.RECORD_FLOATS + size]]),
+        np.concatenate([outcome.sample_mode.ravel(), table[:, st.REC_MODE_AFTER]]),
+    )
+    period = family.period[nodes.motion]
+    order = np.lexsort((nodes.length, nodes.period * period + nodes.phase, nodes.motion))  # a sample before a contact at one instant
+    nodes, period = nodes.rows(order), period[order]
+    behind = np.zeros(len(order), bool)
+    follows = (np.diff(nodes.motion) == 0) & (np.diff(nodes.period * period + nodes.phase) < SAME * period[1:])
+    behind[1:] = follows & (nodes.length[1:] == 0.0) & (nodes.length[:-1] == 1.0)
+    keep = whole[nodes.motion] & ~behind
+    nodes, period = nodes.rows(keep), period[keep]
+    last = np.append(np.diff(nodes.motion) != 0, True)[: len(period)]
+    until_period = np.where(last, periods, np.roll(nodes.period, -1))
+    until_phase = np.where(last, 0.0, np.roll(nodes.phase, -1))
+    nodes = replace(nodes, length=(until_period - nodes.period) * period + (until_phase - nodes.phase))
+    if cubic:  # the last node ends the last piece
+        return replace(nodes, length=np.where(last, period / SAMPLES, nodes.length)).rows((nodes.length > 0.0) | last)
+    return nodes.rows(nodes.length > 0.0)
+
+
+def _joined(parts: list[list[Pieces]]) -> Pieces:
+    """All pieces in the order of motion and time; cubics have as many terms as the others, the last ones zero."""
+    flat = [piece for part in parts for piece in part]
+    longest = max(len(piece.terms) for piece in flat)
+    flat = [replace(piece, terms=np.pad(piece.terms, ((0, longest - len(piece.terms)), (0, 0), (0, 0)))) for piece in flat]
+    whole = Pieces(*(np.concatenate([getattr(piece, name) for piece in flat], axis=-1) for name in Pieces.__dataclass_fields__))
+    return whole.rows(np.lexsort((whole.phase, whole.period, whole.motion)))
+
+
+def _between(whole: Pieces) -> Pieces:
+    """Cubics from each node to the next, through values and rates at both: the node at the end of a motion closes its last piece."""
+    first = np.flatnonzero(np.diff(whole.motion) == 0)
+    length = whole.length[first]
+    rate = whole.terms[1] / whole.length
+    (a, b), (da, db) = ((of[:, first], of[:, first + 1]) for of in (whole.terms[0], rate))
+    terms = polynomials.hermite(a, b, da * length, db * length)
+    return Pieces(whole.motion[first], whole.period[first], whole.phase[first], length, terms, whole.noise[:, first])

@@ -1,0 +1,122 @@
+"""Many polynomials on [0, 1] at once: values, integrals, and every place where one changes its sign.
+
+A polynomial is a column of ``terms`` float64[n + 1, p]: ``sum(terms[k] * x**k)``. Roots are isolated by the sign variations of Bernstein
+coefficients, halving the interval while there are more than one: none is missed, but for pairs closer than rounding can tell. (Lane &
+Riesenfeld, BIT 21 (1981); kernels/isolation.py does the same for one polynomial inside the flow.)
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+#: Halvings after which the roots left in an interval are one.
+DEEPEST = 40
+#: Newton steps and bisections of an isolated root; a step that changes it by less is the last.
+MOST_STEPS, CONVERGED = 80, 4e-16
+
+
+def value(terms: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Each polynomial at a place of its own: terms float64[n + 1, ..., p], x float64[p]; float64[..., p]."""
+    total = terms[-1]
+    for term in terms[-2::-1]:
+        total = total * x + term
+    return total
+
+
+def derivative(terms: np.ndarray) -> np.ndarray:
+    """Terms of the derivatives, float64[n, ..., p]."""
+    return terms[1:] * np.arange(1, len(terms)).reshape(-1, *(1,) * (terms.ndim - 1))
+
+
+def leading_signs(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sign of each polynomial just after 0 and just before 1, float64[p] each; 0 for one that is zero everywhere."""
+    after, before = np.zeros(terms.shape[1]), np.zeros(terms.shape[1])
+    way = 1.0
+    for _ in range(len(terms)):
+        after = np.where(after == 0.0, np.sign(terms[0]), after)
+        before = np.where(before == 0.0, way * np.sign(terms.sum(axis=0)), before)
+        if len(terms) == 1 or (after.all() and before.all()):
+            break
+        terms, way = derivative(terms), -way
+    return after, before
+
+
+def sign_changes(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where polynomials change their sign inside (0, 1).
+
+    Returns
+    -------
+    which : int64[r]
+        The polynomial, ascending.
+    place : float64[r]
+        Where, ascending for each polynomial.
+    """
+    coefficients = bernstein(len(terms) - 1) @ terms
+    which = np.arange(terms.shape[1])
+    low, high = np.zeros(len(which)), np.ones(len(which))
+    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    for level in range(DEEPEST + 1):
+        changes = (np.diff(coefficients > 0.0, axis=0)).sum(axis=0)
+        done = (changes == 1) | (changes > 1) & (level == DEEPEST)
+        found.append((which[done], low[done], high[done]))
+        more = changes > 1
+        if level == DEEPEST or not more.any():
+            break
+        coefficients = np.concatenate(_halves(coefficients[:, more]), axis=1)
+        middle = 0.5 * (low[more] + high[more])
+        which = np.tile(which[more], 2)
+        low, high = np.concatenate([low[more], middle]), np.concatenate([middle, high[more]])
+    which, low, high = (np.concatenate(part) for part in zip(*found, strict=True))
+    place = _refined(terms[:, which], low, high)
+    order = np.lexsort((place, which))
+    return which[order], place[order]
+
+
+@functools.cache
+def bernstein(degree: int) -> np.ndarray:
+    """The matrix float64[n + 1, n + 1] from terms to Bernstein coefficients on [0, 1]."""
+    return np.array([[math.comb(i, k) / math.comb(degree, k) for k in range(degree + 1)] for i in range(degree + 1)])
+
+
+def _halves(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bernstein coefficients on both halves of the interval (de Casteljau)."""
+    left, right = np.empty_like(coefficients), coefficients.copy()
+    left[0] = right[0]
+    for level in range(1, len(right)):
+        right[: len(right) - level] = 0.5 * (right[: len(right) - level] + right[1 : len(right) - level + 1])
+        left[level] = right[0]
+    return left, right
+
+
+def _refined(terms: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """The one root of each polynomial between low and high, by Newton's method inside a shrinking bracket."""
+    rates = derivative(terms)
+    rises = value(terms, high) > value(terms, low)
+    x = 0.5 * (low + high)
+    for _ in range(MOST_STEPS):
+        here = value(terms, x)
+        below = (here < 0.0) == rises
+        low, high = np.where(below, x, low), np.where(below, high, x)
+        with np.errstate(all="ignore"):
+            new = x - here / value(rates, x)
+        new = np.where((new >= low) & (new <= high), new, 0.5 * (low + high))
+        still = (np.abs(new - x) > CONVERGED) & (here != 0.0)
+        x = np.where(here == 0.0, x, new)
+        if not still.any():
+            break
+    return x
+
+
+def hermite(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> np.ndarray:
+    """Terms of the cubics with the values a, b and the slopes da, db at 0 and 1, float64[4, ...]."""
+    return np.stack([a, da, 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db])
+
+
+@functools.cache
+def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places in (0, 1) and weights of Gauss's rule, float64[count] each: exact up to the degree 2 count - 1."""
+    places, weights = np.polynomial.legendre.leggauss(count)
+    return 0.5 * (places + 1.0), 0.5 * weights

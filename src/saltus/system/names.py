@@ -1,0 +1,44 @@
+"""What a system, its states and its parameters may be called."""
+
+from __future__ import annotations
+
+import keyword
+import unicodedata
+from typing import Any
+
+#: Letters that a system's name may have.
+LONGEST = 200
+#: Names that mean something else to whoever reads equations or what is generated from them.
+RESERVED = frozenset({"t", "np", "numpy", "math", "numba", "njit", "saltus", "kept", "kernel", "inner", "entry"})
+
+
+def why_no_name(name: Any) -> str | None:
+    """Why this can't be the name of a state or parameter, as the end of a sentence; None if it can."""
+    if not isinstance(name, str) or not name.isidentifier():
+        return "use letters, digits and _"
+    if keyword.iskeyword(name):
+        return "Python uses this word"
+    if name.startswith("__") or name in RESERVED:
+        return "this name means something else"
+    return f"at most {LONGEST} letters" if len(name) > LONGEST else None
+
+
+def why_no_title(title: Any) -> str | None:
+    """Why this can't be the name of a system, as the end of a sentence; None if it can."""
+    if not isinstance(title, str) or not title.strip():
+        return "it must be text"
+    if _controls(title):
+        return "it must be one line of text without control characters"
+    return f"at most {LONGEST} letters" if len(title) > LONGEST else None
+
+
+def why_no_text(text: Any) -> str | None:
+    """Why this can't be a description or a source, as the end of a sentence; None if it can."""
+    if not isinstance(text, str):
+        return "it must be text"
+    return "it holds control characters" if _controls(text) - {"\n", "\t"} else None
+
+
+def _controls(text: str) -> set[str]:
+    """Letters that a terminal or a parser may obey: control characters, line ends, halves of surrogate pairs."""
+    return {letter for letter in set(text) if unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")}
