@@ -360,13 +360,9 @@ def step_all(lanes, batch, slow):
     """One step of every lane; returns the bit set of lanes that need attention."""
     coefficients(lanes)
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
-<<<<<<< HEAD
-    h = smaller(step_length(lanes.work, batch.options[0]), room)
+    h = smaller(step_length(lanes.work, batch.options[LOG2_TOLERANCE]), room)
     if NSINGULAR > 0:
         h = away_from_boundaries(lanes, h)
-=======
-    h = smaller(step_length(lanes.work, batch.options[LOG2_TOLERANCE]), room)
->>>>>>> main
     if PROBED:
         h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), batch.options[LOG2_TOLERANCE])
     store(lanes.run, STEP, h)

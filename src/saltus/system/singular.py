@@ -54,7 +54,7 @@ class SetAside(NamedTuple):
 
 
 def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
-    """Find the terms of a field and of its gaps that have no Taylor series on a boundary; a bit for each such boundary switches them off."""
+    """Find the terms of a field and its gaps that have no Taylor series on a boundary; a bit for each such boundary switches them off."""
     boundaries = _Boundaries(guards)
     roots = (*field, *(guard.gap for guard in guards))
     broken = {number: nodes for number in range(len(guards)) if (nodes := boundaries.singular_terms(roots, number))}
