@@ -117,9 +117,9 @@ def rounding_of_gaps(lanes, i):
 
 @inner
 def negligible_step(lanes, h, j, wanted):
-    """The longest step up to h, about, over which the terms of boundary j may be left out; by the secant rule on the logarithms, in a bracket.
+    """About the longest step up to h over which the terms of boundary j may be left out.
 
-    Not shorter than the gap needs to be told from zero, nor than SHORTEST.
+    Not shorter than the gap needs to be told from zero, nor than SHORTEST. By the secant rule on the logarithms, in a bracket.
     """
     g = SINGULAR_GUARD[j]
     goal, rate, bend = (
