@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         stroboscope,
         wolf,
     )
+    from saltus.errors import SaltusError
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import contacts, describe, load, samples, save, to_csv, to_mat
     from saltus.system import (
@@ -72,19 +73,22 @@ _HOMES = {
     **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
     **dict.fromkeys(("compare_methods", "energy_balance", "frequency_response", "impact_statistics", "poincare"), "saltus.analysis"),
     **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "wolf"), "saltus.analysis"),
+    "SaltusError": "saltus.errors",
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
         ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan", "tanh"),
         "saltus.system",
     ),
-    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "sign", "sinh", "where"), "saltus.system"),
+    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign", "sinh"), "saltus.system"),
+    **dict.fromkeys(("table", "where"), "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 
 __all__ = [
     "ODE45",
     "Interrupted",
+    "SaltusError",
     "System",
     "Taylor",
     "abs",
@@ -115,6 +119,7 @@ __all__ = [
     "lyapunov",
     "max",
     "min",
+    "mod",
     "models",
     "pi",
     "piecewise",
@@ -131,6 +136,7 @@ __all__ = [
     "sqrt",
     "stroboscope",
     "system",
+    "table",
     "tan",
     "tanh",
     "to_csv",

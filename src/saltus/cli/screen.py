@@ -86,7 +86,7 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
     begin, shown = time.perf_counter(), [0.0]
     if kind == "bar":
         with console(stderr=True).status("working ...") as status:
-            yield lambda report: status.update(_progress_text(report)), say
+            yield (lambda report: status.update(_progress_text(report))) if sys.stderr.isatty() else _log_lines(), say
         say(f"computed in {time.perf_counter() - begin:.1f} s")
         return
 
@@ -120,9 +120,30 @@ def replicating() -> Iterator[Callable[[Progress], None]]:
             f"{time.perf_counter() - begin:.0f} s"
         )
 
+    from saltus.flow.progress import Lines
+
+    lines = Lines(lambda told: console(stderr=True).print(escape(f"saltus: {told}")))
     with console(stderr=True).status("working ...") as status:
-        yield lambda progress: status.update(text(progress))
+        if sys.stderr.isatty():
+            yield lambda progress: status.update(text(progress))
+        else:
+            yield lambda progress: lines.show(progress.done / max(progress.total, 1))
     say(f"computed in {time.perf_counter() - begin:.1f} s")
+
+
+def _log_lines() -> Callable[[Report], None]:
+    """What to call with reports where standard error is a log: a line now and then for each question."""
+    from saltus.flow.progress import Lines
+
+    lines: dict[str, Lines] = {}
+
+    def report(report: Report) -> None:
+        name = report.name
+        if name not in lines:
+            lines[name] = Lines(lambda text: console(stderr=True).print(escape(f"saltus: {name}: {text}")))
+        lines[name].show(report.done / max(report.total, 1))
+
+    return report
 
 
 def _progress_text(report: Report) -> str:

@@ -16,8 +16,8 @@ from typing import NamedTuple
 from saltus.errors import TraceError
 from saltus.system import expression as ex
 from saltus.system.canonical import Canonical, is_multiple
-from saltus.system.expression import And, Bit, Condition, Expr, Not, Or
-from saltus.system.guards import Guard, bits_in, substituted
+from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
+from saltus.system.guards import Guard, bits_in
 
 #: Order of a logarithm: below every power.
 _LOG = -1e-9
@@ -111,6 +111,8 @@ def _knowing(condition: Condition, bit: int, value: bool) -> Condition | bool:
     match condition:
         case Bit(number):
             return value if number == bit else condition
+        case Relation():  # a switch of time
+            return condition
         case Not(inner):
             inside = _knowing(inner, bit, value)
             return not inside if isinstance(inside, bool) else (condition if inside is inner else Not(inside))
@@ -209,7 +211,7 @@ class _Boundaries:
         if guard.state is None or guard.boundary is None:
             return False
         try:
-            there = substituted(node, ex.state(guard.state), guard.boundary)
+            there = ex.substituted(node, ex.state(guard.state), guard.boundary)
         except TraceError:  # something in it is no number there
             return False
         return not self._canonical.polynomial(there)
@@ -249,8 +251,8 @@ def _outermost_bit(node: Expr) -> int | None:
     stack = [node]
     while stack:
         top = stack.pop(0)
-        if top.op == "select":
-            return min(bits_in([ex.Expr("select", (ex.constant(0.0), ex.constant(1.0)), top.payload)]))
+        if top.op == "select" and (bits := bits_in([ex.Expr("select", (ex.constant(0.0), ex.constant(1.0)), top.payload)])):
+            return min(bits)
         stack.extend(top.args)
     return None
 
@@ -271,6 +273,8 @@ def _order_of_power(base: Order, exponent: Expr) -> Order:
 
 
 def _order_of_function(op: str, inner: Order) -> Order:
+    if op in ("mod", "table"):  # of time alone
+        return Order(0.0, False)
     if inner.order == math.inf:
         return Order(0.0 if op in ("exp", "cos") else math.inf, False)
     if op == "sqrt":

@@ -16,6 +16,7 @@ from saltus.system import checks, serial
 from saltus.system.derivatives import gradient
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
+from saltus.system.overlaps import check_overlaps
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,6 +59,7 @@ class System:
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
         for name, value in self.values.items():
             checks.check_range(name, value, self.forced_at)
+        check_overlaps(self, self.values)
         checks.check_periodic(self)
 
     # -- values -----------------------------------------------------------------------------------------------------------------
@@ -208,3 +210,19 @@ class System:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return System.from_dict, (self.to_dict(),)
+
+    # -- what it isn't ----------------------------------------------------------------------------------------------------------
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        """Refuse: a System is no function. Raises ParameterError."""
+        raise ParameterError(
+            f"{self.name} is a System, not a function. Run it with sl.simulate({self.name}, ...); "
+            f"other values are {self.name}.with_values(...)."
+        )
+
+
+def _refuse_change(self: System, name: str, _value: Any) -> None:
+    change = f"system.with_values({name}=...)" if name in self.values else "system.with_values(...)"
+    raise ParameterError(f"a System is never changed. Write system = {change}, a copy with other values.")
+
+
+System.__setattr__ = _refuse_change  # type: ignore[assignment]  # in place of dataclass's own refusal, which doesn't say what to do
