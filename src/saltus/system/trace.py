@@ -20,6 +20,7 @@ from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, s
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
 from saltus.system.names import why_no_name, why_no_text, why_no_title
+from saltus.system.singular import check_finite, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
@@ -198,7 +199,10 @@ def _traced(
         kind = UnitError if isinstance(error, UnitError) else TraceError
         raise kind(explained(error, function, title)) from error
     try:
-        return find_guards(derivatives)
+        field, guards = find_guards(derivatives)
+        field = lifted(field, guards)
+        check_finite(field, guards, states)
+        return field, guards
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
 
