@@ -81,6 +81,9 @@ def frequency_response(
     """
     check_system(system)
     if system.forced_at is None:
-        raise ParameterError(f"{system.name} has no forcing frequency. Declare forced_at= in @sl.system, or use sl.bifurcation_diagram.")
+        raise ParameterError(
+            f"{system.name} has no forcing, so no frequency to vary. Take sl.bifurcation_diagram over another parameter, with every=; "
+            "if a parameter is the frequency of a forcing, declare forced_at= in @sl.system."
+        )
     grid = grid_of(system, {system.forced_at: frequency}, start, box, values, seed, follow)
     return respond(grid, method, periods, threads, progress)

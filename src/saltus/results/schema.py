@@ -108,6 +108,11 @@ ATTRACTOR_VARIABLES = {
     "attractor_margin": Variable(("attractor",), "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"),
     "attractor_multiplier_real": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, real part"),
     "attractor_multiplier_imag": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, imaginary part"),
+    "attractor_cycle": Variable(("attractor",), "s", "period of a limit cycle"),
+    "attractor_eigenvalue_real": Variable(("attractor", "multiplier"), "1/s", "eigenvalue of the Jacobian of an equilibrium, real part"),
+    "attractor_eigenvalue_imag": Variable(
+        ("attractor", "multiplier"), "1/s", "eigenvalue of the Jacobian of an equilibrium, imaginary part"
+    ),
     "attractor_exponent": Variable(("attractor",), "1/s", "largest Lyapunov exponent"),
     "attractor_exponent_error": Variable(("attractor",), "1/s", "error of the largest Lyapunov exponent"),
     "attractor_fraction": Variable(("attractor",), "1", "share of the starts"),

@@ -16,6 +16,7 @@ from saltus.system import checks, serial
 from saltus.system.derivatives import gradient
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
+from saltus.system.overlaps import check_overlaps
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,6 +59,7 @@ class System:
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
         for name, value in self.values.items():
             checks.check_range(name, value, self.forced_at)
+        check_overlaps(self, self.values)
         checks.check_periodic(self)
 
     # -- values -----------------------------------------------------------------------------------------------------------------

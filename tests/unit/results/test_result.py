@@ -4,6 +4,7 @@ import copy
 import pickle
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -21,8 +22,7 @@ def test_the_product_of_samples_contacts_and_guards_is_refused(batch, call):
 
 def test_variables_of_one_table_become_a_frame_as_of_any_dataset(batch):
     frame = batch[["x", "v"]].to_dataframe()
-    plain = xr.Dataset(dict(batch[["x", "v"]].data_vars), batch[["x", "v"]].coords)
-    assert frame.equals(plain.to_dataframe())
+    pd.testing.assert_frame_equal(frame, xr.Dataset(dict(batch[["x", "v"]].variables)).to_dataframe(), check_like=True)
     assert len(frame) == batch.sizes["trajectory"] * batch.sizes["time"]
     assert len(batch[["status", "events"]].to_dataframe()) == 3
     assert len(batch[["contact_time", "contact_guard"]].to_dataframe()) == batch.sizes["contact"]

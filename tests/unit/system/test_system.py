@@ -49,7 +49,7 @@ def test_nothing_can_be_changed_in_place():
         ({"zzz": 1.0}, ParameterError, "Known: contact_stiffness, cubic"),
         ({"mass": 0.0}, ParameterError, "mass = 0 must be positive"),
         ({"mass": "-3 kg"}, ParameterError, "mass = -3 must be positive"),
-        ({"upper_gap": "-0.1 mm"}, ParameterError, "upper_gap = -0.0001 is negative"),
+        ({"upper_gap": "-0.1 mm"}, ParameterError, "lower_gap = 0, upper_gap = -0.0001 the contacts at .* overlap"),
         ({"frequency": 0.0}, ParameterError, "it is the forcing frequency"),
         ({"frequency": "-1 Hz"}, ParameterError, "it is the forcing frequency"),
         ({"force": math.nan}, ParameterError, "force = nan is not a finite number"),
@@ -74,8 +74,8 @@ def test_resolve_takes_one_or_many():
     resolved = RIG.resolve("frequency", grid)
     assert np.array_equal(resolved, grid)
     assert resolved is not grid
-    with pytest.raises(ParameterError, match=r"upper_gap = -1 \(entry 1 of 3\) is negative"):
-        RIG.resolve("upper_gap", np.array([0.0, -1.0, -2.0]))
+    with pytest.raises(ParameterError, match=r"mass = -1 \(entry 1 of 3\) must be positive"):
+        RIG.resolve("mass", np.array([1.0, -1.0, -2.0]))
     with pytest.raises(ParameterError, match=r"entry 0 of 1\) is not a finite"):
         RIG.resolve("force", np.array([math.nan]))
 
