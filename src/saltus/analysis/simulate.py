@@ -11,25 +11,24 @@ import xarray as xr
 
 from saltus.analysis import answers
 from saltus.analysis import time_errors as measure
-from saltus.analysis.along import whole
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow import engine
+from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.results import trajectory_dataset
 from saltus.system.system import System
 
 #: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
 PER_PERIOD = 200
-#: Samples over the whole span of an unforced system.
-PER_SPAN = 2000
-#: Samples beyond which a call is refused: some 5 GB.
-MOST_SAMPLES = 300_000_000
+#: Samples over the whole span of an unforced system: a curve without corners over a hundred oscillations; fewer of many trajectories.
+MOST_PER_SPAN, LEAST_PER_SPAN = 10_000, 2000
 
 
 @verb
@@ -66,7 +65,8 @@ def simulate(
     method : Method
         Default :class:`saltus.Taylor`; :class:`saltus.ODE45` for MATLAB's.
     samples : int
-        Samples per forcing period (default 200), or over the whole span if the system isn't forced (default 2000).
+        Samples per forcing period (default 200), or over the whole span if the system isn't forced (default 10 000, and down to
+        2000 for many trajectories).
     keep : int
         Keep samples and contacts of the last so many periods only (default all).
     values : mapping
@@ -138,7 +138,7 @@ class _Plan:
 
 
 def _plan(system: System, group: Ensemble, length: Span, samples: int | None, keep: int | None) -> _Plan:
-    per = _whole(samples, "samples", PER_SPAN if system.forced_at is None else PER_PERIOD)
+    per = _whole(samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD)
     last = int(np.max(length.count + length.phase / length.period))
     kept = _whole(keep, "keep", max(last, 1))
     if keep is not None and system.forced_at is None:
@@ -146,13 +146,18 @@ def _plan(system: System, group: Ensemble, length: Span, samples: int | None, ke
     first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
     longest = np.max((length.count + length.phase / length.period) * per)
     count = int(longest + 1e-9) + 1 - first * per
-    if count * group.size * len(system.states) > MOST_SAMPLES:
-        raise ParameterError(
-            f"{group.size} trajectories with {count} samples each don't fit in memory. Give keep= (last periods) or fewer samples=, "
-            "or use sl.stroboscope."
-        )
+    check_room(
+        count * group.size * (16.0 * len(system.states) + 16.0),
+        f"{group.size} trajectories with {count} samples each",
+        "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
+    )
     index = first * per + np.arange(count)
     return _Plan(Schedule(index // per, (index % per) / per), first)
+
+
+def _per_span(trajectories: int) -> int:
+    """Samples of a motion without forcing: enough for a smooth curve, fewer where there are many trajectories."""
+    return max(MOST_PER_SPAN // max(trajectories // 20, 1), LEAST_PER_SPAN)
 
 
 def _whole(value: int | None, name: str, default: int) -> int:
