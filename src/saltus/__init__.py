@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         simulate,
         spectrum,
         stroboscope,
+        transmissibility,
         wolf,
     )
     from saltus.flow import ODE45, Interrupted, Taylor
@@ -71,7 +72,7 @@ if TYPE_CHECKING:
 _HOMES = {
     **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
     **dict.fromkeys(("compare_methods", "energy_balance", "frequency_response", "impact_statistics", "poincare"), "saltus.analysis"),
-    **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "wolf"), "saltus.analysis"),
+    **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "transmissibility", "wolf"), "saltus.analysis"),
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("describe", "load", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
@@ -87,7 +88,7 @@ __all__ = [
     "bifurcation_diagram", "clip", "compare", "compare_methods", "cos", "cosh", "describe", "energy_balance", "exp", "freeplay",
     "frequency_response", "heaviside", "hypot", "impact_statistics", "load", "log", "lyapunov", "max", "min", "models", "pi", "piecewise",
     "plot", "poincare", "save", "settled", "sign", "simulate", "sin", "sinh", "spectrum", "sqrt", "stroboscope", "system", "tan", "tanh",
-    "to_csv", "to_mat", "where", "wolf",
+    "to_csv", "to_mat", "transmissibility", "where", "wolf",
 ]  # fmt: skip
 
 

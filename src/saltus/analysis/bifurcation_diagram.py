@@ -24,6 +24,7 @@ def bifurcation_diagram(
     follow: bool = False,
     box: Mapping[str, Any] | None = None,
     values: Mapping[str, Any] | None = None,
+    outputs: Mapping[str, Any] | None = None,
     method: Method | None = None,
     periods: int = 2000,
     seed: int = 1,
@@ -46,7 +47,7 @@ def bifurcation_diagram(
         ``"stroboscope"`` (at whole forcing periods) or ``"contacts"``. Not with two parameters.
     follow : bool
         Whether each start goes on, from the lowest value upwards, where it stood at the value before; otherwise each value starts afresh.
-    box, values, method, periods, seed, threads, progress
+    box, values, outputs, method, periods, seed, threads, progress
         As for :func:`saltus.frequency_response`.
 
     Returns
@@ -67,4 +68,4 @@ def bifurcation_diagram(
     method = check_method(method)
     check_sample(sample, method)
     grid = grid_of(system, vary, start, box, values, seed, follow)
-    return respond(grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "")
+    return respond(grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "", outputs)

@@ -9,6 +9,7 @@ import numpy as np
 
 from saltus.analysis.grid import Grid
 from saltus.analysis.orbit_measures import Measures, measure
+from saltus.analysis.outputs import Outputs
 from saltus.analysis.recurrence import SAME
 from saltus.analysis.steady import CHAOTIC, PERIODIC, QUASI_PERIODIC, Steady, settle_each
 from saltus.analysis.wandering import Wandering, alike
@@ -137,9 +138,9 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
     return (int(result.kind[row]), int(period), *(float(size) for size in sizes))
 
 
-def numbers_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> Measures:
+def numbers_of(found: Found, outputs: Outputs, grid: Grid, method: Method, threads: int | None = None) -> Measures:
     """The numbers of each response."""
-    return measure(grid.family(method, threads).rows(found.place), found.start(), found.period)
+    return measure(grid.family(method, threads).rows(found.place), found.start(), found.period, outputs=outputs)
 
 
 def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:

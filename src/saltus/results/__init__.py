@@ -9,13 +9,14 @@ from saltus.results.files import ResultFileError, usable_folder
 from saltus.results.load import load
 from saltus.results.methods import methods_dataset
 from saltus.results.provenance import attributes, content_hash, describe
-from saltus.results.responses import Events, Responses, Starts, responses_dataset
+from saltus.results.responses import Events, OutputNumbers, Responses, Starts, responses_dataset
 
 __all__ = [
     "AttractorTable",
     "Contacts",
     "Events",
     "Guards",
+    "OutputNumbers",
     "Responses",
     "ResultFileError",
     "Starts",
