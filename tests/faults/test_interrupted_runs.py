@@ -1,7 +1,9 @@
 """Ctrl-C while trajectories are computed: at whatever moment it comes, what is kept is the beginning of the undisturbed answer."""
 
 import _thread
+import os
 import signal
+import threading
 import time
 
 import numpy as np
@@ -9,6 +11,8 @@ import pytest
 
 import saltus as sl
 from saltus.flow import engine
+from saltus.flow.maps import Stroboscope
+from saltus.flow.threads import on_threads
 
 START = {"x": np.linspace(-4e-3, 4e-3, 24), "v": np.linspace(-0.5, 0.5, 24)}
 
@@ -54,3 +58,53 @@ def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, monk
         mine = part.contact_time.values[part.contact_trajectory.values == row]
         theirs = whole.contact_time.values[whole.contact_trajectory.values == row]
         np.testing.assert_array_equal(mine, theirs[: len(mine)])
+
+
+def press_when(event):
+    """Press Ctrl-C once the event is set."""
+
+    def press():
+        assert event.wait(300)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=press)
+    thread.start()
+    return thread
+
+
+@pytest.mark.parametrize("inner", ["a flight", "runs on threads of their own"])
+def test_work_inside_a_piece_of_work_ends_too(inner):
+    """A piece that would go on for ever: what it calls is asked to stop, at whatever depth."""
+    rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    begun, ended = threading.Event(), []
+
+    def endless(_):
+        flight = Stroboscope(rig, sl.Taylor()).launch(np.array([[1e-3, 0.0]]), 1e9)
+        while True:
+            if inner == "a flight":
+                flight.advance(1000)
+            else:
+                sl.stroboscope(rig, START, periods=200, keep=1, progress=False)
+            begun.set()
+
+    def work(item):
+        try:
+            endless(item)
+        except sl.Interrupted:
+            ended.append(item)
+            raise
+
+    presser = press_when(begun)
+    with pytest.raises(KeyboardInterrupt):
+        on_threads(work, [0, 1], lambda *_: None, threads=2)
+    presser.join()
+    assert sorted(ended) == [0, 1]
+
+
+def test_a_frequency_response_hands_out_what_it_has():
+    rig = sl.models.delangre("b", force="4 N")
+    seen = threading.Event()
+    presser = press_when(seen)
+    with pytest.raises(sl.Interrupted, match="stopped by Ctrl-C"):
+        sl.frequency_response(rig, ("2 Hz", "30 Hz", 4000), periods=2000, progress=lambda share: share > 0 and seen.set())
+    presser.join()

@@ -18,6 +18,7 @@ from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import find
 from saltus.analysis.settling import UNCONVERGED, complete, settle_all
 from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
@@ -34,6 +35,7 @@ WATCHED = 64
 SPREAD_STARTS = 4096
 
 
+@verb
 def attractors(
     system: System,
     start: Any,
@@ -93,6 +95,7 @@ def attractors(
     )  # fmt: skip
 
 
+@verb
 def basin_fractions(
     system: System,
     *,

@@ -10,6 +10,7 @@ import xarray as xr
 from saltus.analysis.plan import BasinPlan, basin_plan
 from saltus.analysis.recurrence import Found
 from saltus.analysis.settling import Settling
+from saltus.analysis.verb import verb
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.flow.threads import on_threads
@@ -20,6 +21,7 @@ from saltus.system.system import System
 SCOUTING = 0.05
 
 
+@verb
 def basins(
     system: System,
     *,

@@ -9,12 +9,14 @@ import xarray as xr
 
 from saltus.analysis.grid import grid_of
 from saltus.analysis.response_table import respond
-from saltus.analysis.samples import check_sample
+from saltus.analysis.samples import check_sample, check_unforced_sample
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method, check_method
 from saltus.system.system import System
 
 
+@verb
 def bifurcation_diagram(
     system: System,
     vary: Mapping[str, Any],
@@ -27,6 +29,7 @@ def bifurcation_diagram(
     outputs: Mapping[str, Any] | None = None,
     method: Method | None = None,
     periods: int = 2000,
+    every: float | str | None = None,
     seed: int = 1,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
@@ -36,7 +39,7 @@ def bifurcation_diagram(
     Parameters
     ----------
     system : System
-        A forced system.
+        Any system; one without forcing with ``every``.
     vary : mapping
         One parameter, or two for a map of types: a range, such as ``{"contact_stiffness": ("1e3 N/m", "1e9 N/m", 2000, "log")}``, or a
         list or array of values.
@@ -47,6 +50,9 @@ def bifurcation_diagram(
         ``"stroboscope"`` (at whole forcing periods) or ``"contacts"``. Not with two parameters.
     follow : bool
         Whether each start goes on, from the lowest value upwards, where it stood at the value before; otherwise each value starts afresh.
+    every : float or str, optional
+        Time between two looks at the motion of a system without forcing [s], about a turn of it. Equilibria, limit cycles, their periods,
+        sizes and stability don't depend on it.
     box, values, outputs, method, periods, seed, threads, progress
         As for :func:`saltus.frequency_response`.
 
@@ -54,7 +60,9 @@ def bifurcation_diagram(
     -------
     Dataset
         As :func:`saltus.frequency_response` over the parameters in ``vary``, and ``sample_<state>`` on (response, sample), filled up with
-        NaN.
+        NaN. Without forcing responses are of type ``equilibrium`` (with ``response_eigenvalue_real`` and ``_imag`` of the Jacobian [1/s]),
+        ``limit_cycle`` (with its period ``response_cycle`` [s] and multipliers, one of which is 1), ``quasi_periodic`` or ``chaotic``;
+        ``response_<state>`` then has points of a limit cycle in equal steps of its time.
 
     Raises
     ------
@@ -67,5 +75,6 @@ def bifurcation_diagram(
         raise ParameterError('vary must be a mapping, such as vary={"contact_stiffness": ("1e3 N/m", "1e9 N/m", 200, "log")}.')
     method = check_method(method)
     check_sample(sample, method)
-    grid = grid_of(system, vary, start, box, values, seed, follow)
+    grid = grid_of(system, vary, start, box, values, seed, follow, every)
+    check_unforced_sample(sample, grid.system)
     return respond(grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "", outputs)

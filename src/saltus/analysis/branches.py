@@ -3,53 +3,28 @@
 Two responses at neighbouring values belong to one branch if Newton's method, started on the one, arrives at the other (natural parameter
 continuation); so do those some values apart, if no start led to what it finds in between. Where Newton's method arrives nowhere near, they
 do if their orbits are near each other, point by point at the best phase shift: by identity, never by amplitude, which crossing branches
-share. Names of bifurcations: di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapter 2.
+share.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from saltus.analysis.bifurcations import LINK, Event, closed_again, middle, orbit_distance, why_they_end
 from saltus.analysis.grid import Grid
-from saltus.analysis.polish import close
-from saltus.analysis.recurrence import LONGEST, SAME
+from saltus.analysis.recurrence import SAME
 from saltus.analysis.responses import Found
-from saltus.analysis.steady import CHAOTIC, PERIODIC
+from saltus.analysis.steady import CLOSED
 from saltus.flow.methods import Method
 from saltus.results import AttractorTable
 
-#: Farthest that an orbit moves between two values, in units of its own range; twice and more as far only if Newton's method went with it.
-LINK, FARTHEST = 0.35, 1.0
+#: Farthest that an orbit moves between two values, in units of its own range, if Newton's method went with it; else LINK.
+FARTHEST = 1.0
 #: Values over which a branch may be missing: followed by Newton's method, or not.
 FOLLOWED, MISSED = 16, 3
-#: A branch that ends folds if its leading multiplier is real and beyond this (it moves to 1 as the root of the distance), and sheds a torus
-#: if it is complex and beyond that.
-FOLDING, TURNING = 0.5, 0.95
 #: What is farther apart than any two responses.
 _NEVER = 1e6
-
-
-@dataclass(frozen=True)
-class Event:
-    """What happens to a branch between two values.
-
-    Attributes
-    ----------
-    value : float
-        Middle of the two values [SI].
-    kind : str
-        ``graze`` (contacts come or go), ``period_doubling``, ``fold``, ``neimark_sacker`` (a torus is born), ``chaos`` (its starts are
-        chaotic beyond), or ``end`` (it isn't found any more, by the starts nor by Newton's method).
-    branch : int
-        Its number.
-    """
-
-    value: float
-    kind: str
-    branch: int
 
 
 def follow(found: Found, grid: Grid, method: Method, threads: int | None = None) -> np.ndarray:
@@ -82,7 +57,7 @@ def _continued(found: Found, grid: Grid, method: Method, threads: int | None) ->
         How far the orbit moves to the next value, in units of its range; inf where none that attracts is found.
     """
     onward, moved = np.full(len(found), -1, np.int64), np.full(len(found), np.inf)
-    rows = np.flatnonzero(found.kind == PERIODIC)
+    rows = np.flatnonzero(np.isin(found.kind, CLOSED))
     family = grid.family(method, threads)
     start, scale = found.start()[rows], found.steady.scale[found.row[rows]]
     for ahead in range(1, FOLLOWED + 1 if family.exact else 1):
@@ -91,12 +66,12 @@ def _continued(found: Found, grid: Grid, method: Method, threads: int | None) ->
         if not len(rows):
             break
         place = found.place[rows] + ahead
-        arrived = close(family.rows(place), start, found.period[rows], scale, LONGEST)
+        arrived = closed_again(found, rows, family.rows(place), start, scale)
         going = arrived.stable & (arrived.period == found.period[rows])
         for i in np.flatnonzero(going):
             orbit = arrived.points[i, : arrived.period[i]]
             if ahead == 1:
-                moved[rows[i]] = _orbit_distance(found.points(int(rows[i])), orbit, scale[i])
+                moved[rows[i]] = orbit_distance(found.points(int(rows[i])), orbit, scale[i])
             for other in np.flatnonzero((found.place == place[i]) & (found.period == arrived.period[i])):
                 if arrived.distance(found.points(int(other))[:1], scale[[i]], np.array([i]))[0] < SAME:
                     onward[rows[i]], going[i] = other, False
@@ -121,15 +96,9 @@ def _distance(found: Found, a: int, b: int) -> float:
         return np.inf
     scale = np.maximum(found.steady.scale[found.row[a]], found.steady.scale[found.row[b]])
     p, q = found.points(a), found.points(b)
-    if found.kind[a] != PERIODIC:  # a strange set: where it lies and how wide
+    if found.kind[a] not in CLOSED:  # a strange set: where it lies and how wide
         return float(max(np.abs((p.mean(axis=0) - q.mean(axis=0)) / scale).max(), np.abs((p.std(axis=0) - q.std(axis=0)) / scale).max()))
-    return _orbit_distance(p, q, scale)
-
-
-def _orbit_distance(p: np.ndarray, q: np.ndarray, scale: np.ndarray) -> float:
-    """Largest distance of the points of two orbits float64[n, D] of the same period, at the best phase shift, in units of the scale."""
-    shifts = (np.arange(len(q))[:, None] + np.arange(len(q))) % len(q)
-    return float(np.abs((p[None] - q[shifts]) / scale).max(axis=(1, 2)).min())
+    return orbit_distance(p, q, scale)
 
 
 def events(found: Found, table: AttractorTable, branch: np.ndarray, grid: Grid, method: Method, threads: int | None = None) -> list[Event]:
@@ -141,9 +110,11 @@ def events(found: Found, table: AttractorTable, branch: np.ndarray, grid: Grid, 
         result += _grazes(found, table, members, values, number)
     for way, side in ((+1, -1), (-1, 0)):
         ends = np.array([members[side] for members in groups], np.int64)
-        goes_on = _goes_on(found, grid, method, ends, way, threads)
-        for number in np.flatnonzero(~goes_on).tolist():
-            result += _end(found, table, int(ends[number]), values, number, way)
+        over = np.flatnonzero(~_goes_on(found, grid, method, ends, way, threads))
+        result += why_they_end(found, grid, method, ends[over], over, way, threads)
+    step = float(np.diff(values).max(initial=0.0))  # a limit cycle begins where an equilibrium begins to oscillate: told once
+    born = [event.value for event in result if event.kind == "hopf"]
+    result = [event for event in result if event.kind != "end" or not any(abs(event.value - value) <= step for value in born)]
     return sorted(result, key=lambda event: (event.value, event.branch, event.kind))
 
 
@@ -151,57 +122,22 @@ def _goes_on(found: Found, grid: Grid, method: Method, ends: np.ndarray, way: in
     """Which responses Newton's method finds at the next value (way 1) or the one before (-1) too, bool[k]: just no start leads there."""
     result, place = np.zeros(len(ends), bool), found.place[ends] + way
     family = grid.family(method, threads)
-    inside = np.flatnonzero((found.kind[ends] == PERIODIC) & (place >= 0) & (place < grid.places))
+    inside = np.flatnonzero(np.isin(found.kind[ends], CLOSED) & (place >= 0) & (place < grid.places))
     if not family.exact or not len(inside):
         return result
     rows = ends[inside]
     scale = found.steady.scale[found.row[rows]]
-    arrived = close(family.rows(place[inside]), found.start()[rows], found.period[rows], scale, LONGEST)
+    arrived = closed_again(found, rows, family.rows(place[inside]), found.start()[rows], scale)
     for i in np.flatnonzero(arrived.stable & (arrived.period == found.period[rows])):
         orbit = arrived.points[i, : arrived.period[i]]
-        result[inside[i]] = _orbit_distance(found.points(int(rows[i])), orbit, scale[i]) < LINK
+        result[inside[i]] = orbit_distance(found.points(int(rows[i])), orbit, scale[i]) < LINK
     return result
 
 
 def _grazes(found: Found, table: AttractorTable, members: np.ndarray, values: np.ndarray, number: int) -> list[Event]:
     """Where the number of contacts changes along a periodic branch."""
-    if found.kind[members[0]] != PERIODIC:
+    if found.kind[members[0]] not in CLOSED:
         return []
     contacts, place = np.asarray(table.contacts)[members], found.place[members]
     jumps = np.flatnonzero(np.abs(np.diff(contacts)) > 0.5)
-    return [Event(_middle(values, place[i], place[i + 1]), "graze", number) for i in jumps]
-
-
-def _end(found: Found, table: AttractorTable, last: int, values: np.ndarray, number: int, way: int) -> list[Event]:
-    """Why a branch ends upwards (way 1) or begins (way -1); nothing at the edge of the grid, or where a chaotic one turns regular."""
-    here, beyond = int(found.place[last]), int(found.place[last]) + way
-    if not 0 <= beyond < len(values) or found.kind[last] != PERIODIC or (found.of[beyond] == -4).all():
-        return []
-    value, multiplier = _middle(values, here, beyond), complex(np.asarray(table.multipliers)[last, 0])
-    neighbours = np.flatnonzero(found.place == beyond)
-    doubled = [j for j in neighbours if found.period[j] == 2 * found.period[last] and _covers(found, int(j), last)]
-    if any(found.period[last] == 2 * found.period[j] and _covers(found, last, int(j)) for j in neighbours):
-        return []  # the same doubling, told by the branch of half the period
-    if doubled and multiplier.real < 0:
-        return [Event(value, "period_doubling", number)]
-    starts = np.flatnonzero((found.of[here] >= 0) & (found.of[here] == last))
-    if len(starts) and (found.steady.kind.reshape(found.of.shape)[beyond, starts] == CHAOTIC).any():
-        return [Event(value, "chaos", number)]
-    if abs(multiplier) > TURNING and abs(multiplier.imag) > 1e-9:
-        return [Event(value, "neimark_sacker", number)]
-    if multiplier.real > FOLDING and abs(multiplier.imag) <= 1e-9:
-        return [Event(value, "fold", number)]
-    return [Event(value, "end", number)]
-
-
-def _covers(found: Found, longer: int, shorter: int) -> bool:
-    """Whether every point of an orbit of period 2n lies near one of an orbit of period n."""
-    scale = found.steady.scale[found.row[shorter]]
-    apart = np.abs((found.points(longer)[:, None] - found.points(shorter)[None]) / scale).max(axis=2).min(axis=1)
-    return bool(apart.max() < LINK)
-
-
-def _middle(values: np.ndarray, a: int, b: int) -> float:
-    """Between two values: geometric where the axis spans decades."""
-    low, high = float(values[a]), float(values[b])
-    return float(np.sqrt(low * high)) if values[0] > 0 and values[-1] / values[0] > 100 else 0.5 * (low + high)
+    return [Event(middle(values, place[i], place[i + 1]), "graze", number) for i in jumps]

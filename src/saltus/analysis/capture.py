@@ -107,7 +107,7 @@ def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, n
     iterates = orbit.period * _returns(orbit)
     norms = np.stack([_norm(matrix, scale) for matrix in monodromy])
     _, own = map_.sequences(points, iterates)
-    shell = np.concatenate([_shell(size), 0.5 * _shell(size)])
+    shell = np.concatenate([sphere(size), 0.5 * sphere(size)])
     lengths, asked = np.linalg.norm(shell, axis=1), _asked(orbit)
 
     def passes(radius: np.ndarray, which: np.ndarray) -> np.ndarray:
@@ -168,7 +168,7 @@ def _norm(matrix: np.ndarray, scale: np.ndarray) -> np.ndarray:
         return np.diag(1.0 / scale)
 
 
-def _shell(size: int) -> np.ndarray:
+def sphere(size: int) -> np.ndarray:
     """Points on the unit sphere, float64[count, size]: evenly spaced in the plane, a fixed quasi-random set beyond it."""
     if size == 1:
         return np.array([[1.0], [-1.0]])

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import linear_sum_assignment
 
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.results.basins import agreement_dataset
 from saltus.results.intervals import wilson
@@ -28,6 +29,7 @@ _KEPT = ("system", "parameters", "method", "method_options", "result_hash", "sal
 _NEVER = 1e9
 
 
+@verb
 def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANCE) -> xr.Dataset:
     """Compare two maps of basins on one grid, such as those of two methods.
 

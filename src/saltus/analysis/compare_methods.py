@@ -16,6 +16,7 @@ from saltus.analysis.compare import compare
 from saltus.analysis.frequency_response import frequency_response
 from saltus.analysis.method_errors import cell_agreement, one_period_errors, orbit_distances, response_noise
 from saltus.analysis.starts import check_system
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.family import Family
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
@@ -32,6 +33,7 @@ _ANALYSES: dict[str, Callable[..., xr.Dataset]] = {
 }
 
 
+@verb
 def compare_methods(
     system: System,
     analysis: Callable[..., xr.Dataset] | str,

@@ -98,7 +98,7 @@ class Divergence:
 
 def _of_system(family: Family, system: System) -> Family:
     """The same rows for a system with the same parameters."""
-    every = None if system.forced_at is not None else float(family.period[0])
+    every = None if system.forced_at is not None else family.period
     return Family(system, family.method, family.parameters, every, family.threads)
 
 

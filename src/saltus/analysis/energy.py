@@ -13,6 +13,7 @@ from saltus.analysis.along import whole
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.stretch import Stretch, common, computed, stretch, with_each
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
@@ -28,6 +29,7 @@ INTERVALS = 100
 _SUPPLIED, _DISSIPATED = "work_supplied_", "energy_dissipated_"
 
 
+@verb
 def energy_balance(
     system: System,
     start: Any = None,

@@ -10,11 +10,13 @@ import xarray as xr
 from saltus.analysis.grid import grid_of
 from saltus.analysis.response_table import respond
 from saltus.analysis.starts import check_system
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.system.system import System
 
 
+@verb
 def frequency_response(
     system: System,
     frequency: Any,
@@ -87,6 +89,9 @@ def frequency_response(
     """
     check_system(system)
     if system.forced_at is None:
-        raise ParameterError(f"{system.name} has no forcing frequency. Declare forced_at= in @sl.system, or use sl.bifurcation_diagram.")
+        raise ParameterError(
+            f"{system.name} has no forcing, so no frequency to vary. Take sl.bifurcation_diagram over another parameter, with every=; "
+            "if a parameter is the frequency of a forcing, declare forced_at= in @sl.system."
+        )
     grid = grid_of(system, {system.forced_at: frequency}, start, box, values, seed, follow)
     return respond(grid, method, periods, threads, progress, outputs=outputs)

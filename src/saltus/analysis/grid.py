@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.along import along, whole
-from saltus.analysis.starts import MOST_TRAJECTORIES, check_system, ensemble
+from saltus.analysis.starts import MOST_TRAJECTORIES, check_system, ensemble, looks_every
 from saltus.errors import ParameterError, nearest
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
@@ -36,6 +36,8 @@ class Grid:
         ``"up"`` or ``"down"`` where the end at one value is the start at the next; empty otherwise.
     drawn : bool
         Whether the starts are random: then shares of them are shares of their box.
+    every : float or None
+        Time between two looks [s] at a system without forcing.
     """
 
     system: System
@@ -43,6 +45,7 @@ class Grid:
     starts: np.ndarray
     sweeps: tuple[str, ...] = ()
     drawn: bool = False
+    every: float | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -65,12 +68,14 @@ class Grid:
 
     def family(self, method: Method, threads: int | None = None) -> Family:
         """A map for every point of the grid."""
-        family = Family(self.system, method, self.rows, threads=threads)
+        family = Family(self.system, method, self.rows, self.every, threads)
         family.begin_tangent()
         return family
 
 
-def grid_of(system: System, axes: Mapping[str, Any], start: Any, box: Any, values: Any, seed: int, follow: bool | None) -> Grid:
+def grid_of(
+    system: System, axes: Mapping[str, Any], start: Any, box: Any, values: Any, seed: int, follow: bool | None, every: Any = None
+) -> Grid:
     """A grid from what users write, checked.
 
     Parameters
@@ -89,6 +94,8 @@ def grid_of(system: System, axes: Mapping[str, Any], start: Any, box: Any, value
         Of random starts.
     follow : bool or None
         Whether each start is followed from value to value, upwards.
+    every : float, str or None
+        Time between two looks [s] at a system without forcing.
 
     Raises
     ------
@@ -96,8 +103,7 @@ def grid_of(system: System, axes: Mapping[str, Any], start: Any, box: Any, value
         If a name is unknown, a range is empty, or the grid too large.
     """
     check_system(system)
-    if system.forced_at is None:
-        raise ParameterError(f"{system.name} has no forcing period: it has no response to a forcing. Declare forced_at=.")
+    seconds = looks_every(system, every)
     if values is not None:
         if not isinstance(values, Mapping):
             raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
@@ -110,7 +116,7 @@ def grid_of(system: System, axes: Mapping[str, Any], start: Any, box: Any, value
         sweeps = sweeps or ("up",) * len(starts)
     if sweeps and len(points) > 1:
         raise ParameterError("a sweep follows one parameter; this grid has two. Leave follow= and sweeps out.")
-    grid = Grid(system, points, starts, sweeps, drawn)
+    grid = Grid(system, points, starts, sweeps, drawn, seconds)
     if grid.places * len(starts) > MOST_TRAJECTORIES // 100:
         raise ParameterError(
             f"{grid.places} values with {len(starts)} starts each are more than {MOST_TRAJECTORIES // 100} trajectories. "

@@ -13,6 +13,7 @@ from saltus.analysis.messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.stretch import Stretch, common, computed, stretch, with_each
 from saltus.analysis.touchdowns import Touchdowns
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
@@ -27,6 +28,7 @@ BLOCKS = 20
 BINS = 20
 
 
+@verb
 def impact_statistics(
     system: System,
     start: Any = None,

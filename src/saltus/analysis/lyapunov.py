@@ -15,6 +15,7 @@ from saltus.analysis.exponents import Exponents
 from saltus.analysis.messages import warn
 from saltus.analysis.neighbour_exponents import NeighbourExponents
 from saltus.analysis.starts import Ensemble, check_system, ensemble
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest
 from saltus.flow.family import Family
 from saltus.flow.methods import Method, check_method
@@ -31,6 +32,7 @@ UNITS = {"1/s": (False, 1.0), "1/period": (True, 1.0), "bit/s": (False, math.log
 LEAST_PERIODS = 64
 
 
+@verb
 def lyapunov(
     system: System,
     start: Any = None,

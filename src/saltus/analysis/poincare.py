@@ -13,6 +13,7 @@ from saltus.analysis import answers
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.stretch import Stretch, common, computed, stretch, with_each
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
@@ -26,6 +27,7 @@ from saltus.system.system import System
 SAME_TOUCH = 1e-9
 
 
+@verb
 def poincare(
     system: System,
     start: Any,

@@ -29,22 +29,34 @@ class Closed:
     points : float64[k, N, D]
         Its points from the smallest in the first state on, NaN after n.
     multipliers : complex128[k, D]
-        Floquet multipliers, the largest first.
+        Floquet multipliers, the largest first; of a limit cycle the trivial 1 before them, of an equilibrium the eigenvalues [1/s].
+    time : float64[k]
+        Period of a limit cycle [s], 0 of an equilibrium, NaN of an orbit of the stroboscope. A limit cycle has points in equal steps of
+        its time.
     """
 
     period: np.ndarray
     points: np.ndarray
     multipliers: np.ndarray
+    time: np.ndarray
 
     @classmethod
     def none(cls, count: int, longest: int, size: int) -> Closed:
         """No orbit yet."""
-        return cls(np.zeros(count, np.int64), np.full((count, longest, size), np.nan), np.full((count, size), np.nan + 0j))
+        points, multipliers = np.full((count, longest, size), np.nan), np.full((count, size), np.nan + 0j)
+        return cls(np.zeros(count, np.int64), points, multipliers, np.full(count, np.nan))
 
     @property
     def stable(self) -> np.ndarray:
-        """Which are orbits all of whose multipliers lie inside the unit circle by more than rounding, bool[k]."""
-        return (self.period > 0) & (np.abs(self.multipliers[:, 0]) < 1.0 - MARGINAL)
+        """Which are orbits all of whose multipliers (but a trivial one) lie inside the unit circle by more than rounding, bool[k]."""
+        leading = np.where(self.time > 0, self.multipliers[:, min(1, self.multipliers.shape[1] - 1)], self.multipliers[:, 0])
+        with np.errstate(invalid="ignore"):
+            inside = np.where(self.time == 0, leading.real < 0, np.abs(leading) < 1.0 - MARGINAL)
+        return (self.period > 0) & inside
+
+    def rows(self, which: np.ndarray) -> Closed:
+        """Those of some rows, int64[m] or bool[k]."""
+        return Closed(self.period[which], self.points[which], self.multipliers[which], self.time[which])
 
     def distance(self, state: np.ndarray, scale: np.ndarray, rows: np.ndarray | list[int] | slice = slice(None)) -> np.ndarray:
         """How far states float64[m, D] lie from the orbits of some rows (default all), in units of the scale; inf where there is none."""

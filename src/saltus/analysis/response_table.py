@@ -50,7 +50,7 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
     numbers = numbers_of(found, outputs, grid, method, threads)
     table = table_of(found, numbers, grid, method)
     branch, happened = np.full(len(found), -1, np.int64), []
-    if len(grid.axes) == 1:
+    if len(grid.axes) == 1 and found.complete:  # after Ctrl-C nothing more is computed
         branch = branches.follow(found, grid, method, threads)
         happened = branches.events(found, table, branch, grid, method, threads)
     (name, *_) = grid.axes

@@ -11,7 +11,8 @@ from saltus.analysis.grid import Grid
 from saltus.analysis.orbit_measures import Measures, measure
 from saltus.analysis.outputs import Outputs
 from saltus.analysis.recurrence import SAME
-from saltus.analysis.steady import CHAOTIC, PERIODIC, QUASI_PERIODIC, Steady, settle_each
+from saltus.analysis.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE, PERIODIC, QUASI_PERIODIC, Steady, settle_each
+from saltus.analysis.unforced import multipliers_and_eigenvalues, rest
 from saltus.analysis.wandering import Wandering, alike
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
@@ -19,7 +20,11 @@ from saltus.results import AttractorTable
 from saltus.results.intervals import wilson
 
 #: Words for the kinds of motion.
-KINDS = {PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic"}
+KINDS = {
+    PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic", EQUILIBRIUM: "equilibrium", LIMIT_CYCLE: "limit_cycle",
+}  # fmt: skip
+#: Point of a limit cycle at which the first state doesn't turn: it is least at point 0.
+ASIDE = 23
 #: Points kept of a motion that never repeats.
 WANDERED = 64
 
@@ -57,17 +62,23 @@ class Found:
 
     @property
     def period(self) -> np.ndarray:
-        """n of its nT, 0 if it doesn't repeat, int64[m]."""
+        """Points by which each is known: n of an nT, 1 of an equilibrium, 0 if it doesn't repeat, int64[m]."""
         return self.steady.orbits.period[self.row]
+
+    @property
+    def time(self) -> np.ndarray:
+        """Period of each limit cycle [s], 0 of an equilibrium, NaN of what follows a forcing, float64[m]."""
+        return self.steady.orbits.time[self.row]
 
     def points(self, response: int) -> np.ndarray:
         """Its stroboscopic points, float64[n, D]."""
         row = int(self.row[response])
         return self.steady.trail[row] if row in self.steady.trail else self.steady.orbits.points[row, : self.steady.orbits.period[row]]
 
-    def start(self) -> np.ndarray:
-        """A state on each, float64[m, D]."""
-        return np.array([self.points(i)[0] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
+    def start(self, aside: bool = False) -> np.ndarray:
+        """A state on each, float64[m, D]; ``aside``: not where a limit cycle turns."""
+        index = np.where(aside & (self.kind == LIMIT_CYCLE), ASIDE, 0)
+        return np.array([self.points(i)[index[i]] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
 
 
 def find(grid: Grid, method: Method, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
@@ -124,7 +135,9 @@ def _same(result: Steady, a: int, b: int, tolerance: float) -> bool:
     """Whether two trajectories at one value settled to the same response."""
     if result.kind[a] != result.kind[b] or result.orbits.period[a] != result.orbits.period[b]:
         return False
-    if result.kind[a] == PERIODIC:
+    if result.kind[a] == LIMIT_CYCLE and abs(result.orbits.time[a] / result.orbits.time[b] - 1.0) > tolerance:
+        return False
+    if result.kind[a] in CLOSED:
         return bool(result.orbits.distance(result.orbits.points[[b], 0], result.scale[[a]], [a])[0] < tolerance)
     first, second = (Wandering("", 0.0, 0.0, result.trail[row], result.scale[a]) for row in (a, b))
     return alike(first, second)
@@ -140,14 +153,20 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
 
 def numbers_of(found: Found, outputs: Outputs, grid: Grid, method: Method, threads: int | None = None) -> Measures:
     """The numbers of each response."""
-    return measure(grid.family(method, threads).rows(found.place), found.start(), found.period, outputs=outputs)
+    family, times = grid.family(method, threads).rows(found.place), own_times(found, grid)
+    numbers = measure(family if times is None else family.every(times), found.start(aside=True), spans_of(found), outputs=outputs)
+    rests = np.flatnonzero(found.kind == EQUILIBRIUM)
+    if len(rests):
+        rest(family.rows(rests), found.start()[rests], rests, numbers)
+    return numbers
 
 
 def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
     """What is known of each response."""
     family = grid.family(method).rows(found.place)
-    period, kind, s = found.period, found.kind, found.steady
-    spans = np.where(period > 0, period, WANDERED)
+    kind, s = found.kind, found.steady
+    period = np.where(kind == PERIODIC, found.period, 0)
+    multipliers, eigenvalues = multipliers_and_eigenvalues(s.orbits.multipliers[found.row], kind == EQUILIBRIUM)
     hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
     low, high = wilson(hits, len(grid.starts))
     shares = (hits / len(grid.starts), low, high) if grid.drawn else None
@@ -159,9 +178,20 @@ def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> Att
         peak=numbers.peak[:, 0],
         rms=numbers.rms[:, 0],
         margin=numbers.margin,
-        multipliers=s.orbits.multipliers[found.row],
+        multipliers=multipliers,
         exponent=s.exponent[found.row] / family.period,
         exponent_error=s.exponent_error[found.row] / family.period,
-        points=[found.points(i)[:span] for i, span in enumerate(spans)],
+        points=[found.points(i)[: int(known)] for i, known in enumerate(np.where(found.period > 0, found.period, WANDERED))],
         fractions=shares,
+        **({} if grid.every is None else {"cycle": np.where(kind == LIMIT_CYCLE, found.time, np.nan), "eigenvalues": eigenvalues}),
     )
+
+
+def spans_of(found: Found) -> np.ndarray:
+    """Periods of each response, int64[m]: n of an nT, 1 of a limit cycle or an equilibrium, 0 of one that never repeats."""
+    return np.where(found.kind == PERIODIC, found.period, np.where(found.period > 0, 1, 0))
+
+
+def own_times(found: Found, grid: Grid) -> np.ndarray | None:
+    """Time of one of these periods [s], of a system without forcing: that of the limit cycle, else that between two looks."""
+    return None if grid.every is None else np.where(found.time > 0, found.time, grid.every)

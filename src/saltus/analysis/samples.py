@@ -6,12 +6,13 @@ import numpy as np
 
 from saltus.analysis.grid import Grid
 from saltus.analysis.orbit_measures import Measures
-from saltus.analysis.responses import WANDERED, Found
+from saltus.analysis.responses import WANDERED, Found, own_times, spans_of
 from saltus.errors import ParameterError, nearest
 from saltus.flow.engine import Outcome
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
+from saltus.system.system import System
 
 #: What may be shown.
 SAMPLES = ("turning_points", "stroboscope", "contacts")
@@ -28,15 +29,21 @@ def check_sample(sample: str, method: Method) -> str:
     return sample
 
 
+def check_unforced_sample(sample: str, system: System) -> None:
+    """Raises ParameterError if a system without forcing can't show it."""
+    if sample == "stroboscope" and system.forced_at is None:
+        raise ParameterError(f'{system.name} has no forcing period: it has no stroboscope. Take sample="turning_points" or "contacts".')
+
+
 def sampled(sample: str, numbers: Measures, grid: Grid, method: Method, found: Found, threads: int | None = None) -> list[np.ndarray]:
     """The sampled states of each response, float64[n, D], over one period of a response, or many of one that never repeats."""
-    spans = np.where(found.period > 0, found.period, WANDERED)
+    spans = np.where(found.period > 0, spans_of(found), WANDERED)
     if sample == "stroboscope":
         return [found.points(i)[:span] for i, span in enumerate(spans)]
     if sample == "turning_points":
         return numbers.turning
     start, result = found.start(), [np.zeros((0, len(grid.system.states)))] * len(found)
-    everything = Family(grid.system, method, grid.rows[found.place], threads=threads)
+    everything = Family(grid.system, method, grid.rows[found.place], own_times(found, grid), threads)
     for span in np.unique(spans):
         rows = np.flatnonzero(spans == span)
         for first in range(0, len(rows), PIECE):

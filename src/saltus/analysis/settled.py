@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.results.schema import TRAJECTORY, check, kind_of, states_of
 
@@ -22,6 +23,7 @@ UNDECIDED = 10
 LAST = 96
 
 
+@verb
 def settled(run: xr.Dataset, *, tolerance: float = TOLERANCE, last: int | None = None) -> xr.Dataset:
     """Period, contacts, peak and rms of a forced motion, from its last periods.
 

@@ -13,6 +13,7 @@ from saltus.analysis import answers
 from saltus.analysis.along import whole
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.engine import Outcome, Request, Schedule
@@ -30,6 +31,7 @@ PER_SPAN = 2000
 MOST_SAMPLES = 300_000_000
 
 
+@verb
 def simulate(
     system: System,
     start: Any = None,

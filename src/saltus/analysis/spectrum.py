@@ -11,6 +11,7 @@ import scipy.fft
 import xarray as xr
 
 from saltus.analysis.settled import settled
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest
 from saltus.results import schema, spectrum_dataset
 
@@ -25,6 +26,7 @@ FEWEST = 16
 UNEVEN = 1e-9
 
 
+@verb
 def spectrum(
     run: xr.Dataset, state: str | Sequence[str] | None = None, *, window: str | None = None, last: int | None = None
 ) -> xr.Dataset:

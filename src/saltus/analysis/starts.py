@@ -12,6 +12,7 @@ import numpy as np
 from saltus.analysis.along import along
 from saltus.errors import ParameterError, SaltusError, nearest
 from saltus.system import expression as ex
+from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -88,6 +89,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     varied = {name: np.broadcast_to(np.ravel(value), count).astype(float) for name, value in given.items() if np.ndim(value)}
     shared = system.with_values(**{name: value for name, value in given.items() if not np.ndim(value)}).values
     if varied:
+        check_overlaps(system, {**shared, **varied})
         _check_period_of_each(system, shared, varied, count)
         rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
         return Ensemble(states, np.stack(rows, axis=1), varied, True)
@@ -98,6 +100,29 @@ def check_system(system: Any) -> None:
     """Raises ParameterError for what isn't a System."""
     if not isinstance(system, System):
         raise ParameterError(f"the system must be a System, not {type(system).__name__}. Put @sl.system(states=...) above the function.")
+
+
+def looks_every(system: System, every: Any) -> float | None:
+    """Time between two looks [s] at a system without forcing; None for a forced one.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If it is missing, isn't a positive time, or the system is forced.
+    """
+    if system.forced_at is not None:
+        if every is not None:
+            raise ParameterError(f"{system.name} is forced: it is looked at once a forcing period. Leave every= out.")
+        return None
+    if every is None:
+        raise ParameterError(
+            f'{system.name} has no forcing period. Give every=, the time between two looks at the motion, such as every="0.1 s": '
+            f"about a turn of it. Answers don't depend on it."
+        )
+    seconds = to_si(every, "s", "every")
+    if not 0 < seconds < math.inf:
+        raise ParameterError(f"every must be a positive time, not {every!r}.")
+    return seconds
 
 
 def fill(system: System, columns: Mapping[str, np.ndarray], fixed: Mapping[str, float]) -> np.ndarray:

@@ -12,6 +12,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from saltus.analysis import unforced
+from saltus.analysis.equilibria import autonomous
 from saltus.analysis.polish import Closed, close
 from saltus.analysis.recurrence import LONGEST, ROUND, recurrence
 from saltus.analysis.wandering import growth_rates, kind_of_growth
@@ -21,7 +23,9 @@ from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 
 #: Kinds of motion, and why there may be none.
-PERIODIC, QUASI_PERIODIC, CHAOTIC = 0, 1, 2
+PERIODIC, QUASI_PERIODIC, CHAOTIC, EQUILIBRIUM, LIMIT_CYCLE = 0, 1, 2, 3, 4
+#: Kinds that Newton's method closes.
+CLOSED = (PERIODIC, EQUILIBRIUM, LIMIT_CYCLE)
 ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
 #: States a period apart that agree so well, in units of the range of the motion, are on their way to an orbit: 1e-5 leaves the slowest
 #: transient of the rig in a few rounds, and doesn't take a neighbour for the orbit. Later, slow ones are let in from farther away.
@@ -45,7 +49,7 @@ class Steady:
     Attributes
     ----------
     kind : int64[k]
-        ``PERIODIC``, ``QUASI_PERIODIC``, ``CHAOTIC``, or a code below zero.
+        ``PERIODIC``, ``QUASI_PERIODIC``, ``CHAOTIC``; of a system without forcing ``EQUILIBRIUM``, ``LIMIT_CYCLE``; or a code below zero.
     orbits : Closed
         The orbits of the periodic ones, verified; elsewhere nothing.
     exponent, exponent_error : float64[k]
@@ -154,6 +158,8 @@ def _follow(family: Family, start: np.ndarray, who: np.ndarray, most: int, resul
 
 def _settled(family: Family, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
     """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes the orbits."""
+    if autonomous(family.system):
+        return _settled_unforced(family.rows(who), points, who, near, result)
     scale = result.scale[who]
     period, apart = recurrence(points, scale)
     done = np.zeros(len(who), bool)
@@ -166,10 +172,26 @@ def _settled(family: Family, points: np.ndarray, who: np.ndarray, near: float, r
     right = orbits.stable & (orbits.distance(points[ready, -1], scale[ready]) <= tolerance)
     done[ready[right]] = True
     chosen = who[ready[right]]
-    result.put_orbits(chosen, Closed(orbits.period[right], orbits.points[right], orbits.multipliers[right]))
+    result.put_orbits(chosen, orbits.rows(right))
     result.kind[chosen], result.exponent_error[chosen] = PERIODIC, 0.0
     with np.errstate(divide="ignore"):
         result.exponent[chosen] = np.log(np.abs(orbits.multipliers[right, 0])) / orbits.period[right]
+    return done
+
+
+def _settled_unforced(family: Family, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
+    """As :func:`_settled` for rows of a system without forcing: which rest, or go round a limit cycle."""
+    state, window = points[:, -1], ROUND * float(family.period[0])
+    result.scale[who] = np.maximum(result.scale[who], np.ptp(points, axis=1))
+    found = unforced.attracted(family, state, result.scale[who], window, near)
+    done = found.orbits.period > 0
+    chosen = who[done]
+    result.put_orbits(chosen, found.orbits.rows(done))
+    result.scale[chosen] = found.scale[done]
+    rests = found.orbits.time[done] == 0
+    result.kind[chosen], result.exponent_error[chosen] = np.where(rests, EQUILIBRIUM, LIMIT_CYCLE), 0.0
+    leading = found.orbits.multipliers[done, 0].real * family.period[done]
+    result.exponent[chosen] = np.where(rests, leading, 0.0)  # along a limit cycle nothing grows or dies
     return done
 
 
@@ -182,14 +204,22 @@ def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) 
     recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR_AT_LAST, maps.noise(result.scale[who]))  # by now
     result.end[who] = flight.state
     unclear = np.ones(len(who), bool)
-    for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2)) & ~recurs):
+    if autonomous(family.system):  # a limit cycle that is reached slowly, and no torus
+        recurs |= unforced.nearly_recurs(maps, flight.state, ROUND * float(family.period[0]))
+        away = unforced.runs_away(trail)
+        result.kind[who[away]] = ESCAPED
+    for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2))):
         kind = kind_of_growth(blocks[:, [i]])
-        if kind is not None:
+        if (
+            result.kind[who[i]] != ESCAPED
+            and kind is not None
+            and not (recurs[i] and (kind[0] != "chaotic" or not autonomous(family.system)))
+        ):
             unclear[i], row = False, who[i]
             result.kind[row] = CHAOTIC if kind[0] == "chaotic" else QUASI_PERIODIC
             result.exponent[row], result.exponent_error[row] = kind[1:]
             result.trail[int(row)], result.settled[row] = trail[i], -1
-    return who[unclear]
+    return who[unclear & (result.kind[who] != ESCAPED)]
 
 
 def motion_range(family: Family, state: np.ndarray) -> np.ndarray:

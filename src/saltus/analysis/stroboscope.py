@@ -11,6 +11,7 @@ import xarray as xr
 from saltus.analysis import answers
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import ensemble, span
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.engine import Outcome, Request, Schedule
@@ -24,6 +25,7 @@ from saltus.system.system import System
 MOST_VALUES = 1_000_000_000
 
 
+@verb
 def stroboscope(
     system: System,
     start: Any = None,

@@ -17,6 +17,7 @@ from saltus.analysis.embedding import false_neighbours, first_minimum, hardly_co
 from saltus.analysis.lyapunov_spectrum import BOUNDED, running_ends
 from saltus.analysis.neighbours import CROWD, Evolutions, Search, crowd_distance, follow
 from saltus.analysis.series import LEAST_POINTS, check_length, columns_of, interval_of, samples_of
+from saltus.analysis.verb import verb
 from saltus.analysis.wandering import UNCLEAR
 from saltus.errors import ParameterError, SaltusWarning, nearest
 from saltus.results import exponents_dataset
@@ -66,6 +67,7 @@ _NONE = np.zeros(0)
 NOTHING = Growing(math.nan, math.nan, math.nan, 0, "unclear", _NONE, _NONE, _NONE, Evolutions(_NONE, _NONE, _NONE))
 
 
+@verb
 def wolf(
     series: Any,
     sampling_interval: Any,

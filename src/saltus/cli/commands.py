@@ -12,6 +12,7 @@ from saltus.cli.app import app
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
+    from saltus.study.inputs import Inputs
     from saltus.study.running import Resources
     from saltus.study.spec import Study
     from saltus.system import System
@@ -96,6 +97,10 @@ def run(
     system: Annotated[str, typer.Option(help="A system of your own: FILE.py:NAME. Runs that file.")] = "",
     out: Annotated[Path | None, typer.Option(help="Folder for results; default saltus-runs/STUDY.")] = None,
     only: Only = None,
+    inputs: Annotated[
+        list[Path] | None,
+        typer.Option(help="A folder beside the study's own in which it may read the files that it names; may be given again."),
+    ] = None,
     threads: Threads = None,
     workers: Workers = None,
     scheduler: Scheduler = "",
@@ -104,9 +109,9 @@ def run(
 ) -> None:
     """Run a study file: answer its questions, print their tables, keep data and pictures.
 
-    A study names a model of saltus and its values; it never runs code. A system of your own is given here, by you. What is computed is
-    kept: stopped at any moment, by anything, a study goes on where it was when it is run again. An answer that is there isn't computed
-    twice, unless what it depends on changed.
+    A study names a model of saltus and its values; it never runs code, and reads no file outside its folder unless you allow it with
+    --inputs. A system of your own is given here, by you. What is computed is kept: stopped at any moment, by anything, a study goes on
+    where it was when it is run again. An answer that is there isn't computed twice, unless what it depends on changed.
 
     Example: `saltus run replications/saunders2021/table2.toml`
 
@@ -117,13 +122,18 @@ def run(
     Example: `saltus run replications/saunders2021/fig6b.toml --workers 2`
     """
     from saltus.results import usable_folder
+    from saltus.study.inputs import Inputs
     from saltus.study.own_system import own_system
     from saltus.study.read import read
 
     spec, text = read(study)
+    for place in inputs or []:
+        if not place.is_dir():
+            raise StudyError(f"--inputs {place}: there is no such folder.")
     own = own_system(system) if system else None
     folder = usable_folder(out or Path("saltus-runs") / study.stem)
-    _run(spec, text, folder, study.parent, own, only or [], _resources(spec, threads, workers, scheduler, shard), progress)
+    resources = _resources(spec, threads, workers, scheduler, shard)
+    _run(spec, text, folder, Inputs(study.parent, inputs or []), own, only or [], resources, progress)
 
 
 def _resources(spec: Study, threads: int | None, workers: int | None, scheduler: str, shard: str) -> Resources:
@@ -135,14 +145,14 @@ def _resources(spec: Study, threads: int | None, workers: int | None, scheduler:
 
 
 def _run(
-    spec: Study, text: str, folder: Path, beside: Path, own: System | None, only: list[str], resources: Resources, progress: Progress
+    spec: Study, text: str, folder: Path, inputs: Inputs, own: System | None, only: list[str], resources: Resources, progress: Progress
 ) -> None:
     from saltus.cli import screen
     from saltus.study.run import run_study
 
     try:
         with screen.reporting(progress.value) as (report, say):
-            outcome = run_study(spec, text, folder, own, resources, report, say, beside=beside, only=only)
+            outcome = run_study(spec, text, folder, own, resources, report, say, inputs=inputs, only=only)
     except KeyboardInterrupt:
         screen.fail(f"stopped; what is computed is kept. Go on with: saltus resume {folder}")
         raise
@@ -183,13 +193,13 @@ def resume(
 
     Example: `saltus resume saltus-runs/fig6b`
     """
-    from saltus.study.copies import INPUTS, copy_of
+    from saltus.study.copies import copy_of, inputs_of
     from saltus.study.own_system import own_system
     from saltus.study.read import read
 
     spec, text = read(copy_of(store))
     own = own_system(system) if system else None
-    _run(spec, text, store, store / INPUTS, own, only or [], _resources(spec, threads, workers, scheduler, shard), progress)
+    _run(spec, text, store, inputs_of(store, text), own, only or [], _resources(spec, threads, workers, scheduler, shard), progress)
 
 
 @app.command()

@@ -15,6 +15,8 @@ from rich.markup import escape
 from rich.measure import Measurement
 from rich.table import Table
 
+from saltus.fence import printable
+
 if TYPE_CHECKING:
     from saltus.replication import Progress
     from saltus.study.running import Report
@@ -33,26 +35,26 @@ def console(stderr: bool = False) -> Console:
 def show(table: TextTable) -> None:
     """Print a table and its notes; row by row where the terminal is too narrow for it."""
     screen = console()
-    screen.print(escape(table.title), style="bold")
+    screen.print(_plain(table.title), style="bold")
     grid = Table(show_header=any(table.columns), header_style="dim", box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for number, column in enumerate(table.columns):
         numeric = all(_is_number(row[number]) for row in table.rows if row[number])
-        grid.add_column(escape(column), justify="right" if numeric else "left", no_wrap=True)
+        grid.add_column(_plain(column), justify="right" if numeric else "left", no_wrap=True)
     for row in table.rows:
-        grid.add_row(*map(escape, row))
+        grid.add_row(*map(_plain, row))
     if Measurement.get(screen, screen.options.update(max_width=10 * LOG_WIDTH), grid).maximum <= screen.width:
         screen.print(grid)
     else:
         for row in table.rows:
             lines = [f"{column:>{max(map(len, table.columns))}}  {text}" for column, text in zip(table.columns, row, strict=True) if text]
-            screen.print(escape("\n".join(lines)), end="\n\n")
+            screen.print(_plain("\n".join(lines)), end="\n\n")
     for note in table.notes:
-        screen.print(escape(note), style="dim")
+        screen.print(_plain(note), style="dim")
 
 
 def say(text: str) -> None:
     """Print a line as it is."""
-    console().print(escape(text))
+    console().print(_plain(text))
 
 
 def files(paths: Iterable[Path]) -> None:
@@ -63,7 +65,7 @@ def files(paths: Iterable[Path]) -> None:
 
 def fail(text: str) -> None:
     """Print a message of what went wrong to standard error."""
-    console(stderr=True).print(f"[bold red]saltus:[/] {escape(text)}")
+    console(stderr=True).print(f"[bold red]saltus:[/] {_plain(text)}")
 
 
 @contextmanager
@@ -84,7 +86,7 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
     begin, shown = time.perf_counter(), [0.0]
     if kind == "bar":
         with console(stderr=True).status("working ...") as status:
-            yield lambda report: status.update(_progress_text(report)), say
+            yield (lambda report: status.update(_progress_text(report))) if sys.stderr.isatty() else _log_lines(), say
         say(f"computed in {time.perf_counter() - begin:.1f} s")
         return
 
@@ -113,22 +115,48 @@ def replicating() -> Iterator[Callable[[Progress], None]]:
 
     def text(progress: Progress) -> str:
         running = f"; computing {', '.join(progress.running)}" if progress.running else ""
-        return escape(
+        return _plain(
             f"figure {progress.figure}: {progress.jobs_done} of {progress.jobs}{running}. In all {progress.done} of {progress.total}, "
             f"{time.perf_counter() - begin:.0f} s"
         )
 
+    from saltus.flow.progress import Lines
+
+    lines = Lines(lambda told: console(stderr=True).print(escape(f"saltus: {told}")))
     with console(stderr=True).status("working ...") as status:
-        yield lambda progress: status.update(text(progress))
+        if sys.stderr.isatty():
+            yield lambda progress: status.update(text(progress))
+        else:
+            yield lambda progress: lines.show(progress.done / max(progress.total, 1))
     say(f"computed in {time.perf_counter() - begin:.1f} s")
+
+
+def _log_lines() -> Callable[[Report], None]:
+    """What to call with reports where standard error is a log: a line now and then for each question."""
+    from saltus.flow.progress import Lines
+
+    lines: dict[str, Lines] = {}
+
+    def report(report: Report) -> None:
+        name = report.name
+        if name not in lines:
+            lines[name] = Lines(lambda text: console(stderr=True).print(escape(f"saltus: {name}: {text}")))
+        lines[name].show(report.done / max(report.total, 1))
+
+    return report
 
 
 def _progress_text(report: Report) -> str:
     left = report.seconds_left
     if report.what == "%":
-        return escape(f"{report.name}: {report.done} %{f', {left:.0f} s left' if left is not None else ''}")
+        return _plain(f"{report.name}: {report.done} %{f', {left:.0f} s left' if left is not None else ''}")
     rate = f", {report.computed / report.seconds:.1f} chunks a second, {left:.0f} s left" if left is not None and report.seconds > 0 else ""
-    return escape(f"{report.name}: {report.done} of {report.total} chunks{rate}")
+    return _plain(f"{report.name}: {report.done} of {report.total} chunks{rate}")
+
+
+def _plain(text: str) -> str:
+    """A text that is shown as it is: no markup, and nothing that a terminal would obey."""
+    return escape(printable(text))
 
 
 def _is_number(text: str) -> bool:

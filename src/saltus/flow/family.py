@@ -12,6 +12,7 @@ from saltus.flow.engine import Request, Schedule
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
+from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System
 from saltus.system.tangent import tangent_system
 
@@ -33,20 +34,23 @@ class Family:
         How to integrate.
     parameters : float64[k, P]
         Values in the order of ``system.values``.
-    every : float, optional
+    every : float or float64[k], optional
         Time between two looks [s]: for systems without forcing.
     threads : int, optional
         Threads for everything but :meth:`launch`.
     """
 
-    def __init__(self, system: System, method: Method, parameters: np.ndarray, every: float | None = None, threads: int | None = None):
+    def __init__(
+        self, system: System, method: Method, parameters: np.ndarray, every: float | np.ndarray | None = None, threads: int | None = None
+    ):
         if (every is None) == (system.forced_at is None):
             told = "has no forcing period: give every=, the time between two looks" if every is None else "is forced: leave every= out"
             raise ParameterError(f"{system.name} {told}.")
         self.system, self.method, self.threads = system, method, threads
-        self.parameters, self._every = np.ascontiguousarray(parameters, float), every
+        self.parameters, self._looks = np.ascontiguousarray(parameters, float), every is not None
         self.states = system.states
-        period = np.full(len(self), every) if every is not None else system.period(self.values)
+        check_overlaps(system, self.values)
+        period = system.period(self.values) if every is None else every
         self.period = np.broadcast_to(np.asarray(period, float), len(self)).copy()
 
     def __len__(self) -> int:
@@ -72,7 +76,11 @@ class Family:
 
     def rows(self, which: np.ndarray) -> Family:
         """The family of some of the rows: int64[m], with repeats if wanted, or bool[k]."""
-        return Family(self.system, self.method, self.parameters[which], self._every, self.threads)
+        return Family(self.system, self.method, self.parameters[which], self.period[which] if self._looks else None, self.threads)
+
+    def every(self, time: np.ndarray) -> Family:
+        """The same rows with other times between two looks [s], float64[k]: for systems without forcing."""
+        return Family(self.system, self.method, self.parameters, time, self.threads)
 
     def launch(self, start: np.ndarray, longest: float) -> Flight:
         """Trajectories from float64[k, D], on one thread; they will be asked for ``longest`` periods at most."""

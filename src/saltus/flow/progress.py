@@ -1,24 +1,69 @@
-"""Progress of long work: a callable of the user's, or a bar that appears only if the work lasts."""
+"""Progress of long work: a callable of the user's, a bar on a terminal, lines elsewhere; both only if the work lasts."""
 
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.errors import ParameterError
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
 
 def reporter(progress: bool | Callable[[float], None] | None) -> tuple[Callable[[float], None] | None, Callable[[], None]]:
-    """A progress callable and what to call at the end: the user's own, a bar after two seconds on a terminal, or nothing."""
+    """A progress callable and what to call at the end: the user's own, a bar after two seconds on a terminal, lines elsewhere.
+
+    Raises ParameterError if it is neither a callable, nor True, False or None.
+    """
     if callable(progress):
         return progress, lambda: None
-    if progress is False or (progress is None and not os.isatty(2)):
+    if not (progress is None or isinstance(progress, bool | np.bool_)):
+        raise ParameterError(f"progress must be True, False or a function of the share done, not {progress!r:.80}.")
+    if progress is not None and not progress:
         return None, lambda: None
+    if progress is None and not os.isatty(2):
+        return Lines(_to_stderr).show, lambda: None
     bar = _Bar()
     return bar.show, bar.close
+
+
+def _to_stderr(text: str) -> None:
+    sys.stderr.write(f"saltus: {text}\n")
+    sys.stderr.flush()
+
+
+class Lines:
+    """Lines for a log, which is read afterwards: at 25, 50 and 75 %, and at least one in five minutes, once the work lasts.
+
+    Parameters
+    ----------
+    tell : callable
+        Called with each line.
+    clock : callable
+        The time [s].
+    """
+
+    PATIENCE, EVERY = 10.0, 300.0
+
+    def __init__(self, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
+        self._tell, self._clock = tell, clock
+        self._begun = self._told = clock()
+        self._passed = 0
+
+    def show(self, share: float) -> None:
+        """Say the share done, if it is time to."""
+        now, quarter = self._clock(), int(4 * min(share, 0.999))
+        if now - self._begun < self.PATIENCE or (quarter <= self._passed and now - self._told < self.EVERY):
+            return
+        left = (now - self._begun) * (1 / share - 1) if share > 0 else None
+        self._passed, self._told = max(quarter, self._passed), now
+        self._tell(f"{share:.0%} done in {now - self._begun:.0f} s" + (f", about {left:.0f} s left" if left is not None else ""))
 
 
 class _Bar:

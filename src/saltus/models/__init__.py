@@ -76,4 +76,10 @@ def describe() -> dict[str, str]:
     return {name: (model.__doc__ or "").strip().splitlines()[0] for name, model in MODELS.items()}
 
 
+def __getattr__(name: str) -> Any:
+    if name.startswith("__"):
+        raise AttributeError(name)
+    raise AttributeError(f"no model is called {name!r}. Models: {', '.join(MODELS)}. Write your own equation with @sl.system.")
+
+
 __all__ = ["MODELS", "aeroelastic", "chain", "delangre", "describe", "energy", "find", "gear_pair"]

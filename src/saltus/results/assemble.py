@@ -12,6 +12,7 @@ import xarray as xr
 from saltus.errors import ParameterError
 from saltus.results import schema
 from saltus.results.provenance import content_hash, to_json
+from saltus.results.result import Result
 from saltus.results.variable import Variable
 
 
@@ -154,7 +155,7 @@ class Builder:
     def dataset(self, attrs: Mapping[str, Any]) -> xr.Dataset:
         """The Dataset, with the hash of its numbers."""
         plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
-        ds = xr.Dataset(self.data, self.coords, {**plain, **self.attrs})
+        ds = Result(self.data, self.coords, {**plain, **self.attrs})
         ds.attrs["result_hash"] = content_hash(ds)
         return ds
 

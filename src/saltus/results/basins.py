@@ -25,9 +25,9 @@ class AttractorTable:
     Attributes
     ----------
     kind : sequence of str, length m
-        ``periodic``, ``quasi_periodic`` or ``chaotic``.
+        ``periodic``, ``quasi_periodic`` or ``chaotic``; of a system without forcing ``equilibrium`` or ``limit_cycle`` too.
     period : array of int, shape (m,)
-        Period [forcing periods], 0 where the motion doesn't repeat.
+        Period [forcing periods], 0 where the motion doesn't repeat, or nothing forces it.
     contacts : array, shape (m,)
         Contacts in one period of the response; in a forcing period where it doesn't repeat.
     itinerary : sequence of str, length m
@@ -37,13 +37,17 @@ class AttractorTable:
     margin : array, shape (m,)
         Smallest distance by which the orbit misses or overshoots a boundary [unit of the gap].
     multipliers : array of complex, shape (m, D)
-        Floquet multipliers; NaN where there are none.
+        Floquet multipliers, of a limit cycle the trivial 1 among them; NaN where there are none.
     exponent, exponent_error : array, shape (m,)
         Largest Lyapunov exponent and its error [1/s].
     points : sequence of array, shape (n, D) each
         Stroboscopic points in the order in which they are visited [units of the states]; n may differ between attractors.
     fractions : tuple of three arrays, shape (m,), optional
         Share of the starts, and the lower and upper end of its interval: what :func:`saltus.analysis.uncertainty.fractions` returns.
+    cycle : array, shape (m,), optional
+        Of a system without forcing: period of each limit cycle [s], else NaN.
+    eigenvalues : array of complex, shape (m, D), optional
+        Of a system without forcing: eigenvalues of the Jacobian of each equilibrium [1/s], else NaN.
     """
 
     kind: Sequence[str]
@@ -58,9 +62,24 @@ class AttractorTable:
     exponent_error: np.ndarray
     points: Sequence[np.ndarray]
     fractions: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+    cycle: np.ndarray | None = None
+    eigenvalues: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    @property
+    def points_when(self) -> str:
+        """When the points are taken, in words."""
+        return "at whole forcing periods" if self.cycle is None else "in equal steps of time"
+
+    def unforced(self, size: int) -> dict[str, np.ndarray]:
+        """Columns of a system without forcing, by the ends of their names; none of a forced one. ``size``: as below."""
+        if self.cycle is None or self.eigenvalues is None:
+            return {}
+        both = np.asarray(self.eigenvalues, dtype=complex).reshape(len(self), -1 if len(self) else size)
+        parts = both.real, np.where(np.isnan(both), np.nan, both.imag)
+        return {"cycle": self.cycle, "eigenvalue_real": parts[0], "eigenvalue_imag": parts[1]}
 
     def multiplier_parts(self, size: int) -> tuple[np.ndarray, np.ndarray]:
         """Real and imaginary parts, shape (m, D) each; ``size``: D, where there are no attractors to tell it."""
@@ -99,6 +118,7 @@ class _Builder(Builder):
             "attractor_multiplier_imag": imag,
             "attractor_exponent": table.exponent,
             "attractor_exponent_error": table.exponent_error,
+            **{f"attractor_{name}": column for name, column in table.unforced(len(self.states)).items()},
         }
         self.put("attractor", np.arange(len(table)), coord=True)
         for name, column in columns.items():
@@ -106,7 +126,7 @@ class _Builder(Builder):
         if table.fractions is not None:
             for end, column in zip(("", "_low", "_high"), table.fractions, strict=True):
                 self.put(f"attractor_fraction{end}", column)
-        self.put_points(table.points, ("attractor", "phase"), schema.attractor_name, "at whole forcing periods")
+        self.put_points(table.points, ("attractor", "phase"), schema.attractor_name, table.points_when)
 
 
 def basin_meanings(attractors: int) -> dict[int, str]:

@@ -11,6 +11,7 @@ import xarray as xr
 from saltus.errors import ParameterError
 from saltus.results import schema
 from saltus.results.provenance import content_hash, to_json
+from saltus.results.result import Result
 from saltus.results.variable import Variable
 
 
@@ -58,6 +59,6 @@ class Builder:
         """The Dataset, with the hash of its numbers."""
         plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
         own = {"saltus_result": self.kind, "schema_version": schema.VERSION, "states": " ".join(self.states)}
-        ds = xr.Dataset(self.data, self.coords, {**plain, **own})
+        ds = Result(self.data, self.coords, {**plain, **own})
         ds.attrs["result_hash"] = content_hash(ds)
         return ds

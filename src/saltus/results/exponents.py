@@ -11,6 +11,7 @@ import xarray as xr
 from saltus.errors import ParameterError
 from saltus.results import schema
 from saltus.results.provenance import content_hash, to_json
+from saltus.results.result import Result
 
 #: Meaning of the values of ``near_graze``.
 _NEAR = {0: "clear_of_grazes", 1: "near_graze"}
@@ -73,7 +74,7 @@ def exponents_dataset(
         )
     plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in (attrs or {}).items()}
     own = {"saltus_result": schema.EXPONENTS, "schema_version": schema.VERSION, "states": " ".join(states)}
-    ds = xr.Dataset(data, coords, {**plain, **own})
+    ds = Result(data, coords, {**plain, **own})
     ds.attrs["result_hash"] = content_hash(ds)
     return ds
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import xarray as xr
 
 from saltus.errors import ParameterError, nearest
+from saltus.fence import csv_cell
 from saltus.results import tables
 from saltus.results.files import replacing
 from saltus.results.provenance import describe, file_hash
@@ -127,8 +128,8 @@ def _write_table(path: Path, table: tables.Table, ds: xr.Dataset) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         file.writelines(f"# {line}\n" for line in tables.notes(ds))
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(table)
-        writer.writerows(zip(*(column.tolist() for column in table.values()), strict=True))
+        writer.writerow(map(csv_cell, table))
+        writer.writerows(map(csv_cell, row) for row in zip(*(column.tolist() for column in table.values()), strict=True))
 
 
 # -- MATLAB --------------------------------------------------------------------------------------------------------------------

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import os
+import re
+import time
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from saltus.errors import SaltusError
+
+#: Names of drafts, and the age [s] from which on nobody is writing one any more.
+_DRAFT = re.compile(r"\.(.+\.)?[0-9a-f]{8}\.part")
+_DRAFT_AGE = 86400.0
 
 
 class ResultFileError(SaltusError, OSError):
@@ -35,9 +41,9 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
     Raises
     ------
     ResultFileError
-        If the disk is full, the folder is missing or may not be written to.
+        If the disk is full, the folder is missing or may not be written to, or a path is a link to a file in another folder.
     """
-    paths = tuple(path.resolve() for path in paths)  # through a link, so that the link stays
+    paths = tuple(_target(path) for path in paths)
     if not paths[-1].parent.is_dir():
         raise ResultFileError(f"{paths[-1]} can't be written: there is no folder {paths[-1].parent}. Make it first.")
     temporary = [path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part") for path in paths]
@@ -57,6 +63,24 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
             part.unlink(missing_ok=True)
 
 
+def _target(path: Path) -> Path:
+    """Where a path leads: through a link, so that the link stays, but not out of its folder, where it might lead to anything."""
+    target = path.resolve()
+    if path.is_symlink() and not target.is_relative_to(path.parent.resolve()):
+        raise ResultFileError(
+            f"{path} is a link to {target}, in another folder: nothing is written through it. Remove it, or name the file."
+        )
+    return target
+
+
+def remove_old_drafts(folder: Path) -> None:
+    """Remove the drafts that processes left in a folder which were killed while they wrote: those older than a day."""
+    for draft in folder.glob(".*.part"):
+        with suppress(OSError):  # it isn't ours to remove, or has just taken its place
+            if _DRAFT.fullmatch(draft.name) and draft.is_file() and time.time() - draft.stat().st_mtime > _DRAFT_AGE:
+                draft.unlink()
+
+
 def usable_folder(path: Path) -> Path:
     """A folder that can be written to, made if it isn't there: asked before long work, not after it.
 
@@ -67,6 +91,7 @@ def usable_folder(path: Path) -> Path:
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
+        remove_old_drafts(path)
         probe = path / f".{uuid.uuid4().hex[:8]}.part"
         probe.touch()
         probe.unlink()

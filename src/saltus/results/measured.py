@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 import re
 from collections.abc import Iterator
@@ -11,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from saltus.errors import UnitError, nearest
+from saltus import fence
+from saltus.errors import UnitError
 from saltus.results.files import ResultFileError
 from saltus.units import to_si
 
@@ -43,8 +45,17 @@ def read_measured(path: str | os.PathLike[str], axis: str, axis_unit: str, ampli
         If the file can't be read, lacks a column or a unit, or holds something that isn't a number.
     """
     path = Path(path)
+    try:
+        data = fence.content(path, fence.TABLE_BYTES)
+    except fence.RefusedError as refused:
+        raise ResultFileError(f"{path} {refused}") from None
+    return measured_points(data, path, axis, axis_unit, amplitude_unit)
+
+
+def measured_points(data: bytes, path: Path, axis: str, axis_unit: str, amplitude_unit: str) -> xr.Dataset:
+    """The same from what is in the file; ``path`` is for messages, in which nothing of the file is repeated."""
     units = {axis: axis_unit, "amplitude": amplitude_unit}
-    rows = _rows(path)
+    rows = _rows(data, path)
     header = next(rows, None)
     if header is None:
         raise ResultFileError(f"{path} is empty. Its first line names the columns: {_wanted(units)}.")
@@ -57,15 +68,16 @@ def _wanted(units: dict[str, str]) -> str:
     return ", ".join(f"{name} [{'mm' if unit == 'm' else unit}]" for name, unit in units.items())
 
 
-def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+def _rows(data: bytes, path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of each line that isn't empty or a comment."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            for line, cells in enumerate(csv.reader(file), 1):
-                if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
-                    yield line, cells
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ResultFileError(f"{path} can't be read: {getattr(error, 'strerror', None) or error}.") from None
+        for line, cells in enumerate(csv.reader(fence.text(data).splitlines(keepends=True)), 1):
+            if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
+                yield line, cells
+    except fence.RefusedError as refused:
+        raise ResultFileError(f"{path} {refused}") from None
+    except csv.Error as error:
+        raise ResultFileError(f"{path} can't be read: {error}.") from None
 
 
 def _column(path: Path, header: list[str], name: str, unit: str, units: dict[str, str]) -> tuple[int, str, str, str]:
@@ -75,7 +87,7 @@ def _column(path: Path, header: list[str], name: str, unit: str, units: dict[str
         match = _HEADER.fullmatch(text)
         found[match["name"] if match else text.strip()] = (i, match["unit"].strip() if match else "")
     if name not in found:
-        raise ResultFileError(f"{path} has no column {name!r}. {nearest(name, found)} The first line must be like {_wanted(units)}.")
+        raise ResultFileError(f"{path} has no column {name!r}. The first line must be like {_wanted(units)}.")
     index, given = found[name]
     if not given and unit not in ("", "1"):
         raise ResultFileError(f"{path}: the column {name!r} has no unit. Write it in the header: {_wanted(units)}.")
@@ -83,14 +95,16 @@ def _column(path: Path, header: list[str], name: str, unit: str, units: dict[str
 
 
 def _number(path: Path, line: int, row: list[str], index: int, name: str, given: str, unit: str) -> float:
-    text = row[index].strip() if index < len(row) else ""
     try:
-        value = float(text)
+        value = float(row[index].strip() if index < len(row) else "")
     except ValueError:
-        raise ResultFileError(f"{path}, line {line}: {text!r} in the column {name!r} is no number.") from None
+        value = math.nan
+    if not math.isfinite(value):
+        raise ResultFileError(f"{path}, line {line}: what stands in the column {name!r} is no finite number.")
     if not given:
         return value
     try:
         return to_si(f"{value!r} {given}", unit, name)
-    except UnitError as error:
-        raise ResultFileError(f"{path}: {error}") from None
+    except UnitError:
+        wanted = "mm" if unit == "m" else unit
+        raise ResultFileError(f"{path}: the column {name!r} has the wrong unit in its header. Write {name} [{wanted}].") from None

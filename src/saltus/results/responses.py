@@ -239,7 +239,7 @@ class _Builder(Builder):
         columns = {
             "branch": responses.branch, "type": list(table.kind), "period": table.period, "contacts": _per_period(table),
             "peak": table.peak, "rms": table.rms, "margin": table.margin, "multiplier_real": real, "multiplier_imag": imag,
-            "exponent": table.exponent, "exponent_error": table.exponent_error,
+            "exponent": table.exponent, "exponent_error": table.exponent_error, **table.unforced(len(self.states)),
         }  # fmt: skip
         self.put("response", np.arange(len(table)), coord=True)
         place = np.asarray(responses.place, dtype=np.int64).reshape(len(table), len(axes))
@@ -250,7 +250,7 @@ class _Builder(Builder):
         if table.fractions is not None:
             for end, column in zip(("", "_low", "_high"), table.fractions, strict=True):
                 self.put(f"response_share{end}", column)
-        self.put_points(table.points, ("response", "phase"), schema.response_name, "at whole forcing periods")
+        self.put_points(table.points, ("response", "phase"), schema.response_name, table.points_when)
 
     def put_outputs(self, outputs: OutputNumbers) -> None:
         """Add what is read off each response; the units of outputs differ, so they stand in a variable of their own."""
@@ -281,5 +281,5 @@ class _Builder(Builder):
 
 
 def _per_period(table: AttractorTable) -> np.ndarray:
-    """Contacts in a forcing period."""
+    """Contacts in a forcing period; in a cycle, where nothing forces it."""
     return np.asarray(table.contacts, dtype=float) / np.maximum(np.asarray(table.period), 1)

@@ -30,6 +30,7 @@ from saltus.errors import ParameterError
 from saltus.results import motions
 from saltus.results.method_variables import METHODS_VARIABLES
 from saltus.results.response_variables import RESPONSES_VARIABLES
+from saltus.results.result import Result
 from saltus.results.variable import COUNTERS, FORCING_PERIOD, GUARDS, MINIMA, STATUS, TRAJECTORY_NUMBER, Variable
 
 #: Version of the tables below, kept in every result as ``schema_version``.
@@ -107,6 +108,11 @@ ATTRACTOR_VARIABLES = {
     "attractor_margin": Variable(("attractor",), "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"),
     "attractor_multiplier_real": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, real part"),
     "attractor_multiplier_imag": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, imaginary part"),
+    "attractor_cycle": Variable(("attractor",), "s", "period of a limit cycle"),
+    "attractor_eigenvalue_real": Variable(("attractor", "multiplier"), "1/s", "eigenvalue of the Jacobian of an equilibrium, real part"),
+    "attractor_eigenvalue_imag": Variable(
+        ("attractor", "multiplier"), "1/s", "eigenvalue of the Jacobian of an equilibrium, imaginary part"
+    ),
     "attractor_exponent": Variable(("attractor",), "1/s", "largest Lyapunov exponent"),
     "attractor_exponent_error": Variable(("attractor",), "1/s", "error of the largest Lyapunov exponent"),
     "attractor_fraction": Variable(("attractor",), "1", "share of the starts"),
@@ -340,7 +346,7 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
             attrs["flag_values"] = np.atleast_1d(np.asarray(attrs["flag_values"], dtype=data.dtype))
         variables[name] = xr.Variable(variable.dims, data, attrs)
     coords = {name: variables.pop(name) for name in ds.coords}
-    return xr.Dataset(variables, coords, {key: _plain(value) for key, value in ds.attrs.items()})
+    return Result(variables, coords, {key: _plain(value) for key, value in ds.attrs.items()})
 
 
 def _plain(value: Any) -> Any:

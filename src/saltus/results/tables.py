@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,19 +14,38 @@ from saltus.results.schema import parameters_of, response_name, sample_dim, stat
 Table = dict[str, np.ndarray]
 
 
-def samples(ds: xr.Dataset) -> Table:
-    """One row a sample: trajectory (of a batch), time, period, states, mode. Headers carry the units: ``x [m]``."""
+#: Columns by name, each with the variable of the result that it is.
+Columns = dict[str, tuple[str, np.ndarray]]
+
+
+def sample_columns(ds: xr.Dataset) -> Columns:
+    """One row a sample: trajectory (of a batch), time, period, states, mode."""
     names = [name for name in ("trajectory", "time", "period", *states_of(ds), "mode") if name in ds]
     dims = [dim for dim in ("trajectory", sample_dim(ds)) if dim in ds.dims]
     shape = xr.Variable(dims, np.empty([ds.sizes[dim] for dim in dims]))
-    return {_header(ds, name): _spread(ds[name].variable, shape) for name in names}
+    return {name: (name, _spread(ds[name].variable, shape)) for name in names}
+
+
+def contact_columns(ds: xr.Dataset) -> Columns:
+    """One row a contact, of the trajectories that the Dataset (still) has. The prefix ``contact_`` is dropped; empty for a result without
+    contacts.
+    """
+    names = [str(name) for name in ds.data_vars if ds[name].dims == ("contact",)]
+    names.sort(key=lambda name: name != "contact_trajectory")
+    mine: Any = slice(None)
+    if "contact_trajectory" in names and "trajectory" in ds:
+        mine = np.isin(ds["contact_trajectory"].values, ds["trajectory"].values)
+    return {name.removeprefix("contact_"): (name, ds[name].values[mine]) for name in names}
+
+
+def samples(ds: xr.Dataset) -> Table:
+    """As :func:`sample_columns`, with headers that carry the units: ``x [m]``."""
+    return {_header(ds, name): values for name, values in sample_columns(ds).values()}
 
 
 def contacts(ds: xr.Dataset) -> Table:
-    """One row a contact. The prefix ``contact_`` is dropped; empty for a result without contacts."""
-    names = [str(name) for name in ds.data_vars if ds[name].dims == ("contact",)]
-    names.sort(key=lambda name: name != "contact_trajectory")
-    return {_header(ds, name).removeprefix("contact_"): ds[name].values for name in names}
+    """As :func:`contact_columns`, with headers that carry the units."""
+    return {_header(ds, name).removeprefix("contact_"): values for name, values in contact_columns(ds).values()}
 
 
 def trajectories(ds: xr.Dataset) -> Table:

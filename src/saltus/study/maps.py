@@ -18,6 +18,7 @@ from saltus.flow.threads import usable_processors
 from saltus.results.store import Store
 from saltus.study import quantities
 from saltus.study.identity import identity
+from saltus.study.inputs import Inputs
 from saltus.study.names import slug
 from saltus.study.processes import run_on_processes
 from saltus.study.questions.basins import Basins, Map
@@ -65,7 +66,7 @@ def jobs_of(study: Study, own: System | None = None) -> list[MapJob]:
         If the study doesn't fit its system.
     """
     assert study.basins is not None
-    return jobs_of_setting(study.basins, Setting(study, system_of(study.system, own), Path()))
+    return jobs_of_setting(study.basins, Setting(study, system_of(study.system, own), Inputs(Path())))
 
 
 def jobs_of_setting(table: Basins, setting: Setting) -> list[MapJob]:

@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from saltus.errors import nearest
+from saltus.fence import SHOWN, shown
 from saltus.study.questions.basins import Axis, Basins, Map
 from saltus.study.questions.lyapunov import Lyapunov
 from saltus.study.questions.responses import BifurcationDiagram, FrequencyResponse
@@ -38,6 +39,12 @@ _EXPECTED = {
 }
 
 
+def _given(value: Any) -> str:
+    """A value as a message repeats it: as TOML would write it, cut if it is long."""
+    whole = toml(value)
+    return whole if len(whole) <= SHOWN else f"{whole[:SHOWN]}…"
+
+
 def toml(value: Any) -> str:
     """A value as TOML would write it on one line."""
     match value:
@@ -55,7 +62,8 @@ def syntax_fault(error: TOMLDecodeError, text: str) -> str:
     """A sentence on text that isn't TOML: the line, and what to write if the fault is a common one."""
     place = re.search(r"line (\d+)", str(error))
     number = int(place[1]) if place else text.rstrip().count("\n") + 1
-    line = text.splitlines()[number - 1].strip() if text.strip() else ""
+    lines = text.split("\n")
+    line = shown(lines[min(number, len(lines)) - 1].strip())
     if re.match(r"Cannot (overwrite|declare|mutate)|Duplicate", str(error)):
         return f"line {number}: {line!r} gives again what stands in the file already. Keep one of the two."
     quantity = _BARE_QUANTITY.fullmatch(line)
@@ -99,7 +107,7 @@ def _fault(place: tuple, details: list[dict], data: Any) -> str:
     if kind == "union_tag_invalid":
         given = str(first["ctx"]["tag"])
         alike = [name for name in METHODS if name.lower() == given.lower()]
-        return f"[{'.'.join(path)}] name = {toml(given)} is no method. {nearest(alike[0] if alike else given, METHODS)}"
+        return f"[{'.'.join(path)}] name = {_given(given)} is no method. {nearest(alike[0] if alike else given, METHODS)}"
     if kind == "union_tag_not_found":
         return f'[{".".join(path)}] needs \'name\'. Write name = "Taylor" or name = "ODE45".'
     if kind == "value_error":
@@ -108,12 +116,12 @@ def _fault(place: tuple, details: list[dict], data: Any) -> str:
         finite = any(detail["type"] == "finite_number" for detail in details)
         expected = "a finite number" if finite else 'a plain number, or text with a unit, such as "0.4 mm"'
     elif kind in ("too_short", "too_long"):
-        return f"{where}{key} = {toml(first['input'])} must have {first['msg'].split('have ')[1].split(' after')[0]}." + _example(place)
+        return f"{where}{key} = {_given(first['input'])} must have {first['msg'].split('have ')[1].split(' after')[0]}." + _example(place)
     elif kind == "list_type" and len(place) == 1:
         expected = "a table"
     else:
         expected = _EXPECTED.get(kind, first["msg"].removeprefix("Input should be "))
-    return f"{where}{key} = {toml(first['input'])} must be {expected}." + _example(place)
+    return f"{where}{key} = {_given(first['input'])} must be {expected}." + _example(place)
 
 
 def _table(place: tuple) -> type[BaseModel] | None:

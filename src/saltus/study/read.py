@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
+from saltus import fence
 from saltus.errors import StudyError
 from saltus.study.messages import content_faults, syntax_fault
 from saltus.study.spec import Study
@@ -24,7 +26,7 @@ def read(path: Path | str) -> tuple[Study, str]:
     -------
     study : Study
     text : str
-        The file as it stands; kept with the result.
+        The file as it stands, to the byte; kept with the result.
 
     Raises
     ------
@@ -33,21 +35,43 @@ def read(path: Path | str) -> tuple[Study, str]:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it isn't UTF-8 text"
-        raise StudyError(f"the study {path} can't be read: {reason}.") from None
+        data = fence.content(path, fence.STUDY_BYTES)
+        fence.text(data)
+    except fence.RefusedError as refused:
+        raise StudyError(f"the study {path} {refused}") from None
+    text = data.decode("utf-8")
     return parse(text, str(path)), text
 
 
 def parse(text: str, name: str = "study") -> Study:
     """A study from its text; ``name`` stands in the messages. Raises StudyError as :func:`read` does."""
+    text = text.removeprefix("\ufeff")  # the mark of Windows editors
     try:
-        data = tomllib.loads(text)
+        data = fence.toml(text)
+        _short(data)
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{name}, {syntax_fault(error, text)}") from None
+    except fence.RefusedError as refused:
+        raise StudyError(f"{name} {refused}") from None
     try:
         return Study.model_validate(data)
     except ValidationError as error:
         faults = content_faults(error, data)
         raise StudyError(f"{name}: " + (faults[0] if len(faults) == 1 else "".join(f"\n  - {fault}" for fault in faults))) from None
+
+
+#: Most characters of texts, by key: titles and paths may be longer than quantities and words, descriptions longer still.
+_LONGEST = {"name": 200, "printed": 400, "exact": 400, "measured": 400, "description": 20_000, "source": 20_000}
+_WORD = 100
+
+
+def _short(data: Any, key: str = "") -> None:
+    """Refuse a text that is longer than any that could stand there."""
+    if isinstance(data, dict):
+        for name, value in data.items():
+            _short(value, name)
+    elif isinstance(data, list):
+        for value in data:
+            _short(value, key)
+    elif isinstance(data, str) and len(data) > _LONGEST.get(key, _WORD):
+        raise fence.RefusedError(f"has a text of {len(data)} characters in {key!r}, where at most {_LONGEST.get(key, _WORD)} fit.")

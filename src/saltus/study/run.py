@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import StudyError, nearest
+from saltus.results.files import remove_old_drafts
 from saltus.study.copies import keep_copy
+from saltus.study.inputs import Inputs
 from saltus.study.questions import basins, lyapunov, responses, simulate
 from saltus.study.running import Outcome, Report, Resources, Running
 from saltus.study.setting import Setting, system_of
@@ -37,7 +39,7 @@ def run_study(
     say: Callable[[str], None],
     pictures: bool = True,
     *,
-    beside: Path | None = None,
+    inputs: Inputs | None = None,
     only: Sequence[str] = (),
 ) -> Outcome:
     """Answer the questions of a study, or what is missing of the answers, and write what came out.
@@ -58,8 +60,8 @@ def run_study(
         Called with the progress of a question; with a sentence.
     pictures : bool
         Whether to draw.
-    beside : Path, optional
-        Where the study stands: files that it names are looked for there. Default: ``folder``.
+    inputs : Inputs, optional
+        The files that the study names. By default they are looked for in ``folder``.
     only : sequence of str
         Names of questions to answer; by default all.
 
@@ -70,14 +72,16 @@ def run_study(
     StoreError
         If a store in the folder was made from something else: names what differs.
     """
-    asked = questions_of(study, own, beside or folder, only)
+    remove_old_drafts(folder)
+    inputs = inputs or Inputs(folder)
+    asked = questions_of(study, own, inputs, only)
     if resources.scheduler not in (None, "local"):
         from saltus.study.cluster import check_scheduler
 
         check_scheduler(str(resources.scheduler))
     for question in asked:
         question.prepare(folder)
-    keep_copy(folder, text, (file for question in asked for file in question.files()))
+    keep_copy(folder, text, inputs.taken)
     at, outcome = Running(folder, text, resources, report, say, pictures), Outcome()
     for question in asked:
         if resources.shard is None or resources.shard[0] == 0 or question.shared:
@@ -85,7 +89,7 @@ def run_study(
     return outcome
 
 
-def questions_of(study: Study, own: System | None, beside: Path, only: Sequence[str] = ()) -> list[Question]:
+def questions_of(study: Study, own: System | None, inputs: Inputs, only: Sequence[str] = ()) -> list[Question]:
     """The questions of a study, or some of them, checked against its system.
 
     Raises
@@ -93,7 +97,7 @@ def questions_of(study: Study, own: System | None, beside: Path, only: Sequence[
     StudyError, UnitError, ParameterError
         If one doesn't fit the system, two would write the same files, or ``only`` names none.
     """
-    setting = Setting(study, system_of(study.system, own), beside)
+    setting = Setting(study, system_of(study.system, own), inputs)
     asked = [(name, question) for name, table in study.questions() for question in _PLANS[name](table, setting)]
     stems = [stem for _, question in asked for stem in question.stems]
     twice = sorted({stem for stem in stems if stems.count(stem) > 1})

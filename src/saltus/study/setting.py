@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from inspect import signature
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import StudyError
 from saltus.study import quantities
 
 if TYPE_CHECKING:
+    from saltus.study.inputs import Inputs
     from saltus.study.spec import Study
     from saltus.study.spec_parts import SystemTable
     from saltus.study.spec_parts import Table as SpecTable
@@ -26,13 +26,13 @@ class Setting:
     study : Study
     base : System
         With the values of [system].
-    beside : Path
-        Where files that the study names are looked for.
+    inputs : Inputs
+        The files that the study names.
     """
 
     study: Study
     base: System
-    beside: Path
+    inputs: Inputs
 
     def system(self, values: Any, place: str) -> System:
         """The system with the values of one question."""
@@ -41,11 +41,6 @@ class Setting:
     def method(self, own: SpecTable | None = None) -> Any:
         """The method of one question: its own, or the study's."""
         return method_of(own or self.study.method)
-
-    def file(self, name: str) -> Path:
-        """A file that the study names; of the copy of a study in an output folder, the copy of the file."""
-        path = self.beside / name
-        return path if path.exists() else self.beside / Path(name).name
 
 
 def system_of(table: SystemTable, own: System | None = None) -> System:

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
+from saltus.fence import MOST_COUNT, MOST_PERIODS, has_control
 from saltus.study.names import slug
 
 #: A quantity as written: a bare number if it has no dimension, else text with its unit.
@@ -17,6 +18,25 @@ Quantity = float | str
 Start = Quantity | list[Quantity]
 #: Lower and upper end.
 Interval = Annotated[list[Quantity], Field(min_length=2, max_length=2)]
+
+
+def _title(name: str) -> str:
+    if has_control(name) or len(name.splitlines()) != 1 or not name.strip():
+        raise ValueError("must be one line of plain text")
+    return name
+
+
+def _file_name(name: str) -> str:
+    if len(slug(name)) > LONGEST:
+        raise ValueError(f"gives a file name of {len(slug(name))} characters; at most {LONGEST} fit beside the others")
+    return name
+
+
+#: Most characters of a name that names files too.
+LONGEST = 100
+#: What something is called in tables and pictures; and in the names of files as well.
+Title = Annotated[str, Field(min_length=1), AfterValidator(_title)]
+FileTitle = Annotated[Title, AfterValidator(_file_name)]
 
 
 class Table(BaseModel):
@@ -28,7 +48,7 @@ class Table(BaseModel):
 class Header(Table):
     """[study]: what it is, for people."""
 
-    name: str = Field(min_length=1, description="A title.", examples=["Rig b4 at 15 Hz"])
+    name: Title = Field(description="A title.", examples=["Rig b4 at 15 Hz"])
     description: str = Field("", description="What the study shows.", examples=["Four starts, four responses"])
     source: str = Field("", description="Where the setting comes from.", examples=["Saunders et al. (2021), Table 2"])
 
@@ -76,7 +96,7 @@ class Range(Table):
 
     first: Quantity | None = Field(None, description="The first value.", examples=["2 Hz"])
     last: Quantity | None = Field(None, description="The last value.", examples=["30 Hz"])
-    count: int | None = Field(None, ge=1, description="How many values.", examples=[281])
+    count: int | None = Field(None, ge=1, le=MOST_COUNT, description="How many values.", examples=[281])
     scale: Literal["linear", "log"] = Field("linear", description="Evenly spaced in the values, or in their logarithms.", examples=["log"])
     values: list[Quantity] | None = Field(None, min_length=1, description="The values themselves, ascending.", examples=[["5 Hz", "17 Hz"]])
 
@@ -105,7 +125,7 @@ class Named(Table):
     #: What one without a name is called.
     called: ClassVar[str]
 
-    name: str | None = Field(None, min_length=1, description="What it is called in tables, pictures and files.", examples=["stiff stop"])
+    name: FileTitle | None = Field(None, description="What it is called in tables, pictures and files.", examples=["stiff stop"])
 
     @property
     def title(self) -> str:
@@ -135,7 +155,7 @@ START = Field(
     examples=[{"x": ["0 mm", "2 mm"], "v": "0 m/s"}, "sweep_up"],
 )
 BOX = Field(None, description="Range of each state for random starts.", examples=[{"x": ["-5 mm", "5 mm"], "v": ["-1 m/s", "1 m/s"]}])
-PERIODS = Field(2000, ge=1, description="Forcing periods that a start is followed at most.", examples=[2000])
+PERIODS = Field(2000, ge=1, le=MOST_PERIODS, description="Forcing periods that a start is followed at most.", examples=[2000])
 SEED = Field(1, ge=0, description="Of random starts.", examples=[1])
 
 T = TypeVar("T", bound=Table)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from saltus.errors import SaltusError, StudyError
-from saltus.study.copies import COPY, copy_of
+from saltus.study.copies import COPY, copy_of, inputs_of
 from saltus.study.kept import PARTIAL
 from saltus.study.maps import STORES
 from saltus.study.table import TextTable
@@ -28,10 +28,10 @@ def status_tables(folder: Path) -> list[TextTable]:
         If it holds neither a study nor a store.
     """
     maps = [status_table(found)] if (found := stores(folder)) else []
-    others = [] if (folder / "store.json").exists() else question_rows(folder)
-    if not maps and not others:
+    others = None if (folder / "store.json").exists() else question_table(folder)
+    if not maps and others is None:
         raise StudyError(f"{folder} holds no store and no study. Give the output folder of a study, such as saltus-runs/fig6b.")
-    return maps + ([TextTable("Questions", ("question", "file", "state", "last written"), tuple(others))] if others else [])
+    return maps + ([others] if others is not None else [])
 
 
 @dataclass(frozen=True)
@@ -72,13 +72,20 @@ def _row(one: StoreStatus | DamagedStore) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def question_rows(folder: Path) -> list[tuple[str, ...]]:
-    """A row for each question whose answer is one file; none without a copy of the study."""
+def question_table(folder: Path) -> TextTable | None:
+    """A row for each question whose answer is one file; None without a copy of the study."""
     from saltus.study.read import read
 
     if not (folder / COPY).is_file():
-        return []
-    return [(title, f"{stem}.nc", *_state(folder / f"{stem}.nc")) for title, stem in read(copy_of(folder))[0].answers()]
+        return None
+    notes: list[str] = []
+    try:
+        study, text = read(copy_of(folder))
+        inputs_of(folder, text)
+        rows = [(title, f"{stem}.nc", *_state(folder / f"{stem}.nc")) for title, stem in study.answers()]
+    except StudyError as error:
+        rows, notes = [("the study", COPY, "changed or damaged", _written(folder / COPY))], [str(error)]
+    return TextTable("Questions", ("question", "file", "state", "last written"), tuple(rows), tuple(notes)) if rows else None
 
 
 def _state(file: Path) -> tuple[str, str]:
@@ -87,9 +94,12 @@ def _state(file: Path) -> tuple[str, str]:
 
     if not file.exists():
         return ("stopped on the way" if file.with_stem(f"{file.stem}{PARTIAL}").exists() else "not yet"), "never"
-    written = datetime.datetime.fromtimestamp(file.stat().st_mtime, datetime.UTC).strftime(_TIME)
     try:
         load(file)
     except SaltusError:
-        return "damaged", written
-    return "done", written
+        return "damaged", _written(file)
+    return "done", _written(file)
+
+
+def _written(file: Path) -> str:
+    return datetime.datetime.fromtimestamp(file.stat().st_mtime, datetime.UTC).strftime(_TIME)

@@ -6,6 +6,8 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 
+from saltus.fence import csv_cell
+
 #: Rows printed at most; the files hold them all.
 ROWS = 24
 
@@ -35,6 +37,6 @@ class TextTable:
         from saltus.results.files import replacing
 
         with replacing(path) as (part,), part.open("w", newline="", encoding="utf-8") as file:
-            file.writelines(f"# {note}\n" for note in (self.title, *self.notes))
-            csv.writer(file).writerows([self.columns, *self.rows])
+            file.writelines(f"# {' '.join(note.split())}\n" for note in (self.title, *self.notes))
+            csv.writer(file).writerows([map(csv_cell, row) for row in (self.columns, *self.rows)])
         return path

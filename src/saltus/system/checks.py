@@ -26,8 +26,6 @@ def check_range(name: str, value: Any, forced_at: str | None) -> None:
             raise ParameterError(f"{name} = {numbers[bad].ravel()[0]:g}{where} {what}")
 
     refuse(~np.isfinite(numbers), "is not a finite number.")
-    if "gap" in name:
-        refuse(numbers < 0, "is negative. A gap is a distance, >= 0; the lower boundary stands at x = -lower_gap.")
     if "mass" in name:
         refuse(numbers <= 0, "must be positive: the equation divides by the mass.")
     if name == forced_at:

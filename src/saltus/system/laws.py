@@ -39,8 +39,9 @@ def freeplay(
     gap : Expr or float, optional
         Clearance on either side [as x], >= 0. In place of ``lower_gap`` and ``upper_gap``.
     lower_gap, upper_gap : Expr or float, optional
-        Clearance below and above [as x], >= 0; contact begins at ``x = -lower_gap`` and ``x = upper_gap``. A side that isn't given has no
-        contact.
+        Clearance below and above [as x]; contact begins at ``x = -lower_gap`` and ``x = upper_gap``. A side that isn't given has no
+        contact. One of them may be negative, as that of a preloaded stop is; their sum may not: springs that touch on both sides at once
+        are the sum of two one-sided contacts.
     damping : Expr or float, optional
         Viscous damping in contact only [N*s/m, or N*m*s/rad]. The force then jumps at the boundary, and may pull shortly before contact
         ends.

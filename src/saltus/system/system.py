@@ -9,11 +9,14 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from saltus.errors import ParameterError, nearest
 from saltus.system import checks, serial
 from saltus.system.derivatives import gradient
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
+from saltus.system.overlaps import check_overlaps
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,6 +59,7 @@ class System:
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
         for name, value in self.values.items():
             checks.check_range(name, value, self.forced_at)
+        check_overlaps(self, self.values)
         checks.check_periodic(self)
 
     # -- values -----------------------------------------------------------------------------------------------------------------
@@ -128,6 +132,35 @@ class System:
         """Derivative of each gap (row) with respect to each state (column), in a frozen mode."""
         return tuple(gradient(guard.gap, self.states) for guard in self.guards)
 
+    def rhs(self, t: Any, y: Any) -> np.ndarray:
+        """The right-hand side as a plain function: time derivatives of the states, by NumPy.
+
+        For other integrators to be held against: ``scipy.integrate.solve_ivp(rig.rhs, (0, 1), y0)``. It knows no modes: which piece holds
+        is read off the state, and no contact is located. Trajectories of saltus are computed by generated code, some thousand times faster.
+
+        Parameters
+        ----------
+        t : float or array
+            Time [s].
+        y : array, shape (states, ...)
+            The states, in their order [SI].
+
+        Returns
+        -------
+        ndarray, shape (states, ...)
+            [SI per second].
+
+        Raises
+        ------
+        ParameterError
+            If ``y`` has another number of states.
+        """
+        from saltus.system.evaluate import field
+
+        if len(y) != len(self.states):
+            raise ParameterError(f"{self.name} has the states {', '.join(self.states)}, but y holds {len(y)} of them.")
+        return field(self, t, y)
+
     def equations(self) -> list[str]:
         """The equations as text, one line each; long parts that are used twice come first, named."""
         from saltus.system.display import equation_lines
@@ -177,3 +210,19 @@ class System:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return System.from_dict, (self.to_dict(),)
+
+    # -- what it isn't ----------------------------------------------------------------------------------------------------------
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        """Refuse: a System is no function. Raises ParameterError."""
+        raise ParameterError(
+            f"{self.name} is a System, not a function. Run it with sl.simulate({self.name}, ...); "
+            f"other values are {self.name}.with_values(...)."
+        )
+
+
+def _refuse_change(self: System, name: str, _value: Any) -> None:
+    change = f"system.with_values({name}=...)" if name in self.values else "system.with_values(...)"
+    raise ParameterError(f"a System is never changed. Write system = {change}, a copy with other values.")
+
+
+System.__setattr__ = _refuse_change  # type: ignore[assignment]  # in place of dataclass's own refusal, which doesn't say what to do

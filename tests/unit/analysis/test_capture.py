@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from saltus.analysis.capture import Neighbourhoods, _alike, _shell, neighbourhoods
+from saltus.analysis.capture import Neighbourhoods, _alike, neighbourhoods, sphere
 from saltus.analysis.orbits import polish
 from saltus.analysis.recurrence import Found, find
 from saltus.analysis.settling import settle
@@ -190,7 +190,7 @@ def test_alike_allows_a_contact_at_the_very_start_or_end_and_nothing_else():
 def test_shells_lie_on_the_unit_sphere_all_round_and_without_warnings(size):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        points = _shell(size)
+        points = sphere(size)
     assert np.linalg.norm(points, axis=1) == pytest.approx(np.ones(len(points)), abs=1e-15)
     assert (points.min(axis=0) < -0.7).all()
     assert (points.max(axis=0) > 0.7).all()

@@ -83,15 +83,19 @@ def test_two_parameters_can_not_be_swept_and_three_not_varied():
         sl.bifurcation_diagram(RIG, {**two, "mass": ("2 kg", "3 kg", 2)})
 
 
-def test_an_unforced_system_is_refused():
+def test_an_unforced_system_is_told_what_to_give():
     @sl.system(states="x v")
     def free(t, x, v, *, stiffness=1.0):
         return v, -stiffness * x
 
-    with pytest.raises(ParameterError, match="no forcing frequency"):
+    with pytest.raises(ParameterError, match=r"Take sl\.bifurcation_diagram over another parameter, with every="):
         sl.frequency_response(free, (1.0, 2.0, 3))
-    with pytest.raises(ParameterError, match="no forcing period"):
+    with pytest.raises(ParameterError, match="Give every="):
         sl.bifurcation_diagram(free, {"stiffness": (1.0, 2.0, 3)})
+    with pytest.raises(ParameterError, match="it has no stroboscope"):
+        sl.bifurcation_diagram(free, {"stiffness": (1.0, 2.0, 3)}, every=1.0, sample="stroboscope")
+    with pytest.raises(ParameterError, match=r"is forced.*Leave every= out"):
+        sl.bifurcation_diagram(RIG, {"force": (1.0, 2.0, 3)}, every=1.0)
 
 
 def test_a_huge_grid_is_refused_before_it_fills_memory():

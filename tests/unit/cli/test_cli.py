@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from saltus.cli import app, commands
+from saltus.codegen import entry
 
 COMMANDS = ["demo", "run", "status", "resume", "plot", "reproduce", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
 
@@ -98,9 +99,8 @@ def test_models():
 
 def test_cache(monkeypatch, tmp_path):
     monkeypatch.setenv("SALTUS_CACHE", str(tmp_path))
-    entry = tmp_path / "0123456789abcdef"
-    entry.mkdir()
-    (entry / "manifest.json").write_text('{"title": "rig, ode45", "files": {}}')
+    tmp_path.chmod(0o700)
+    entry.write(tmp_path / "0123456789abcdef.kernel", "rig, ode45", b"machine code")
     assert "rig, ode45" in saltus("cache", "show").output
     assert saltus("cache").output == saltus("cache", "show").output
     assert "deleted 1 entry from" in saltus("cache", "clear").output

@@ -34,6 +34,20 @@ def test_every_key_of_a_study_stands_in_the_tables():
     assert "anything" not in text, "a type has no words"
 
 
+def test_every_variable_of_every_result_stands_in_the_dictionary():
+    from result_tables import markdown
+
+    from saltus.results.schema import TABLES
+
+    text = markdown()
+    for table in TABLES.values():
+        for name, variable in table.items():
+            assert f"| `{name}` | {', '.join(variable.dims)} |" in text
+            assert variable.long_name.replace("|", "\N{DIVIDES}").replace("<", "&lt;") in text
+    lengths = {line.count("|") for line in text.splitlines() if line.startswith("|")}
+    assert lengths == {5}, "a cell holds the sign between cells"
+
+
 def reachable(model, base):
     """All tables below one, found without the code under test."""
     found = set()

@@ -1,5 +1,6 @@
 """A file is there in full or not at all, and one that isn't what it was is refused."""
 
+import os
 import subprocess
 import sys
 import textwrap
@@ -9,7 +10,7 @@ import pytest
 import xarray as xr
 
 from saltus.errors import SaltusError
-from saltus.results import ResultFileError, export, load, save
+from saltus.results import ResultFileError, export, load, save, usable_folder
 from saltus.results.files import replacing
 
 from .conftest import sine_run
@@ -77,6 +78,26 @@ def test_a_link_stays_a_link(tmp_path):
     save(sine_run(), tmp_path / "link.nc")
     assert (tmp_path / "link.nc").is_symlink()
     assert load(tmp_path / "real.nc").attrs["system"] == "sine"
+
+
+def test_a_link_out_of_the_folder_is_not_written_through(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "precious").write_text("mine")
+    (tmp_path / "out" / "run.nc").symlink_to(tmp_path / "precious")
+    with pytest.raises(ResultFileError, match=r"is a link to .*precious, in another folder"):
+        save(sine_run(), tmp_path / "out" / "run.nc")
+    assert (tmp_path / "precious").read_text() == "mine"
+    (tmp_path / "linked").symlink_to(tmp_path / "out")
+    assert save(sine_run(), tmp_path / "linked" / "other.nc").exists(), "a folder may be a link: it was named by whoever asked"
+
+
+def test_old_drafts_are_removed_and_nothing_else(tmp_path):
+    names = [".run.nc.0123abcd.part", ".0123abcd.part", ".run.nc.part", "run.nc.0123abcd.part", ".run.nc.0123abcd.part.nc"]
+    for name in [*names, ".young.nc.0123abcd.part"]:
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (0, 0) if "young" not in name else None)
+    usable_folder(tmp_path)
+    assert sorted(one.name for one in tmp_path.iterdir()) == sorted([*names[2:], ".young.nc.0123abcd.part"])
 
 
 def test_nothing_is_visible_before_the_end(tmp_path):

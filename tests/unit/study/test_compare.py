@@ -9,9 +9,7 @@ import pytest
 import xarray as xr
 
 from saltus.errors import StudyError
-from saltus.study.questions.simulate import Compare
-from saltus.study.questions.simulate_compare import contact_table, exact_times
-from saltus.study.spec_parts import ODE45
+from saltus.study.questions.simulate_compare import contact_table, exact_times, printed_rows
 
 
 def made_up_run(method: str, times: list[float]) -> xr.Dataset:
@@ -40,9 +38,10 @@ def folder(tmp_path):
 
 
 def table(folder, exact="exact.csv", reference="Taylor"):
-    spec = Compare(printed="printed.csv", exact=exact, reference=ODE45(name="ODE45") if reference else None)
+    printed = printed_rows((folder / "printed.csv").read_bytes(), folder / "printed.csv")
+    times = exact_times((folder / exact).read_bytes(), folder / exact) if exact else {}
     second = made_up_run("Taylor", [0.125, 0.2500001, 0.5 + 1e-13]) if reference else None
-    return contact_table("title", made_up_run("ODE45", [0.125, 0.25 + 2**-50, 0.5]), spec, folder.joinpath, second)
+    return contact_table("title", made_up_run("ODE45", [0.125, 0.25 + 2**-50, 0.5]), printed, times, second)
 
 
 def test_rows(folder):
@@ -70,27 +69,38 @@ def test_without_exact_times_and_second_method(folder):
 def test_a_residual_off_the_states_is_unknown(folder):
     run = made_up_run("ODE45", [0.125, 0.25, 0.5])
     run["guard_state"] = ("guard", ["", "x"])
-    found = contact_table("title", run, Compare(printed="printed.csv"), folder.joinpath, None)
+    found = contact_table("title", run, printed_rows((folder / "printed.csv").read_bytes(), folder / "printed.csv"), {}, None)
     assert np.isnan(float(found.rows[0][5]))
 
 
 @pytest.mark.parametrize(
     ("file", "text", "part"),
     [
-        ("printed.csv", None, "can't be read: No such file"),
         ("printed.csv", "marker,time_s\nA,0.25\n", "lacks the column 'event_number'"),
-        ("printed.csv", "event_number,time_s\n2,soon\n", "holds 'soon' in column 'time_s', which is no number"),
+        ("printed.csv", "event_number,time_s\n2,hunter2\n", "printed.csv, line 2: what stands in the column 'time_s' is no finite number"),
+        ("printed.csv", "# from a book\nevent_number,time_s\n2,inf\n", "printed.csv, line 3: what stands in the column 'time_s'"),
+        ("printed.csv", "event_number,time_s\nnan,1\n", "is no finite number"),
+        ("printed.csv", "event_number,time_s\n1e400,1\n", "is no finite number"),
+        ("printed.csv", "event_number,time_s\n1.7,1\n", "is no whole number from 1 to 2^31"),
+        ("printed.csv", "event_number,time_s\n0,1\n", "is no whole number from 1 to 2^31"),
+        ("printed.csv", "event_number,time_s,position_minus_boundary_m\n1,1,x\n", "'position_minus_boundary_m' is no finite number"),
+        ("printed.csv", "", "lacks the column 'event_number'"),
+        ("printed.csv", "a\0b", "line 1 holds the control character U+0000"),
         ("printed.csv", "event_number,time_s\n4,0.7\n", "names contact 4, but ODE45 had 3. Run longer."),
         ("exact.csv", "event_number\n1\n", "lacks the column 'time_s'"),
     ],
 )
 def test_refusals(folder, file, text, part):
-    (folder / file).unlink()
-    if text is not None:
-        (folder / file).write_text(text)
+    (folder / file).write_text(text)
     with pytest.raises(StudyError) as caught:
         table(folder)
     assert part in str(caught.value)
+    assert "hunter2" not in str(caught.value)
+
+
+def test_a_mark_of_windows_before_the_text_is_no_part_of_it(folder):
+    (folder / "printed.csv").write_bytes(b"\xef\xbb\xbf" + (folder / "printed.csv").read_bytes().replace(b"\n", b"\r\n"))
+    assert [row[1] for row in table(folder).rows] == ["2", "3"]
 
 
 def test_csv_keeps_what_was_printed(folder):
@@ -103,6 +113,7 @@ def test_csv_keeps_what_was_printed(folder):
 def test_exact_times_of_the_replication():
     from pathlib import Path
 
-    times = exact_times(Path(__file__).parents[3] / "replications" / "saunders2021" / "exact_events.csv")
+    path = Path(__file__).parents[3] / "replications" / "saunders2021" / "exact_events.csv"
+    times = exact_times(path.read_bytes(), path)
     assert len(times) == 63
     assert times[1] == 0.027283034515573257

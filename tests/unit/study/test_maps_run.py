@@ -329,13 +329,13 @@ def test_a_full_disk_keeps_the_copy_of_the_study(whole, tmp_path, monkeypatch):
     """Resuming where the disk is full must not cost what resuming needs."""
     folder = copied(whole, tmp_path / "run")
 
-    def full(self, text, encoding=None):
+    def full(self, data):
         self.open("w").close()  # what the system does first
         raise OSError(28, "No space left on device", str(self))
 
-    monkeypatch.setattr(copies.Path, "write_text", full)
+    monkeypatch.setattr(copies.Path, "write_bytes", full)
     with pytest.raises(OSError, match="No space"):
-        Run(folder)
+        Run(folder, STUDY + "# a line more\n")
     assert copy_of(folder).read_text() == STUDY
 
 

@@ -12,6 +12,8 @@ from saltus import analysis
 from saltus.errors import SaltusError, StudyError
 from saltus.flow import Interrupted
 from saltus.results import load, save
+from saltus.study.copies import inputs_of
+from saltus.study.inputs import Inputs
 from saltus.study.read import parse
 from saltus.study.run import questions_of, run_study
 from saltus.study.running import Resources
@@ -203,10 +205,10 @@ def test_only_one_question(tmp_path, no_computing, monkeypatch):
     calls = []
     monkeypatch.setattr(analysis, "bifurcation_diagram", lambda *_, **call: calls.append(call) or pytest.skip("reached"))
     for name in ("soft", "A map", "a-map"):
-        assert len(questions_of(parse(STUDY), None, tmp_path, [name])) == 1
-    assert len(questions_of(parse(STUDY), None, tmp_path, ["bifurcation_diagram"])) == 2
+        assert len(questions_of(parse(STUDY), None, Inputs(tmp_path), [name])) == 1
+    assert len(questions_of(parse(STUDY), None, Inputs(tmp_path), ["bifurcation_diagram"])) == 2
     with pytest.raises(StudyError, match=r"--only sofd: this study has no such question\. Did you mean 'soft'\?"):
-        questions_of(parse(STUDY), None, tmp_path, ["sofd"])
+        questions_of(parse(STUDY), None, Inputs(tmp_path), ["sofd"])
 
 
 def test_other_shards_leave_small_questions_to_the_first(tmp_path):
@@ -254,19 +256,19 @@ def test_a_frequency_response_needs_forcing(tmp_path):
 
     own = own_system(str(tmp_path / "free.py"))
     with pytest.raises(StudyError, match="no forcing frequency"):
-        questions_of(parse('[study]\nname = "a"\n[frequency_response]\nfrequency = { values = [1.0] }\n'), own, tmp_path)
+        questions_of(parse('[study]\nname = "a"\n[frequency_response]\nfrequency = { values = [1.0] }\n'), own, Inputs(tmp_path))
     with pytest.raises(StudyError, match="Write every ="):
-        questions_of(parse('[study]\nname = "a"\n[lyapunov]\n'), own, tmp_path)
+        questions_of(parse('[study]\nname = "a"\n[lyapunov]\n'), own, Inputs(tmp_path))
 
 
 def test_measured_points_are_drawn_and_kept_with_the_study(tmp_path, whole):
     (tmp_path / "shaker.csv").write_text("frequency [Hz],amplitude [mm]\n15,0.3\n")
     text = HEAD + RESPONSE + 'measured = "shaker.csv"\n'
-    run = Run(tmp_path / "out", text, beside=tmp_path, pictures=True)
+    run = Run(tmp_path / "out", text, inputs=Inputs(tmp_path), pictures=True)
     assert (tmp_path / "out" / "inputs" / "shaker.csv").read_text() == (tmp_path / "shaker.csv").read_text()
     with_points, without = ((folder / "frequency-response.png").read_bytes() for folder in (run.folder, whole.folder))
     assert with_points != without
-    Run(tmp_path / "out", text, beside=tmp_path / "out" / "inputs", pictures=True)
+    Run(tmp_path / "out", text, inputs=inputs_of(tmp_path / "out", text), pictures=True)
     assert (run.folder / "frequency-response.png").read_bytes() == with_points
 
 

@@ -11,7 +11,9 @@ import pytest
 from saltus.errors import StudyError
 from saltus.results import load
 from saltus.study import doctor
+from saltus.study.copies import inputs_of
 from saltus.study.demo import demo, draw
+from saltus.study.inputs import Inputs
 from saltus.study.own_system import own_system
 from saltus.study.read import parse, read
 from saltus.study.run import run_study
@@ -34,12 +36,12 @@ periods = 12
 class Run:
     """A study that is run in a folder of its own; what it wrote, read back."""
 
-    def __init__(self, text: str, folder: Path, own=None, beside=None, **options):
+    def __init__(self, text: str, folder: Path, own=None, inputs=None, **options):
         self.folder, self.said = folder, []
         folder.mkdir(exist_ok=True)
         resources = Resources(threads=1)
         self.outcome = run_study(
-            parse(text), text, folder, own, resources, lambda _: None, self.said.append, **({"pictures": False} | options), beside=beside
+            parse(text), text, folder, own, resources, lambda _: None, self.said.append, **({"pictures": False} | options), inputs=inputs
         )
 
     @property
@@ -65,7 +67,7 @@ def run_text(tmp_path):
 @pytest.fixture(scope="module")
 def table2(tmp_path_factory) -> Run:
     file = ROOT / "replications" / "saunders2021" / "table2.toml"
-    return Run(read(file)[1], tmp_path_factory.mktemp("table2"), beside=file.parent)
+    return Run(read(file)[1], tmp_path_factory.mktemp("table2"), inputs=Inputs(file.parent))
 
 
 def test_table2_gives_the_printed_times(table2):
@@ -100,7 +102,8 @@ def test_files_keep_it_all(table2):
 def test_a_study_goes_on_from_its_copy(table2):
     """Nothing is computed again, and the printed times are found beside the copy."""
     before = (table2.folder / "run.nc").stat().st_mtime_ns
-    again = Run(table2.run.attrs["study"], table2.folder, beside=table2.folder / "inputs")
+    text = table2.run.attrs["study"]
+    again = Run(text, table2.folder, inputs=inputs_of(table2.folder, text))
     assert again.table == table2.table
     assert (table2.folder / "run.nc").stat().st_mtime_ns == before
 

@@ -134,7 +134,7 @@ def damaged(change):
             "damaged",
         ),
         (damaged(lambda d: d["values"].update(gap="a")), "damaged"),
-        (damaged(lambda d: d["values"].update(gap=-1.0)), "negative"),
+        (damaged(lambda d: d["values"].update(frequency=-1.0)), "forcing frequency"),
     ],
 )
 def test_damaged_data_is_refused(data, teaches):

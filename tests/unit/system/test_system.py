@@ -50,7 +50,7 @@ def test_nothing_can_be_changed_in_place():
         ({"zzz": 1.0}, ParameterError, "Known: contact_stiffness, cubic"),
         ({"mass": 0.0}, ParameterError, "mass = 0 must be positive"),
         ({"mass": "-3 kg"}, ParameterError, "mass = -3 must be positive"),
-        ({"upper_gap": "-0.1 mm"}, ParameterError, "upper_gap = -0.0001 is negative"),
+        ({"upper_gap": "-0.1 mm"}, ParameterError, "lower_gap = 0, upper_gap = -0.0001 the contacts at .* overlap"),
         ({"frequency": 0.0}, ParameterError, "it is the forcing frequency"),
         ({"frequency": "-1 Hz"}, ParameterError, "it is the forcing frequency"),
         ({"force": math.nan}, ParameterError, "force = nan is not a finite number"),
@@ -75,8 +75,8 @@ def test_resolve_takes_one_or_many():
     resolved = RIG.resolve("frequency", grid)
     assert np.array_equal(resolved, grid)
     assert resolved is not grid
-    with pytest.raises(ParameterError, match=r"upper_gap = -1 \(entry 1 of 3\) is negative"):
-        RIG.resolve("upper_gap", np.array([0.0, -1.0, -2.0]))
+    with pytest.raises(ParameterError, match=r"mass = -1 \(entry 1 of 3\) must be positive"):
+        RIG.resolve("mass", np.array([1.0, -1.0, -2.0]))
     with pytest.raises(ParameterError, match=r"entry 0 of 1\) is not a finite"):
         RIG.resolve("force", np.array([math.nan]))
 
@@ -125,3 +125,15 @@ def test_derived_equations_are_computed_once():
 def test_importing_the_layer_is_light():
     code = "import sys, saltus.system, saltus.models; print([m for m in ('sympy', 'pint', 'numba', 'scipy', 'xarray') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_the_right_hand_side_is_a_plain_function():
+    rig = delangre("b", force="4 N", frequency="7 Hz")
+    t, y = 0.123, np.array([[-1e-4, 2e-4, 1e-3], [0.1, -0.2, 0.3]])
+    wn, w, (x, v) = 2 * np.pi * 5.0, 2 * np.pi * 7.0, y
+    stop = np.where(x < 0, x, np.where(x > 0.4e-3, x - 0.4e-3, 0.0))
+    rate = -2 * 0.03 * wn * v - wn**2 * x - 7e8 / 3 * x**3 - 1.4e4 / 3 * stop + 4 * (1 - 18 / w**2) * np.cos(w * t) / 3
+    np.testing.assert_allclose(rig.rhs(t, y), [v, rate], rtol=1e-14)
+    np.testing.assert_allclose(rig.rhs(t, y[:, 2]), [v[2], rate[2]], rtol=1e-14)
+    with pytest.raises(ParameterError, match="delangre has the states x, v, but y holds 3 of them"):
+        rig.rhs(t, (1.0, 2.0, 3.0))

@@ -136,7 +136,6 @@ def test_options(options, error, teaches):
     [
         ({"mass": 0.0}, ParameterError, "mass = 0 must be positive"),
         ({"mass": "3 s"}, UnitError, "measured in kg"),
-        ({"gap": -1e-3}, ParameterError, "gap = -0.001 is negative"),
         ({"gap": math.nan}, ParameterError, "finite"),
         ({"gap": None}, ParameterError, "not a number"),
         ({"gap": [1.0]}, ParameterError, "gap"),
@@ -204,7 +203,7 @@ def chained(t, x, v):
 
 
 def of_time(t, x, v):
-    return v, piecewise((1, sin(t) > 0), otherwise=0)
+    return v, piecewise((1, sin(t * t) > 0), otherwise=0)
 
 
 def of_parameters(t, x, v, *, a=1.0, b=2.0):
@@ -219,7 +218,7 @@ def of_parameters(t, x, v, *, a=1.0, b=2.0):
         (math_call, "return v, -math.cos", "sl.cos"),
         (sympy_call, "return v, -sympy.cos", "sl.cos"),
         (unknown_name, "return v, -stiffness", "NameError.*stiffness"),
-        (modulo, "return v, x % 1", "the remainder"),
+        (modulo, "return v, x % 1", "sl.mod of x"),
         (chained, "return v, piecewise", "a < x < b"),
         (too_few, "", "returns 1 value, but there are 2 states"),
         (nothing, "", "returns nothing. End it with: return dx/dt, dv/dt"),

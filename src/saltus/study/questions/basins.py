@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field, model_validator
 
+from saltus.fence import MOST_COUNT
 from saltus.study.kept import save_picture
 from saltus.study.questions.question import Question
 from saltus.study.running import Outcome, Running
-from saltus.study.spec_parts import Method, Quantity, Range, Table
+from saltus.study.spec_parts import PERIODS as FOLLOWED
+from saltus.study.spec_parts import FileTitle, Method, Quantity, Range, Table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,14 +32,14 @@ class Axis(Range):
 
     first: Quantity | None = Field(None, description="The first start.", examples=["-5 mm"])
     last: Quantity | None = Field(None, description="The last start.", examples=["5 mm"])
-    count: int | None = Field(None, ge=2, description="How many starts.", examples=[400])
+    count: int | None = Field(None, ge=2, le=MOST_COUNT, description="How many starts.", examples=[400])
     values: list[Quantity] | None = Field(None, min_length=2, description="The starts themselves, ascending.", examples=[["-1 mm", "1 mm"]])
 
 
 class Map(Table):
     """[[basins.map]]: one of the maps of a study, with what sets it apart from the others."""
 
-    name: str = Field(min_length=1, description="What it is called in tables, pictures and file names.", examples=["exact, 25.5 kN/m"])
+    name: FileTitle = Field(description="What it is called in tables, pictures and file names.", examples=["exact, 25.5 kN/m"])
     method: Method | None = Field(None, description="How to integrate; the study's [method] by default.", examples=[{"name": "Taylor"}])
     values: dict[str, Quantity] = Field(
         default_factory=dict, description="Values that differ from [system].", examples=[{"contact_stiffness": "25.5 kN/m"}]
@@ -53,7 +55,7 @@ class Basins(Table):
         examples=[{"x": {"first": "-5 mm", "last": "5 mm", "count": 400}, "v": {"first": "-1 m/s", "last": "1 m/s", "count": 400}}],
     )  # fmt: skip
     at: dict[str, Quantity] = Field(default_factory=dict, description="Starts of the other states; 0 by default.", examples=[{"y": "0 mm"}])
-    periods: int = Field(2000, ge=1, description="Forcing periods that a start is followed at most.", examples=[2000])
+    periods: int = FOLLOWED
     every: Quantity | None = Field(None, description="Time between two looks, for a system without forcing.", examples=["1 s"])
     map: list[Map] = Field(default_factory=list, description="Several maps of one study.", examples=[[{"name": "exact"}]])
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field
 
 from saltus.errors import StudyError
+from saltus.fence import MOST_PERIODS
 from saltus.study import quantities
 from saltus.study.questions.question import OneDataset, Question
 from saltus.study.spec_parts import Method, Named, Quantity, Start
@@ -36,8 +37,8 @@ class Lyapunov(Named):
         "variational", description="By the variational equations, or the largest one by Wolf's algorithm.", examples=["wolf"]
     )
     flow: Method | None = Field(None, description="How to integrate; the study's [method] by default.", examples=[{"name": "Taylor"}])
-    periods: int = Field(2000, ge=1, description="Forcing periods that growth is measured over.", examples=[2000])
-    transient: int = Field(500, ge=0, description="Forcing periods before them that don't count.", examples=[500])
+    periods: int = Field(2000, ge=1, le=MOST_PERIODS, description="Forcing periods that growth is measured over.", examples=[2000])
+    transient: int = Field(500, ge=0, le=MOST_PERIODS, description="Forcing periods before them that don't count.", examples=[500])
     every: Quantity | None = Field(None, description="Time of a block, for a system without forcing.", examples=["1 s"])
     unit: Literal["1/s", "1/period", "bit/s", "bit/period"] = Field("1/s", description="Unit of the exponents.", examples=["1/period"])
     values: dict[str, Start] = Field(

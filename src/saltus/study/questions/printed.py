@@ -1,42 +1,86 @@
-"""CSV files that stand beside a study: numbers that somebody printed, and exact ones."""
+"""CSV files that stand beside a study: numbers that somebody printed, and exact ones. What they hold is never repeated in a message."""
 
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
+from saltus import fence
 from saltus.errors import StudyError
 
 
-def rows(path: Path, columns: tuple[str, ...]) -> list[dict[str, str]]:
-    """The rows of a CSV file by column name. Lines that begin with # are comments.
+@dataclass(frozen=True)
+class Row:
+    """One row of a CSV file.
+
+    Attributes
+    ----------
+    place : str
+        File and line, for messages.
+    cells : dict of str to str
+        By column.
+    """
+
+    place: str
+    cells: dict[str, str]
+
+    def text(self, column: str) -> str:
+        """A cell as it stands; "" if there is none."""
+        return self.cells.get(column) or ""
+
+    def number(self, column: str) -> float:
+        """A finite number. Raises StudyError if the cell holds something else."""
+        try:
+            value = float(self.text(column))
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise StudyError(f"[compare] {self.place}: what stands in the column {column!r} is no finite number.")
+        return value
+
+    def whole(self, column: str) -> int:
+        """A whole number from 1 on. Raises StudyError if the cell holds something else."""
+        value = self.number(column)
+        if value != int(value) or not 1 <= value <= fence.MOST_COUNT:
+            raise StudyError(f"[compare] {self.place}: what stands in the column {column!r} is no whole number from 1 to 2^31.")
+        return int(value)
+
+
+def rows(data: bytes, path: Path, columns: tuple[str, ...]) -> list[Row]:
+    """The rows of a CSV file. Lines that begin with # are comments.
+
+    Parameters
+    ----------
+    data : bytes
+        What is in the file.
+    path : Path
+        Its name, for messages.
+    columns : tuple of str
+        Those that it must have.
 
     Raises
     ------
     StudyError
-        If the file can't be read or lacks one of ``columns``.
+        If it can't be read or lacks one of ``columns``.
     """
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(_without_comments(file))
-            found = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise StudyError(f"[compare] {path} can't be read: {reason}. It must stand beside the study.") from None
-    lacking = [column for column in columns if column not in (reader.fieldnames or ())]
+        lines = list(_lines(fence.text(data)))
+        header, *table = [(number, cells) for number, line in lines for cells in csv.reader([line])] or [(0, [])]
+    except fence.RefusedError as refused:
+        raise StudyError(f"[compare] {path} {refused}") from None
+    except csv.Error as error:
+        raise StudyError(f"[compare] {path} can't be read: {error}.") from None
+    lacking = [column for column in columns if column not in header[1]]
     if lacking:
         raise StudyError(f"[compare] {path} lacks the column {lacking[0]!r}. It needs {', '.join(columns)}.")
-    return found
+    return [Row(f"{path}, line {number}", dict(zip(header[1], cells, strict=False))) for number, cells in table]
 
 
-def cell(row: dict[str, str], column: str, path: Path) -> float:
-    """One number of a row. Raises StudyError if it isn't one."""
-    try:
-        return float(row[column])
-    except (TypeError, ValueError):
-        raise StudyError(f"[compare] {path} holds {row[column]!r} in column {column!r}, which is no number.") from None
-
-
-def _without_comments(lines: Iterator[str]) -> Iterator[str]:
-    return (line for line in lines if line.strip() and not line.startswith("#"))
+def _lines(text: str) -> Iterator[tuple[int, str]]:
+    """The lines that hold something, with their numbers."""
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip() and not line.startswith("#"):
+            yield number, line

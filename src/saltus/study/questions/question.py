@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from saltus.study.running import Outcome, Running
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.study.inputs import Input
     from saltus.study.table import TextTable
     from saltus.system import System
 
@@ -35,9 +37,13 @@ class Question(ABC):
     stems: tuple[str, ...]
     shared: bool = False
 
-    def files(self) -> list[Path]:
-        """Files that the question reads."""
+    def inputs(self) -> list[Input]:
+        """Files that take part in the answer."""
         return []
+
+    def write_table(self, table: TextTable, path: Path) -> Path:
+        """Write a table as CSV, with the hashes of the files that took part in it."""
+        return replace(table, notes=(*table.notes, *(file.note for file in self.inputs()))).write_csv(path)
 
     def prepare(self, folder: Path) -> None:  # noqa: ARG002
         """Refuse an output folder with which the question can't go on; called for all questions before anything is computed."""
@@ -88,7 +94,7 @@ class OneDataset(Question):
         (stem,) = self.stems
         ds = kept_or_computed(stem, self.title, self.identity(), lambda show: self.compute(at.resources.threads, show), at)
         tables = self.tables(ds)
-        files = [at.folder / f"{stem}.nc", tables[0].write_csv(at.folder / f"{stem}.csv"), *self.more_files(ds, at.folder)]
+        files = [at.folder / f"{stem}.nc", self.write_table(tables[0], at.folder / f"{stem}.csv"), *self.more_files(ds, at.folder)]
         if at.pictures:
             from saltus import plot
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field, model_validator
 
 from saltus.errors import SaltusError, StudyError
+from saltus.results.measured import measured_points
 from saltus.study import quantities
 from saltus.study.questions.question import OneDataset, Question
 from saltus.study.spec_parts import (
@@ -29,6 +30,7 @@ from saltus.study.spec_parts import (
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.study.inputs import Input
     from saltus.study.setting import Setting
     from saltus.study.table import TextTable
     from saltus.system import System
@@ -93,7 +95,9 @@ def frequency_responses(table: FrequencyResponse, setting: Setting) -> list[Ques
     grid = quantities.grid(system, system.forced_at, table.frequency, f"{place}.frequency")
     arguments = {"frequency": grid, **_followed(system, table, place)}
     _check(system, {system.forced_at: grid}, arguments, place)
-    measured = None if table.measured is None else setting.file(table.measured)
+    measured = None if table.measured is None else setting.inputs.read(table.measured, place)
+    if measured is not None:
+        _points(measured, system.forced_at, system, place)  # read now, so that a fault is told before anything is computed
     return [Responses(table.title, table.stem, system, setting.method(table.method), arguments, place, measured)]
 
 
@@ -132,16 +136,24 @@ def _arrays(axes: dict[str, Any]) -> dict[str, Any]:
     return {name: np.array(values) if isinstance(values, list) else values for name, values in axes.items()}
 
 
+def _points(measured: Input, axis: str, system: System, place: str) -> xr.Dataset:
+    """Measured points in SI: amplitudes of the first state."""
+    try:
+        return measured_points(measured.data, measured.path, axis, system.units.get(axis, "1"), system.units.get(system.states[0], "1"))
+    except SaltusError as error:
+        raise StudyError(f"[{place}] {error}") from None
+
+
 class Responses(OneDataset):
     """Steady responses over one or two parameters."""
 
     def __init__(
-        self, title: str, stem: str, system: System, method: Any, arguments: dict[str, Any], analysis: str, measured: Path | None = None
+        self, title: str, stem: str, system: System, method: Any, arguments: dict[str, Any], analysis: str, measured: Input | None = None
     ) -> None:
         super().__init__(title, stem, system, method, arguments)
         self.analysis, self.measured = analysis, measured
 
-    def files(self) -> list[Path]:
+    def inputs(self) -> list[Input]:
         """Measured points."""
         return [] if self.measured is None else [self.measured]
 
@@ -172,7 +184,10 @@ class Responses(OneDataset):
         from saltus.study.draw import default_kind
 
         kind = default_kind(ds)
-        more = {"measured": self.measured} if self.measured is not None and kind == FREQUENCY_RESPONSE else {}
+        more = {}
+        if self.measured is not None and kind == FREQUENCY_RESPONSE:
+            assert self.system.forced_at is not None
+            more["measured"] = _points(self.measured, self.system.forced_at, self.system, self.analysis)
         axes = getattr(plot, kind)(ds, **more)
         axes.set_title(self.title if kind != "type_map" else f"{self.title}: {axes.get_title('left')}", loc="left")
         return {"": axes.figure}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, model_validator
 
 from saltus.errors import ParameterError, StudyError
+from saltus.fence import MOST_COUNT, MOST_PERIODS
 from saltus.study import quantities
 from saltus.study.identity import identity
 from saltus.study.kept import kept_or_computed, save_picture
@@ -19,6 +20,8 @@ from saltus.study.spec_parts import Method, Quantity, Start, Table
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.study.inputs import Input
+    from saltus.study.questions.printed import Row
     from saltus.study.setting import Setting
 
 #: Stems of the files.
@@ -32,11 +35,13 @@ class Simulate(Table):
         description="Every state at t_start. A list of values makes a batch; single values beside it hold for all.",
         examples=[{"x": "0 mm", "v": "0 m/s"}, {"x": ["0.2 mm", "0.4 mm"], "v": "0 m/s"}],
     )
-    periods: int | None = Field(None, ge=1, description="Length in forcing periods.", examples=[60])
+    periods: int | None = Field(None, ge=1, le=MOST_PERIODS, description="Length in forcing periods.", examples=[60])
     t_end: Quantity | None = Field(None, description="End time; in place of periods.", examples=["2 s"])
     t_start: Quantity = Field("0 s", description="Start time.", examples=["0 s"])
-    samples: int = Field(200, ge=1, description="Samples per period; over the whole span if the system isn't forced.", examples=[200])
-    keep: int | None = Field(None, ge=1, description="Keep only this many periods at the end.", examples=[12])
+    samples: int = Field(
+        200, ge=1, le=MOST_COUNT, description="Samples per period; over the whole span if the system isn't forced.", examples=[200]
+    )
+    keep: int | None = Field(None, ge=1, le=MOST_PERIODS, description="Keep only this many periods at the end.", examples=[12])
     values: dict[str, list[Quantity]] = Field(
         default_factory=dict,
         description="Parameters that differ from trajectory to trajectory: one value each.",
@@ -93,10 +98,21 @@ class Motion(Question):
         self.title, self.stems = setting.study.study.name, (RUN, REFERENCE, TABLE)
         self.setting, self.arguments, self.compare = setting, dict(arguments), setting.study.compare
 
-    def files(self) -> list[Path]:
+        self._inputs, self.printed, self.exact = self._read() if self.compare is not None else ([], [], {})
+
+    def _read(self) -> tuple[list[Input], list[Row], dict[int, float]]:
+        """The files of [compare], and what they say: read now, so that a fault is told before anything is computed."""
+        from saltus.study.questions.simulate_compare import exact_times, printed_rows
+
+        assert self.compare is not None
+        names = [name for name in (self.compare.printed, self.compare.exact) if name is not None]
+        files = [self.setting.inputs.read(name, "compare") for name in names]
+        exact = exact_times(files[1].data, files[1].path) if self.compare.exact is not None else {}
+        return files, printed_rows(files[0].data, files[0].path), exact
+
+    def inputs(self) -> list[Input]:
         """Printed and exact times."""
-        names = [self.compare.printed, self.compare.exact] if self.compare is not None else []
-        return [self.setting.file(name) for name in names if name is not None]
+        return self._inputs
 
     def answer(self, at: Running) -> Outcome:
         """Simulate with the study's method, and the reference's if there is one; compare, tell, draw."""
@@ -110,8 +126,8 @@ class Motion(Question):
         if self.compare is None:
             table = run_table(self.title, runs[RUN])
         else:
-            table = contact_table(self.title, runs[RUN], self.compare, self.setting.file, runs.get(REFERENCE))
-        files = [at.folder / f"{RUN}.nc", table.write_csv(at.folder / f"{TABLE}.csv")]
+            table = contact_table(self.title, runs[RUN], self.printed, self.exact, runs.get(REFERENCE))
+        files = [at.folder / f"{RUN}.nc", self.write_table(table, at.folder / f"{TABLE}.csv")]
         files += [at.folder / f"{REFERENCE}.nc"] * (REFERENCE in runs)
         return Outcome([table], files + ([self._picture(runs[RUN], at.folder)] if at.pictures else []))
 

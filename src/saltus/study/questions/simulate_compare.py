@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from saltus.errors import StudyError
-from saltus.study.questions.printed import cell, rows
+from saltus.study.questions.printed import Row, rows
 from saltus.study.table import TextTable
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.questions.simulate import Compare
+
+#: Columns that the files must have.
+COLUMNS = ("event_number", "time_s")
 
 
-def contact_table(title: str, run: xr.Dataset, compare: Compare, find: Callable[[str], Path], reference: xr.Dataset | None) -> TextTable:
+def contact_table(
+    title: str, run: xr.Dataset, printed: Sequence[Row], exact: Mapping[int, float], reference: xr.Dataset | None
+) -> TextTable:
     """A row for each contact that was printed.
 
     Parameters
@@ -27,10 +31,10 @@ def contact_table(title: str, run: xr.Dataset, compare: Compare, find: Callable[
         Goes above the table.
     run : Dataset
         What ``simulate`` returned for one start.
-    compare : Compare
-        [compare] of the study.
-    find : callable
-        Where a CSV file of this name stands.
+    printed : sequence of Row
+        What was printed.
+    exact : mapping of int to float
+        Exact contact times [s] by number of the contact; empty if there are none.
     reference : Dataset or None
         The same run by the second method.
 
@@ -43,20 +47,17 @@ def contact_table(title: str, run: xr.Dataset, compare: Compare, find: Callable[
     Raises
     ------
     StudyError
-        If a file can't be read, or names a contact that the run doesn't have.
+        If a row isn't one of numbers, or names a contact that the run doesn't have.
     """
-    path = find(compare.printed)
-    printed = rows(path, ("event_number", "time_s"))
-    exact = exact_times(find(compare.exact)) if compare.exact else {}
     residual, legs = residuals(run), _legs(run)
     table, before = [], 0
     for row in printed:
-        number = int(cell(row, "event_number", path))
-        ours, theirs = _time(run, number, path), cell(row, "time_s", path)
-        line = [row.get("marker") or "", str(number), _seconds(ours), _seconds(theirs), _small(ours - theirs), _small(residual[number - 1])]
-        line.append(_small(abs(cell(row, "position_minus_boundary_m", path))) if row.get("position_minus_boundary_m") else "")
+        number = row.whole("event_number")
+        ours, theirs = _time(run, number, row), row.number("time_s")
+        line = [row.text("marker"), str(number), _seconds(ours), _seconds(theirs), _small(ours - theirs), _small(residual[number - 1])]
+        line.append(_small(abs(row.number("position_minus_boundary_m"))) if row.text("position_minus_boundary_m") else "")
         line.append(_seconds(exact[number]) if number in exact else "")
-        line.append(_small(_time(reference, number, path) - exact[number]) if reference is not None and number in exact else "")
+        line.append(_small(_time(reference, number, row) - exact[number]) if reference is not None and number in exact else "")
         line.append(" ".join(map(str, legs[before:number])))
         table.append(tuple(line))
         before = number
@@ -77,19 +78,29 @@ def contact_table(title: str, run: xr.Dataset, compare: Compare, find: Callable[
     return TextTable(title, columns, tuple(table), _notes(run, exact, reference))
 
 
-def exact_times(path: Path) -> dict[int, float]:
+def printed_rows(data: bytes, path: Path) -> list[Row]:
+    """The rows that somebody printed; every number is looked at now, before anything is computed. Raises StudyError."""
+    found = rows(data, path, COLUMNS)
+    for row in found:
+        row.whole("event_number"), row.number("time_s")
+        if row.text("position_minus_boundary_m"):
+            row.number("position_minus_boundary_m")
+    return found
+
+
+def exact_times(data: bytes, path: Path) -> dict[int, float]:
     """Exact contact times [s] by number of the contact, from a CSV file with the columns event_number and time_s."""
-    return {int(cell(row, "event_number", path)): cell(row, "time_s", path) for row in rows(path, ("event_number", "time_s"))}
+    return {row.whole("event_number"): row.number("time_s") for row in rows(data, path, COLUMNS)}
 
 
-def largest_difference(run: xr.Dataset, exact: dict[int, float]) -> tuple[float, int]:
+def largest_difference(run: xr.Dataset, exact: Mapping[int, float]) -> tuple[float, int]:
     """Largest difference [s] of contact times from exact ones, and how many contacts both have."""
     times = run["contact_time"].values
     differences = [abs(times[number - 1] - time) for number, time in exact.items() if number <= times.size]
     return max(differences, default=np.nan), len(differences)
 
 
-def _notes(run: xr.Dataset, exact: dict[int, float], reference: xr.Dataset | None) -> tuple[str, ...]:
+def _notes(run: xr.Dataset, exact: Mapping[int, float], reference: xr.Dataset | None) -> tuple[str, ...]:
     notes = ["j: the boundary that is met. steps: of each leg, the leg being the motion from one contact to the next."]
     for one in (run, reference):
         if one is not None and exact:
@@ -98,9 +109,9 @@ def _notes(run: xr.Dataset, exact: dict[int, float], reference: xr.Dataset | Non
     return tuple(notes)
 
 
-def _time(run: xr.Dataset, number: int, path: Path) -> float:
+def _time(run: xr.Dataset, number: int, row: Row) -> float:
     if not 1 <= number <= run.sizes["contact"]:
-        raise StudyError(f"[compare] {path} names contact {number}, but {run.attrs['method']} had {run.sizes['contact']}. Run longer.")
+        raise StudyError(f"[compare] {row.place} names contact {number}, but {run.attrs['method']} had {run.sizes['contact']}. Run longer.")
     return float(run["contact_time"][number - 1])
 
 

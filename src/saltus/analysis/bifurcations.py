@@ -1,0 +1,224 @@
+"""Why a branch ends between two values of a parameter: the bifurcation, where it can be told.
+
+A fold, at which a stable and an unstable orbit meet, is told by three things: the leading multiplier is real and goes to +1, by the square
+root of the distance; Newton's method finds nothing beyond; and the place to which (1 - multiplier)^2 extrapolates is where it stops finding
+the orbit. Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapters 4 and 5; di Bernardo, Budd, Champneys & Kowalczyk,
+Piecewise-smooth Dynamical Systems (2008), chapter 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.grid import Grid
+from saltus.analysis.polish import Closed, close
+from saltus.analysis.recurrence import LONGEST
+from saltus.analysis.responses import Found
+from saltus.analysis.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE
+from saltus.analysis.unforced import close_again
+from saltus.flow.family import Family
+from saltus.flow.methods import Method
+
+#: Farthest that an orbit moves between two values, in units of its own range.
+LINK = 0.35
+#: A leading multiplier that is real and beyond this may be on its way to +1; one that is complex and beyond that to the unit circle.
+FOLDING, TURNING = 0.5, 0.95
+#: Times that the interval in which a branch ends is halved, and how many times its last width the law is measured over.
+HALVINGS, OVER = 14, 64
+#: Farthest that the law's extrapolation may lie from the interval, in its widths.
+BESIDE = 3.0
+
+
+@dataclass(frozen=True)
+class Event:
+    """What happens to a branch between two values.
+
+    Attributes
+    ----------
+    value : float
+        Where [SI]: a fold or Hopf bifurcation to some ten thousandths of the step; anything else is in the middle of the two values.
+    kind : str
+        ``graze`` (contacts come or go), ``period_doubling``, ``fold``, ``hopf`` (an equilibrium begins to oscillate), ``neimark_sacker``
+        (a torus is born), ``chaos`` (its starts are chaotic beyond), or ``end`` (it isn't found any more, by the starts nor by Newton's
+        method, for none of these reasons).
+    branch : int
+        Its number.
+    """
+
+    value: float
+    kind: str
+    branch: int
+
+
+def closed_again(
+    found: Found, rows: np.ndarray, family: Family, start: np.ndarray, scale: np.ndarray, time: np.ndarray | None = None
+) -> Closed:
+    """Orbits, limit cycles and equilibria near states of some responses int64[m], at the parameter values of a family."""
+    time = found.time[rows] if time is None else time
+    if np.isnan(time).all():
+        return close(family, start, found.period[rows], scale, LONGEST)
+    return close_again(family, start, time, scale)
+
+
+def orbit_distance(p: np.ndarray, q: np.ndarray, scale: np.ndarray) -> float:
+    """Largest distance of the points of two orbits float64[n, D] of the same period, at the best phase shift, in units of the scale."""
+    shifts = (np.arange(len(q))[:, None] + np.arange(len(q))) % len(q)
+    return float(np.abs((p[None] - q[shifts]) / scale).max(axis=(1, 2)).min())
+
+
+def why_they_end(
+    found: Found,
+    grid: Grid,
+    method: Method,
+    ends: np.ndarray,
+    branch: np.ndarray,
+    way: int,
+    threads: int | None = None,
+) -> list[Event]:
+    """Why branches end upwards (way 1) or begin (way -1).
+
+    Parameters
+    ----------
+    found : Found
+        The responses.
+    grid, method, threads
+        As they were computed.
+    ends : int64[k]
+        The last response of each branch; Newton's method doesn't go on from it to an orbit that attracts.
+    branch : int64[k]
+        Their numbers.
+    way : {1, -1}
+        Direction in which it ends.
+
+    Returns
+    -------
+    list of Event
+        None for a branch at the edge of the grid, one that never repeats, or one that was not computed beyond.
+    """
+    (values,) = grid.axes.values()
+    beyond = found.place[ends] + way
+    inside = (beyond >= 0) & (beyond < len(values)) & np.isin(found.kind[ends], CLOSED)
+    inside[inside] = ~(found.of[beyond[inside]] == -4).all(axis=1)
+    ends, branch = ends[inside], branch[inside]
+    words = [_told_by_neighbours(found, int(end), int(found.place[end]) + way, _leading(found, int(end))) for end in ends]
+    places = np.array([middle(values, int(found.place[end]), int(found.place[end]) + way) for end in ends])
+    asked = np.array([i for i, word in enumerate(words) if word == "end" and _may_be_located(found, int(ends[i]))], np.int64)
+    if len(asked):
+        for i, (word, place) in zip(asked, _located(found, grid, method, ends[asked], way, threads), strict=True):
+            words[i], places[i] = word, place if np.isfinite(place) else places[i]
+    return [Event(float(place), word, int(number)) for place, word, number in zip(places, words, branch, strict=True) if word]
+
+
+def _leading(found: Found, response: int) -> complex:
+    """Leading multiplier; of a limit cycle the largest but the trivial one, of an equilibrium the leading eigenvalue [1/s]."""
+    multipliers = found.steady.orbits.multipliers[found.row[response]]
+    return complex(multipliers[1 if found.kind[response] == LIMIT_CYCLE and len(multipliers) > 1 else 0])
+
+
+def _told_by_neighbours(found: Found, last: int, beyond: int, multiplier: complex) -> str:
+    """What the responses at the next value say, ``end`` if nothing; "" if it is told by another branch."""
+    here = int(found.place[last])
+    neighbours = np.flatnonzero(found.place == beyond)
+    doubled = [j for j in neighbours if _is_twice(found, int(j), last) and _covers(found, int(j), last)]
+    if any(_is_twice(found, last, int(j)) and _covers(found, last, int(j)) for j in neighbours):
+        return ""  # the same doubling, told by the branch of half the period
+    if doubled and multiplier.real < 0:
+        return "period_doubling"
+    starts = np.flatnonzero((found.of[here] >= 0) & (found.of[here] == last))
+    if len(starts) and (found.steady.kind.reshape(found.of.shape)[beyond, starts] == CHAOTIC).any():
+        return "chaos"
+    if found.kind[last] != EQUILIBRIUM and abs(multiplier) > TURNING and abs(multiplier.imag) > 1e-9:
+        return "neimark_sacker"
+    return "end"
+
+
+def _is_twice(found: Found, longer: int, shorter: int) -> bool:
+    """Whether one response takes twice as long as another."""
+    if found.kind[longer] != found.kind[shorter]:
+        return False
+    if found.kind[longer] == LIMIT_CYCLE:
+        return bool(abs(found.time[longer] / (2 * found.time[shorter]) - 1.0) < 0.2)
+    return bool(found.kind[longer] != EQUILIBRIUM and found.period[longer] == 2 * found.period[shorter])
+
+
+def _covers(found: Found, longer: int, shorter: int) -> bool:
+    """Whether every point of an orbit of period 2n lies near one of an orbit of period n."""
+    scale = found.steady.scale[found.row[shorter]]
+    apart = np.abs((found.points(longer)[:, None] - found.points(shorter)[None]) / scale).max(axis=2).min(axis=1)
+    return bool(apart.max() < LINK)
+
+
+def middle(values: np.ndarray, a: int, b: int) -> float:
+    """Between two values: geometric where the axis spans decades."""
+    low, high = float(values[a]), float(values[b])
+    return float(np.sqrt(low * high)) if values[0] > 0 and values[-1] / values[0] > 100 else 0.5 * (low + high)
+
+
+# -- folds and Hopf bifurcations -----------------------------------------------------------------------------------------------
+def _may_be_located(found: Found, response: int) -> bool:
+    """Whether the leading multiplier is one that may be on its way to +1 (an eigenvalue to the imaginary axis)."""
+    leading = _leading(found, response)
+    return bool(found.kind[response] == EQUILIBRIUM or (leading.real > FOLDING and abs(leading.imag) <= 1e-9))
+
+
+class _Follower:
+    """Some responses, followed by Newton's method to any value of the parameter between two of the grid."""
+
+    def __init__(self, found: Found, grid: Grid, method: Method, ends: np.ndarray, threads: int | None):
+        (self._name, _) = next(iter(grid.axes.items()))
+        self._found, self._grid, self._ends, self._threads = found, grid, ends, threads
+        self._method = method if method.exact else method.companion()
+        self._scale = found.steady.scale[found.row[ends]]
+        self.points = [found.points(int(end)) for end in ends]
+        self.time = found.time[ends].copy()
+
+    def at(self, value: np.ndarray) -> tuple[Closed, np.ndarray]:
+        """What Newton's method finds at values float64[k], and which of it is the same orbit, moved, bool[k]."""
+        system = self._grid.system
+        rows = self._grid.rows[self._found.place[self._ends]]
+        rows[:, list(system.values).index(self._name)] = value
+        family = Family(system, self._method, rows, self._grid.every, self._threads)
+        start = np.array([points[0] for points in self.points])
+        arrived = closed_again(self._found, self._ends, family, start, self._scale, self.time)
+        same = arrived.period == [len(points) for points in self.points]
+        for i in np.flatnonzero(same):
+            same[i] = orbit_distance(self.points[i], arrived.points[i, : arrived.period[i]], self._scale[i]) < LINK
+        return arrived, same
+
+    def move(self, arrived: Closed, which: np.ndarray) -> None:
+        """Go on from what was found, where ``which``, bool[k]."""
+        for i in np.flatnonzero(which):
+            self.points[i], self.time[i] = arrived.points[i, : arrived.period[i]], arrived.time[i]
+
+
+def _located(found: Found, grid: Grid, method: Method, ends: np.ndarray, way: int, threads: int | None) -> list[tuple[str, float]]:
+    """Kind and place of what ends branches whose leading multiplier is real and positive, or that rest."""
+    (values,) = grid.axes.values()
+    last, first = values[found.place[ends]].copy(), values[found.place[ends] + way].copy()
+    follower = _Follower(found, grid, method, ends, threads)
+    for _ in range(HALVINGS):
+        value = 0.5 * (last + first)
+        arrived, same = follower.at(value)
+        goes_on = same & arrived.stable
+        follower.move(arrived, goes_on)
+        last, first = np.where(goes_on, value, last), np.where(goes_on, first, value)
+    width = first - last
+    farther = last - np.clip(OVER * np.abs(width), 0.0, np.abs(last - values[found.place[ends]])) * np.sign(width)
+    near, _ = follower.at(last)
+    far, same = follower.at(farther)
+    _, beyond = follower.at(first + width)
+    result = []
+    for i, end in enumerate(ends):
+        rests = found.kind[end] == EQUILIBRIUM
+        column = 1 if found.kind[end] == LIMIT_CYCLE and near.multipliers.shape[1] > 1 else 0
+        one, other = complex(near.multipliers[i, column]), complex(far.multipliers[i, column])
+        oscillates = abs(one.imag) > 1e-9 * abs(one)
+        distance = np.abs([one.real, other.real]) if rests else np.abs([1.0 - one, 1.0 - other])
+        law = distance if rests and oscillates else distance**2  # linear through a Hopf bifurcation, a square root at a fold
+        place = last[i] + law[0] * (last[i] - farther[i]) / (law[1] - law[0]) if law[1] > law[0] else np.nan
+        here = bool(same[i]) and abs(place - last[i] - 0.5 * width[i]) <= (0.5 + BESIDE) * abs(width[i])
+        word = "hopf" if rests and oscillates and beyond[i] else "fold" if not oscillates and not beyond[i] else "end"
+        result.append((word, float(place)) if here else ("end", np.nan))
+    return [(word, place if word != "end" and method.exact else np.nan) for word, place in result]

@@ -1,0 +1,93 @@
+"""What every public verb does beside its work: say in a sentence how it is called, and end well on Ctrl-C."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from contextvars import ContextVar
+from typing import Any, ParamSpec, TypeVar
+
+from saltus.codegen.announce import silent
+from saltus.errors import ParameterError, nearest
+from saltus.interrupt import Interrupted
+from saltus.system.system import System
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+#: What people write who come from elsewhere, and what it is called here.
+_ELSEWHERE: Mapping[str, str] = {
+    **dict.fromkeys(("tend", "tfinal", "t_final", "tf", "t_max", "tmax", "duration", "t_span", "tspan"), "t_end="),
+    **dict.fromkeys(("t_eval", "teval", "n_samples", "nsamples", "dt", "step"), "samples= (so many a period)"),
+    **dict.fromkeys(("y0", "x0", "u0", "initial", "initial_state", "ic"), "start="),
+    **dict.fromkeys(("rtol", "atol"), "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none"),
+    **dict.fromkeys(("params", "parameters", "args", "p"), "values="),
+    **dict.fromkeys(("n_jobs", "workers", "cores"), "threads="),
+    **dict.fromkeys(("n", "n_periods", "nperiods", "cycles"), "periods="),
+    **dict.fromkeys(("solver", "integrator"), "method="),
+}
+_INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
+
+
+def verb(function: Callable[P, R]) -> Callable[P, R]:
+    """Make a function a public verb.
+
+    Arguments that it doesn't have are answered by those that it has; ``progress=False`` silences what is said about compiling; Ctrl-C that
+    comes before anything is finished is an :class:`Interrupted` too.
+    """
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def called(*args: P.args, **kwargs: P.kwargs) -> R:
+        if _INSIDE.get():
+            return function(*args, **kwargs)
+        _check(function.__name__, signature, args, kwargs)
+        quiet: AbstractContextManager[Any] = silent() if kwargs.get("progress") is False else nullcontext()
+        token = _INSIDE.set(True)
+        try:
+            with quiet:
+                return function(*args, **kwargs)
+        except Interrupted:
+            raise
+        except KeyboardInterrupt:
+            raise Interrupted from None
+        finally:
+            _INSIDE.reset(token)
+
+    return called
+
+
+def _check(name: str, signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> None:
+    """Raise ParameterError unless the arguments fit."""
+    known = signature.parameters
+    if not any(parameter.kind == parameter.VAR_KEYWORD for parameter in known.values()):
+        for word in kwargs:
+            if word not in known:
+                raise ParameterError(f"sl.{name} has no argument {word!r}. {_instead(word, known, args, kwargs)}")
+    try:
+        signature.bind(*args, **kwargs)
+    except TypeError as error:
+        raise ParameterError(f"sl.{name}: {error}. Write sl.{name}({_call(known)}).") from None
+
+
+def _instead(word: str, known: Mapping[str, inspect.Parameter], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str:
+    """What to write in place of an argument that isn't there."""
+    system = kwargs.get("system", args[0] if args else None)
+    if isinstance(system, System) and word in system.values:
+        by = f"values={{{word!r}: ...}} or " if "values" in known else ""
+        return f"It is a parameter of {system.name}: give it by {by}system.with_values({word}=...)."
+    if isinstance(system, System) and word in system.states and "start" in known:
+        return f"It is a state of {system.name}: give it by start={{{', '.join(f'{state!r}: ...' for state in system.states)}}}."
+    there = _ELSEWHERE.get(word.lower())
+    if there is not None and there.partition("=")[0] in known:
+        return f"Write {there}."
+    return nearest(word, known)
+
+
+def _call(known: Mapping[str, inspect.Parameter]) -> str:
+    """How it is called, with the arguments that it can't do without."""
+    needed = [p.name for p in known.values() if p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    rest = [p.name for p in known.values() if p.default is not p.empty][:2]
+    return ", ".join([*needed, *(f"{name}=..." for name in rest), "..."])

@@ -1,0 +1,63 @@
+"""The type of every result: an xarray.Dataset that doesn't multiply its tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Sequence
+from typing import Any
+
+import xarray as xr
+
+from saltus.errors import ParameterError
+
+
+class Result(xr.Dataset):
+    """A Dataset in every respect but one: what would make the product of all its dims is refused.
+
+    A result holds several tables: a run has samples, contacts and guards, a map cells and attractors. ``to_dataframe`` of a Dataset makes a
+    row for every combination of them, which for an ordinary run is more than a computer can hold. Of variables that are one table,
+    ``run[["x", "v"]]``, it makes what it always makes. See docs/decisions/0021.
+    """
+
+    __slots__ = ()
+
+    def to_dataframe(self, dim_order: Sequence[Hashable] | None = None) -> Any:
+        """A pandas.DataFrame with a row for each point of the dims, as that of a Dataset; of one table only.
+
+        Raises
+        ------
+        ParameterError
+            If the variables are more than one table. It says how to choose one.
+        """
+        self._refuse_product("to_dataframe")
+        return super().to_dataframe(dim_order)
+
+    def to_dask_dataframe(self, dim_order: Sequence[Hashable] | None = None, set_index: bool = False) -> Any:
+        """As :meth:`to_dataframe`, for dask."""
+        self._refuse_product("to_dask_dataframe")
+        return super().to_dask_dataframe(dim_order, set_index)
+
+    def to_dataarray(self, dim: Hashable = "variable", name: Hashable | None = None) -> xr.DataArray:
+        """One array of all variables, as that of a Dataset; of one table only."""
+        self._refuse_product("to_dataarray")
+        return super().to_dataarray(dim, name)
+
+    def _refuse_product(self, caller: str) -> None:
+        """Raise unless one variable has all dims."""
+        dims = set(self.dims)
+        if not dims or any(set(variable.dims) == dims for variable in self.variables.values()):
+            return
+        tables: dict[tuple[Hashable, ...], list[str]] = {}
+        for name, variable in self.data_vars.items():
+            if variable.dims:
+                tables.setdefault(variable.dims, []).append(str(name))
+        some, name = ", ".join(map(repr, next(iter(tables.values()), [])[:2])), "run" if "contact" in dims else "ds"
+        rows = math.prod(self.sizes.values())
+        raise ParameterError(
+            f"{caller} of this result would multiply its tables ({' and '.join(map(_dims, tables))}) to {rows} rows. "
+            f"Take one: {'sl.samples(run), sl.contacts(run) or ' if name == 'run' else ''}{name}[[{some}]].{caller}()."
+        )
+
+
+def _dims(dims: tuple[Hashable, ...]) -> str:
+    return " x ".join(map(str, dims))

@@ -1,0 +1,79 @@
+"""Pieces that hide one another: two stops whose boundaries have changed places, as a clearance with a negative gap would have them.
+
+`sl.piecewise` takes the first piece whose condition holds. Of ``(k*(x + gap), x < -gap), (k*(x - gap), x > gap)`` at most one holds while
+``gap >= 0``. Beyond that both do between the boundaries, and the second spring would be missing there. A gap of one stop alone may have any
+sign: a preloaded stop has a negative one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.system.canonical import Canonical
+from saltus.system.evaluate import evaluate
+from saltus.system.expression import Bit, Condition, Expr, Not, add, neg, walk
+from saltus.system.guards import equation_of
+
+if TYPE_CHECKING:
+    from saltus.system.system import System
+
+
+def check_overlaps(system: System, values: Mapping[str, Any]) -> None:
+    """Raise a ParameterError if two pieces, one below a boundary and one above another, overlap.
+
+    Parameters
+    ----------
+    system : System
+        Its equations.
+    values : mapping of str to float or array
+        Values of all parameters [SI]; arrays of one length, one for each trajectory.
+
+    Raises
+    ------
+    ParameterError
+        With the boundaries and the values of their parameters.
+    """
+    for first, second, width in _opposed(system):
+        (overlap,) = evaluate([width], states=dict.fromkeys(system.states, 0.0), values=values)  # states cancel in it
+        if not np.any(overlap > 0):
+            continue
+        worst = int(np.argmax(np.ravel(overlap > 0)))
+        names = sorted({node.payload for node in walk(width) if node.op == "param"})
+        told = ", ".join(f"{name} = {np.ravel(values[name])[worst if np.size(values[name]) > 1 else 0]:g}" for name in names)
+        entry = f" (trajectory {worst} of {np.size(overlap)})" if np.ndim(overlap) else ""
+        places = " and ".join(equation_of(number, system.guards) for number in (first, second))
+        raise ParameterError(
+            f"{system.name}: with {told}{entry} the contacts at {places} overlap, and the first piece would hide the second. A "
+            f"clearance can't be negative. Springs that touch on both sides at once are the sum of two one-sided contacts: "
+            f"sl.freeplay(x, stiffness=k, lower_gap=gap) + sl.freeplay(x, stiffness=k, upper_gap=gap)."
+        )
+
+
+def _opposed(system: System) -> Iterator[tuple[int, int, Expr]]:
+    """Guards of a piece and of the next one, and how far they overlap: the sum of their gaps, where it depends on parameters only."""
+    canonical, seen = Canonical(), set()
+    for node in walk(*system.field, *(guard.gap for guard in system.guards)):
+        behind = node.args[1] if node.op == "select" else node
+        if node.op != "select" or behind.op != "select":
+            continue
+        first, second = _side(node.payload), _side(behind.payload)
+        if first is None or second is None or (first, second) in seen:
+            continue
+        seen.add((first, second))
+        width = add(*(system.guards[number].gap if positive else neg(system.guards[number].gap) for number, positive in (first, second)))
+        if canonical.kinds(canonical.polynomial(width)) == {"param"}:
+            yield first[0], second[0], width
+
+
+def _side(condition: Condition) -> tuple[int, bool] | None:
+    """The guard of a condition on one side of it, and whether that is the positive one."""
+    match condition:
+        case Bit(guard):
+            return guard, True
+        case Not(Bit(guard)):
+            return guard, False
+    return None

@@ -1,0 +1,113 @@
+"""Systems without forcing: equilibria and limit cycles against closed forms and an independent solver."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import saltus as sl
+from saltus.analysis.cycles import find_cycles, returns
+from saltus.analysis.equilibria import find_equilibria
+from saltus.flow.family import Family
+
+FAST = sl.Taylor(order=12, lanes=2)
+
+
+@sl.system(states="x y")
+def planar(t, x, y, *, mu=1.0, omega=1.0, circle=1.0):
+    """Hopf's normal form with ``circle`` = 1; van der Pol's equation with ``circle`` = 0."""
+    r = x * x + y * y
+    return (
+        circle * (mu * x - omega * y - r * x) + (1 - circle) * y,
+        circle * (omega * x + mu * y - r * y) + (1 - circle) * (mu * (1 - x * x) * y - x),
+    )
+
+
+STARTS = {"x": [0.3, -1.0], "y": [0.1, 0.0]}
+
+
+@pytest.fixture(scope="module")
+def hopf():
+    return {
+        every: sl.bifurcation_diagram(planar, {"mu": (-0.5, 1.0, 7)}, STARTS, every=every, values={"omega": 2.0}, method=FAST, periods=400)
+        for every in (0.05, 1.0, 20.0)
+    }
+
+
+def test_a_limit_cycle_has_the_period_size_and_multipliers_of_the_closed_form(hopf):
+    ds = hopf[1.0].isel(response=hopf[1.0].response_type.values == "limit_cycle")
+    mu = ds.response_mu.values
+    np.testing.assert_allclose(mu, [0.25, 0.5, 0.75, 1.0])
+    np.testing.assert_allclose(ds.response_cycle, np.pi, rtol=1e-12)
+    np.testing.assert_allclose(ds.response_peak, np.sqrt(mu), rtol=1e-12)
+    np.testing.assert_allclose(ds.response_rms, np.sqrt(mu / 2), rtol=1e-12)
+    np.testing.assert_allclose(ds.response_multiplier_real.values[:, 0], 1.0)
+    np.testing.assert_allclose(ds.response_multiplier_real.values[:, 1], np.exp(-2 * mu * np.pi), rtol=1e-9)
+    np.testing.assert_allclose(ds.response_exponent, 0.0)
+    turns = np.sort(ds.sample_x.values, axis=1)
+    np.testing.assert_allclose(turns[:, :2], np.stack([-np.sqrt(mu), np.sqrt(mu)], axis=1), rtol=1e-12)
+    assert np.isnan(turns[:, 2:]).all(), "it turns twice in a cycle"
+
+
+def test_an_equilibrium_has_the_eigenvalues_of_the_jacobian_and_begins_to_oscillate_where_they_say(hopf):
+    ds = hopf[1.0]
+    rests = ds.isel(response=ds.response_type.values == "equilibrium")
+    np.testing.assert_allclose(rests.response_mu, [-0.5, -0.25])
+    np.testing.assert_allclose(rests.response_eigenvalue_real, np.stack([rests.response_mu] * 2, axis=1), rtol=1e-12)
+    np.testing.assert_allclose(rests.response_eigenvalue_imag, [[2.0, -2.0]] * 2, rtol=1e-12)
+    np.testing.assert_allclose(rests.response_exponent, rests.response_mu, rtol=1e-12)
+    assert np.isnan(rests.response_multiplier_real).all()
+    assert np.isnan(rests.response_cycle).all()
+    assert ds.event_kind.values.tolist() == ["hopf"]
+    assert abs(ds.event_mu.item()) < 1e-9
+    assert (ds.type.sel(mu=0.0) == "unconverged").all(), "at the bifurcation nothing decays exponentially"
+
+
+def test_answers_do_not_depend_on_the_time_between_looks(hopf):
+    one, *others = hopf.values()
+    for other in others:
+        np.testing.assert_array_equal(other.type, one.type)
+        np.testing.assert_array_equal(other.response_branch, one.response_branch)
+        for name in ("response_cycle", "response_peak", "response_multiplier_real", "response_eigenvalue_real"):
+            np.testing.assert_allclose(other[name], one[name], rtol=1e-9, atol=1e-12)
+        for name in ("response_x", "response_y"):  # the same points of it, whoever found it
+            np.testing.assert_allclose(other[name], one[name], atol=1e-9)
+
+
+def van_der_pol(mu):
+    """Period and amplitude by an independent solver: from one maximum to the next on the cycle."""
+
+    def turn(_, u):
+        return u[1]
+
+    turn.direction = -1
+    run = solve_ivp(
+        lambda _, u: [u[1], mu * (1 - u[0] ** 2) * u[1] - u[0]], (0, 120), [2.0, 0.0], "DOP853", events=turn, rtol=1e-13, atol=1e-14
+    )
+    return run.t_events[0][-1] - run.t_events[0][-2], run.y_events[0][-1][0]
+
+
+@pytest.mark.parametrize("mu", [1.0, 5.0])
+def test_van_der_pol_agrees_with_an_independent_solver(mu):
+    ds = sl.bifurcation_diagram(planar, {"mu": [mu]}, STARTS, every=0.7, values={"circle": 0.0}, method=FAST, periods=400)
+    period, amplitude = van_der_pol(mu)
+    assert ds.response_type.values.tolist() == ["limit_cycle"]
+    assert ds.response_cycle.item() == pytest.approx(period, rel=1e-10)
+    assert ds.response_peak.item() == pytest.approx(amplitude, rel=1e-10)
+    if mu == 1.0:
+        assert ds.response_cycle.item() == pytest.approx(6.6632868593, abs=2e-10)
+
+
+def test_a_guess_at_several_turns_gives_one_turn():
+    family = Family(planar, FAST, np.array([[1.0, 1.0, 1.0]]), 1.0)
+    seen = returns(family, np.array([[1.0, 0.0]]), 50.0)
+    assert seen.time[0] == pytest.approx(2 * np.pi, rel=1e-9)
+    cycles = find_cycles(family, np.array([[0.9, 0.1]]), np.array([6 * np.pi]), np.ones((1, 2)))
+    assert cycles.period[0] == pytest.approx(2 * np.pi, rel=1e-12)
+
+
+def test_an_unstable_equilibrium_is_found_and_captures_nothing():
+    family = Family(planar, FAST, np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]]), 1.0)
+    found = find_equilibria(family, np.full((2, 2), 0.01), np.ones((2, 2)))
+    np.testing.assert_allclose(found.place, 0.0, atol=1e-12)
+    assert found.stable.tolist() == [False, True]
+    assert found.holds(np.full((2, 2), 0.01)).tolist() == [False, True]

@@ -1,0 +1,115 @@
+"""What every public verb says about its arguments, about compiling and about Ctrl-C."""
+
+import pytest
+
+import saltus as sl
+from saltus.analysis.verb import verb
+from saltus.codegen.announce import announce
+from saltus.flow.progress import Lines, reporter
+
+rig = sl.models.delangre("b")
+
+
+@pytest.mark.parametrize(
+    ("keywords", "teaches"),
+    [
+        ({"lower_gap": 1}, r"parameter of delangre: give it by values={'lower_gap': \.\.\.} or system.with_values\(lower_gap=\.\.\.\)"),
+        ({"v": 1}, r"state of delangre: give it by start={'x': \.\.\., 'v': \.\.\.}"),
+        ({"tend": 1}, "Write t_end="),
+        ({"t_eval": [1]}, "Write samples="),
+        ({"y0": [1, 0]}, "Write start="),
+        ({"rtol": 1e-3}, "Write method=sl.ODE45"),
+        ({"peroids": 1}, "Did you mean 'periods'"),
+    ],
+)
+def test_an_argument_that_is_not_there_is_answered_by_one_that_is(keywords, teaches):
+    with pytest.raises(sl.SaltusError, match=teaches):
+        sl.simulate(rig, **keywords)
+
+
+def test_too_few_and_too_many():
+    with pytest.raises(sl.SaltusError, match=r"missing a required argument: 'system'. Write sl.simulate\(system, "):
+        sl.simulate()
+    with pytest.raises(sl.SaltusError, match="too many positional arguments"):
+        sl.simulate(rig, (0, 0), 1, None, 1, 1)
+
+
+def test_every_public_verb_is_one():
+    from saltus import analysis
+
+    for name in analysis.__all__:
+        with pytest.raises(sl.SaltusError, match=f"sl.{name}"):
+            getattr(sl, name)(**{"no such argument": 1}) if name not in ("basins", "basin_fractions") else getattr(sl, name)()
+
+
+def test_ctrl_c_before_anything_is_finished_is_told_in_a_sentence():
+    @verb
+    def pressed(progress=None):
+        raise KeyboardInterrupt
+
+    with pytest.raises(sl.Interrupted, match="stopped by Ctrl-C before anything was finished") as stopped:
+        pressed()
+    assert stopped.value.partial is None
+    assert isinstance(stopped.value, KeyboardInterrupt)
+
+
+def test_progress_false_silences_what_is_compiled_and_only_the_outermost_counts(capfd):
+    @verb
+    def inner(progress=None):
+        announce("an equation", 20.0)
+
+    @verb
+    def outer(progress=None):
+        inner(progress=False)
+
+    inner(progress=False)
+    assert capfd.readouterr().err == ""
+    outer()
+    assert capfd.readouterr().err == "saltus: compiling an equation: once for each new equation, about 20 s\n"
+
+
+# -- what a System isn't -----------------------------------------------------------------------------------------------------------
+def test_a_system_says_what_to_do_in_place_of_calling_or_changing_it():
+    with pytest.raises(sl.SaltusError, match=r"sl.simulate\(delangre, \.\.\.\)"):
+        rig(0.0, (0.0, 0.0))
+    with pytest.raises(sl.SaltusError, match=r"with_values\(lower_gap=\.\.\.\)"):
+        rig.lower_gap = 1.0
+    with pytest.raises(sl.SaltusError, match="never changed"):
+        rig.name = "another"
+    assert rig.name == "delangre"
+
+
+def test_a_model_that_is_not_there_is_answered_by_those_that_are():
+    with pytest.raises(AttributeError, match="Models: delangre, chain, gear_pair, aeroelastic"):
+        sl.models.duffing  # noqa: B018
+
+
+# -- progress in logs --------------------------------------------------------------------------------------------------------------
+def told(shares_at):
+    """Lines of a work whose share done is so much at such a time [s]."""
+    now, lines = [0.0], []
+    show = Lines(lines.append, clock=lambda: now[0]).show
+    for when, share in shares_at:
+        now[0] = when
+        show(share)
+    return lines
+
+
+def test_a_log_has_a_line_for_each_quarter_of_long_work():
+    assert told([(t, t / 100) for t in range(101)]) == [
+        "25% done in 25 s, about 75 s left",
+        "50% done in 50 s, about 50 s left",
+        "75% done in 75 s, about 25 s left",
+    ]
+
+
+def test_short_work_says_nothing_and_slow_work_says_that_it_lives():
+    assert told([(t / 10, t / 90) for t in range(91)]) == []
+    assert told([(t, 0.0) for t in range(0, 701, 10)]) == ["0% done in 300 s", "0% done in 600 s"]
+
+
+def test_what_progress_may_be():
+    assert reporter(False)[0] is None
+    assert reporter(print)[0] is print
+    with pytest.raises(sl.SaltusError, match="progress must be"):
+        reporter("bar")
