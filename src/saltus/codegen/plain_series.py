@@ -36,6 +36,7 @@ def _plain(head: str) -> ModuleType:
         *((name, _template(name)) for name in ("clocks.py", "taylor_layout.py", "taylor_step.py")),
     ):
         exec(compile(text, name, "exec"), names)
+    names["SINGULAR"], names["NSINGULAR"] = names["NSINGULAR"], 0  # rows of `side`; no term is left out of these series
     names["splat"] = lambda value, width: value  # noqa: ARG005  (NumPy spreads a number over any width)
     return module
 

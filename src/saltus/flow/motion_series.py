@@ -98,7 +98,8 @@ class MotionSeries:
     def of(self, nodes: Nodes, cubic: bool) -> list[Pieces]:
         """The pieces that begin at nodes and fill them; for cubics the first terms of each will do."""
         result, state, left = [], nodes.state.T.copy(), nodes.length.copy()
-        side = np.where((nodes.mode[None] >> np.arange(self._guards)[:, None]) & 1 == 1, 1.0, -1.0)
+        side = np.full((self._module.NGUARDS + self._module.SINGULAR, len(left)), -1.0)  # -1: no term is left out
+        side[: self._guards] = np.where((nodes.mode[None] >> np.arange(self._guards)[:, None]) & 1 == 1, 1.0, -1.0)
         new = np.ones(len(left), bool)
         for _ in range(MOST_PIECES):
             work, h = self._step(nodes, state, side, new)
@@ -144,11 +145,11 @@ class MotionSeries:
         room = np.full(len(motion), np.inf)
         if module.NCLOCKS:
             numbers, held = np.zeros((module.NUMBERS + 1) * module.NCLOCKS), np.zeros(module.HELD * module.NCLOCKS)
-            for i, row in enumerate(motion.tolist()):
-                period, count = self._family.period[row], int(nodes.period[i])
-                module.place_clocks(self._family.parameters[row], 0.0, period, count, numbers, self._tables)
-                room[i] = module.set_clocks(nodes.phase[i], count * period, numbers, self._tables, False, held) - nodes.phase[i]
-                clock[module.CLOCK_ROW :, i] = held
+            for at, who in enumerate(motion.tolist()):
+                period, count = self._family.period[who], int(nodes.period[at])
+                module.place_clocks(self._family.parameters[who], 0.0, period, count, numbers, self._tables)
+                room[at] = module.set_clocks(nodes.phase[at], count * period, numbers, self._tables, False, held) - nodes.phase[at]
+                clock[module.CLOCK_ROW :, at] = held
         return clock, room
 
     def _probed(
@@ -166,7 +167,7 @@ class MotionSeries:
 
     def _until_own_boundary(self, work: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lengths up to the first boundary of the quantities' own, and the guards float64[guards, n] that flip there."""
-        flips = np.zeros((self._guards, len(h)), bool)
+        flips = np.zeros((self._module.NGUARDS + self._module.SINGULAR, len(h)), bool)
         for guard in range(self._own, self._guards):
             which, place = polynomials.sign_changes(self._gap(work, guard) * h ** np.arange(ORDER + 1)[:, None])
             which, place = which[place > BEGAN], place[place > BEGAN]
