@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import branches
-from saltus.analysis.along import whole
 from saltus.analysis.answers import gap_unit, guards_over, provenance
 from saltus.analysis.grid import Grid
 from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.analysis.responses import Found, find, numbers_of, table_of
 from saltus.analysis.samples import sampled
+from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.interrupt import Interrupted
