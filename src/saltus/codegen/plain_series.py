@@ -31,8 +31,12 @@ def _plain(head: str) -> ModuleType:
     names |= {name: value for name, value in vars(lanes).items() if callable(value) and not name.startswith("_")}
     names |= dict.fromkeys(("kernel", "inner"), lambda function: function)
     names |= {"math": math, "np": np, "sincos": getattr(trigonometry.sincos, "py_func", trigonometry.sincos), "turned": trigonometry.turned}
-    for name, text in (("<generated head>", head), *((name, _template(name)) for name in ("taylor_layout.py", "taylor_step.py"))):
+    for name, text in (
+        ("<generated head>", head),
+        *((name, _template(name)) for name in ("clocks.py", "taylor_layout.py", "taylor_step.py")),
+    ):
         exec(compile(text, name, "exec"), names)
+    names["SINGULAR"], names["NSINGULAR"] = names["NSINGULAR"], 0  # rows of `side`; no term is left out of these series
     names["splat"] = lambda value, width: value  # noqa: ARG005  (NumPy spreads a number over any width)
     return module
 
