@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from typing import Any
 
 import typer
@@ -28,6 +30,8 @@ class Commands(TyperGroup):
         except BrokenPipeError:  # `saltus models | head`
             raise
         except OSError as error:
+            if error.errno == errno.EBADF and not error.filename:  # standard output was closed meanwhile: nobody reads on, as with a pipe
+                raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)) from None
             screen.fail(f"{error.filename or 'a file'}: {error.strerror or error}. Choose another folder, or free some space.")
             raise typer.Exit(REFUSED) from None
         except KeyboardInterrupt:

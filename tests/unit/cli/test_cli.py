@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 
@@ -135,3 +136,33 @@ def test_a_wrong_figure_gets_those_that_there_are(tmp_path):
     wrong = saltus("reproduce", "saunders2021", "--figure", "44", "--out", str(tmp_path))
     assert wrong.exit_code == 2
     assert "2, 3, 4, 5, 6" in wrong.output
+
+
+@pytest.mark.parametrize("command", [["models"], ["schema"], ["models", "delangre"]])
+@pytest.mark.parametrize("how", ["nobody reads on", "closed from the start", "closed on the way"])
+def test_a_closed_output_ends_quietly(command, how):
+    """``saltus models | head``, ``saltus models >&-``: nothing is wrong with a file, so nothing is said about one."""
+    close = {"nobody reads on": "", "closed from the start": "os.close(1); ", "closed on the way": "os.close(1); "}[how]
+    call = "cli.app(prog_name='saltus')" if how == "closed on the way" else "cli.main()"
+    code = f"import os, sys; from saltus import cli; sys.argv = ['saltus', *{command!r}]; {close}{call}"
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        done = subprocess.run([sys.executable, "-c", code], stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+    finally:
+        os.close(write)
+    assert done.stderr == ""
+    assert done.returncode in (0, 1)
+
+
+def test_a_file_never_takes_the_place_of_a_closed_output(tmp_path):
+    """What is printed must not land in the next file that is opened."""
+    code = (
+        "import os; os.close(1)\n"
+        "from saltus import cli\n"
+        "cli._replace_closed_streams()\n"
+        f"file = open({str(tmp_path / 'result')!r}, 'w'); assert file.fileno() > 2\n"
+        "print('told'); file.write('kept')\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    assert (tmp_path / "result").read_text() == "kept"
