@@ -80,7 +80,8 @@ _HOMES = {
         ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan", "tanh"),
         "saltus.system",
     ),
-    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "sign", "sinh", "where"), "saltus.system"),
+    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign", "sinh"), "saltus.system"),
+    **dict.fromkeys(("table", "where"), "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 
@@ -118,6 +119,7 @@ __all__ = [
     "lyapunov",
     "max",
     "min",
+    "mod",
     "models",
     "pi",
     "piecewise",
@@ -134,6 +136,7 @@ __all__ = [
     "sqrt",
     "stroboscope",
     "system",
+    "table",
     "tan",
     "tanh",
     "to_csv",

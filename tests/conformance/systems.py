@@ -75,6 +75,25 @@ def latch(t, x, v, *, half_width=0.5, gain=0.0):
     return v, -x - sl.piecewise((gain, x > threshold), otherwise=0)
 
 
+@sl.system(states="x y v w", forced_at="f")
+def two_masses(
+    t, x, y, v, w, *, k1=30.0, k2=12.0, c1=0.3, c2=0.2, ka=500.0, ga=0.05, kb=300.0, gb=0.07, kd=400.0, gd=0.03, ke=90.0, ge=0.04,
+    A=2.0, f=0.9, mu=2.0,
+):  # fmt: skip
+    """Two masses with a stop on either side of the first, and clearances of both signs between the two."""
+    stop = sl.piecewise((ka * (x - ga), x > ga), (kb * (x + gb), x < -gb), otherwise=0)
+    between = sl.piecewise((kd * (y - x - gd), y - x > gd), (ke * (y - x + ge), y - x < -ge), otherwise=0)
+    inner = k2 * (y - x) + c2 * (w - v) + between
+    return v, w, A * sl.cos(2 * sl.pi * f * t) - k1 * x - c1 * v - stop + inner, -mu * inner
+
+
+@sl.system(states="x y z")
+def circuit(t, x, y, z, *, al=9.0, be=14.0, m0=-1.14, m1=-0.71, b=1.0, e=0.02, h=2.0):
+    """Chua's circuit with a third kink and a cubic term."""
+    diode = sl.piecewise((m1 * x + (m0 - m1) * b, x > b), (m1 * x - (m0 - m1) * b, x < -b), otherwise=m0 * x)
+    return al * (y - x - diode), x - y + z - e * y**3, -be * y - 0.05 * sl.abs(x - h)
+
+
 class Contact(NamedTuple):
     """One row of a table of contacts."""
 

@@ -51,7 +51,7 @@ def test_the_error_estimate_covers_the_true_error_of_all_63_contacts(runs, metho
     assert run.sizes["contact"] == len(exact) == 63
     true = np.abs(run.contact_time.values - exact)
     assert (true <= run.contact_time_error.values).all()
-    assert run.contact_time_error.values.max() < 10 * true.max()  # honest, not merely large
+    assert run.contact_time_error.values.max() < 20 * true.max()  # honest, not merely large: eight times what copies differ by
     if method == "taylor":
         assert true.max() < 1e-13
     else:

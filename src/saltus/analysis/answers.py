@@ -15,9 +15,6 @@ from saltus.results import Contacts, Guards, attributes
 from saltus.system.evaluate import evaluate
 from saltus.system.system import System
 
-#: An error estimate is this many times the largest difference to the companion run so far.
-SAFETY = 4.0
-
 
 def shared_values(system: System, group: Ensemble) -> dict[str, float]:
     """Parameter values of the first trajectory."""
@@ -98,37 +95,3 @@ def contacts(outcome: Outcome, states: int, time_error: np.ndarray) -> Contacts:
 def contact_times(outcome: Outcome) -> np.ndarray:
     """Absolute times of the contacts [s]."""
     return outcome.record_floats[:, -1]
-
-
-def local_time_errors(outcome: Outcome) -> np.ndarray:
-    """What one step's own error means for the time of its contact [s]."""
-    return outcome.record_floats[:, st.REC_TIME_ERROR]
-
-
-def measured_time_errors(outcome: Outcome, companion: Outcome) -> np.ndarray:
-    """Error of every contact's time [s], measured against a more exact run of the same trajectories.
-
-    The k-th contact of a trajectory is compared with the k-th of its companion; errors grow along a trajectory, so the estimate is
-    four times the largest difference so far (both runs round, so one difference can be small by chance), and never less than the local
-    error and four ulp of the time. From the first contact on at which the two runs meet
-    different guards (or one of them meets none) nothing is known: infinite.
-    """
-    ours, theirs = outcome.record_integers, companion.record_integers
-    error = np.full(len(ours), np.inf)
-    bounds_ours, bounds_theirs = _bounds(ours, outcome), _bounds(theirs, companion)
-    for i in range(len(outcome.status)):
-        a, b = slice(*bounds_ours[i : i + 2]), slice(*bounds_theirs[i : i + 2])
-        shared = min(a.stop - a.start, b.stop - b.start)
-        a, b = slice(a.start, a.start + shared), slice(b.start, b.start + shared)
-        columns = [st.REC_GUARD, st.REC_DIRECTION]
-        differ = (ours[a][:, columns] != theirs[b][:, columns]).any(axis=1)
-        same = int(np.argmax(differ)) if differ.any() else shared
-        here = slice(a.start, a.start + same)
-        difference = np.abs(outcome.record_floats[here, -1] - companion.record_floats[b.start : b.start + same, -1])
-        error[here] = SAFETY * np.maximum.accumulate(difference)
-    return np.maximum(error, local_time_errors(outcome) + 4.0 * np.spacing(np.abs(contact_times(outcome))))
-
-
-def _bounds(table: np.ndarray, outcome: Outcome) -> np.ndarray:
-    """Where each trajectory's contacts begin in a sorted table, and where the last ends."""
-    return np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(len(outcome.status) + 1))

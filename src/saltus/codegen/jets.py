@@ -25,6 +25,15 @@ MASK_WORDS = ("&", "|", "~")
 SINE = 12
 
 
+#: What makes a coefficient differ from step to step.
+MOVING = ("select", "held")
+
+
+def held(row: int) -> str:
+    """Code for what a clock holds."""
+    return f"load(clock, CLOCK_ROW + {row}, LANES)"
+
+
 class Constants:
     """Parameter-only values, worked out once per trajectory: each gets a row of the table ``c``."""
 
@@ -89,7 +98,9 @@ class JetCode:
             if node.op == "select":
                 a, b = (self._as_lane(self.coefficient(x), x) for x in node.args)
                 code = f"select({self._mask(node.payload)}, {a}, {b})"
-            elif not ex.depends_on(node, ("select",)):
+            elif node.op == "held":
+                code = held(node.payload)
+            elif not ex.depends_on(node, MOVING):
                 code = f"load(c, {self._constants.index(node)}, LANES)"
             else:
                 code = self._coefficient_operation(node)
@@ -117,8 +128,10 @@ class JetCode:
         if condition not in self._masks:
             if isinstance(condition, ex.Bit):
                 code = f"load(side, {condition.guard}, LANES) > 0.0"
+            elif isinstance(condition, ex.Relation):
+                code = f"{held(self._builder.row_of_side(condition))} > 0.0"
             else:
-                code = condition_code(condition, lambda i: self._mask(ex.Bit(i)), MASK_WORDS)
+                code = condition_code(condition, lambda i: self._mask(ex.Bit(i)), self._mask, MASK_WORDS)
             self._masks[condition] = self._assign(code)
         return self._masks[condition]
 
@@ -202,6 +215,12 @@ class JetCode:
     def _time(self, _series: Series, k: int) -> str | None:
         if k == 0:
             return self._assign("load(clock, 0, LANES) + load(clock, 1, LANES)")
+        return self._assign("splat(1.0, LANES)") if k == 1 else None
+
+    def _since(self, series: Series, k: int) -> str | None:
+        if k == 0:
+            assert isinstance(series.payload, int)
+            return self._assign(f"load(clock, 0, LANES) - {held(series.payload)}")
         return self._assign("splat(1.0, LANES)") if k == 1 else None
 
     def _linear(self, series: Series, k: int) -> str | None:
@@ -326,7 +345,7 @@ class JetCode:
             return ex.constant(1.0), ex.constant(0.0)
         if a.kind == "linear" and isinstance(a.payload, Linear) and [s.kind for s in a.payload.terms] == ["time"]:
             (rate,) = a.payload.terms.values()
-            if not ex.depends_on(rate, ("select",)) and not ex.depends_on(a.payload.offset, ("select",)):
+            if not ex.depends_on(rate, MOVING) and not ex.depends_on(a.payload.offset, MOVING):
                 return rate, a.payload.offset
         return None
 

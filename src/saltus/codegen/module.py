@@ -27,11 +27,11 @@ _I1, _I2 = "int64[::1]", "int64[:, ::1]"
 #: Types of a batch, the first arguments of every `propagate`, in order; flow/engine.py says what they are.
 BATCH = (
     _F1, _F1, _F2, "int64", _F2, _I1, _F1, _I1, _I1, _F2, _I1, _I1, _F1, _I2, _F2,
-    _I1, _F1, _I1, _F3, _I2, _I1, _I2, _F2, _I1, _F1, "int64",
+    _I1, _F1, _I1, _F3, _I2, _I1, _I2, _F2, _I1, _F1, _F1, "int64",
 )  # fmt: skip
 
 #: Types of the arrays that kernels/taylor_lanes.py:workspace returns.
-TAYLOR_WORKSPACE = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2)
+TAYLOR_WORKSPACE = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2, _F1, _F1)
 #: Types of the arrays that kernels/dormand_prince.py:workspace returns.
 ODE45_WORKSPACE = (_F1,)
 
@@ -82,7 +82,7 @@ def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
         f"{system.name}, Taylor order {order}, {lanes} lanes",
         f"{_described(system)} for Taylor",
         taylor_head(system, order, lanes),
-        ("taylor_layout.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"),
+        ("clocks.py", "taylor_layout.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"),
         BATCH + TAYLOR_WORKSPACE,
     )
 
@@ -90,7 +90,7 @@ def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
 @lru_cache(maxsize=64)
 def ode45_module(system: System) -> ModuleType:
     """The compiled ode45 of a system."""
-    templates = ("dormand_prince.py", "odezero.py", "ode45.py")
+    templates = ("clocks.py", "dormand_prince.py", "odezero.py", "ode45.py")
     what = f"{_described(system)} for ODE45"
     return _module(f"{system.name}, ode45", what, ode45_head(system), templates, BATCH + ODE45_WORKSPACE)
 
@@ -141,7 +141,9 @@ def _environment() -> str:
     import llvmlite
     import numpy
 
-    inlined = "".join(_template(name) for name in ("lanes.py", "trigonometry.py", "isolation.py", "status.py", "batch.py", "parts.py"))
+    inlined = "".join(
+        _template(name) for name in ("lanes.py", "trigonometry.py", "isolation.py", "status.py", "batch.py", "parts.py", "clocks_layout.py")
+    )
     versions = (sys.version, numba.__version__, llvmlite.__version__, numpy.__version__)
     settings = [f"{name}={getattr(numba.config, name, None)}" for name in _SETTINGS]
     return "\n".join([inlined, *versions, platform.machine(), *_target(), *settings])

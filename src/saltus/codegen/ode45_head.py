@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from saltus.codegen.clocks import Clocks
 from saltus.codegen.saltation import jump_function
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.taylor_head import bits_of, evaluation_order
@@ -39,7 +40,7 @@ class _Stages:
     """Leaves for the state-dependent code: whatever doesn't depend on the state is read from ``c`` or ``q``."""
 
     def __init__(self, system: System) -> None:
-        self.constants, self.drives = _Slots("c"), _Slots("q")
+        self.constants, self.drives, self.clocks = _Slots("c"), _Slots("q"), Clocks(system)
         self._system = system
 
     def state_leaf(self, node: Expr) -> str | None:
@@ -53,6 +54,8 @@ class _Stages:
     def drive_leaf(self, node: Expr) -> str | None:
         if node.op == "time":
             return "t"
+        if (clocked := self.clocks.value(node)) is not None:
+            return clocked
         return self.constants.code(node) if _level(node) == 0 and node.op != "const" else None
 
 
@@ -60,7 +63,7 @@ def _with_sides(system: System, stages: _Stages, roots: Iterable[Expr]) -> Scala
     """Code that first takes from the state the sides that the roots ask about."""
     roots = list(roots)
     asked = {g for root in roots for node in ex.walk(root) if node.op == "select" for g in bits_of(node.payload)}
-    code = ScalarCode(stages.state_leaf, side=lambda i: f"b{i}")
+    code = ScalarCode(stages.state_leaf, side=lambda i: f"b{i}", switch=stages.clocks.side)
     for i in evaluation_order(system):
         if i in asked or any(i in _asked_by(system, g) for g in asked):
             value = code.value(system.guards[i].gap)
@@ -123,10 +126,11 @@ def ode45_head(system: System) -> str:
             *(f"{name} = {value!r}" for name, value in sizes.items()),
             "",
             f"@kernel\ndef prepare(p, c):\n{indented(prepare.lines)}\n",
-            f"@kernel\ndef drive(t, c, q):\n{indented(drive.lines)}\n",
-            f"@kernel\ndef field(t, y, c, q, out):\n{field}\n",
-            f"@kernel\ndef gaps(t, y, c, q, out):\n{gap_values}\n",
-            jump_function(system),
-            f"@kernel\ndef gap_rates(t, y, dy, c, q, out):\n{gap_rates}\n",
+            *stages.clocks.head(),
+            f"@kernel\ndef drive(t, c, h, q):\n{indented(drive.lines)}\n",
+            f"@kernel\ndef field(t, y, c, q, h, out):\n{field}\n",
+            f"@kernel\ndef gaps(t, y, c, q, h, out):\n{gap_values}\n",
+            jump_function(system, stages.clocks),
+            f"@kernel\ndef gap_rates(t, y, dy, c, q, h, out):\n{gap_rates}\n",
         ]
     )

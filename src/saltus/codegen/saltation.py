@@ -8,24 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from saltus.codegen.clocks import Clocks
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
 from saltus.system.system import System
 
 
-def jump_function(system: System) -> str:
-    """``jump(t, y, p, before, after, g)``: multiply the tangent rows of y by S at a crossing of guard g, between two modes (bits).
+def jump_function(system: System, clocks: Clocks) -> str:
+    """``jump(t, y, p, h, before, after, g)``: multiply the tangent rows of y by S at a crossing of guard g, between two modes (bits).
 
     Does nothing for a system that carries no tangent. A crossing at zero rate makes the tangent infinite, as it is.
     """
     base = system.tangent_of
     if base is None or not base.guards:
-        return "@kernel\ndef jump(t, y, p, before, after, g):\n    pass\n"
+        return "@kernel\ndef jump(t, y, p, h, before, after, g):\n    pass\n"
     size = len(base.states)
+    leaf = parameter_leaf(base, "y", clocks.value)
     lines = []
     for word in ("before", "after"):
-        code = ScalarCode(parameter_leaf(base, "y"), side=_bit_of(word), prefix=f"{word}_")
+        code = ScalarCode(leaf, side=_bit_of(word), prefix=f"{word}_", switch=clocks.side)
         for i, value in enumerate(code.values(base.field)):
             code.lines.append(f"rate_{word}_{i} = {value}")
         lines += code.lines
@@ -33,7 +35,7 @@ def jump_function(system: System) -> str:
     lines += [f"if {' and '.join(f'leap_{i} == 0.0' for i in range(size))}:", "    return"]
     lines += [f"n_{i} = 0.0" for i in range(size + 1)]
     for g, guard in enumerate(base.guards):
-        code = ScalarCode(parameter_leaf(base, "y"), side=_bit_of("before"), prefix=f"gap{g}_")
+        code = ScalarCode(leaf, side=_bit_of("before"), prefix=f"gap{g}_", switch=clocks.side)
         entries = [differentiate(guard.gap, leaf) for leaf in (*map(ex.state, base.states), ex.TIME)]
         for i, value in enumerate(code.values(entries)):
             code.lines.append(f"n_{i} = {value}")
@@ -43,7 +45,7 @@ def jump_function(system: System) -> str:
         column = [f"y[{size + i * size + j}]" for i in range(size)]
         lines.append(f"along_{j} = ({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing")
         lines += [f"{entry} += leap_{i} * along_{j}" for i, entry in enumerate(column)]
-    return f"@kernel\ndef jump(t, y, p, before, after, g):\n{indented(lines)}\n"
+    return f"@kernel\ndef jump(t, y, p, h, before, after, g):\n{indented(lines)}\n"
 
 
 def _bit_of(word: str) -> Callable[[int], str]:

@@ -16,8 +16,10 @@ def indented(lines: list[str]) -> str:
     return "\n".join("    " + line for line in lines) if lines else "    pass"
 
 
-def parameter_leaf(system: System, states: str | None = None) -> Callable[[Expr], str | None]:
-    """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions."""
+def parameter_leaf(
+    system: System, states: str | None = None, clocked: Callable[[Expr], str | None] | None = None
+) -> Callable[[Expr], str | None]:
+    """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions, and for what ``clocked`` knows."""
     names, state_names = tuple(system.values), system.states
 
     def leaf(node: Expr) -> str | None:
@@ -25,22 +27,33 @@ def parameter_leaf(system: System, states: str | None = None) -> Callable[[Expr]
             return f"p[{names.index(node.payload)}]"
         if states and node.op == "state":
             return f"{states}[{state_names.index(node.payload)}]"
+        if clocked is not None and (code := clocked(node)) is not None:
+            return code
         return "t" if states and node.op == "time" else None
 
     return leaf
 
 
-def condition_code(condition: ex.Condition, bit: Callable[[int], str], words: tuple[str, str, str] = ("and", "or", "not")) -> str:
-    """A condition over mode bits as code; ``bit(i)`` is the code for side i, ``words`` are the operators (``& | ~`` for lane masks)."""
+def condition_code(
+    condition: ex.Condition,
+    bit: Callable[[int], str],
+    switch: Callable[[ex.Relation], str],
+    words: tuple[str, str, str] = ("and", "or", "not"),
+) -> str:
+    """A condition as code: ``bit(i)`` is the code for side i, ``switch(relation)`` that for what time decides, ``words`` are the operators
+    (``& | ~`` for lane masks).
+    """
     match condition:
         case ex.Bit(guard):
             return bit(guard)
+        case ex.Relation():
+            return switch(condition)
         case ex.And(left, right):
-            return f"({condition_code(left, bit, words)} {words[0]} {condition_code(right, bit, words)})"
+            return f"({condition_code(left, bit, switch, words)} {words[0]} {condition_code(right, bit, switch, words)})"
         case ex.Or(left, right):
-            return f"({condition_code(left, bit, words)} {words[1]} {condition_code(right, bit, words)})"
+            return f"({condition_code(left, bit, switch, words)} {words[1]} {condition_code(right, bit, switch, words)})"
         case ex.Not(inner):
-            return f"({words[2]} {condition_code(inner, bit, words)})"
+            return f"({words[2]} {condition_code(inner, bit, switch, words)})"
     raise TypeError(condition)
 
 
@@ -55,11 +68,19 @@ class ScalarCode:
         ``side(guard) -> str``: code that is true where the guard is positive.
     prefix : str
         Start of the names of temporaries.
+    switch : callable
+        ``switch(relation) -> str``: code that is true where what time alone decides holds.
     """
 
-    def __init__(self, leaf: Callable[[Expr], str | None], side: Callable[[int], str] | None = None, prefix: str = "q"):
+    def __init__(
+        self,
+        leaf: Callable[[Expr], str | None],
+        side: Callable[[int], str] | None = None,
+        prefix: str = "q",
+        switch: Callable[[ex.Relation], str] | None = None,
+    ):
         self.lines: list[str] = []
-        self._leaf, self._side, self._prefix = leaf, side, prefix
+        self._leaf, self._side, self._prefix, self._switch = leaf, side, prefix, switch
         self._names: dict[Expr, str] = {}
 
     def value(self, root: Expr) -> str:
@@ -104,7 +125,8 @@ class ScalarCode:
             return self._power(a[0], node.args[1], a[1])
         if node.op == "select":
             assert self._side is not None, "a mode-dependent value where none is allowed"
-            return f"{a[0]} if {condition_code(node.payload, self._side)} else {a[1]}"
+            assert self._switch is not None, "a value that switches where none is allowed"
+            return f"{a[0]} if {condition_code(node.payload, self._side, self._switch)} else {a[1]}"
         return f"math.{node.op}({a[0]})"
 
     @staticmethod

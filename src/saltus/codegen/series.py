@@ -11,11 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from saltus.codegen.clocks import Clocks
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
 
 #: Series kinds whose value is finite wherever their operands are.
-_TOTAL = ("state", "time", "product", "sin", "cos", "atan", "tanh", "linear")
+_TOTAL = ("state", "time", "since", "product", "sin", "cos", "atan", "tanh", "linear")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +26,12 @@ class Series:
     Attributes
     ----------
     kind : str
-        ``state``, ``time``, ``linear``, ``product``, ``quotient``, ``power``, ``select``, or an elementary function.
+        ``state``, ``time``, ``since`` (time since the reference of a clock's polynomial), ``linear``, ``product``, ``quotient``,
+        ``power``, ``select``, or an elementary function.
     operands : tuple of Series
         Its arguments.
     payload : object
-        Name of a state, exponent (Expr) of a power, condition of a select, :class:`Linear` of a linear series.
+        Name of a state, row of a reference, exponent (Expr) of a power, condition of a select, :class:`Linear` of a linear series.
     """
 
     kind: str
@@ -67,7 +69,7 @@ def _scale(factor: Expr, c: Expr, by_division: bool = False) -> Expr:
 
 
 def _may_hide(series: Series) -> bool:
-    if series.kind in ("state", "time", "linear"):
+    if series.kind in ("state", "time", "since", "linear"):
         return False
     if series.kind == "product":
         return _degree_in_time(series) > 8
@@ -83,19 +85,20 @@ def _degree_in_time(series: Series) -> int:
 
 def _of_time(series: Series) -> bool:
     """Whether a series is time, or a linear form of time only."""
-    return series.kind == "time" or (series.kind == "linear" and all(s.kind == "time" for s in series.operands))
+    return series.kind in ("time", "since") or (series.kind == "linear" and all(s.kind in ("time", "since") for s in series.operands))
 
 
 class SeriesBuilder:
-    """Turns expressions into :class:`Linear` forms over shared series."""
+    """Turns expressions into :class:`Linear` forms over shared series; ``clocks`` numbers what time alone decides in them."""
 
-    def __init__(self) -> None:
+    def __init__(self, clocks: Clocks | None = None) -> None:
+        self._clocks = clocks
         self._known: dict[tuple, Series] = {}
         self._forms: dict[Expr, Linear] = {}
 
     def form(self, node: Expr) -> Linear:
         """The linear form of an expression."""
-        for step in ex.walk(node):
+        for step in ex.walk(node, conditions=False):
             if step not in self._forms:
                 self._forms[step] = self._flatten(step)
         return self._forms[node]
@@ -103,6 +106,11 @@ class SeriesBuilder:
     def series(self, node: Expr) -> Series:
         """The expression as one series."""
         return self._as_series(self.form(node))
+
+    def row_of_side(self, relation: ex.Relation) -> int:
+        """Row in which the clocks hold the side of a switch."""
+        assert self._clocks is not None
+        return self._clocks.row_of_side(relation)
 
     def may_hide(self) -> bool:
         """Whether some series can be asleep where it is expanded and awake within the step, so that its coefficients don't tell.
@@ -133,7 +141,16 @@ class SeriesBuilder:
                 return self._power(forms[0], node.args[1])
             case "select":
                 return self._selection(node.payload, *forms)
+            case "mod" | "table":
+                return self._polynomial(node)
         return self._unit(self._make(node.op, (self._as_series(forms[0]),)))
+
+    def _polynomial(self, node: Expr) -> Linear:
+        """The present piece of a remainder or a table: what its clock holds, times powers of the time since its reference."""
+        assert self._clocks is not None
+        offset, *rest = (Expr("held", (), row) for row in self._clocks.rows_of_coefficients(node))
+        since = self._make("since", (), self._clocks.row_of_reference(node))
+        return Linear(offset, {self._multiply_out(since, k): coefficient for k, coefficient in enumerate(rest, start=1)})
 
     def _make(self, kind: str, operands: tuple[Series, ...], payload: object = None) -> Series:
         key = (kind, payload, tuple(map(id, operands)))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from saltus.codegen.jets import Constants, JetCode
+from saltus.codegen.clocks import Clocks
+from saltus.codegen.jets import MOVING, Constants, JetCode
 from saltus.codegen.saltation import jump_function
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.series import Linear, SeriesBuilder, is_constant
@@ -14,13 +15,13 @@ from saltus.system.system import System
 FIRST_TURN = 2
 
 
-def gaps_function(system: System) -> str:
-    """``gaps(t, y, p, out)``: value of every guard, sides taken from the state."""
-    code = ScalarCode(parameter_leaf(system, "y"), side=lambda i: f"(out[{i}] > 0.0)")
+def gaps_function(system: System, clocks: Clocks) -> str:
+    """``gaps(t, y, p, h, out)``: value of every guard, sides taken from the state; h is what the clocks hold."""
+    code = ScalarCode(parameter_leaf(system, "y", clocks.value), side=lambda i: f"(out[{i}] > 0.0)", switch=clocks.side)
     for i in evaluation_order(system):
         value = code.value(system.guards[i].gap)
         code.lines.append(f"out[{i}] = {value}")
-    return f"@kernel\ndef gaps(t, y, p, out):\n{indented(code.lines)}\n"
+    return f"@kernel\ndef gaps(t, y, p, h, out):\n{indented(code.lines)}\n"
 
 
 def evaluation_order(system: System) -> list[int]:
@@ -46,6 +47,8 @@ def bits_of(condition: ex.Condition) -> set[int]:
     match condition:
         case ex.Bit(guard):
             return {guard}
+        case ex.Relation():
+            return set()
         case ex.And(left, right) | ex.Or(left, right):
             return bits_of(left) | bits_of(right)
         case ex.Not(inner):
@@ -65,7 +68,7 @@ class _Guards:
 
 def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
     """(state, sign, boundary) if the gap is ``sign * (state - boundary)`` with a boundary of parameters only."""
-    if len(form.terms) != 1 or ex.depends_on(form.offset, ("select",)):
+    if len(form.terms) != 1 or ex.depends_on(form.offset, MOVING):
         return None
     ((series, coefficient),) = form.terms.items()
     if series.kind != "state" or not (is_constant(coefficient, 1.0) or is_constant(coefficient, -1.0)):
@@ -76,7 +79,8 @@ def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
 
 def taylor_head(system: System, order: int, lanes: int) -> str:
     """Everything that kernels/taylor_*.py expect to stand above it."""
-    builder, constants = SeriesBuilder(), Constants()
+    clocks = Clocks(system)
+    builder, constants = SeriesBuilder(clocks), Constants()
     fields = tuple(builder.form(f) for f in system.field)
     code = JetCode(system.states, fields, builder, constants, order)
     for i in range(len(system.states)):
@@ -97,7 +101,8 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
     stepped = sorted({*series, *(i * (order + 1) for i in range(len(system.states)))})
     sizes = dict(
         LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order, NCONST=len(constants.rows),
-        NTURNS=len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, ROWS=scale_row + len(system.guards),
+        NTURNS=len(code.harmonics),
+        CLOCK_ROW=FIRST_TURN + len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, ROWS=scale_row + len(system.guards),
         NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped), NSERIES=len(series),
         PROBED=builder.may_hide(), TANGENT=system.tangent_of is not None,
     )  # fmt: skip
@@ -111,8 +116,9 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
             *(f"{name} = {tuple(rows) or (0,)!r}" for name, rows in tables.items()),  # Numba can't index an empty tuple
             "",
             f"@kernel\ndef constants(p, c, lane):\n{indented(constant_code.lines)}\n",
-            gaps_function(system),
-            jump_function(system),
+            *clocks.head(),
+            gaps_function(system, clocks),
+            jump_function(system, clocks),
             _turns_function(system, code),
             f"@inner\ndef jets(y, side, c, clock, work):\n{indented(code.lines)}\n",
             f"@inner\ndef rates(y, side, c, clock, work):\n{indented(probe.lines)}\n",

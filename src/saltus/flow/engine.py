@@ -12,6 +12,7 @@ from types import ModuleType
 
 import numpy as np
 
+from saltus.codegen.clocks import table_data
 from saltus.errors import ParameterError
 from saltus.flow.methods import Method
 from saltus.flow.threads import on_threads, usable_processors
@@ -139,8 +140,8 @@ def run(
     module = method.kernels(system)
     outcome, whole = allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
-    options = method.numbers(periods)
-    chunks = [_cut(request, whole, first, options) for first in range(0, len(request.start), CHUNK)]
+    shared = {"options": method.numbers(periods), "data": table_data(system)}
+    chunks = [_cut(request, whole, first, shared) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
     stop = Stop()
     try:
@@ -187,7 +188,7 @@ def allocate(request: Request, states: int, module: ModuleType) -> tuple[Outcome
 ARGUMENTS = Batch._fields
 
 
-def _cut(request: Request, whole: dict[str, np.ndarray], first: int, options: np.ndarray) -> _Chunk:
+def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dict[str, np.ndarray]) -> _Chunk:
     """The arrays of one chunk: views of the whole, and tables of its own."""
     last = min(first + CHUNK, len(request.start))
     arrays = {name: array[first:last] for name, array in whole.items()}
@@ -197,7 +198,7 @@ def _cut(request: Request, whole: dict[str, np.ndarray], first: int, options: np
     arrays["sample_count"], arrays["sample_fraction"] = request.schedule.count, request.schedule.fraction
     arrays["rec_first"] = np.full(last - first, 0 if request.record_from is None else request.record_from, np.int64)
     arrays["rec_used"] = np.zeros(1, np.int64)
-    arrays["options"] = options
+    arrays |= common
     return _Chunk(first, arrays, request.record_from is not None)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from saltus.codegen.clocks import table_data
 from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate, slice_of
 from saltus.flow.methods import Method
 from saltus.interrupt import check_stop
@@ -54,7 +55,7 @@ class Flight:
         request = Request(start, parameters, period, 0.0, np.zeros(count, np.int64), np.zeros(count), Schedule.none(), None)
         _, self._arrays = allocate(request, start.shape[1], self._module)
         self._arrays["param"] = np.ascontiguousarray(parameters, float)
-        self._options = method.numbers(longest)
+        self._options, self._data = method.numbers(longest), table_data(system)
         self.age = 0
 
     def __len__(self) -> int:
@@ -100,6 +101,7 @@ class Flight:
             sample_mode=np.zeros((k, periods), np.int64), rec_first=np.zeros(k, np.int64),
             rec_i=np.zeros((0, st.RECORD_INTEGERS), np.int64),
             rec_f=np.zeros((0, st.RECORD_FLOATS + states + 1)), rec_used=np.zeros(1, np.int64), options=self._options,
+            data=self._data,
         )  # fmt: skip
         steps = slice_of(states)
         while self._module.propagate(*(call[name] for name in ARGUMENTS), steps, *self._workspace) == st.PAUSED:

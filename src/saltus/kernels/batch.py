@@ -23,6 +23,7 @@ rec_first          i8[n]             first period whose contacts are recorded
 rec_i, rec_f       [cap, .]          contact records, columns in status.py; cap = 0 records nothing
 rec_used           i8[1]             records in use
 options            f8[.]             numbers of the method (flow/methods.py)
+data               f8[.]             tables of the system (kernels/clocks.py)
 =================  ================  =====================================================================================
 """
 
@@ -33,5 +34,5 @@ from collections import namedtuple
 Batch = namedtuple(
     "Batch",
     "period origin param stride state count phase mode fresh carry status end_count end_phase counters minima "
-    "sample_count sample_fraction cursor samples sample_mode rec_first rec_i rec_f rec_used options",
+    "sample_count sample_fraction cursor samples sample_mode rec_first rec_i rec_f rec_used options data",
 )

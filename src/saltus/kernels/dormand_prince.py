@@ -5,8 +5,8 @@ codegen puts a generated head before this text and odezero.py and ode45.py behin
 it keeps each stage in a variable of its own: the last digits depend on that.
 
 The head supplies NSTATES, NGUARDS, NCONST, NDRIVE, GAPS_IN_TIME (whether a gap depends on time otherwise than through the state), and
-prepare(p, c), drive(t, c, q), field(t, y, c, q, out), gaps(t, y, c, q, out), gap_rates(t, y, dy, c, q, out): c holds what depends on
-parameters only, q what depends on time too.
+prepare(p, c), drive(t, c, h, q), field(t, y, c, q, h, out), gaps(t, y, c, q, h, out), gap_rates(t, y, dy, c, q, h, out): c holds what
+depends on parameters only, q what depends on time too, h what the clocks hold (clocks.py).
 
 Symbols
 -------
@@ -27,7 +27,10 @@ AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST = (VECTORS * NSTATES + NG
 # q at each stage time and at any other, and c.
 Q2, Q3, Q4, Q5, Q6, Q = (VECTORS * NSTATES + GAPS * NGUARDS + NDRIVE * row for row in range(DRIVES))
 C = VECTORS * NSTATES + GAPS * NGUARDS + DRIVES * NDRIVE
-WORK = C + NCONST
+# What the clocks hold, and their numbers.
+H = C + NCONST
+N = H + HELD * NCLOCKS
+WORK = N + (NUMBERS + 1) * NCLOCKS
 
 # The pair: times, stages, error estimate.
 A2, A3, A4, A5 = 1 / 5, 3 / 10, 4 / 5, 8 / 9
@@ -51,26 +54,29 @@ D72, D73, D74 = 3 / 2, -4.0, 5 / 2
 @inner
 def drive_at(time, q, work):
     """Time-only values at a time, to `q`."""
-    drive(time, part(work, C, NCONST), part(work, q, NDRIVE))
+    drive(time, part(work, C, NCONST), part(work, H, HELD * NCLOCKS), part(work, q, NDRIVE))
 
 
 @inner
 def rate_at(time, state, q, out, work):
     """The right-hand side, to `out`."""
-    field(time, part(work, state, NSTATES), part(work, C, NCONST), part(work, q, NDRIVE), part(work, out, NSTATES))
+    c, h = part(work, C, NCONST), part(work, H, HELD * NCLOCKS)
+    field(time, part(work, state, NSTATES), c, part(work, q, NDRIVE), h, part(work, out, NSTATES))
 
 
 @inner
 def gaps_at(time, state, q, out, work):
     """All gaps, to `out`."""
-    gaps(time, part(work, state, NSTATES), part(work, C, NCONST), part(work, q, NDRIVE), part(work, out, NGUARDS))
+    c, h = part(work, C, NCONST), part(work, H, HELD * NCLOCKS)
+    gaps(time, part(work, state, NSTATES), c, part(work, q, NDRIVE), h, part(work, out, NGUARDS))
 
 
 @inner
 def gap_rates_at(time, state, rate, q, out, work):
     """d/dt of all gaps where the state changes at `rate`, to `out`."""
     y, dy = part(work, state, NSTATES), part(work, rate, NSTATES)
-    gap_rates(time, y, dy, part(work, C, NCONST), part(work, q, NDRIVE), part(work, out, NGUARDS))
+    c, h = part(work, C, NCONST), part(work, H, HELD * NCLOCKS)
+    gap_rates(time, y, dy, c, part(work, q, NDRIVE), h, part(work, out, NGUARDS))
 
 
 # -- one step ------------------------------------------------------------------------------------------------------------------

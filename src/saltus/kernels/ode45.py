@@ -232,7 +232,8 @@ def saltate(i, t_hit, before, after, batch, work):
     for g in range(NGUARDS):
         if changes_sign(work, LEFT, RIGHT, g):
             flipped = (mode & ~(1 << g)) | (after & (1 << g))
-            jump(t_hit, part(work, NEXT, NSTATES), batch.param[i * batch.stride], mode, flipped, g)
+            h = part(work, H, HELD * NCLOCKS)
+            jump(t_hit, part(work, NEXT, NSTATES), batch.param[i * batch.stride], h, mode, flipped, g)
             mode = flipped
 
 
@@ -275,13 +276,14 @@ def go_on(rate, work):
 
 @kernel
 def take_up(i, theta, batch, work):
-    """Load a trajectory, from its start (mode < 0) or from where it was paused: (t, start of the leg, next step length)."""
+    """Load a trajectory, from its start (mode < 0) or from where it was paused: (t, start of the leg, next step length, next break)."""
     prepare(batch.param[i * batch.stride], part(work, C, NCONST))
     t, t_leg, length = batch.carry[i, TIME], batch.carry[i, LEG], batch.carry[i, LENGTH]
     if batch.mode[i] < 0:
         t = batch.origin[i] + batch.count[i] * batch.period[i] + batch.phase[i]
     for j in range(NSTATES):
         work[NODE + j], work[REST + j] = batch.state[i, j], 0.0
+    t_break = follow_clocks(i, t, False, batch, work)
     drive_at(t, Q, work)
     gaps_at(t, NODE, Q, AT_NODE, work)
     rate_at(t, NODE, Q, K1, work)
@@ -289,7 +291,28 @@ def take_up(i, theta, batch, work):
         t_leg, length = t, first_length(t, end_time(i, batch), batch.options[RTOL], theta, work)
         batch.mode[i] = sides(AT_NODE, work)
         write_samples_here(i, t, batch, work)
-    return t, t_leg, length
+    return t, t_leg, length, t_break
+
+
+@kernel
+def follow_clocks(i, t, known, batch, work):
+    """Bring the clocks to their pieces at a time, from those that they hold if these are known; returns the next break."""
+    if NCLOCKS == 0:
+        return math.inf
+    n = part(work, N, (NUMBERS + 1) * NCLOCKS)
+    place_clocks(batch.param[i * batch.stride], 0.0, 1.0, 0, n, batch.data)
+    return set_clocks(t, 0.0, n, batch.data, known, part(work, H, HELD * NCLOCKS))
+
+
+@kernel
+def start_leg(i, t, t_end, rtol, theta, batch, work):
+    """Start afresh at a break, where the equations change: rates, gaps and sides at NODE; returns the length of the next step."""
+    drive_at(t, Q, work)
+    gaps_at(t, NODE, Q, AT_NODE, work)
+    rate_at(t, NODE, Q, K1, work)
+    if batch.options[LOCATE] != 0.0:
+        batch.mode[i] = sides(AT_NODE, work)
+    return first_length(t, t_end, rtol, theta, work)
 
 
 @kernel
@@ -340,10 +363,10 @@ def advance(i, budget, batch, work):
     rtol, theta = batch.options[RTOL], batch.options[ATOL] / batch.options[RTOL]
     locate = batch.options[LOCATE] != 0.0
     t_end = end_time(i, batch)
-    t, t_leg, length = take_up(i, theta, batch, work)
+    t, t_leg, length, t_break = take_up(i, theta, batch, work)
     status = status_at(i, t, t_end, batch)
     while status == RUNNING and budget > 0 and has_room(batch):
-        t_new, h, length, err, rejections = step(t, t_end, longest_step(t_leg, t_end), length, rtol, theta, work)
+        t_new, h, length, err, rejections = step(t, min(t_end, t_break), longest_step(t_leg, t_end), length, rtol, theta, work)
         budget -= 1 + rejections
         batch.counters[i, REJECTED] += rejections
         if not err <= rtol:
@@ -365,6 +388,10 @@ def advance(i, budget, batch, work):
             go_on(K7, work)
             length = next_length(length, err, rejections, rtol)
             t = t_new
+        if NCLOCKS > 0 and t + SAME_BREAK * abs(t) >= t_break:
+            t_break = follow_clocks(i, t, True, batch, work)
+            length = start_leg(i, t, t_end, rtol, theta, batch, work)
+            t_leg = t
         status = status_at(i, t, t_end, batch)
     put_back(i, t, t_leg, length, status, batch, work)
     return budget
@@ -372,11 +399,12 @@ def advance(i, budget, batch, work):
 
 @entry
 def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
-              sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, budget,
+              sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, data, budget,
               work):  # fmt: skip
     """Move every trajectory whose status is RUNNING to its end, `budget` tries of a step at most. See kernels/batch.py for the arrays."""
     batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
-                  sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options)  # fmt: skip
+                  sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options,
+                  data)  # fmt: skip
     for i in range(status.shape[0]):
         if status[i] == RUNNING:
             budget = advance(i, budget, batch, work)

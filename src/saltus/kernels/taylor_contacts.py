@@ -189,6 +189,32 @@ def note_touch(lanes, lane, batch, slow, g, d, start):
     record(lanes, lane, batch, start + d, g, side, velocity, kind, mode, mode, error, slow.state)
 
 
+# -- clocks --------------------------------------------------------------------------------------------------------------------
+@kernel
+def follow_clocks(lanes, lane, batch, slow, known):
+    """Bring the clocks of a lane to their pieces at its phase, from those that it holds if they are known; sets its next break."""
+    if NCLOCKS > 0:
+        who, count, base = lanes.memo[lane, WHO], lanes.memo[lane, COUNT], lanes.clock[BASE, lane]
+        place_clocks(batch.param[who * batch.stride], batch.origin[who], batch.period[who], count, slow.numbers, batch.data)
+        for row in range(HELD * NCLOCKS):
+            slow.held[row] = lanes.clock[CLOCK_ROW + row, lane]
+        following = set_clocks(lanes.clock[TAU, lane], base, slow.numbers, batch.data, known, slow.held)
+        for row in range(HELD * NCLOCKS):
+            lanes.clock[CLOCK_ROW + row, lane] = slow.held[row]
+        lanes.run[BREAK, lane] = following
+        lanes.run[WATCH, lane] = following - SAME_BREAK * (abs(following) + abs(base)) if following < math.inf else math.inf
+
+
+@inner
+def show_clocks(lanes, lane, slow):
+    """What the clocks of a lane hold to slow.held, for code that reads the time as one number."""
+    if NCLOCKS > 0:
+        for row in range(HELD * NCLOCKS):
+            slow.held[row] = lanes.clock[CLOCK_ROW + row, lane]
+        for j in range(NCLOCKS):
+            slow.held[HELD * j + REF] += lanes.clock[BASE, lane]
+
+
 # -- landing -------------------------------------------------------------------------------------------------------------------
 @inner
 def mode_of(lanes, lane):
@@ -303,7 +329,8 @@ def saltate(lanes, lane, batch, g, before, slow):
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
-    jump(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, before, mode_of(lanes, lane), g)
+    show_clocks(lanes, lane, slow)
+    jump(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.held, before, mode_of(lanes, lane), g)
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
 

@@ -58,13 +58,14 @@ def set_due(lanes, lane, batch):
 
 
 @inner
-def set_period(lanes, lane, batch):
-    """Everything of a lane that depends on its period count: time base, phases of harmonics, end of the stretch, next sample."""
+def set_period(lanes, lane, batch, slow):
+    """Everything of a lane that depends on its period count: time base, phases of harmonics, clocks, end of the stretch, next sample."""
     who, count = lanes.memo[lane, WHO], lanes.memo[lane, COUNT]
     lanes.clock[BASE, lane] = batch.origin[who] + count * batch.period[who]
     if lanes.memo[lane, DRIFTS] == 1:
         turns(batch.param[who * batch.stride], batch.origin[who], batch.period[who], count, lane, lanes.clock)
     lanes.run[END, lane] = batch.period[who] if count < batch.end_count[who] else batch.end_phase[who]
+    follow_clocks(lanes, lane, batch, slow, False)
     set_due(lanes, lane, batch)
 
 
@@ -74,7 +75,8 @@ def final_contacts(lanes, lane, batch, slow):
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
-    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.gaps)
+    show_clocks(lanes, lane, slow)
+    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.held, slow.gaps)
     d, met = lanes.found[DELTA, lane], 0
     for g in range(NGUARDS):
         inside = slow.gaps[g] * lanes.side[g, lane]
@@ -97,7 +99,7 @@ def end_stretch(lanes, lane, batch, slow):
     if lanes.memo[lane, COUNT] < batch.end_count[who]:
         lanes.memo[lane, COUNT] += 1
         lanes.clock[TAU, lane] = 0.0
-        set_period(lanes, lane, batch)
+        set_period(lanes, lane, batch, slow)
         if lanes.run[DUE, lane] <= 0.0:
             write_samples(lanes, lane, batch, 0.0, slow)
     if lanes.memo[lane, COUNT] < batch.end_count[who] or lanes.clock[TAU, lane] < batch.end_phase[who]:
@@ -161,6 +163,8 @@ def attend(lanes, lane, batch, slow):
     for g in range(NGUARDS):
         if (lanes.memo[lane, RESTS] >> g) & 1:
             lanes.fresh[g, lane] = 1.0
+    if NCLOCKS > 0 and lanes.clock[TAU, lane] >= lanes.run[WATCH, lane]:
+        follow_clocks(lanes, lane, batch, slow, True)
     if status == RUNNING and lanes.clock[TAU, lane] >= lanes.run[END, lane]:
         status = end_stretch(lanes, lane, batch, slow)
     if status == RUNNING and is_slow(lanes, lane, batch):
@@ -175,7 +179,9 @@ def attend(lanes, lane, batch, slow):
 @kernel
 def start_sides(lanes, lane, batch, slow):
     """Sides of all guards from the state; on a boundary the guard is fresh and its side is settled by the first step."""
-    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, batch.param[lanes.memo[lane, WHO] * batch.stride], slow.gaps)
+    show_clocks(lanes, lane, slow)
+    parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
+    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.held, slow.gaps)
     for g in range(NGUARDS):
         lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
         lanes.fresh[g, lane] = 1.0 if slow.gaps[g] == 0.0 else 0.0
@@ -192,7 +198,7 @@ def fill(lanes, lane, who, batch, slow):
     drifts = turns(batch.param[who * batch.stride], batch.origin[who], batch.period[who], batch.count[who], lane, lanes.clock)
     lanes.memo[lane, DRIFTS] = 1 if drifts else 0
     lanes.clock[TAU, lane] = batch.phase[who]
-    set_period(lanes, lane, batch)
+    set_period(lanes, lane, batch, slow)
     lanes.run[TAKEN, lane] = batch.counters[who, STEPS]
     lanes.run[MET, lane], lanes.run[SHALLOW, lane] = batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED]
     lanes.run[LEAST, lane], lanes.run[SLOWEST, lane] = batch.minima[who, GAP_MARGIN], batch.minima[who, CONTACT_SPEED]
@@ -267,27 +273,29 @@ def workspace():
     """The memory that one call of `propagate` works in; one set for each thread."""
     guards = max(NGUARDS, 1)
     rows = dict(
-        y=NSTATES, side=guards, fresh=guards, clock=TURN + NTURNS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
+        y=NSTATES, side=guards, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
         prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS, probe_y=NSTATES,
-        probe_clock=TURN + NTURNS, probe_rate=3 * NSTATES,
+        probe_clock=CLOCK_ROWS, probe_rate=3 * NSTATES,
     )  # fmt: skip
     lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: rows_of_lanes(count) for name, count in rows.items()})
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)), bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
         out=np.zeros(2), gaps=np.zeros(guards), state=np.zeros(NSTATES), touches=np.zeros((MOST_TOUCHES, 2)),
+        held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
     )  # fmt: skip
     return (*lanes, *slow)
 
 
 @entry
 def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
-              sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, budget,
+              sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, data, budget,
               lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found,
               lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo,
-              slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches):  # fmt: skip
+              slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches, slow_held, slow_numbers):  # fmt: skip
     """Move every trajectory whose status is RUNNING to its end, `budget` steps of the lanes at most. See flow/engine.py for the arrays."""
     batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
-                  sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options)  # fmt: skip
+                  sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options,
+                  data)  # fmt: skip
     lanes = Lanes(
         lane_y,
         lane_side,
@@ -305,12 +313,14 @@ def propagate(period, origin, param, stride, state, count, phase, mode, fresh, c
         lane_probe_rate,
         lane_memo,
     )
-    slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches)
+    slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches, slow_held, slow_numbers)
     roomy = rec_i.shape[0] - STEP_RECORDS
     following = 0
     busy = 0
     store(lanes.run, END, splat(1.0, LANES))
     store(lanes.run, ACTIVE, splat(0.0, LANES))
+    store(lanes.run, BREAK, splat(math.inf, LANES))
+    store(lanes.run, WATCH, splat(math.inf, LANES))
     store(lanes.clock, TAU, splat(0.0, LANES))
     lanes.memo[:, WHO] = -1
     for lane in range(LANES):

@@ -13,7 +13,7 @@ A guard is *fresh* while its lane stands exactly on the boundary: P(0) = 0, and 
 
 The head supplies the sizes LANES, NSTATES, NGUARDS, ORDER, NCONST, NTURNS, ROWS, NSERIES, the rows SERIES_ROW, GUARD_ROW, GUARD_SERIES,
 GUARD_SIGN, GAP_ROW, SCALE_ROW, SNAP_STATE, SNAP_CONST, the degrees NEWTON_DEGREE_1 and _2, and the functions constants(p, c, lane),
-gaps(t, y, p, out), turns(p, origin, period, count, lane, clock) -> whether they change from period to period, jets(y, side, c, clock,
+gaps(t, y, p, h, out), turns(p, origin, period, count, lane, clock) -> whether they change from period to period, jets(y, side, c, clock,
 work) and rates(y, side, c, clock, work), the right-hand side alone; PROBED says whether a step must be probed with it.
 """
 
@@ -21,15 +21,19 @@ from collections import namedtuple
 
 from saltus.kernels.isolation import MOST_TOUCHES
 
-# Rows of `clock`: phase, time at phase zero, then one phase offset for each harmonic of the forcing.
+# Rows of `clock`: phase, time at phase zero, then one phase offset for each harmonic of the forcing; then, from
+# CLOCK_ROW on, what the clocks hold.
 TAU, BASE, TURN = 0, 1, 2
+CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
 # Rows of `run`: the phase at which the current stretch ends, the next sample's phase, steps taken, smallest gap margin, active (0/1), the
 # step length, the phase at its start, time of the last landing, contacts in a row without time passing, whether the mode at the start is
 # still being settled (0/1); contacts so far, those too shallow to be sure of, the slowest; the guards that changed sides at the last
-# landing's instant (bits; bit NGUARDS: one of them changed back and was counted again); the number of steps
-# at which its pace is looked at next, and the periods behind it when that was done last.
-END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED, BOUNCES, STARTING, MET, SHALLOW, SLOWEST, FLIPPED, LIMIT, MARK = range(16)
-RUN_ROWS = 16
+# landing's instant (bits; bit NGUARDS: one of them changed back and was counted again); the number of steps at which its pace is looked at
+# next, and the periods behind it when that was done last; the phase of the next break of a clock, and from which on it counts as reached.
+END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED, BOUNCES, STARTING, MET, SHALLOW, SLOWEST, FLIPPED, LIMIT, MARK, BREAK, WATCH = range(
+    18
+)
+RUN_ROWS = 18
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
 # Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when;
@@ -64,4 +68,4 @@ DEFECT = 1024.0
 MOST_HALVINGS = 40
 
 Lanes = namedtuple("Lanes", "y side fresh clock c work bounds prior poly run found probe_y probe_clock probe_rate memo")
-Slow = namedtuple("Slow", "q b bounds rates out gaps state touches")
+Slow = namedtuple("Slow", "q b bounds rates out gaps state touches held numbers")

@@ -69,7 +69,7 @@ def disagrees(lanes, h, share, log2_tolerance):
             value = fma(value, d, load(work, i * (ORDER + 1) + k, LANES))
         store(lanes.probe_y, i, value)
         store(lanes.probe_rate, NSTATES + i, slope)
-    for row in range(TURN + NTURNS):
+    for row in range(CLOCK_ROWS):
         store(lanes.probe_clock, row, load(lanes.clock, row, LANES))
     store(lanes.probe_clock, TAU, load(lanes.clock, TAU, LANES) + d)
     rates(lanes.probe_y, lanes.side, lanes.c, lanes.probe_clock, lanes.probe_rate)
@@ -299,12 +299,15 @@ def advance(lanes, room, options, records):
         inherited = 0.5 * load(lanes.prior, PRIOR_ROWS * g + OLD, LANES)
         store(lanes.prior, PRIOR_ROWS * g + NEW, size_of_terms(lanes, g, share) + inherited)
     start, end = load(clock, TAU, LANES), load(run, END, LANES)
-    tau = select(d >= room, end, smaller(start + d, end))
+    stop = smaller(end, load(run, BREAK, LANES)) if NCLOCKS > 0 else end
+    tau = select(d >= room, stop, smaller(start + d, stop))
     store(clock, TAU, tau)
     store(run, START, start)
     taken = load(run, TAKEN, LANES) + 1.0
     store(run, TAKEN, taken)
     due = (tau >= end) | (tau >= load(run, DUE, LANES)) | (~(total < HUGE)) | (taken > load(run, LIMIT, LANES))
+    if NCLOCKS > 0:
+        due = due | (tau >= load(run, WATCH, LANES))
     crosses = load(lanes.found, WHICH, LANES) >= 0.0
     if TANGENT or records:
         due = due | crosses
@@ -349,6 +352,8 @@ def step_all(lanes, batch, slow):
     """One step of every lane; returns the bit set of lanes that need attention."""
     jets(lanes.y, lanes.side, lanes.c, lanes.clock, lanes.work)
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
+    if NCLOCKS > 0:
+        room = smaller(load(lanes.run, BREAK, LANES) - load(lanes.clock, TAU, LANES), room)
     h = smaller(step_length(lanes.work, batch.options[LOG2_TOLERANCE]), room)
     if PROBED:
         h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), batch.options[LOG2_TOLERANCE])

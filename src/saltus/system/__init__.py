@@ -11,16 +11,18 @@
 import sys
 from types import ModuleType
 
+from saltus.system.clocks import mod
 from saltus.system.compositions import acos, asin, atan2, clip, cosh, heaviside, hypot, sign, sinh, where
 from saltus.system.functions import abs, atan, cos, exp, log, max, min, pi, piecewise, sin, sqrt, tan, tanh
 from saltus.system.guards import Guard
 from saltus.system.laws import freeplay
 from saltus.system.system import System
+from saltus.system.tables import table
 from saltus.system.trace import system
 
 __all__ = [
     "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp", "freeplay", "heaviside", "hypot", "log", "max",
-    "min", "pi", "piecewise", "sign", "sin", "sinh", "sqrt", "system", "tan", "tanh", "where",
+    "min", "mod", "pi", "piecewise", "sign", "sin", "sinh", "sqrt", "system", "table", "tan", "tanh", "where",
 ]  # fmt: skip
 
 

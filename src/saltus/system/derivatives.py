@@ -65,6 +65,10 @@ def _rule(node: Expr, inner: list[Expr]) -> Expr:
             return by_base if dn is _ZERO else add(by_base, mul(mul(node, elementary("log", a)), dn))
         case "select", _, (da, db):
             return select(node.payload, da, db)
+        case "mod", _, (da, _):
+            return da
+        case "table", (u,), (du,):
+            return mul(Expr("table", (u,), node.payload.derivative()), du)
         case op, (u,), (du,):
             return mul(_outer(op, node, u), du)
     raise TypeError(node.op)

@@ -59,6 +59,10 @@ class DimensionCheck:
         if node not in self._known:
             self._known[node] = self._of(node)
 
+    def leave_open(self, node: Expr) -> None:
+        """Ask nothing about a node: its unit isn't known."""
+        self._known[node] = None
+
     def check_rates(self, rates: Sequence[Expr]) -> None:
         """Raise a UnitError unless each rate is in the unit of its state per second, where both are known."""
         for name, rate in zip(self._states, rates, strict=True):
@@ -90,7 +94,7 @@ class DimensionCheck:
                 return self._time
             case "neg":
                 return args[0]
-            case "add" | "sub" | "select":
+            case "add" | "sub" | "select" | "mod":
                 return self._alike(node, args[0], args[1])
             case "mul" | "div":
                 return _joined(args[0], args[1], -1 if node.op == "div" else 1)

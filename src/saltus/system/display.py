@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from saltus.system.expression import Condition, Expr
+from saltus.system.expression import ELEMENTARY, Condition, Expr
 from saltus.system.text import _ATOM, _PRODUCT, PI_MULTIPLES, Writer
 from saltus.units import from_si
 
@@ -125,11 +125,13 @@ class LatexWriter(Writer):
         text = self.part(base, _ATOM)
         return rf"{text if base.op in ('state', 'param', 'time') else '{' + text + '}'}^{{{self.text(exponent)}}}"
 
-    def call(self, function: str, argument: Expr) -> str:
+    def call(self, function: str, *arguments: Expr) -> str:
         """A function or a root."""
-        inner = self.text(argument)
+        inner = ", ".join(map(self.text, arguments))
         if function == "sqrt":
             return rf"\sqrt{{{inner}}}"
+        if function not in ELEMENTARY:
+            return latex_name(function) + self.parentheses(inner)
         return rf"\{'arctan' if function == 'atan' else function}{self.parentheses(inner)}"
 
     def piece(self, value: Expr, condition: Condition) -> str:

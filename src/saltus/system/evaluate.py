@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from saltus.system.system import System
 
 _OPERATIONS: dict[str, Any] = {
-    "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative, "pow": np.power,
+    "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative, "pow": np.power, "mod": np.mod,
     "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan, "atan": np.arctan, "tanh": np.tanh,
 }  # fmt: skip
 
@@ -74,7 +74,7 @@ def evaluate(
             elif node.op == "select":
                 known[node] = np.where(truth(node.payload), *args)[()]
             else:
-                known[node] = _OPERATIONS[node.op](*args)
+                known[node] = (node.payload if node.op == "table" else _OPERATIONS[node.op])(*args)
     return [known[expression] for expression in expressions]
 
 

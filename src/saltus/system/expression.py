@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any, Union
+from typing import Any, Protocol, Union, runtime_checkable
 
 from saltus.errors import TraceError
 
@@ -38,12 +38,12 @@ class Expr:
     Attributes
     ----------
     op : str
-        ``const``, ``param``, ``state``, ``time``, ``add``, ``sub``, ``mul``, ``div``, ``neg``, ``pow``, ``select`` or one of
-        :data:`ELEMENTARY`.
+        ``const``, ``param``, ``state``, ``time``, ``add``, ``sub``, ``mul``, ``div``, ``neg``, ``pow``, ``select``, ``mod``, ``table`` or
+        one of :data:`ELEMENTARY`.
     args : tuple of Expr
         Operands in the order written. ``pow`` holds base and exponent, ``select`` the value where its condition holds and the other.
     payload : object
-        The number of a ``const``, the name of a ``param`` or ``state``, the condition of a ``select``; else None.
+        The number of a ``const``, the name of a ``param`` or ``state``, the condition of a ``select``, the data of a ``table``; else None.
     """
 
     __slots__ = ("__weakref__", "args", "op", "payload")
@@ -114,13 +114,20 @@ class Expr:
         return traced_ufunc(ufunc, method, inputs, keywords)
 
     # -- what has no meaning here -----------------------------------------------------------------------------------------------
-    def __mod__(self, other: object) -> Expr:
+    def __mod__(self, other: Operand) -> Expr:
+        from saltus.system.clocks import mod  # clocks.py builds on this module
+
+        return mod(self, other)
+
+    def __rmod__(self, other: Operand) -> Expr:
+        raise TraceError(f"an equation took the remainder {other!r} % {self!r}: the divisor must be a number or a parameter.")
+
+    def __floordiv__(self, other: Operand) -> Expr:
         raise TraceError(
-            f"an equation took the remainder {self!r} % {other!r}, which has no end of boundaries. A drive that repeats is written with "
-            f"sl.sin and sl.cos."
+            f"an equation took the whole part {self!r} // {other!r}. Of a time it is (t - sl.mod(t, T))/T; of a state there is none."
         )
 
-    __rmod__ = __floordiv__ = __rfloordiv__ = __mod__
+    __rfloordiv__ = __floordiv__
 
     def __call__(self, *_arguments: object) -> Expr:
         """Refused: the value of a state at another time."""
@@ -206,6 +213,24 @@ def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
         _OBSERVER.reset(token)
 
 
+def with_own_unit(make: Callable[[], Any]) -> Any:
+    """What ``make`` returns, made unobserved and of a unit that the observer can't know: numbers in it carry units of their own."""
+    observer = _OBSERVER.get()
+    with observed(None):
+        made = make()
+    if isinstance(observer, _LeavesOpen) and isinstance(made, Expr):
+        observer.leave_open(made)
+    return made
+
+
+@runtime_checkable
+class _LeavesOpen(Protocol):
+    """An observer that can be told to ask nothing about a node."""
+
+    def leave_open(self, node: Expr) -> None:
+        """Take the node as it is."""
+
+
 # -- conditions ----------------------------------------------------------------------------------------------------------------
 class Condition:
     """A truth value that depends on the state: sides of guards, joined by ``&``, ``|`` and ``~``."""
@@ -229,7 +254,9 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class Relation(Condition):
-    """``gap > 0``: one side of a guard. Only while tracing: a system's conditions hold bits."""
+    """``gap > 0``. While tracing, any comparison; in a system's conditions, one of time and parameters only: no guard, but a switch whose
+    times are known. What a state decides is a :class:`Bit` there.
+    """
 
     gap: Expr
 
@@ -439,8 +466,11 @@ def operands(node: Expr) -> tuple[Expr, ...]:
     return node.args
 
 
-def walk(*roots: Expr) -> Iterator[Expr]:
-    """Every node below the roots once, operands before the nodes that use them (iterative: deep sums don't overflow the stack)."""
+def walk(*roots: Expr, conditions: bool = True) -> Iterator[Expr]:
+    """Every node below the roots once, operands before the nodes that use them (iterative: deep sums don't overflow the stack).
+
+    Those that only comparisons in conditions use are left out if ``conditions`` is False.
+    """
     seen: set[Expr] = set()
     stack = [(root, False) for root in reversed(roots)]
     while stack:
@@ -450,7 +480,8 @@ def walk(*roots: Expr) -> Iterator[Expr]:
         elif node not in seen:
             seen.add(node)
             stack.append((node, True))
-            stack.extend((child, False) for child in reversed(operands(node)) if child not in seen)
+            below = operands(node) if conditions else node.args
+            stack.extend((child, False) for child in reversed(below) if child not in seen)
 
 
 def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
@@ -461,7 +492,17 @@ def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
         return select(payload, *args)
     if node.op in ELEMENTARY:
         return elementary(node.op, *args)
+    if node.op in ("mod", "table"):
+        return Expr(node.op, args, payload)
     return _OPERATIONS[node.op](*args)
+
+
+def substituted(root: Expr, old: Expr, new: Expr) -> Expr:
+    """The expression with another node in the place of ``old``; conditions stay as they are."""
+    memo: dict[Expr, Expr] = {}
+    for node in walk(root):
+        memo[node] = new if node is old else rebuild(node, tuple(memo[child] for child in node.args), node.payload)
+    return memo[root]
 
 
 def depends_on(node: Expr, ops: tuple[str, ...]) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 from saltus.errors import TraceError
 from saltus.system import compositions as made
 from saltus.system import functions as own
+from saltus.system.clocks import mod
 from saltus.system.expression import as_expr
 
 #: NumPy's ufuncs that an equation may call, by their names: the traced function that each stands for.
@@ -20,7 +21,7 @@ UFUNCS: dict[str, Callable[..., Any]] = {
     "equal": operator.eq, "not_equal": operator.ne, "maximum": own.max, "minimum": own.min, "fmax": own.max, "fmin": own.min,
     "sqrt": own.sqrt, "exp": own.exp, "log": own.log, "sin": own.sin, "cos": own.cos, "tan": own.tan, "tanh": own.tanh,
     "arctan": own.atan, "arcsin": made.asin, "arccos": made.acos, "arctan2": made.atan2, "sinh": made.sinh, "cosh": made.cosh,
-    "hypot": made.hypot, "sign": made.sign, "heaviside": made.heaviside, "deg2rad": lambda a: a * (own.pi / 180),
+    "hypot": made.hypot, "remainder": mod, "sign": made.sign, "heaviside": made.heaviside, "deg2rad": lambda a: a * (own.pi / 180),
     "radians": lambda a: a * (own.pi / 180), "rad2deg": lambda a: a * (180 / own.pi), "degrees": lambda a: a * (180 / own.pi),
 }  # fmt: skip
 
@@ -69,5 +70,6 @@ def traced_ufunc(ufunc: Any, method: str, inputs: tuple[Any, ...], keywords: dic
 #: The functions that an equation may call, as a sentence.
 OWN_FUNCTIONS = (
     "Use saltus's own: sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.asin, sl.acos, sl.atan, sl.atan2, sl.sinh, sl.cosh, sl.tanh, "
-    "sl.hypot, sl.abs, sl.sign, sl.heaviside, sl.min, sl.max, sl.clip, sl.where, sl.piecewise."
+    "sl.hypot, sl.abs, sl.sign, sl.heaviside, sl.min, sl.max, sl.clip, sl.where, sl.piecewise; "
+    "sl.mod(t, T) for a time that repeats; sl.table(x, points, values) for measured points, in place of np.interp or a spline."
 )

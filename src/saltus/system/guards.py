@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from saltus.errors import TraceError
 from saltus.system import expression as ex
 from saltus.system.canonical import ONE, Canonical, Polynomial, proportion
+from saltus.system.clocks import of_time_only, switch
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
 from saltus.system.text import Writer
 
@@ -49,7 +50,7 @@ def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, .
     Raises
     ------
     TraceError
-        If a comparison doesn't depend on a state, or compares equal things.
+        If a comparison depends on parameters only, compares equal things, or depends on time in a way that can't be solved.
     """
     return join_guards(field, ())
 
@@ -114,6 +115,9 @@ class _Finder:
         if relation in self._outcome:
             return
         gap = self.rewrite(relation.gap)
+        if of_time_only(gap) and not bits_in([gap]):
+            self._outcome[relation] = switch(gap)
+            return
         polynomial = self._canonical.polynomial(gap)
         if polynomial.keys() <= {ONE}:
             if not polynomial:
@@ -173,11 +177,8 @@ def _check_moves(gap: Expr, kinds: frozenset[str]) -> None:
     if "state" in kinds:
         return
     what = f"the boundary {gap!r} = 0"
-    if "time" in kinds:
-        raise TraceError(
-            f"{what} depends on time only, not on a state. Contacts are boundaries that a state crosses; a drive that switches at given "
-            f"times isn't one. Write the drive as a smooth function of t."
-        )
+    if "time" in kinds and "select" not in kinds:
+        raise TraceError(f"{what} depends on time only, not on a state: no motion crosses it. A surface is a function of the states.")
     if "select" in kinds:
         raise TraceError(
             f"{what} depends on a state only through another condition: it jumps and is never crossed. Join the conditions with & or |, "
@@ -198,7 +199,7 @@ def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
     name, factor = canonical.level_of(gap)
     if name is None:
         return Guard("", gap), positive
-    state, at_zero = ex.state(name), _substituted(gap, ex.state(name), ex.constant(0.0))
+    state, at_zero = ex.state(name), ex.substituted(gap, ex.state(name), ex.constant(0.0))
     boundary = ex.div(_negated(at_zero) if factor > 0 else at_zero, abs(factor))
     if ex.varies(boundary):
         return Guard("", gap), positive
@@ -218,13 +219,6 @@ def _without_factor(gap: Expr) -> tuple[Expr, bool]:
                 gap, positive = inner, positive == (number > 0)
             case _:
                 return gap, positive
-
-
-def _substituted(root: Expr, old: Expr, new: Expr) -> Expr:
-    memo: dict[Expr, Expr] = {}
-    for node in ex.walk(root):
-        memo[node] = new if node is old else ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
-    return memo[root]
 
 
 def _negated(a: Expr) -> Expr:
@@ -273,6 +267,8 @@ def _renumbered(root: Expr, new: Mapping[int, int]) -> Expr:
         match old:
             case Bit(guard):
                 return Bit(new[guard])
+            case Relation():
+                return old
             case Not(inner):
                 return Not(condition(inner))
             case And(left, right) | Or(left, right):

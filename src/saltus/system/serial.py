@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import SaltusError
-from saltus.system.expression import ELEMENTARY, And, Bit, Condition, Expr, Not, Or, constant, walk
+from saltus.system.clocks import affine, switch
+from saltus.system.expression import ELEMENTARY, And, Bit, Condition, Expr, Not, Or, Relation, constant, varies, walk
 from saltus.system.guards import Guard, bits_in
 from saltus.system.names import why_no_name, why_no_text, why_no_title
+from saltus.system.tables import Table
 
 if TYPE_CHECKING:
     from saltus.system.system import System
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 FORMAT = "saltus-system/1"
 
 _OPERANDS = {"const": 0, "param": 0, "state": 0, "time": 0, "add": 2, "sub": 2, "mul": 2, "div": 2, "neg": 1, "pow": 2, "select": 2}
+_OPERANDS |= {"mod": 2, "table": 1}
 _OPERANDS |= dict.fromkeys(ELEMENTARY, 1)
 
 
@@ -44,7 +47,9 @@ def _equations(system: System) -> dict[str, Any]:
     nodes = []
     for node in walk(*roots):
         index[node] = len(index)
-        payload = _condition_data(node.payload) if node.op == "select" else node.payload
+        payload = _condition_data(node.payload, index) if node.op == "select" else node.payload
+        if isinstance(payload, Table):
+            payload = payload.to_data()
         nodes.append([node.op, [index[child] for child in node.args], payload])
     return {
         "states": list(system.states),
@@ -67,16 +72,18 @@ def fingerprint(system: System) -> str:
     return hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
-def _condition_data(condition: Condition) -> list[Any]:
+def _condition_data(condition: Condition, index: Mapping[Expr, int]) -> list[Any]:
     match condition:
         case Bit(guard):
             return ["bit", guard]
+        case Relation(gap):
+            return ["switch", index[gap]]
         case Not(inner):
-            return ["not", _condition_data(inner)]
+            return ["not", _condition_data(inner, index)]
         case And(left, right):
-            return ["and", _condition_data(left), _condition_data(right)]
+            return ["and", _condition_data(left, index), _condition_data(right, index)]
         case Or(left, right):
-            return ["or", _condition_data(left), _condition_data(right)]
+            return ["or", _condition_data(left, index), _condition_data(right, index)]
     raise TypeError(condition)
 
 
@@ -110,7 +117,7 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     nodes: list[Expr] = []
     for op, args, payload in data["nodes"]:
         _require(len(args) == _OPERANDS[op] and all(0 <= i < len(nodes) for i in args), f"wrong operands of {op!r}")
-        nodes.append(_node(op, tuple(nodes[i] for i in args), payload, names))
+        nodes.append(_node(op, tuple(nodes[i] for i in args), payload, names, nodes))
     guards = tuple(
         Guard(str(name), nodes[gap], state, None if boundary is None else nodes[boundary]) for name, gap, state, boundary in data["guards"]
     )
@@ -134,22 +141,31 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _node(op: str, args: tuple[Expr, ...], payload: Any, names: Mapping[str, set[str]]) -> Expr:
+def _node(op: str, args: tuple[Expr, ...], payload: Any, names: Mapping[str, set[str]], nodes: Sequence[Expr]) -> Expr:
     if op == "const":
         return constant(payload)
     if op in names:
         _require(payload in names[op], f"unknown {op} {payload!r}")
         return Expr(op, args, str(payload))
     if op == "select":
-        return Expr(op, args, _condition(payload))
+        return Expr(op, args, _condition(payload, nodes))
+    if op == "table":
+        _require(affine(args[0]) is not None, "a table is not of time")
+        return Expr(op, args, Table.from_data(payload))
+    if op == "mod":
+        _require(affine(args[0]) is not None and not varies(args[1]), "a remainder is not of time")
     return Expr(op, args)
 
 
-def _condition(data: Sequence[Any]) -> Condition:
+def _condition(data: Sequence[Any], nodes: Sequence[Expr]) -> Condition:
     kind, *parts = data
     if kind == "bit" and len(parts) == 1 and isinstance(parts[0], int) and parts[0] >= 0:
         return Bit(parts[0])
-    inner = [_condition(part) for part in parts] if kind in ("not", "and", "or") else []
+    if kind == "switch" and len(parts) == 1 and isinstance(parts[0], int) and 0 <= parts[0] < len(nodes):
+        condition = switch(nodes[parts[0]])
+        if isinstance(condition, Relation):
+            return condition
+    inner = [_condition(part, nodes) for part in parts] if kind in ("not", "and", "or") else []
     if kind == "not" and len(inner) == 1:
         return Not(inner[0])
     if kind in ("and", "or") and len(inner) == 2:

@@ -124,9 +124,9 @@ class Writer:
         """A power."""
         return f"{self.part(base, _ATOM)}**{self.part(exponent, _ATOM)}"
 
-    def call(self, function: str, argument: Expr) -> str:
-        """An elementary function."""
-        return f"{function}({self.text(argument)})"
+    def call(self, function: str, *arguments: Expr) -> str:
+        """A function."""
+        return f"{function}({', '.join(map(self.text, arguments))})"
 
     def piece(self, value: Expr, condition: Condition) -> str:
         """One branch of a piecewise expression."""
@@ -166,7 +166,7 @@ class Writer:
                 return self._select(node), _ATOM
             case op if op in _INFIX:
                 return self.infix(op, *node.args)
-        return self.call(node.op, node.args[0]), _ATOM
+        return self.call(node.payload.name if node.op == "table" else node.op, *node.args), _ATOM
 
     def _select(self, node: Expr) -> str:
         """A select and those nested in its second branch as one list of pieces."""

@@ -127,7 +127,7 @@ def flow(module, start, p, periods=0, *, rtol=1e-4, atol=1e-7, locate=True, extr
         outcome = module.propagate(
             row * (1 / p[0, -1] if period is None else period), row * origin, p, int(len(p) > 1), r.state, r.count, r.phase, r.mode,
             np.zeros(n, np.int64), r.carry, r.status, np.full(n, periods), row * extra, r.counters, r.minima, count, fraction, r.cursor,
-            r.samples, r.sample_mode, np.full(n, record_from), rec_i, rec_f, used, options, budget, *module.workspace(),
+            r.samples, r.sample_mode, np.full(n, record_from), rec_i, rec_f, used, options, np.zeros(1), budget, *module.workspace(),
         )  # fmt: skip
         integers.append(rec_i[: used[0]].copy())
         floats.append(rec_f[: used[0]].copy())

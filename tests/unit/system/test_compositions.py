@@ -10,7 +10,7 @@ import saltus as sl
 from saltus.errors import TraceError, UnusedParameterWarning
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
-from saltus.system.evaluate import evaluate
+from saltus.system.evaluate import evaluate, field
 
 X, Y = ex.state("x"), ex.state("y")
 EPS = 2.0**-52
@@ -120,8 +120,8 @@ def test_numpy_scalars_on_the_left():
         (lambda x: np.log10(x), r"sl.log\(x\)/math.log\(10\)"),
         (lambda x: math.cos(x), "Write sl.cos in place of math.cos"),
         (lambda x: np.interp(x, [0, 1], [0, 1]), "np.interp"),
-        (lambda x: x % 1, "the remainder x % 1"),
-        (lambda x: 7 // x, "no end of boundaries"),
+        (lambda x: x % 1, "sl.mod of x: a remainder"),
+        (lambda x: 7 // x, "the whole part 7 // x|the whole part x // 7"),
         (lambda x: x(ex.TIME - 0.1), "There are no delays"),
         (lambda x: sl.arctan2(x, 1), r"saltus has no 'arctan2'. Write sl.atan2\(y, x\)"),
         (lambda x: sl.impact(x), r"z = -log\(e\)/sqrt\(pi\*\*2 \+ log\(e\)\*\*2\)"),
@@ -150,3 +150,51 @@ def test_a_parameter_that_nothing_uses_is_named():
 
 def test_the_forcing_frequency_is_used_by_the_period():
     sl.system(states="x", forced_at="f")(lambda t, x, *, f=1.0: -x)
+
+
+def test_measured_numbers_bring_their_own_units():
+    """The coefficients of a table are numbers in an equation, but not plain ones: nothing is asked of its unit."""
+
+    @sl.system(states="x v", units={"x": "m", "v": "m/s"})
+    def law(t, x, v, *, mass="2 kg", force="3 N", period="0.5 s"):
+        drive = force * sl.where(sl.mod(t, period) < 0.1, 1, 0)
+        return v, (drive + sl.table(t, [0, 1], [0, 1]) - sl.table(x, [-1, 0, 1], [-3, 0, 4], "spline", outside="extend")) / mass
+
+    assert [guard.name for guard in law.guards] == ["x = 0"]
+
+
+@pytest.mark.parametrize("kind", ["linear", "pchip", "spline"])
+@pytest.mark.parametrize("outside", ["hold", "extend"])
+def test_a_table_in_a_state_is_the_same_curve_in_pieces(kind, outside):
+    points, values = [-1.0, -0.2, 0.5, 0.9, 2.0], [0.3, 0.4, 1.0, -2.0, 0.7]
+    law = sl.system(states="x")(lambda t, x: -sl.table(x, points, values, kind, outside=outside))
+    x = np.linspace(-2, 3, 301)
+    by_guards = field(law, 0.0, [x])[0]
+    assert np.allclose(by_guards, [-sl.table(float(one), points, values, kind, outside=outside) for one in x], rtol=0, atol=1e-14)
+    assert [guard.boundary.payload for guard in law.guards] == (points if outside == "hold" else points[1:-1])
+
+
+@pytest.mark.parametrize(
+    ("make", "teaches"),
+    [
+        (lambda t, x: sl.table(x, np.arange(40.0), np.random.default_rng(1).normal(size=40)), "has 40 knots.*32 at most"),
+        (lambda t, x: sl.table(x, [0, 1], [0, 0], outside="periodic"), "is for tables in time"),
+        (lambda t, x: sl.table(t * t, [0, 1], [0, 0]), "look up at a state, or at rate"),
+        (lambda t, x: sl.table(t, [0, 1, 1], [0, 0, 0]), r"points\[2\] = 1 follows 1"),
+        (lambda t, x: sl.table(t, [0, 1], [0, math.nan]), r"values\[1\] is not a finite number"),
+        (lambda t, x: sl.table(t, [0, 1], [0, 1, 2]), "one length"),
+        (lambda t, x: sl.table(t, [0, 1], ["a", "b"]), "must be numbers"),
+        (lambda t, x: sl.table(t, [0, 1], [0, 1], outside="periodic"), "same first and last value"),
+        (lambda t, x: sl.table(t, [0, 1], [0, 1], "splin"), "Did you mean 'spline'"),
+        (lambda t, x: sl.table(t, [0, 1], [0, 1], outside="zero"), "outside='zero'"),
+        (lambda t, x: sl.table(t, [0, 1], [0, 1], name="a b"), "is no name"),
+        (lambda t, x: sl.mod(x, 2.0), "sl.mod of x"),
+        (lambda t, x: sl.mod(t, x), "the cycle of sl.mod"),
+        (lambda t, x: sl.mod(t, 0), "is zero"),
+        (lambda t, x: sl.where(sl.exp(t) > 2, 1, 0), "can't be solved for"),
+        (lambda t, x: sl.where(sl.table(t, [0, 1], [0, 1]) > 0.5, 1, 0), "can't be solved for"),
+    ],
+)
+def test_inputs_that_are_refused(make, teaches):
+    with pytest.raises(TraceError, match=teaches):
+        sl.system(states="x")(lambda t, x: make(t, x) - x)

@@ -66,7 +66,7 @@ def _branches(x):
         (_branches, r"if x > 0"),
         (lambda x: (x, x), "neither a number nor a traced value"),
         ("x - 0.3", "must be a function such as `lambda t, x, v: ...`, not 'x - 0.3'"),
-        (lambda t, x: sl.piecewise((x, t > 1), otherwise=0), "depends on time only"),
+        (lambda t, x: sl.piecewise((x, t * t > 1), otherwise=0), "depends on time only"),
     ],
 )
 def test_what_cant_be_traced_says_where_and_why(function, words):

@@ -203,7 +203,7 @@ def chained(t, x, v):
 
 
 def of_time(t, x, v):
-    return v, piecewise((1, sin(t) > 0), otherwise=0)
+    return v, piecewise((1, sin(t * t) > 0), otherwise=0)
 
 
 def of_parameters(t, x, v, *, a=1.0, b=2.0):
@@ -218,7 +218,7 @@ def of_parameters(t, x, v, *, a=1.0, b=2.0):
         (math_call, "return v, -math.cos", "sl.cos"),
         (sympy_call, "return v, -sympy.cos", "sl.cos"),
         (unknown_name, "return v, -stiffness", "NameError.*stiffness"),
-        (modulo, "return v, x % 1", "the remainder"),
+        (modulo, "return v, x % 1", "sl.mod of x"),
         (chained, "return v, piecewise", "a < x < b"),
         (too_few, "", "returns 1 value, but there are 2 states"),
         (nothing, "", "returns nothing. End it with: return dx/dt, dv/dt"),

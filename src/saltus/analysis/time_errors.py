@@ -1,0 +1,142 @@
+"""Errors of contact times: of one step, or measured by running the same trajectories again, more exactly and nudged by roundings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from saltus.flow import engine
+from saltus.flow.engine import Outcome, Request, Schedule
+from saltus.flow.methods import Method
+from saltus.kernels import status as st
+from saltus.system import expression as ex
+from saltus.system.evaluate import evaluate
+from saltus.system.system import System
+
+#: Copies of a trajectory whose errors are rounding. Errors soon lie along the one direction that grows fastest, so the ratio of a
+#: trajectory's error to its distance from a copy stays what chance made it at the start: one copy can be near for ever, three rarely are.
+COPIES = 3
+#: The estimate is this many times the largest distance so far: where errors are rounding, and where the companion is exact beside them.
+SAFETY, SAFETY_OF_EXACT_COMPANION = 8.0, 4.0
+#: Up to so many trajectories, the copies run together: they fill lanes that would stay empty.
+FEW = 16
+#: Seed of the signs of the nudges. They are the same for every trajectory, so that no result depends on its neighbours.
+SEED = 20
+
+
+def local(outcome: Outcome) -> np.ndarray:
+    """What one step's own error means for the time of its contact [s]."""
+    return outcome.record_floats[:, st.REC_TIME_ERROR]
+
+
+def measured(
+    system: System, method: Method, request: Request, outcome: Outcome, threads: int | None, show: Callable[[float], None] | None
+) -> np.ndarray:
+    """Estimated error of the time of every contact of an outcome [s]; infinite from where on nothing is known.
+
+    Parameters
+    ----------
+    system, method, request, outcome
+        What was run, how, and what came out.
+    threads, show
+        As for :func:`saltus.flow.engine.run`.
+    """
+    copies, n = COPIES if method.exact else 1, len(request.start)
+    nudged = [_nudged(system, request, i if method.exact else None) for i in range(copies)]
+    batches = [nudged] if n <= FEW else [[one] for one in nudged]
+    distance = np.zeros(len(outcome.record_integers))
+    for done, batch in enumerate(batches):
+
+        def part(share: float, done: int = done) -> None:
+            if show:
+                show((done + share) / len(batches))
+
+        check = engine.run(system, method.companion(), _together(batch), threads, part if show else None)
+        for i in range(len(batch)):
+            distance = np.maximum(distance, _distances(outcome, check, i * n))
+    error = (SAFETY if method.exact else SAFETY_OF_EXACT_COMPANION) * distance
+    return np.maximum(error, local(outcome) + 4.0 * np.spacing(np.abs(outcome.record_floats[:, -1])))
+
+
+# -- nudges ----------------------------------------------------------------------------------------------------------------------
+def _nudged(system: System, request: Request, copy: int | None) -> Request:
+    """The request with starts and values wrong by an ulp; None: as it is. What moves a boundary, or time, stays."""
+    request = replace(request, schedule=Schedule.none())
+    if copy is None:
+        return request
+    signs = np.random.default_rng([SEED, copy]).choice([-1.0, 1.0], len(system.states) + len(system.values))
+    nudge = 1.0 + signs * np.finfo(float).eps
+    places = {leaf.payload for guard in system.guards for leaf in ex.walk(guard.gap) if leaf.op == "param"} | {system.forced_at}
+    fixed = np.array([name in places for name in system.values], bool)
+    by_state = np.where(_on_a_boundary(system, request)[:, None], 1.0, nudge[: len(system.states)])
+    by_value = np.where(fixed, 1.0, nudge[len(system.states) :])
+    return replace(request, start=request.start * by_state, parameters=request.parameters * by_value)
+
+
+def _on_a_boundary(system: System, request: Request) -> np.ndarray:
+    """Trajectories that start on a boundary, and would leave it by a nudge: bool[n]."""
+    gaps = evaluate(
+        [guard.gap for guard in system.guards],
+        t=request.origin,
+        states=dict(zip(system.states, request.start.T, strict=True)),
+        values=dict(zip(system.values, request.parameters.T, strict=True)),
+        bits=[False] * len(system.guards),
+    )
+    return np.any([np.broadcast_to(gap, len(request.start)) == 0.0 for gap in gaps], axis=0)
+
+
+def _together(requests: list[Request]) -> Request:
+    """Several requests of the same kind as one."""
+    first = requests[0]
+    if len(requests) == 1:
+        return first
+    return replace(
+        first,
+        start=np.concatenate([r.start for r in requests]),
+        parameters=np.concatenate([np.broadcast_to(r.parameters, (len(r.start), r.parameters.shape[1])) for r in requests]),
+        period=np.concatenate([r.period for r in requests]),
+        end_count=np.concatenate([r.end_count for r in requests]),
+        end_phase=np.concatenate([r.end_phase for r in requests]),
+    )
+
+
+# -- distances -------------------------------------------------------------------------------------------------------------------
+def _distances(outcome: Outcome, check: Outcome, offset: int) -> np.ndarray:
+    """Largest distance so far of the contacts of a trajectory from those of its copy [s], ``offset`` rows later in ``check``.
+
+    The k-th contact is compared with the k-th; from the first at which the two runs meet different guards on, it is infinite.
+    """
+    distance = np.full(len(outcome.record_integers), np.inf)
+    bounds_ours, bounds_theirs = _bounds(outcome, 0, len(outcome.status)), _bounds(check, offset, len(outcome.status))
+    for i in range(len(outcome.status)):
+        a, b = slice(*bounds_ours[i : i + 2]), slice(*bounds_theirs[i : i + 2])
+        times, same = _in_order(_events(outcome, a), _events(check, b), check.record_floats[b, -1].copy())
+        here = slice(a.start, a.start + same)
+        distance[here] = np.maximum.accumulate(np.abs(outcome.record_floats[here, -1] - times[:same]))
+    return distance
+
+
+def _events(outcome: Outcome, rows: slice) -> np.ndarray:
+    """Guard and direction of contacts, int64[k, 2]."""
+    return outcome.record_integers[rows][:, [st.REC_GUARD, st.REC_DIRECTION]]
+
+
+def _in_order(ours: np.ndarray, theirs: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, int]:
+    """Their times in the order of our contacts, and how many are the same; neighbours are swapped (contacts at one instant)."""
+    shared, first = min(len(ours), len(theirs)), 0
+    while first < shared:
+        differ = (ours[first:shared] != theirs[first:shared]).any(axis=1)
+        if not differ.any():
+            return times, shared
+        k = first + int(np.argmax(differ))
+        if k + 1 >= shared or (ours[k : k + 2] != theirs[k : k + 2][::-1]).any():
+            return times, k
+        times[k : k + 2], first = times[k : k + 2][::-1].copy(), k + 2
+    return times, shared
+
+
+def _bounds(outcome: Outcome, first: int, count: int) -> np.ndarray:
+    """Where the contacts of ``count`` trajectories from ``first`` on begin in a sorted table, and where the last ends."""
+    return np.searchsorted(outcome.record_integers[:, st.REC_TRAJECTORY], first + np.arange(count + 1))
