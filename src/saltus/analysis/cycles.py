@@ -110,7 +110,7 @@ def returns(family: Family, start: np.ndarray, window: float) -> Returns:
 
 
 def _seen(family: Family, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, ...]:
-    """From samples over a window each: time and distance of the return, range of the states, whether the samples follow the motion, turns."""
+    """From samples over a window each: time and distance of the return, range of the states, whether samples follow the motion, turns."""
     k, size = start.shape
     index = np.arange(SAMPLES)
     samples = family.every(length).run(start, 1, Schedule(0 * index, index / SAMPLES)).samples

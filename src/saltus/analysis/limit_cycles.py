@@ -35,9 +35,11 @@ def limit_cycles(map_: Stroboscope, state: np.ndarray, window: float, scale: np.
     """
     cycles, near = _closed(map_, state, window)
     rows = np.flatnonzero(cycles.stable & near)
+    if not len(rows):
+        return []
     index = np.arange(TRAIL)
     once = map_.family(len(rows)).every(cycles.period[rows])
-    points = once.run(cycles.points[rows, 0], 1, Schedule(0 * index, index / TRAIL)).samples if len(rows) else []
+    points = once.run(cycles.points[rows, 0], 1, Schedule(0 * index, index / TRAIL)).samples
     return [Wandering(LIMIT_CYCLE, 0.0, 0.0, one, scale) for one in points]
 
 

@@ -67,7 +67,7 @@ def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
     for i in range(rests):
         points[i] = start[i : i + 1] = still.place[i : i + 1] if np.isfinite(still.place[i]).all() else start[i : i + 1]
         eigenvalues[i], exponent[i] = still.eigenvalues[i], still.eigenvalues[i, 0].real
-    for i in np.flatnonzero(kind == LIMIT_CYCLE):
+    for i in np.flatnonzero(kind == LIMIT_CYCLE).tolist():
         one = cycle_of(map_, found.wandering[i - rests])
         cycle[i], multipliers[i], points[i], start[i] = one.period[0], one.multipliers[0], one.points[0], one.points[0, ASIDE]
     family = map_.family(len(kind)).every(np.where(np.isfinite(cycle), cycle, map_.period))
