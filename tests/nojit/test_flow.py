@@ -12,6 +12,7 @@ import pytest
 
 import saltus as sl
 from oracles import piecewise_linear
+from power_laws import duration_of, power_stop
 from saltus.errors import SaltusWarning
 from saltus.flow import engine
 from saltus.system.evaluate import evaluate
@@ -48,6 +49,19 @@ def closed_form(rig, x, v, end):
     p = dict(rig.values)
     drive = p["force"] * (1 - 18 / (2 * math.pi * p["frequency"]) ** 2)
     return piecewise_linear.contacts({**p, "drive": drive}, x, v, end)
+
+
+# -- laws without a Taylor series on a boundary ---------------------------------------------------------------------------------
+
+
+def test_hertz_contacts_last_as_long_as_the_closed_form_says():
+    system = power_stop.with_values(stiffness=1e6)
+    run = sl.simulate(system, [(-1e-3, 0.1), (0.0, 0.2), (0.0, -0.2)], t_end=0.04, method=sl.Taylor(order=12, lanes=2))
+    assert list(run.status.values) == ["ok"] * 3
+    first = run.contact_time.values[run.contact_trajectory.values == 0]
+    assert np.abs(np.diff(first) - duration_of(0.1, 1e6, 1.5)) < 1e-15
+    second = run.contact_time.values[run.contact_trajectory.values == 1]
+    assert np.abs(second - duration_of(0.2, 1e6, 1.5)) < 1e-15
 
 
 # -- Taylor ----------------------------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ _ADVICE = {
     st.BUDGET_STEPS: "Raise max_steps of the method, say Taylor(max_steps=10**10); if steps shrink towards one place, the equations are "
     "singular there.",
     st.BUDGET_EVENTS: "Contacts accumulate; give the contact a finite stiffness or damping, or raise max_events of the method.",
-    st.NONFINITE: "The motion left the range of numbers, or a piece isn't analytic where it is entered (x**1.5 at x = 0: use sl.ODE45).",
+    st.NONFINITE: "The motion left the range of numbers, or met a pole or a root of something negative: check the equations at that state.",
     st.INVALID: "Check the starts and values of these trajectories.",
     st.INTERRUPTED: "The run was stopped; its end_* are where it stood. Start it again.",
     st.NOT_COMPUTED: "The run was stopped; start it again.",

@@ -26,8 +26,8 @@ from saltus.system.system import System
 
 #: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
 PER_PERIOD = 200
-#: Samples over the whole span of an unforced system.
-PER_SPAN = 2000
+#: Samples over the whole span of an unforced system: a curve without corners over a hundred oscillations; fewer of many trajectories.
+MOST_PER_SPAN, LEAST_PER_SPAN = 10_000, 2000
 #: Samples beyond which a call is refused: some 5 GB.
 MOST_SAMPLES = 300_000_000
 
@@ -66,7 +66,8 @@ def simulate(
     method : Method
         Default :class:`saltus.Taylor`; :class:`saltus.ODE45` for MATLAB's.
     samples : int
-        Samples per forcing period (default 200), or over the whole span if the system isn't forced (default 2000).
+        Samples per forcing period (default 200), or over the whole span if the system isn't forced (default 10 000, and down to
+        2000 for many trajectories).
     keep : int
         Keep samples and contacts of the last so many periods only (default all).
     values : mapping
@@ -138,7 +139,7 @@ class _Plan:
 
 
 def _plan(system: System, group: Ensemble, length: Span, samples: int | None, keep: int | None) -> _Plan:
-    per = _whole(samples, "samples", PER_SPAN if system.forced_at is None else PER_PERIOD)
+    per = _whole(samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD)
     last = int(np.max(length.count + length.phase / length.period))
     kept = _whole(keep, "keep", max(last, 1))
     if keep is not None and system.forced_at is None:
@@ -153,6 +154,11 @@ def _plan(system: System, group: Ensemble, length: Span, samples: int | None, ke
         )
     index = first * per + np.arange(count)
     return _Plan(Schedule(index // per, (index % per) / per), first)
+
+
+def _per_span(trajectories: int) -> int:
+    """Samples of a motion without forcing: enough for a smooth curve, fewer where there are many trajectories."""
+    return max(MOST_PER_SPAN // max(trajectories // 20, 1), LEAST_PER_SPAN)
 
 
 def _whole(value: int | None, name: str, default: int) -> int:

@@ -82,7 +82,7 @@ def taylor_module(system: System, order: int, lanes: int) -> ModuleType:
         f"{system.name}, Taylor order {order}, {lanes} lanes",
         f"{_described(system)} for Taylor",
         taylor_head(system, order, lanes),
-        ("clocks.py", "taylor_layout.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"),
+        ("clocks.py", "taylor_layout.py", "taylor_singular.py", "taylor_step.py", "taylor_contacts.py", "taylor_lanes.py"),
         BATCH + TAYLOR_WORKSPACE,
     )
 

@@ -12,6 +12,7 @@ from saltus.codegen.clocks import Clocks
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
+from saltus.system.singular import SetAside, set_aside
 from saltus.system.system import System
 
 
@@ -24,18 +25,19 @@ def jump_function(system: System, clocks: Clocks) -> str:
     if base is None or not base.guards:
         return "@kernel\ndef jump(t, y, p, h, before, after, g):\n    pass\n"
     size = len(base.states)
+    aside = set_aside(base.field, base.guards)  # what has no derivative on the boundary is zero on it, and no jump
     leaf = parameter_leaf(base, "y", clocks.value)
     lines = []
     for word in ("before", "after"):
-        code = ScalarCode(leaf, side=_bit_of(word), prefix=f"{word}_", switch=clocks.side)
-        for i, value in enumerate(code.values(base.field)):
+        code = ScalarCode(leaf, side=_bit_of(word, aside), prefix=f"{word}_", switch=clocks.side)
+        for i, value in enumerate(code.values(aside.field)):
             code.lines.append(f"rate_{word}_{i} = {value}")
         lines += code.lines
     lines += [f"leap_{i} = rate_after_{i} - rate_before_{i}" for i in range(size)]
     lines += [f"if {' and '.join(f'leap_{i} == 0.0' for i in range(size))}:", "    return"]
     lines += [f"n_{i} = 0.0" for i in range(size + 1)]
     for g, guard in enumerate(base.guards):
-        code = ScalarCode(leaf, side=_bit_of("before"), prefix=f"gap{g}_", switch=clocks.side)
+        code = ScalarCode(leaf, side=_bit_of("before", aside), prefix=f"gap{g}_", switch=clocks.side)
         entries = [differentiate(guard.gap, leaf) for leaf in (*map(ex.state, base.states), ex.TIME)]
         for i, value in enumerate(code.values(entries)):
             code.lines.append(f"n_{i} = {value}")
@@ -48,5 +50,6 @@ def jump_function(system: System, clocks: Clocks) -> str:
     return f"@kernel\ndef jump(t, y, p, h, before, after, g):\n{indented(lines)}\n"
 
 
-def _bit_of(word: str) -> Callable[[int], str]:
-    return lambda i: f"(({word} >> {i}) & 1) == 1"
+def _bit_of(word: str, aside: SetAside) -> Callable[[int], str]:
+    """Code for the side of a guard in a mode; beyond the guards, for the bits that set terms aside: those of the boundary crossed."""
+    return lambda i: f"(({word} >> {i}) & 1) == 1" if i < aside.first else f"g == {aside.guards[i - aside.first]}"

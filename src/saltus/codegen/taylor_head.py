@@ -9,6 +9,7 @@ from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.series import Linear, SeriesBuilder, is_constant
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
+from saltus.system.singular import set_aside
 from saltus.system.system import System
 
 #: Rows of the clock before the phases of harmonics (kernels/taylor_layout.py: TAU, BASE).
@@ -81,18 +82,23 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
     """Everything that kernels/taylor_*.py expect to stand above it."""
     clocks = Clocks(system)
     builder, constants = SeriesBuilder(clocks), Constants()
-    fields = tuple(builder.form(f) for f in system.field)
+    aside = set_aside(system.field, system.guards)
+    fields = tuple(builder.form(f) for f in aside.field)
     code = JetCode(system.states, fields, builder, constants, order)
     for i in range(len(system.states)):
         for k in range(order + 1):
             code.write(i * (order + 1) + k, code.state(i, k))
-    guards, rows = _write_guards(system, code, builder, constants, order)
+    guards, rows = _write_guards(system, code, [builder.form(gap) for gap in aside.gaps], constants, order)
     probe = JetCode(system.states, fields, builder, constants, 0)
     probe.harmonics = code.harmonics
     for i, form in enumerate(fields):
         probe.write(i, probe.linear(form, 0))
         probe.write(2 * len(fields) + i, probe.size(form))
-    gap_row, scale_row = rows, rows + len(system.guards)
+    gap_row, scale_row, calm_row = rows, rows + len(system.guards), rows + 2 * len(system.guards)
+    moved = len((system.tangent_of or system).states)
+    for j in range(len(aside.guards)):
+        for i, entry in enumerate(aside.without(j)[:moved]):
+            code.write(calm_row + j * moved + i, code.linear(builder.form(entry), 0))
     constant_code = ScalarCode(parameter_leaf(system))
     for node, i in constants.rows.items():
         value = constant_code.value(node)
@@ -101,14 +107,14 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
     stepped = sorted({*series, *(i * (order + 1) for i in range(len(system.states)))})
     sizes = dict(
         LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order, NCONST=len(constants.rows),
-        NTURNS=len(code.harmonics),
-        CLOCK_ROW=FIRST_TURN + len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, ROWS=scale_row + len(system.guards),
+        NTURNS=len(code.harmonics), CLOCK_ROW=FIRST_TURN + len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, CALM_ROW=calm_row,
+        ROWS=calm_row + moved * len(aside.guards), NMOVED=moved, NSINGULAR=len(aside.guards),
         NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped), NSERIES=len(series),
         PROBED=builder.may_hide(), TANGENT=system.tangent_of is not None,
     )  # fmt: skip
     tables: dict[str, list] = dict(
         STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row, GUARD_SERIES=[series.index(row) for row in guards.row],
-        GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const,
+        GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const, SINGULAR_GUARD=list(aside.guards),
     )  # fmt: skip
     return "\n".join(
         [
@@ -126,10 +132,9 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
     )
 
 
-def _write_guards(system: System, code: JetCode, builder: SeriesBuilder, constants: Constants, order: int) -> tuple[_Guards, int]:
+def _write_guards(system: System, code: JetCode, forms: list[Linear], constants: Constants, order: int) -> tuple[_Guards, int]:
     """Write every gap to the work rows; guards of one state share that state's rows."""
     guards, rows = _Guards(), len(system.states) * (order + 1)
-    forms = [builder.form(guard.gap) for guard in system.guards]
     boundaries = [_state_boundary(form) for form in forms]
     own_rows = rows
     for form, boundary in zip(forms, boundaries, strict=True):

@@ -1,4 +1,4 @@
-"""Template, 3 of 4 of the Taylor flow: contacts of one lane - settling what the quadratic bound could not, landing, recording."""
+"""Template, 4 of 5 of the Taylor flow: contacts of one lane - settling what the quadratic bound could not, landing, recording."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Template, 4 of 4 of the Taylor flow: the life of a lane - filled, attended to at contacts, samples and ends of periods, emptied."""
+"""Template, 5 of 5 of the Taylor flow: the life of a lane - filled, attended to at contacts, samples and ends of periods, emptied."""
 
 import math
 
@@ -273,9 +273,9 @@ def workspace():
     """The memory that one call of `propagate` works in; one set for each thread."""
     guards = max(NGUARDS, 1)
     rows = dict(
-        y=NSTATES, side=guards, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
+        y=NSTATES, side=guards + NSINGULAR, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
         prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS, probe_y=NSTATES,
-        probe_clock=CLOCK_ROWS, probe_rate=3 * NSTATES,
+        probe_clock=CLOCK_ROWS, probe_rate=(6 if NSINGULAR > 0 else 3) * NSTATES,
     )  # fmt: skip
     lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: rows_of_lanes(count) for name, count in rows.items()})
     slow = Slow(

@@ -1,4 +1,4 @@
-"""Template, 1 of 4 of the Taylor flow: what its work arrays hold. codegen puts a generated head before the four.
+"""Template, 1 of 5 of the Taylor flow: what its work arrays hold. codegen puts a generated head before the five.
 
 One step of all lanes reads: jets -> step length -> locate contacts -> advance and land (taylor_step.py), then attend to the lanes where
 more happened: a contact to be recorded or hard to settle (taylor_contacts.py), the end of a period, a sample, the end (taylor_lanes.py).
@@ -66,6 +66,24 @@ LONGEST_SHARE = 0.1
 DEFECT = 1024.0
 #: Halvings of a step that its probes can ask for.
 MOST_HALVINGS = 40
+
+# -- laws without a series on a boundary (taylor_singular.py) --
+#: Effect on a state, relative to it, below which the terms without a series are left out of a step's series.
+NEGLIGIBLE = 2.0**-50
+#: Share of the way to the boundary that other steps may go.
+REACH = 0.9
+#: All steps behind such a boundary are shorter by this factor, as if the tolerance were 2**-13 of itself: near the edge of its disc a
+#: series converges so slowly that its last terms are a small part of what follows them (with 2**-8 a Hertz contact takes 1e-15 of the
+#: energy away, each time).
+FINER = 2.0 ** (-13.0 / ORDER)
+#: A gap that is so many rounding errors wide can be told from zero.
+TOLD = 64.0
+#: Way to the boundary [s] below which coefficients of the last order could overflow.
+SHORTEST = 2.0 ** (-950.0 / ORDER)
+#: Exponent of time that the search for a negligible step begins with: force d**1.5, and one for its integral.
+USUAL_POWER = 2.5
+#: Steps that this search tries.
+MOST_TRIALS = 12
 
 Lanes = namedtuple("Lanes", "y side fresh clock c work bounds prior poly run found probe_y probe_clock probe_rate memo")
 Slow = namedtuple("Slow", "q b bounds rates out gaps state touches held numbers")

@@ -1,4 +1,4 @@
-"""Template, 2 of 4 of the Taylor flow: one step of all lanes, as arithmetic on lanes."""
+"""Template, 3 of 5 of the Taylor flow: one step of all lanes, as arithmetic on lanes."""
 
 import math
 
@@ -60,6 +60,24 @@ def probed(lanes, h, log2_tolerance):
 def disagrees(lanes, h, share, log2_tolerance):
     """Where the defect of the series at a share of h, times h, is larger than truncation and rounding explain."""
     work, d = lanes.work, h * share
+    look_ahead(lanes, d)
+    wrong = splat(0.0, LANES) > 1.0
+    for i in range(NSTATES):
+        base = i * (ORDER + 1)
+        rate, slope = load(lanes.probe_rate, i, LANES), load(lanes.probe_rate, NSTATES + i, LANES)
+        size = magnitude(load(work, base, LANES)) + h * (magnitude(load(work, base + 1, LANES)) + magnitude(rate))
+        rounding = ROUNDING * load(lanes.probe_rate, 2 * NSTATES + i, LANES)
+        if NSINGULAR > 0:
+            rounding = rounding + rounding_of_gaps(lanes, i)
+        allowed = DEFECT * (coarse_exp2(splat(log2_tolerance, LANES)) * size + h * rounding)
+        wrong = wrong | (h * magnitude(rate - slope) > allowed)
+    return wrong
+
+
+@inner
+def look_ahead(lanes, d):
+    """The right-hand side at the states of the series at d; beside it the derivative of the series, and the size of the terms."""
+    work = lanes.work
     for i in range(NSTATES):
         value = load(work, i * (ORDER + 1) + ORDER, LANES)
         slope = value
@@ -73,15 +91,6 @@ def disagrees(lanes, h, share, log2_tolerance):
         store(lanes.probe_clock, row, load(lanes.clock, row, LANES))
     store(lanes.probe_clock, TAU, load(lanes.clock, TAU, LANES) + d)
     rates(lanes.probe_y, lanes.side, lanes.c, lanes.probe_clock, lanes.probe_rate)
-    wrong = splat(0.0, LANES) > 1.0
-    for i in range(NSTATES):
-        base = i * (ORDER + 1)
-        rate, slope = load(lanes.probe_rate, i, LANES), load(lanes.probe_rate, NSTATES + i, LANES)
-        size = magnitude(load(work, base, LANES)) + h * (magnitude(load(work, base + 1, LANES)) + magnitude(rate))
-        rounding = ROUNDING * load(lanes.probe_rate, 2 * NSTATES + i, LANES)
-        allowed = DEFECT * (coarse_exp2(splat(log2_tolerance, LANES)) * size + h * rounding)
-        wrong = wrong | (h * magnitude(rate - slope) > allowed)
-    return wrong
 
 
 @inner
@@ -292,6 +301,8 @@ def advance(lanes, room, options, records):
         value = state_after(work, i * (ORDER + 1), d)
         total = total + magnitude(value)
         store(lanes.y, i, value)
+    if NSINGULAR > 0:
+        add_what_was_left_out(lanes, d)
     h = load(run, STEP, LANES)
     share = select(d < h, d / h, 1.0)
     for g in range(NGUARDS):
@@ -350,11 +361,13 @@ def land_simply(lanes, simple, tau):
 @inner
 def step_all(lanes, batch, slow):
     """One step of every lane; returns the bit set of lanes that need attention."""
-    jets(lanes.y, lanes.side, lanes.c, lanes.clock, lanes.work)
+    coefficients(lanes)
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
     if NCLOCKS > 0:
         room = smaller(load(lanes.run, BREAK, LANES) - load(lanes.clock, TAU, LANES), room)
     h = smaller(step_length(lanes.work, batch.options[LOG2_TOLERANCE]), room)
+    if NSINGULAR > 0:
+        h = away_from_boundaries(lanes, h)
     if PROBED:
         h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), batch.options[LOG2_TOLERANCE])
     store(lanes.run, STEP, h)

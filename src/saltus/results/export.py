@@ -15,7 +15,8 @@ import xarray as xr
 from saltus.errors import ParameterError, nearest
 from saltus.fence import csv_cell
 from saltus.results import tables
-from saltus.results.files import replacing
+from saltus.results.ending import with_ending
+from saltus.results.files import path_of, replacing
 from saltus.results.provenance import describe, file_hash
 from saltus.results.schema import RESPONSES, STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
 
@@ -53,7 +54,7 @@ def save(ds: xr.Dataset, path: Target) -> Path:
     ResultFileError
         If the file can't be written: a full disk, a missing folder.
     """
-    path = Path(path)
+    path = path_of(path)
     writers = {".nc": to_netcdf, ".csv": to_csv, ".mat": to_mat}
     if path.suffix not in writers:
         raise ParameterError(f"the file {path.name!r} has no suffix that says how to write it. {nearest(path.suffix, writers)}")
@@ -61,18 +62,20 @@ def save(ds: xr.Dataset, path: Target) -> Path:
 
 
 def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
-    """Write a result to a netCDF file; see :func:`save`. A checksum of the numbers goes with it."""
+    """Write a result to a netCDF file; see :func:`save`. A checksum of the numbers goes with it, and one of the file, at its end."""
     check(ds, caller="to_netcdf", kinds=list(TABLES))
     engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if _has("h5netcdf") and _has("h5py") else "scipy"
     marked = ds.assign_attrs(file_hash=file_hash(ds))
     try:
         content = marked.to_netcdf(engine=engine)  # to memory: the HDF5 library crashes the process when it meets a full disk
     except ValueError as error:
+        if "embedded null" in str(error) or "VLEN strings" in str(error):
+            raise ParameterError(f"{path}: a name, text or attribute of the result holds a NUL character, which no file keeps.") from error
         if "safely cast" not in str(error):
             raise
         raise ParameterError(f'{path}: a count is too large for netCDF-3. Install "saltus[io]", which writes netCDF-4.') from error
     with replacing(Path(path)) as (part,):
-        part.write_bytes(content)
+        part.write_bytes(with_ending(content))
     return Path(path)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from saltus.errors import SaltusError
+from saltus.errors import ParameterError, SaltusError
 
 #: Names of drafts, and the age [s] from which on nobody is writing one any more.
 _DRAFT = re.compile(r"\.(.+\.)?[0-9a-f]{8}\.part")
@@ -19,6 +19,13 @@ _DRAFT_AGE = 86400.0
 
 class ResultFileError(SaltusError, OSError):
     """The file of a result can't be written or read."""
+
+
+def path_of(given: object) -> Path:
+    """What a caller gave as the path of a file. Raises ParameterError if it is none."""
+    if not isinstance(given, str | os.PathLike):
+        raise ParameterError(f"{given!r} isn't the path of a file. Write it as text, such as 'run.nc'.")
+    return Path(given)
 
 
 @contextmanager

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 from pathlib import Path
 
 import xarray as xr
 
-from saltus.results.files import ResultFileError
+from saltus.fence import RefusedError, regular
+from saltus.results.ending import is_whole, try_elsewhere
+from saltus.results.files import ResultFileError, path_of
 from saltus.results.provenance import file_hash
 from saltus.results.schema import kind_of, restore
 
@@ -21,7 +24,8 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     Parameters
     ----------
     path : str or path
-        A ``.nc`` file.
+        A ``.nc`` file. One that was not written by saltus (but by ``to_netcdf`` of xarray) has no checksum at its end: it is tried in
+        another process first, since a damaged file can keep its reader busy for ever.
 
     Returns
     -------
@@ -33,7 +37,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     ResultFileError
         If the file is missing, damaged, changed since, or not a result of saltus.
     """
-    path = Path(path)
+    path = path_of(path)
     ds = _read(path)
     expected = ds.attrs.pop("file_hash", None)
     if expected is not None and expected != file_hash(ds):
@@ -49,28 +53,33 @@ def _read(path: Path) -> xr.Dataset:
     if path.suffix in (".csv", ".mat"):
         raise ResultFileError(f"{path}: only .nc files hold everything that a result is made of. Save it as {path.stem}.nc too.")
     try:
-        with path.open("rb") as file:
-            engine = _ENGINES.get(file.read(4))
-        if engine is None:
-            raise ResultFileError(f"{path} is not a netCDF file, or its beginning is damaged. saltus.save makes the files that load reads.")
-        if engine == "h5netcdf":
-            _probe(path)
+        regular(path)
+        engine = _engine(path)
+        whole = is_whole(path)
+        if whole is False:
+            raise ResultFileError(f"{path} is damaged: the checksum at its end doesn't match. Restore it from a copy or compute it again.")
+        if whole is None:  # not written by saltus.save, or cut
+            try_elsewhere(path, engine)
         ds = xr.load_dataset(path, engine=engine)
         if not kind_of(ds):
             raise ResultFileError(f"{path} is a netCDF file, but not a result of saltus. Read it with xarray.open_dataset({str(path)!r}).")
         return restore(ds)
     except ResultFileError:
         raise
-    except FileNotFoundError:
-        raise ResultFileError(f"there is no file {path} (looked in {path.parent.resolve()}).") from None
-    except ImportError as error:
-        raise ResultFileError(f'{path} is a netCDF-4 file. Install "saltus[io]" to read it ({error}).') from error
+    except RefusedError as refused:
+        if not path.exists():
+            raise ResultFileError(f"there is no file {path} (looked in {path.parent.resolve()}).") from None
+        raise ResultFileError(f"{path} {refused} Name a .nc file that saltus.save wrote.") from None
     except Exception as error:  # a damaged file makes the readers raise almost anything, struct.error and KeyError among it
         raise ResultFileError(f"{path} is damaged: {type(error).__name__}: {error}. Restore it from a copy or compute it again.") from error
 
 
-def _probe(path: Path) -> None:
-    """Raise what h5py raises on a file that it can't open; h5netcdf would print a second error while it cleans up."""
-    import h5py  # type: ignore[import-untyped]
-
-    h5py.File(path, "r").close()
+def _engine(path: Path) -> str:
+    """The xarray engine that reads the file."""
+    with path.open("rb") as file:
+        engine = _ENGINES.get(file.read(4))
+    if engine is None:
+        raise ResultFileError(f"{path} is not a netCDF file, or its beginning is damaged. saltus.save makes the files that load reads.")
+    if engine == "h5netcdf" and not all(importlib.util.find_spec(package) for package in ("h5netcdf", "h5py")):
+        raise ResultFileError(f'{path} is a netCDF-4 file. Install "saltus[io]" to read it.')
+    return engine

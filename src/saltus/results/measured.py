@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from saltus import fence
 from saltus.errors import UnitError
+from saltus.fence import TABLE_BYTES, RefusedError, content
+from saltus.fence import text as text_of
 from saltus.results.files import ResultFileError
 from saltus.units import to_si
 
@@ -46,8 +47,8 @@ def read_measured(path: str | os.PathLike[str], axis: str, axis_unit: str, ampli
     """
     path = Path(path)
     try:
-        data = fence.content(path, fence.TABLE_BYTES)
-    except fence.RefusedError as refused:
+        data = content(path, TABLE_BYTES)
+    except RefusedError as refused:
         raise ResultFileError(f"{path} {refused}") from None
     return measured_points(data, path, axis, axis_unit, amplitude_unit)
 
@@ -71,10 +72,10 @@ def _wanted(units: dict[str, str]) -> str:
 def _rows(data: bytes, path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of each line that isn't empty or a comment."""
     try:
-        for line, cells in enumerate(csv.reader(fence.text(data).splitlines(keepends=True)), 1):
+        for line, cells in enumerate(csv.reader(text_of(data).splitlines(keepends=True)), 1):
             if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#"):
                 yield line, cells
-    except fence.RefusedError as refused:
+    except RefusedError as refused:
         raise ResultFileError(f"{path} {refused}") from None
     except csv.Error as error:
         raise ResultFileError(f"{path} can't be read: {error}.") from None

@@ -138,3 +138,18 @@ def proportion(a: Polynomial, b: Polynomial) -> int:
     if any(abs(ratio - first) > _SAME * abs(first) for ratio in ratios):
         return 0
     return 1 if first > 0 else -1
+
+
+def is_multiple(a: Polynomial, b: Polynomial) -> bool:
+    """Whether ``a = m b`` with a monomial m: a gap times, or over, quantities that it doesn't hold."""
+    if len(a) != len(b) or not a:
+        return False
+    own = {atom for monomial in b for atom, _ in monomial}
+    first = next(iter(b))
+    inverse = frozenset((atom, -exponent) for atom, exponent in first)
+    for candidate in a:
+        factor = _merged(candidate, inverse)
+        multiple = {_merged(monomial, factor): coefficient for monomial, coefficient in b.items()}
+        if all(exponent > 0 or atom not in own for atom, exponent in factor) and proportion(a, multiple):
+            return True
+    return False

@@ -16,6 +16,7 @@ from saltus.errors import ParameterError, TraceError, nearest
 from saltus.system.expression import TIME, Expr, as_expr, parameter, state, sub
 from saltus.system.guards import Guard, bits_in, join_guards, surface_guard
 from saltus.system.names import why_no_name
+from saltus.system.singular import lifted
 from saltus.system.system import System
 from saltus.system.trace import explained, place
 from saltus.units import check_declared, to_si
@@ -63,6 +64,7 @@ def quantity(system: System, function: Quantity, what: str = "a quantity") -> tu
         raise TraceError(explained(error, function, title)) from error
     try:
         (root,), guards = join_guards([expression], system.guards)
+        (root,) = lifted([root], guards)
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
     return root, guards

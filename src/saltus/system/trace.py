@@ -20,6 +20,7 @@ from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, s
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
 from saltus.system.names import why_no_name, why_no_text, why_no_title
+from saltus.system.singular import check_finite, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
@@ -40,7 +41,8 @@ def system(
     """Decorator that turns an equation of motion into a :class:`System`.
 
     The function takes the time, the states, and after a ``*`` the parameters with their default values; it returns the time derivative of
-    each state. It is called once, with symbols. Comparisons inside :func:`piecewise` become the contacts.
+    each state. Where the states are many, ``*y`` after the time takes them all, in their order. The function is called once, with symbols.
+    Comparisons inside :func:`piecewise` become the contacts.
 
     Parameters
     ----------
@@ -121,11 +123,15 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
     """Names and defaults of the parameters; checks the signature."""
     _check_states(states, title)
     wanted = f"def {title}(t, {', '.join(states)}, *, ...)"
-    positional, parameters = [], {}
+    positional: list[inspect.Parameter] = []
+    parameters: dict[str, Any] = {}
+    together = False
     for argument in inspect.signature(function).parameters.values():
-        if argument.kind in (argument.VAR_POSITIONAL, argument.VAR_KEYWORD):
+        if argument.kind == argument.VAR_POSITIONAL and len(positional) == 1:
+            together = True
+        elif argument.kind in (argument.VAR_POSITIONAL, argument.VAR_KEYWORD):
             raise TraceError(f"{title}: name every parameter; *{argument.name} can't be traced. Write {wanted}.")
-        if argument.kind != argument.KEYWORD_ONLY:
+        elif argument.kind != argument.KEYWORD_ONLY:
             positional.append(argument)
         elif argument.default is argument.empty:
             raise TraceError(
@@ -136,7 +142,7 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
         else:
             parameters[argument.name] = argument.default
     names = [argument.name for argument in positional]
-    if names[1:] == list(states):
+    if names[1:] == list(states) or together:
         return parameters
     if names[: len(states)] == list(states):
         raise TraceError(f"{title}: the time is the first argument, before the states. Write {wanted}.")
@@ -193,7 +199,10 @@ def _traced(
         kind = UnitError if isinstance(error, UnitError) else TraceError
         raise kind(explained(error, function, title)) from error
     try:
-        return find_guards(derivatives)
+        field, guards = find_guards(derivatives)
+        field = lifted(field, guards)
+        check_finite(field, guards, states)
+        return field, guards
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
 

@@ -12,6 +12,18 @@ from saltus.system import cos, freeplay, pi, piecewise, sin, system
 from saltus.system.text import to_text
 
 
+def test_many_states_come_together():
+    def row(t, *y, spring=4.0):
+        return [*y[2:], *(-spring * x for x in y[:2])]
+
+    def written_out(t, a, b, c, d, *, spring=4.0):
+        return c, d, -spring * a, -spring * b
+
+    together, apart = (system(states="a b c d", name="row")(function) for function in (row, written_out))
+    assert together.equations() == apart.equations()
+    assert together.states == ("a", "b", "c", "d")
+
+
 def make(function, **options):
     return system(**{"states": "x v", **options})(function)
 

@@ -1,0 +1,294 @@
+"""Laws that have no Taylor series on a boundary: ``d**1.5``, ``sqrt(d)``, ``d*log(d)`` where the gap d is zero.
+
+Such a term is analytic on either side of its boundary, and small beside it. :func:`set_aside` finds these terms and lets a bit of their
+own switch them off, so that a step off the boundary, or onto it, sees the rest of the equations only (kernels/taylor_singular.py).
+:func:`check_finite` refuses what is infinite there. Both rest on the *order* of an expression on a boundary: the power of the gap with
+which it goes to zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from functools import reduce
+from typing import NamedTuple
+
+from saltus.errors import TraceError
+from saltus.system import expression as ex
+from saltus.system.canonical import Canonical, is_multiple
+from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
+from saltus.system.guards import Guard, bits_in
+
+#: Order of a logarithm: below every power.
+_LOG = -1e-9
+
+
+class Order(NamedTuple):
+    """How an expression behaves on a boundary: like gap**order, or smaller; ``singular`` if it has no Taylor series there."""
+
+    order: float
+    singular: bool
+
+
+class SetAside(NamedTuple):
+    """A field whose terms without a series can be switched off.
+
+    Attributes
+    ----------
+    field, gaps : tuple of Expr
+        The bit ``first + j`` switches off what has no series on the boundary ``guards[j]``.
+    guards : tuple of int
+        Numbers of those guards.
+    first : int
+        Number of guards of the system.
+    """
+
+    field: tuple[Expr, ...]
+    gaps: tuple[Expr, ...]
+    guards: tuple[int, ...]
+    first: int
+
+    def without(self, j: int) -> tuple[Expr, ...]:
+        """The field without the terms of ``guards[j]``."""
+        return tuple(assuming(entry, self.first + j, True) for entry in self.field)
+
+
+def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
+    """Find the terms of a field and its gaps that have no Taylor series on a boundary; a bit for each such boundary switches them off."""
+    boundaries = _Boundaries(guards)
+    roots = (*field, *(guard.gap for guard in guards))
+    broken = {number: nodes for number in range(len(guards)) if (nodes := boundaries.singular_terms(roots, number))}
+    terms: dict[Expr, list[int]] = {}
+    for j, nodes in enumerate(broken.values()):
+        for node in nodes:
+            terms.setdefault(node, []).append(len(guards) + j)
+    switched = tuple(_switched(root, terms) for root in roots)
+    return SetAside(switched[: len(field)], switched[len(field) :], tuple(broken), len(guards))
+
+
+def check_finite(field: Sequence[Expr], guards: Sequence[Guard], states: Sequence[str]) -> None:
+    """Raise a TraceError if a piece of the field is infinite on its own boundary: nothing can be said of a motion that meets it."""
+    boundaries = _Boundaries(guards)
+    for number, guard in enumerate(guards):
+        orders = boundaries.orders(field, number)
+        for name, entry in zip(states, field, strict=True):
+            if orders[entry].singular and orders[entry].order < 0 and number in bits_in([entry]):
+                worst = next(node for node in ex.walk(entry) if orders[node].singular and orders[node].order < 0)
+                raise TraceError(
+                    f"d{name}/dt is infinite on the boundary {guard.name!r}, where its piece begins: {worst!r}. Write a law that is finite "
+                    f"there, such as one of the depth plus a small length, or begin the piece a little further in."
+                )
+
+
+def lifted(field: Iterable[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
+    """The same field with powers, roots and logarithms of pieces, ``sl.max(d, 0)**1.5``, as pieces of powers.
+
+    Only where a piece is zero on a boundary: the rest stays as it was written.
+    """
+    boundaries = _Boundaries(guards)
+    memo: dict[Expr, Expr] = {}
+    roots = tuple(field)
+    for node in ex.walk(*roots):
+        new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
+        memo[node] = boundaries.lifted(new) if new.op in ("pow", "sqrt", "log") else new
+    return tuple(memo[root] for root in roots)
+
+
+def assuming(root: Expr, bit: int, value: bool) -> Expr:
+    """The expression with one bit known."""
+    memo: dict[Expr, Expr] = {}
+    for node in ex.walk(root):
+        args = tuple(memo[child] for child in node.args)
+        if node.op == "select":
+            condition = _knowing(node.payload, bit, value)
+            memo[node] = args[not condition] if isinstance(condition, bool) else ex.rebuild(node, args, condition)
+        else:
+            memo[node] = ex.rebuild(node, args, node.payload)
+    return memo[root]
+
+
+def _knowing(condition: Condition, bit: int, value: bool) -> Condition | bool:
+    match condition:
+        case Bit(number):
+            return value if number == bit else condition
+        case Relation():  # a switch of time
+            return condition
+        case Not(inner):
+            inside = _knowing(inner, bit, value)
+            return not inside if isinstance(inside, bool) else (condition if inside is inner else Not(inside))
+        case And(left, right) | Or(left, right):
+            neutral = isinstance(condition, And)
+            a, b = _knowing(left, bit, value), _knowing(right, bit, value)
+            if isinstance(a, bool):
+                return b if a is neutral else a
+            if isinstance(b, bool):
+                return a if b is neutral else b
+            return condition if a is left and b is right else type(condition)(a, b)
+    raise TypeError(condition)
+
+
+def _switched(root: Expr, terms: dict[Expr, list[int]]) -> Expr:
+    """The expression with zero in place of its singular terms where their bits are set."""
+    memo: dict[Expr, Expr] = {}
+    for node in ex.walk(root):
+        new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
+        if node in terms:
+            bits: list[Condition] = [Bit(number) for number in terms[node]]
+            new = ex.select(reduce(Or, bits), 0.0, new)
+        memo[node] = new
+    return memo[root]
+
+
+class _Boundaries:
+    """Orders of expressions on the boundaries of a system."""
+
+    def __init__(self, guards: Sequence[Guard]) -> None:
+        self._canonical = Canonical()
+        self._gaps = [self._canonical.polynomial(guard.gap) for guard in guards]
+        self._guards = tuple(guards)
+        self._states = [_states_in(guard.gap) for guard in guards]
+
+    def singular_terms(self, field: Sequence[Expr], number: int) -> list[Expr]:
+        """The nodes at which a series ends to exist on a boundary: powers, roots, logarithms and quotients of what vanishes there."""
+        orders = self.orders(field, number)
+        return [node for node in ex.walk(*field) if self._breaks(node, orders)]
+
+    @staticmethod
+    def _breaks(node: Expr, orders: dict[Expr, Order]) -> bool:
+        if not orders[node].singular or not node.args:
+            return False
+        match node.op:
+            case "pow" | "sqrt" | "log":
+                return 0 < orders[node.args[0]].order < math.inf
+            case "div":
+                return 0 < orders[node.args[1]].order < math.inf
+            case "exp":
+                return _exponent_of_power(node, orders)
+        return False
+
+    def orders(self, field: Sequence[Expr], number: int) -> dict[Expr, Order]:
+        """Order of every node on boundary ``number``."""
+        orders: dict[Expr, Order] = {}
+        for node in ex.walk(*field):
+            orders[node] = self._order(node, orders, number)
+        return orders
+
+    def _order(self, node: Expr, known: dict[Expr, Order], number: int) -> Order:
+        if node.op == "const":
+            return Order(math.inf if node.payload == 0 else 0.0, False)
+        if node.op in ("state", "add", "sub", "select") and self._vanishes(node, number):
+            return Order(1.0, False)
+        if not node.args:
+            return Order(0.0, False)
+        parts = [known[child] for child in node.args]
+        singular = any(part.singular for part in parts)
+        first = parts[0].order
+        match node.op:
+            case "add" | "sub" | "select":
+                return Order(min(part.order for part in parts), singular)
+            case "neg":
+                return parts[0]
+            case "mul":
+                if any(part.order == math.inf for part in parts):
+                    return Order(math.inf, False)
+                return Order(first + parts[1].order, singular)
+            case "div":
+                below = parts[1].order
+                return Order(math.inf, False) if first == math.inf else Order(first - below, singular or below > 0)
+            case "pow":
+                return _order_of_power(parts[0], node.args[1])
+            case "exp" if _exponent_of_power(node, known):
+                return Order(-_LOG, True)
+        return _order_of_function(node.op, parts[0])
+
+    def _vanishes(self, node: Expr, number: int) -> bool:
+        """Whether a node is zero on a boundary: the gap times a factor, or zero once the state is put there."""
+        guard = self._guards[number]
+        if not self._states[number] & _states_in(node):
+            return False
+        if self._is_gap(node, number):
+            return True
+        if guard.state is None or guard.boundary is None:
+            return False
+        try:
+            there = ex.substituted(node, ex.state(guard.state), guard.boundary)
+        except TraceError:  # something in it is no number there
+            return False
+        return not self._canonical.polynomial(there)
+
+    def _is_gap(self, node: Expr, number: int) -> bool:
+        """Whether a node is the gap of a guard times a factor."""
+        return is_multiple(self._canonical.polynomial(node), self._gaps[number])
+
+    def lifted(self, node: Expr) -> Expr:
+        """A function of a piece as a piece of functions, if that shows a zero on a boundary."""
+        new = self._spread(node)
+        if new is node:
+            return node
+        for number in range(len(self._gaps)):
+            orders = self.orders([new], number)
+            if any(below.op == node.op and orders[below.args[0]].order > 0 for below in ex.walk(new) if below.args):
+                return new
+        return new if any(below.op == "const" and below.payload == 0 for below in ex.walk(new)) else node
+
+    def _spread(self, node: Expr) -> Expr:
+        operand = node.args[0]
+        if any(self._is_gap(operand, number) for number in range(len(self._gaps))):
+            return node
+        outer = _outermost_bit(operand)
+        if outer is None:
+            return node
+        branches = []
+        for value in (True, False):
+            inner = assuming(operand, outer, value)
+            new = ex.rebuild(node, (inner, *node.args[1:]), node.payload)
+            branches.append(self._spread(new) if new.op == node.op else new)
+        return ex.select(Bit(outer), *branches)
+
+
+def _outermost_bit(node: Expr) -> int | None:
+    """A bit of the first piece on the way down."""
+    stack = [node]
+    while stack:
+        top = stack.pop(0)
+        if top.op == "select" and (bits := bits_in([ex.Expr("select", (ex.constant(0.0), ex.constant(1.0)), top.payload)])):
+            return min(bits)
+        stack.extend(top.args)
+    return None
+
+
+def _states_in(node: Expr) -> set[str]:
+    return {below.payload for below in ex.walk(node) if below.op == "state"}
+
+
+def _order_of_power(base: Order, exponent: Expr) -> Order:
+    """Of ``base**exponent``; an exponent that is a parameter is taken to be positive, and not whole."""
+    if base.order == math.inf:
+        return Order(math.inf, False)
+    if exponent.op != "const":
+        return Order(base.order, base.singular or base.order > 0)
+    number = float(exponent.payload)
+    whole = number == int(number) and number >= 0
+    return Order(base.order * number, base.singular or (base.order > 0 and not whole))
+
+
+def _order_of_function(op: str, inner: Order) -> Order:
+    if op in ("mod", "table"):  # of time alone
+        return Order(0.0, False)
+    if inner.order == math.inf:
+        return Order(0.0 if op in ("exp", "cos") else math.inf, False)
+    if op == "sqrt":
+        return Order(0.5 * inner.order, inner.singular or inner.order > 0)
+    if op == "log":
+        return Order(_LOG, True) if inner.order > 0 else Order(0.0, inner.singular)
+    if inner.singular and inner.order < 0:
+        return Order(_LOG, True)  # a function of something infinite: no limit is known
+    return Order(0.0 if op in ("exp", "cos") else max(inner.order, 0.0), inner.singular)
+
+
+def _exponent_of_power(node: Expr, orders: dict[Expr, Order]) -> bool:
+    """Whether this is ``exp(y*log(u))``, the form of ``u**y`` with an exponent that varies."""
+    if node.op != "exp" or node.args[0].op != "mul":
+        return False
+    factor = node.args[0].args[1]
+    return factor.op == "log" and 0 < orders[factor.args[0]].order < math.inf

@@ -1,0 +1,108 @@
+"""Result files that something befell: each is refused in a sentence before a parser sees it; none keeps anybody waiting."""
+
+import os
+import random
+import shutil
+import sys
+
+import pytest
+import xarray as xr
+
+from saltus.errors import ParameterError
+from saltus.results import ResultFileError, ending, export, load, save
+from unit.results.conftest import sine_run
+
+ENDING = 80
+
+
+@pytest.fixture(params=["h5netcdf", "scipy"])
+def saved(request, tmp_path, monkeypatch):
+    if request.param == "scipy":
+        monkeypatch.setattr(export, "_has", lambda _: False)
+    return save(sine_run(samples=50), tmp_path / "run.nc")
+
+
+def damaged(data: bytes, draw: random.Random) -> bytes:
+    """A bit flipped, a block zeroed, or a block put in another place; mostly near the beginning, where files keep their structure."""
+    inside = bytearray(data[:-ENDING])
+    place = draw.randrange(min(8192, len(inside)) if draw.random() < 0.7 else len(inside))
+    size = draw.choice([8, 16, 64, 128, 512])
+    match draw.randrange(4):
+        case 0:
+            inside[place] ^= 1 << draw.randrange(8)
+        case 1 | 2:
+            inside[place : place + size] = bytes(len(inside[place : place + size]))
+        case 3:
+            other = draw.randrange(len(inside) - size)
+            inside[place : place + size] = inside[other : other + len(inside[place : place + size])]
+    return bytes(inside) + data[-ENDING:]
+
+
+def test_a_damaged_file_meets_no_parser(saved, monkeypatch):
+    """HDF5 loops for ever over some of these; so nobody asks it."""
+    data, draw, refused = saved.read_bytes(), random.Random(11), 0
+    monkeypatch.setattr(xr, "load_dataset", lambda *_, **__: pytest.fail("a parser was asked"))
+    for _ in range(500):
+        bad = damaged(data, draw)
+        if bad == data:
+            continue
+        saved.write_bytes(bad)
+        with pytest.raises(ResultFileError, match="is damaged") as told:
+            load(saved)
+        assert "\n" not in str(told.value)
+        refused += 1
+    assert refused > 300
+
+
+def test_a_result_moved_alone_is_read(saved, tmp_path):
+    run = load(saved)
+    (tmp_path / "elsewhere").mkdir()
+    moved = shutil.move(saved, tmp_path / "elsewhere" / "other name.nc")
+    xr.testing.assert_identical(load(moved), run)
+    with xr.open_dataset(moved) as plain:
+        assert plain.sizes["time"] == run.sizes["time"], "other readers stop where the data end"
+
+
+def test_a_file_that_xarray_wrote_is_read(saved, tmp_path):
+    run = load(saved)
+    run.to_netcdf(tmp_path / "by_xarray.nc", engine="h5netcdf" if saved.read_bytes()[:4] == b"\x89HDF" else "scipy")
+    xr.testing.assert_identical(load(tmp_path / "by_xarray.nc"), run)
+
+
+@pytest.mark.parametrize("cut", [1, ENDING])
+def test_a_file_that_lost_its_ending_only_is_read(saved, cut):
+    run = load(saved)
+    saved.write_bytes(saved.read_bytes()[:-cut])
+    xr.testing.assert_identical(load(saved), run)
+
+
+def test_a_file_that_lost_more_is_refused(saved):
+    saved.write_bytes(saved.read_bytes()[:-2000])
+    with pytest.raises(ResultFileError, match=r"is damaged: .*compute it again\.$"):
+        load(saved)
+
+
+def test_reading_that_comes_to_no_end_is_stopped(saved, monkeypatch):
+    saved.write_bytes(saved.read_bytes()[:-ENDING])
+    monkeypatch.setattr(ending, "_TRIAL", "while True: pass")
+    monkeypatch.setattr(ending, "PATIENCE", 0.2)
+    with pytest.raises(ResultFileError, match=r"reading it came to no end within 0 s\. Restore it from a copy or compute it again\."):
+        load(saved)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes are POSIX")
+def test_what_is_no_file_is_told_apart(tmp_path):
+    os.mkfifo(tmp_path / "pipe.nc")
+    known = {tmp_path: "it is a folder", tmp_path / "pipe.nc": "a pipe", "/dev/zero": "a device", "a\0.nc": "there is no file"}
+    for path, told in known.items():
+        with pytest.raises(ResultFileError, match=told):
+            load(path)
+    for call in (lambda: load(5), lambda: save(sine_run(), None)):
+        with pytest.raises(ParameterError, match="the path of a file"):
+            call()
+
+
+def test_a_nul_in_a_text_is_told(tmp_path):
+    with pytest.raises(ParameterError, match="NUL"):
+        save(sine_run().assign_attrs(study="a\0b"), tmp_path / "run.nc")
+    assert not list(tmp_path.iterdir())
