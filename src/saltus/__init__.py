@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         simulate,
         spectrum,
         stroboscope,
+        transmissibility,
         wolf,
     )
     from saltus.errors import SaltusError
@@ -72,7 +73,7 @@ if TYPE_CHECKING:
 _HOMES = {
     **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
     **dict.fromkeys(("compare_methods", "energy_balance", "frequency_response", "impact_statistics", "poincare"), "saltus.analysis"),
-    **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "wolf"), "saltus.analysis"),
+    **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "transmissibility", "wolf"), "saltus.analysis"),
     "SaltusError": "saltus.errors",
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"), "saltus.results"),
@@ -141,6 +142,7 @@ __all__ = [
     "tanh",
     "to_csv",
     "to_mat",
+    "transmissibility",
     "where",
     "wolf",
 ]  # fmt: skip

@@ -117,6 +117,34 @@ def test_balances_that_cant_be_drawn(arguments, words):
         sl.energy_balance(rig(), **arguments, **energy("delangre"))
 
 
+# -- undamped, unforced ----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("values", "frequency"),
+    [
+        pytest.param({}, 1 / 6.3, id="linear"),
+        pytest.param({}, 0.2, id="linear_other_steps"),
+        pytest.param({"stiffness": 20.0, "boundary": 0.2}, 1 / 6.3, id="stop"),
+        pytest.param({"cubic": 0.5}, 1 / 6.3, id="cubic"),
+    ],
+)
+def test_energy_wanders_as_roundings_do(values, frequency):
+    """Sixteen amplitudes, 20 000 periods: as many gain energy as lose it, and none more than a walk of one rounding a step does."""
+    periods, amplitude = 20_000, np.geomspace(0.3, 3.0, 16)
+    values = {"spring": 1.0, "boundary": 99.0} | values
+    run = sl.stroboscope(lab.with_values(frequency=frequency, **values), {"x": amplitude, "v": 0.0}, periods, keep=1)
+    x, v = run.x.values[:, -1], run.v.values[:, -1]
+
+    def stored(x, v):
+        beyond = np.maximum(x - values["boundary"], 0.0)
+        return (v**2 + x**2 + values.get("stiffness", 0.0) * beyond**2) / 2 + values.get("cubic", 0.0) * x**4 / 4
+
+    drift = stored(x, v) / stored(amplitude, 0.0) - 1
+    walk = 2.0**-53 * np.sqrt(run.steps.values)
+    assert np.abs(drift.mean()) < 4 * drift.std() / np.sqrt(len(drift))
+    assert np.all(np.abs(drift) < 6 * walk)
+    assert 0 < (drift > 0).sum() < len(drift)
+
+
 # -- impacts ---------------------------------------------------------------------------------------------------------------------
 #: A mass that falls with 9.81 m/s^2 from 0.2 m above a spring, on and on.
 FALL = {"lift": 9.81, "boundary": 0.0, "stiffness": 4e3}

@@ -6,7 +6,7 @@ import pytest
 
 import saltus as sl
 from saltus.errors import TraceError
-from saltus.flow import Stroboscope
+from saltus.flow.maps import Stroboscope
 
 METHOD = sl.Taylor(order=14, lanes=2)
 F = 0.7

@@ -163,3 +163,25 @@ def test_the_tangent_flow_across_a_contact(power):
     tangent = [run[f"end_{name}"].item() for name in system.states[2:]]
     truth = [-1.0, -end + 2 * duration / (power + 1), 0.0, -1.0]
     assert np.abs(np.subtract(tangent, truth)).max() < 1e-12
+
+
+@sl.system(states="x v")
+def lossy_stop(t, x, v, *, stiffness=2.47e6, stop=0.005):
+    """A Hertz stop with a loss on the way in, a root in a root: example 4 of DISODE45 (Calvo, Montijano & Randez)."""
+    depth = x - stop
+    force, loss = stiffness * depth**1.5, 1.98 * sl.sqrt(2 * stiffness * sl.sqrt(depth)) * v
+    contact = sl.piecewise((force + loss, (depth > 0) & (v > 0)), (force, depth > 0), otherwise=0)
+    return v, (-4.1 * v - 210.125 * x - contact - 2 * sl.sin(14 * t)) / 2
+
+
+def test_the_published_switches_of_a_lossy_hertz_stop():
+    """Entry, turn and exit, six times; the first entry is printed to ten digits. Turns outside the stop switch nothing."""
+    run = run_of(lossy_stop, (0.0, 0.0), 3.0, method=sl.Taylor(order=12, lanes=2))
+    assert run.status.item() == "ok"
+    at_stop = run.contact_guard.values == "stop"
+    entries = run.contact_time.values[at_stop][::2]
+    exits = run.contact_time.values[at_stop][1::2]
+    turns = run.contact_time.values[~at_stop]
+    inside = [np.sum((turns > a) & (turns < b)) for a, b in zip(entries, exits, strict=True)]
+    assert inside == [1] * 6
+    assert abs(entries[0] - 0.4006647561) < 1e-10

@@ -14,6 +14,7 @@ from saltus.analysis.settled import settled
 from saltus.analysis.simulate import simulate
 from saltus.analysis.spectrum import spectrum
 from saltus.analysis.stroboscope import stroboscope
+from saltus.analysis.transmissibility import transmissibility
 from saltus.analysis.wolf import wolf
 
 __all__ = [
@@ -32,5 +33,6 @@ __all__ = [
     "simulate",
     "spectrum",
     "stroboscope",
+    "transmissibility",
     "wolf",
 ]

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from saltus.errors import ParameterError, nearest
+from saltus.flow.counts import whole
 
 #: Values along a range, by what users write for the scale.
 SCALES = ("linear", "log")
 #: Values along one axis beyond which a range is refused before it fills memory.
 MOST_VALUES = 100_000_000
-
-
-def whole(value: Any, name: str, least: int = 1) -> int:
-    """A whole number. Raises ParameterError for anything else, or one below ``least``."""
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float | np.number)
-        or not math.isfinite(value)
-        or value != int(value)
-        or value < least
-    ):
-        raise ParameterError(f"{name} must be a whole number of at least {least}, not {value!r}.")
-    return int(value)
 
 
 def along(name: str, given: Any, number: Callable[[Any], float], what: str, example: str, least: int = 1) -> np.ndarray:

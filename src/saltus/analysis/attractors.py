@@ -11,18 +11,19 @@ import xarray as xr
 from scipy.stats import qmc
 
 from saltus.analysis import uncertainty
-from saltus.analysis.along import whole
 from saltus.analysis.answers import gap_unit, provenance
-from saltus.analysis.plan import SCOUTS
+from saltus.analysis.plan import SCOUTS, memory
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import find
 from saltus.analysis.settling import UNCONVERGED, complete, settle_all
 from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
+from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.flow.room import check_room
 from saltus.results import attractors_dataset
 from saltus.system.system import System
 from saltus.units import to_si
@@ -138,6 +139,7 @@ def basin_fractions(
     samples, periods, seed = whole(samples, "samples"), whole(periods, "periods"), whole(seed, "seed", 0)
     fixed = fixed_states(system, at, box)
     ranges = _ranges(system, box)
+    check_room(memory(samples, len(system.states)), f"{samples} random starts", "Draw fewer: samples=10_000 tells shares to 1 %.")
     map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
     start = fill(system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed)
     scale = _spread(map_, start[:SPREAD_STARTS])

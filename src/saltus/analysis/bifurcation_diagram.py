@@ -26,6 +26,7 @@ def bifurcation_diagram(
     follow: bool = False,
     box: Mapping[str, Any] | None = None,
     values: Mapping[str, Any] | None = None,
+    outputs: Mapping[str, Any] | None = None,
     method: Method | None = None,
     periods: int = 2000,
     every: float | str | None = None,
@@ -52,7 +53,7 @@ def bifurcation_diagram(
     every : float or str, optional
         Time between two looks at the motion of a system without forcing [s], about a turn of it. Equilibria, limit cycles, their periods,
         sizes and stability don't depend on it.
-    box, values, method, periods, seed, threads, progress
+    box, values, outputs, method, periods, seed, threads, progress
         As for :func:`saltus.frequency_response`.
 
     Returns
@@ -76,4 +77,4 @@ def bifurcation_diagram(
     check_sample(sample, method)
     grid = grid_of(system, vary, start, box, values, seed, follow, every)
     check_unforced_sample(sample, grid.system)
-    return respond(grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "")
+    return respond(grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "", outputs)

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.along import whole
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.stretch import Stretch, common, computed, stretch, with_each
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
+from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.results import motion_dataset, schema

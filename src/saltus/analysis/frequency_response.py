@@ -25,6 +25,7 @@ def frequency_response(
     box: Mapping[str, Any] | None = None,
     follow: bool = False,
     values: Mapping[str, Any] | None = None,
+    outputs: Mapping[str, Any] | None = None,
     method: Method | None = None,
     periods: int = 2000,
     seed: int = 1,
@@ -52,6 +53,9 @@ def frequency_response(
         Whether given starts are swept upwards too.
     values : mapping, optional
         Other values of parameters.
+    outputs : mapping of str to callable, or to (callable, unit), optional
+        What to read off each response besides the states: functions of (t, states, parameters), their arguments found by name, such as
+        ``{"acceleration": (lambda x, v, k, c, m: -(k*x + c*v)/m, "m/s^2")}``. Comparisons that are contacts of the system read their sides.
     method : Method
         Default :class:`saltus.Taylor`.
     periods : int
@@ -70,7 +74,11 @@ def frequency_response(
         ``response_of``, ``rms``, ``peak``, ``period``, ``type``, ``contacts_per_period``. On response: ``response_<parameter>``,
         ``response_branch``, ``response_type``, ``response_period``, ``response_rms``, ``response_peak``, ``response_margin``, multipliers,
         exponent, stroboscopic points, and for random starts ``response_share`` with its 95 % Wilson interval. ``event_kind`` and
-        ``event_branch`` tell what happens to branches between two frequencies.
+        ``event_branch`` tell what happens to branches between two frequencies. On (response, output): ``output_maximum``, ``_minimum``,
+        ``_peak``, ``_peak_to_peak``, ``_mean``, ``_rms``, ``_rms_about_mean`` of every state and output, over whole responses (64 forcing
+        periods of one that never repeats), and ``output_amplitude``, ``output_phase`` [rad] of the first harmonic: A cos(2 pi f t + phase),
+        f the forcing frequency and t the time of the equations, also where the response repeats after several periods only.
+        Turning points are located and means exact: nothing comes from samples.
 
     Raises
     ------
@@ -86,4 +94,4 @@ def frequency_response(
             "if a parameter is the frequency of a forcing, declare forced_at= in @sl.system."
         )
     grid = grid_of(system, {system.forced_at: frequency}, start, box, values, seed, follow)
-    return respond(grid, method, periods, threads, progress)
+    return respond(grid, method, periods, threads, progress, outputs=outputs)

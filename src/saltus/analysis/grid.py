@@ -8,16 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.along import along, whole
-from saltus.analysis.starts import MOST_TRAJECTORIES, check_system, ensemble, looks_every
+from saltus.analysis.along import along
+from saltus.analysis.recurrence import LONGEST
+from saltus.analysis.starts import check_system, ensemble, looks_every
 from saltus.errors import ParameterError, nearest
+from saltus.flow.counts import whole
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
+from saltus.flow.room import check_room
 from saltus.system.system import System
 from saltus.units import to_si
 
 #: Directions of a sweep by what users write.
 SWEEPS = {"sweep_up": "up", "sweep_down": "down"}
+
+
+#: Memory of what is known of one response, for each state [bytes]: the points of its orbit, twice.
+RESPONSE = 16.0 * LONGEST
 
 
 @dataclass(frozen=True)
@@ -117,11 +124,11 @@ def grid_of(
     if sweeps and len(points) > 1:
         raise ParameterError("a sweep follows one parameter; this grid has two. Leave follow= and sweeps out.")
     grid = Grid(system, points, starts, sweeps, drawn, seconds)
-    if grid.places * len(starts) > MOST_TRAJECTORIES // 100:
-        raise ParameterError(
-            f"{grid.places} values with {len(starts)} starts each are more than {MOST_TRAJECTORIES // 100} trajectories. "
-            "Take a coarser grid or fewer starts."
-        )
+    check_room(
+        grid.places * (len(starts) * (400.0 + RESPONSE * len(system.states)) + 16.0 * len(system.values)),
+        f"{grid.places} values with {len(starts)} starts each",
+        "Take a coarser grid or fewer starts.",
+    )
     corners = {name: np.array([column.min(), column.max()]) for name, column in points.items()}
     ensemble(system, np.zeros(len(system.states)), corners)  # ranges and periodicity of the forcing are checked there
     return grid

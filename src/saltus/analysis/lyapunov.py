@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.along import whole
 from saltus.analysis.answers import gap_unit, provenance, shared_values
 from saltus.analysis.exponents import Exponents
 from saltus.analysis.messages import warn
@@ -17,6 +16,7 @@ from saltus.analysis.neighbour_exponents import NeighbourExponents
 from saltus.analysis.starts import Ensemble, check_system, ensemble
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest
+from saltus.flow.counts import whole
 from saltus.flow.family import Family
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.flow import polynomials
 from saltus.flow.engine import Outcome
 from saltus.flow.family import Family
@@ -31,16 +32,16 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Measures:
-    """The numbers of m motions of D states, each over its period, or over many forcing periods if it never repeats.
+    """The numbers of m motions of D states and K outputs, each over its period, or over many forcing periods if it never repeats.
 
     Attributes
     ----------
-    maximum, minimum, mean : float64[m, D]
-        Of each state [its unit].
-    deviation : float64[m, D]
+    maximum, minimum, mean : float64[m, K]
+        Of each output [its unit]; the states come first.
+    deviation : float64[m, K]
         Root mean square about the mean.
-    harmonic : complex128[m, D]
-        First harmonic: ``A exp(i phi)`` of ``A cos(2 pi t/T + phi)``, T the forcing period, t the time of the equations.
+    harmonic : complex128[m, K]
+        First harmonic: ``A exp(i phi)`` of ``A cos(2 pi t/T + phi)``, T the forcing period, t the time of the equations; NaN if unforced.
     margin : float64[m]
         Smallest size of a gap where it turns [unit of the gap]; zero if it is within rounding, inf without gaps.
     span : float64[m]
@@ -66,13 +67,21 @@ class Measures:
 
     @property
     def peak(self) -> np.ndarray:
-        """Largest magnitude, float64[m, D]."""
+        """Largest magnitude, float64[m, K]."""
         return np.maximum(np.abs(self.maximum), np.abs(self.minimum))
 
     @property
     def rms(self) -> np.ndarray:
-        """Root mean square about zero, float64[m, D]."""
+        """Root mean square about zero, float64[m, K]."""
         return np.hypot(self.mean, self.deviation)
+
+    def by_name(self) -> dict[str, np.ndarray]:
+        """What is read off each motion, float64[m, K] by the names that results use."""
+        return {
+            "maximum": self.maximum, "minimum": self.minimum, "peak": self.peak, "peak_to_peak": self.maximum - self.minimum,
+            "mean": self.mean, "rms": self.rms, "rms_about_mean": self.deviation,
+            "amplitude": np.abs(self.harmonic), "phase": np.angle(self.harmonic),
+        }  # fmt: skip
 
     def put(self, rows: np.ndarray, other: Measures) -> None:
         """Write another's numbers to the rows int64[n]."""
@@ -85,15 +94,16 @@ class Measures:
                     mine[row] = one
 
 
-def unknown(m: int, size: int) -> Measures:
-    """Nothing known of m motions of so many states."""
-    maximum, minimum, mean, deviation = np.full((4, m, size), np.nan)
+def unknown(m: int, size: int, outputs: int | None = None) -> Measures:
+    """Nothing known of m motions of so many states and outputs (default: just the states)."""
+    wide = size if outputs is None else outputs
+    maximum, minimum, mean, deviation = np.full((4, m, wide), np.nan)
     margin, span, contacts = np.full((3, m), np.nan)
-    harmonic, turning = np.full((m, size), np.nan + 0j), [np.zeros((0, size)) for _ in range(m)]
+    harmonic, turning = np.full((m, wide), np.nan + 0j), [np.zeros((0, size)) for _ in range(m)]
     return Measures(maximum, minimum, mean, deviation, harmonic, margin, span, contacts, [""] * m, turning)
 
 
-def measure(family: Family, start: np.ndarray, periods: np.ndarray, window: int = WANDERED) -> Measures:
+def measure(family: Family, start: np.ndarray, periods: np.ndarray, window: int = WANDERED, outputs: Outputs | None = None) -> Measures:
     """The numbers of the motions from states float64[m, D], row i by row i of the family.
 
     Parameters
@@ -106,8 +116,11 @@ def measure(family: Family, start: np.ndarray, periods: np.ndarray, window: int 
         Period of each [forcing periods]; 0 for a motion that never repeats.
     window : int
         Forcing periods of such a motion that are looked at.
+    outputs : Outputs, optional
+        What is asked about; default the states.
     """
-    result, parts = unknown(*start.shape), []
+    wanted = outputs or outputs_of(family.system)
+    result, parts = unknown(len(start), start.shape[1], len(wanted)), []
     for n in np.unique(periods):
         rows = np.flatnonzero(periods == n)
         step = max(1, HELD // (nodes_of(family) * int(n or window)))
@@ -116,17 +129,17 @@ def measure(family: Family, start: np.ndarray, periods: np.ndarray, window: int 
     def work(part: np.ndarray) -> Measures:
         n, some = int(periods[part[0]]), family.rows(part)
         some.threads = 1
-        return _measured(some, start[part], n or window, n > 0)
+        return _measured(some, start[part], n or window, n > 0, wanted)
 
     on_threads(work, parts, result.put, family.threads)
     return result
 
 
-def _measured(family: Family, start: np.ndarray, span: int, closed: bool) -> Measures:
+def _measured(family: Family, start: np.ndarray, span: int, closed: bool, outputs: Outputs) -> Measures:
     """The numbers of some motions over so many periods, after which they repeat or don't."""
-    size = start.shape[1]
-    whole, outcome = pieces(family, start, span, (), family.system.guards)
-    result = unknown(*start.shape)
+    size, wide = start.shape[1], len(outputs)
+    whole, outcome = pieces(family, start, span, outputs.formulas, outputs.guards)
+    result = unknown(len(start), size, wide)
     if family.method.records_contacts:
         result.contacts[:] = outcome.counters[:, st.EVENTS] / span
         if closed:
@@ -135,10 +148,10 @@ def _measured(family: Family, start: np.ndarray, span: int, closed: bool) -> Mea
     if len(known):
         first = np.flatnonzero(np.diff(whole.motion, prepend=-1))
         turns = [_Turns.of(whole, first, quantity, closed) for quantity in range(whole.terms.shape[1])]
-        for state in range(size):
-            result.maximum[known, state], result.minimum[known, state] = _extremes(whole, first, turns[state], state)
-            _means(family, whole, first, state, result)
-        gaps = range(size, whole.terms.shape[1])
+        for output in range(wide):
+            result.maximum[known, output], result.minimum[known, output] = _extremes(whole, first, turns[output], output)
+            _means(family, whole, first, output, result)
+        gaps = range(wide, whole.terms.shape[1])
         margins = [_margin(whole, first, turns[gap], gap) for gap in gaps]
         ranges = [np.subtract(*_extremes(whole, first, turns[gap], gap)) for gap in gaps]
         result.margin[known] = np.min(margins, axis=0, initial=np.inf) if margins else np.inf
@@ -201,21 +214,22 @@ def _margin(whole: Pieces, first: np.ndarray, turns: _Turns, gap: int) -> np.nda
     return np.minimum.reduceat(least, first)
 
 
-def _means(family: Family, whole: Pieces, first: np.ndarray, state: int, result: Measures) -> None:
-    """Mean, root mean square about it and first harmonic of a state, over the whole of each motion."""
+def _means(family: Family, whole: Pieces, first: np.ndarray, output: int, result: Measures) -> None:
+    """Mean, root mean square about it and first harmonic of an output, over the whole of each motion."""
     motion, count = whole.motion, np.diff(np.append(first, len(whole.motion)))
     places, weights = polynomials.gauss(PLACES)
     total = np.add.reduceat(whole.length, first)
-    values = places[:, None] ** np.arange(len(whole.terms)) @ whole.terms[:, state]
+    values = places[:, None] ** np.arange(len(whole.terms)) @ whole.terms[:, output]
     share = weights[:, None] * (whole.length / np.repeat(total, count))
-    origin = np.repeat(whole.terms[0, state, first], count)  # a small motion about a large mean keeps its digits
+    origin = np.repeat(whole.terms[0, output, first], count)  # a small motion about a large mean keeps its digits
     mean = np.add.reduceat((share * (values - origin)).sum(axis=0), first)
     values -= origin + np.repeat(mean, count)
     angle = 2.0 * np.pi * (whole.phase + places[:, None] * whole.length) / family.period[motion]
     known = motion[first]
-    result.mean[known, state] = whole.terms[0, state, first] + mean
-    result.deviation[known, state] = np.sqrt(np.add.reduceat((share * values**2).sum(axis=0), first))
-    result.harmonic[known, state] = 2.0 * np.add.reduceat((share * values * np.exp(-1j * angle)).sum(axis=0), first)
+    result.mean[known, output] = whole.terms[0, output, first] + mean
+    result.deviation[known, output] = np.sqrt(np.add.reduceat((share * values**2).sum(axis=0), first))
+    if family.system.forced_at is not None:
+        result.harmonic[known, output] = 2.0 * np.add.reduceat((share * values * np.exp(-1j * angle)).sum(axis=0), first)
 
 
 def _itineraries(names: list[str], outcome: Outcome) -> list[str]:

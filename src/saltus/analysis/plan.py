@@ -15,15 +15,17 @@ import xarray as xr
 from scipy.stats import qmc
 
 from saltus.analysis import uncertainty
-from saltus.analysis.along import along, whole
+from saltus.analysis.along import along
 from saltus.analysis.answers import gap_unit, provenance
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import Found, find
 from saltus.analysis.settling import OPEN, UNCONVERGED, Settling, complete, settle
 from saltus.analysis.starts import check_system, fill, fixed_states
 from saltus.errors import ParameterError
+from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
+from saltus.flow.room import check_room
 from saltus.kernels import status as st
 from saltus.results import basins_dataset
 from saltus.results.intervals import wilson
@@ -37,8 +39,6 @@ SCOUTS = 1024
 CHUNK = 4096
 #: Cells recomputed with a more exact method.
 CHECKED = 1000
-#: Cells beyond which a map is refused: some 5 GB.
-MOST_CELLS = 50_000_000
 
 
 @dataclass(frozen=True)
@@ -162,6 +162,11 @@ class BasinPlan:
         return {"flip_rate": flips / len(chosen), "flip_rate_low": float(low), "flip_rate_high": float(high), "flip_checked": len(chosen)}
 
 
+def memory(cells: int, states: int) -> float:
+    """Memory that a map takes, or as many random starts [bytes]: what is kept of each cell, and the measures of the map."""
+    return 2.5e8 + cells * (120.0 + 24.0 * states)
+
+
 def basin_plan(
     system: System, axes: Mapping[str, Any], at: Mapping[str, Any] | None, method: Method, periods: int, every: float | str | None
 ) -> BasinPlan:
@@ -180,8 +185,7 @@ def basin_plan(
     periods = whole(periods, "periods")
     values = {name: _axis(system, name, given) for name, given in axes.items()}
     first, second = (len(one) for one in values.values())
-    if first * second > MOST_CELLS:
-        raise ParameterError(f"{first} x {second} cells are more than {MOST_CELLS:.0e}. Take a coarser grid, or sl.basin_fractions.")
+    check_room(memory(first * second, len(system.states)), f"{first} x {second} cells", "Take a coarser grid, or sl.basin_fractions.")
     seconds = None if every is None else to_si(every, "s", "every")
     plan = BasinPlan(system, method, values, fixed, periods, seconds)
     plan.map()  # every= is checked where it is used

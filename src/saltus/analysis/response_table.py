@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from saltus.analysis import branches
-from saltus.analysis.along import whole
 from saltus.analysis.answers import gap_unit, guards_over, provenance
 from saltus.analysis.grid import Grid
+from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.analysis.responses import Found, find, numbers_of, table_of
 from saltus.analysis.samples import sampled
+from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.interrupt import Interrupted
-from saltus.results import Events, Responses, Starts, responses_dataset
+from saltus.results import Events, OutputNumbers, Responses, Starts, responses_dataset
 
 
 def respond(
@@ -26,15 +28,17 @@ def respond(
     threads: int | None,
     progress: bool | Callable[[float], None] | None,
     sample: str = "",
+    outputs: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
     """The Dataset of a grid's responses. Raises Interrupted, with the Dataset of what is known, on Ctrl-C."""
     method, periods = check_method(method), whole(periods, "periods")
+    wanted = outputs_of(grid.system, outputs)
     show, close = reporter(progress)
     try:
         found = find(grid, method, periods, threads, show)
     finally:
         close()
-    result = _dataset(grid, method, periods, found, threads, sample)
+    result = _dataset(grid, method, periods, found, threads, sample, wanted)
     if not found.complete:
         stopped = Interrupted()
         stopped.partial = result
@@ -42,8 +46,8 @@ def respond(
     return result
 
 
-def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: int | None, sample: str) -> xr.Dataset:
-    numbers = numbers_of(found, grid, method, threads)
+def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: int | None, sample: str, outputs: Outputs) -> xr.Dataset:
+    numbers = numbers_of(found, outputs, grid, method, threads)
     table = table_of(found, numbers, grid, method)
     branch, happened = np.full(len(found), -1, np.int64), []
     if len(grid.axes) == 1 and found.complete:  # after Ctrl-C nothing more is computed
@@ -62,6 +66,7 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
         responses=Responses(
             table, np.stack(np.unravel_index(found.place, grid.shape), axis=1), branch,
             sampled(sample, numbers, grid, method, found, threads) if sample else None,
+            OutputNumbers(outputs.names, outputs.units, numbers.by_name()),
         ),
         events=Events(
             {name: np.array([event.value for event in happened])}, [event.kind for event in happened],

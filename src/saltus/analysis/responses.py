@@ -9,6 +9,7 @@ import numpy as np
 
 from saltus.analysis.grid import Grid
 from saltus.analysis.orbit_measures import Measures, measure
+from saltus.analysis.outputs import Outputs
 from saltus.analysis.recurrence import SAME
 from saltus.analysis.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE, PERIODIC, QUASI_PERIODIC, Steady, settle_each
 from saltus.analysis.unforced import multipliers_and_eigenvalues, rest
@@ -150,10 +151,10 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
     return (int(result.kind[row]), int(period), *(float(size) for size in sizes))
 
 
-def numbers_of(found: Found, grid: Grid, method: Method, threads: int | None = None) -> Measures:
+def numbers_of(found: Found, outputs: Outputs, grid: Grid, method: Method, threads: int | None = None) -> Measures:
     """The numbers of each response."""
     family, times = grid.family(method, threads).rows(found.place), own_times(found, grid)
-    numbers = measure(family if times is None else family.every(times), found.start(aside=True), spans_of(found))
+    numbers = measure(family if times is None else family.every(times), found.start(aside=True), spans_of(found), outputs=outputs)
     rests = np.flatnonzero(found.kind == EQUILIBRIUM)
     if len(rests):
         rest(family.rows(rests), found.start()[rests], rests, numbers)

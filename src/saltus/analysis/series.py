@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.along import whole
 from saltus.analysis.batch_means import LEAST
 from saltus.errors import ParameterError
+from saltus.flow.counts import whole
 from saltus.units import to_si
 
 #: Points from which something can be said at least.

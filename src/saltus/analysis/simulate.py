@@ -11,15 +11,16 @@ import xarray as xr
 
 from saltus.analysis import answers
 from saltus.analysis import time_errors as measure
-from saltus.analysis.along import whole
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow import engine
+from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.results import trajectory_dataset
 from saltus.system.system import System
@@ -28,8 +29,6 @@ from saltus.system.system import System
 PER_PERIOD = 200
 #: Samples over the whole span of an unforced system: a curve without corners over a hundred oscillations; fewer of many trajectories.
 MOST_PER_SPAN, LEAST_PER_SPAN = 10_000, 2000
-#: Samples beyond which a call is refused: some 5 GB.
-MOST_SAMPLES = 300_000_000
 
 
 @verb
@@ -147,11 +146,11 @@ def _plan(system: System, group: Ensemble, length: Span, samples: int | None, ke
     first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
     longest = np.max((length.count + length.phase / length.period) * per)
     count = int(longest + 1e-9) + 1 - first * per
-    if count * group.size * len(system.states) > MOST_SAMPLES:
-        raise ParameterError(
-            f"{group.size} trajectories with {count} samples each don't fit in memory. Give keep= (last periods) or fewer samples=, "
-            "or use sl.stroboscope."
-        )
+    check_room(
+        count * group.size * (16.0 * len(system.states) + 16.0),
+        f"{group.size} trajectories with {count} samples each",
+        "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
+    )
     index = first * per + np.arange(count)
     return _Plan(Schedule(index // per, (index % per) / per), first)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from saltus.analysis.along import along
 from saltus.errors import ParameterError, SaltusError, nearest
+from saltus.flow.counts import whole
 from saltus.system import expression as ex
 from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System
@@ -250,15 +251,12 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
     """
     begin = _time(t_start, "t_start")
     n = group.size
-    if isinstance(periods, float) and not math.isfinite(periods):
-        raise ParameterError(f"periods must be a whole number of at least 1, not {periods!r}.")
     if (periods is None) == (t_end is None):
         raise ParameterError("give periods= (whole forcing periods) or t_end= (seconds), and only one of them.")
     if periods is not None:
         if system.forced_at is None:
             raise ParameterError(f"{system.name} has no forcing period. Give t_end= in place of periods=.")
-        if isinstance(periods, bool) or not isinstance(periods, int | float | np.integer) or periods != int(periods) or periods < 1:
-            raise ParameterError(f"periods must be a whole number of at least 1, not {periods!r}. For a part of a period give t_end=.")
+        periods = whole(periods, "periods")
         return Span(begin, _periods(system, group), np.full(n, int(periods), np.int64), np.zeros(n))
     end = _time(t_end, "t_end")
     length = end - begin

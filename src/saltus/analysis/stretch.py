@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import answers
-from saltus.analysis.along import whole
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.errors import ParameterError
 from saltus.flow import engine
+from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method
 from saltus.flow.progress import reporter

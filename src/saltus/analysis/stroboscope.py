@@ -12,17 +12,15 @@ from saltus.analysis import answers
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import ensemble, span
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError
 from saltus.flow import engine
+from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
+from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.results import stroboscope_dataset
 from saltus.system.system import System
-
-#: Values beyond which a call is refused: 8 GB.
-MOST_VALUES = 1_000_000_000
 
 
 @verb
@@ -65,14 +63,12 @@ def stroboscope(
     method = check_method(method)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, None, t_start)
-    if keep is not None and (isinstance(keep, bool) or keep != int(keep) or keep < 1):
-        raise ParameterError(f"keep must be a whole number of at least 1, not {keep!r}.")
-    first = 0 if keep is None else max(int(periods) + 1 - int(keep), 0)
-    if (int(periods) + 1 - first) * group.size * len(system.states) > MOST_VALUES:
-        raise ParameterError(
-            f"{group.size} trajectories with {int(periods) + 1 - first} periods each don't fit in memory. Give keep= (last periods)."
-        )
-    kept = np.arange(first, int(periods) + 1, dtype=np.int64)
+    whole_periods = whole(periods, "periods")
+    first = 0 if keep is None else max(whole_periods + 1 - whole(keep, "keep"), 0)
+    count = whole_periods + 1 - first
+    size = count * group.size * (16.0 * len(system.states) + 16.0)
+    check_room(size, f"{group.size} trajectories with {count} periods each", "Give keep= (last periods).")
+    kept = np.arange(first, whole_periods + 1, dtype=np.int64)
     schedule = Schedule(kept, np.zeros(len(kept)))
     request = Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, schedule, None)
 

@@ -90,9 +90,10 @@ def runs_away(trail: np.ndarray) -> np.ndarray:
 
 
 def rest(family: Family, place: np.ndarray, rows: np.ndarray, numbers: Measures) -> None:
-    """Fill in the rows int64[m] of equilibria float64[m, D]: their size, no contacts, and the distance to the nearest boundary."""
-    numbers.maximum[rows] = numbers.minimum[rows] = numbers.mean[rows] = place
-    numbers.deviation[rows], numbers.harmonic[rows], numbers.span[rows] = 0.0, 0.0, 0.0
+    """Fill in the rows int64[m] of equilibria float64[m, D]: the size of their states, and the distance to the nearest boundary."""
+    size = place.shape[1]
+    numbers.maximum[rows, :size] = numbers.minimum[rows, :size] = numbers.mean[rows, :size] = place
+    numbers.deviation[rows, :size], numbers.span[rows] = 0.0, 0.0
     states, values = dict(zip(family.system.states, place.T, strict=True)), family.values
     bits: list[np.ndarray] = []
     nearest = np.full(len(rows), np.inf)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.along import whole
 from saltus.analysis.batch_means import CONFIDENCE, batch_means
 from saltus.analysis.embedding import embed as embedded
 from saltus.analysis.embedding import false_neighbours, first_minimum, hardly_correlated, least_dimension
@@ -20,6 +19,7 @@ from saltus.analysis.series import LEAST_POINTS, check_length, columns_of, inter
 from saltus.analysis.verb import verb
 from saltus.analysis.wandering import UNCLEAR
 from saltus.errors import ParameterError, SaltusWarning, nearest
+from saltus.flow.counts import whole
 from saltus.results import exponents_dataset
 
 #: Default of the largest distance at most, as a share of the range: beyond it growth isn't that of small deviations. Wolf's rule.

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from fractions import Fraction
 
 from saltus.codegen.scalar import condition_code
 from saltus.codegen.series import Linear, Series, SeriesBuilder, is_constant
@@ -21,6 +22,8 @@ from saltus.system import expression as ex
 from saltus.system.expression import Expr
 
 MASK_WORDS = ("&", "|", "~")
+#: Terms beyond this one are too small, within a step, for the rounding of 1/k to matter.
+LAST_EXACT_DIVISOR = 12
 #: Operations, one after the other, in a sine.
 SINE = 12
 
@@ -153,6 +156,13 @@ class JetCode:
             return value
         return self._assign(f"{value} * {number!r}")
 
+    def _over(self, value: str | None, k: int) -> str | None:
+        """A value over k, rounded once: the rounding of 1/k alone would bend every step the same way, and energy would drift with time."""
+        rest = float(Fraction(1, k) - Fraction(1.0 / k))
+        if value is None or rest == 0.0 or k > LAST_EXACT_DIVISOR:
+            return self._times(value, 1.0 / k)
+        return self._assign(f"fma({value}, {1.0 / k!r}, {value} * {rest!r})")
+
     def linear(self, form: Linear, k: int) -> str | None:
         """Coefficient k of a linear form; None if it is structurally zero."""
         total = self.coefficient(form.offset) if k == 0 and not is_constant(form.offset, 0.0) else None
@@ -186,7 +196,7 @@ class JetCode:
             if k == 0:
                 self._memo[key] = self._assign(f"load(y, {i}, LANES)")
             else:
-                self._memo[key] = self._times(self.linear(self._fields[i], k - 1), 1.0 / k)
+                self._memo[key] = self._over(self.linear(self._fields[i], k - 1), k)
         return self._memo[key]
 
     def value(self, series: Series, k: int, part: str = "") -> str | None:

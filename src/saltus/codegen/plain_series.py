@@ -23,10 +23,6 @@ def series_module(system: System, order: int) -> ModuleType:
     return _plain(taylor_head(system, order, 1))
 
 
-#: What a step needs, in the order of the flow's own module (module.py).
-_TEMPLATES = ("clocks_layout.py", "taylor_layout.py", "taylor_step.py")
-
-
 @lru_cache(maxsize=64)
 def _plain(head: str) -> ModuleType:
     """A head and the templates of a step as a Python module, its lanes whole arrays."""
@@ -35,8 +31,12 @@ def _plain(head: str) -> ModuleType:
     names |= {name: value for name, value in vars(lanes).items() if callable(value) and not name.startswith("_")}
     names |= dict.fromkeys(("kernel", "inner"), lambda function: function)
     names |= {"math": math, "np": np, "sincos": getattr(trigonometry.sincos, "py_func", trigonometry.sincos), "turned": trigonometry.turned}
-    for name, text in (("<generated head>", head), *((name, _template(name)) for name in _TEMPLATES)):
+    for name, text in (
+        ("<generated head>", head),
+        *((name, _template(name)) for name in ("clocks.py", "taylor_layout.py", "taylor_step.py")),
+    ):
         exec(compile(text, name, "exec"), names)
+    names["SINGULAR"], names["NSINGULAR"] = names["NSINGULAR"], 0  # rows of `side`; no term is left out of these series
     names["splat"] = lambda value, width: value  # noqa: ARG005  (NumPy spreads a number over any width)
     return module
 

@@ -6,6 +6,7 @@ Every trajectory is independent of all others, so chunks may be cut and threads 
 from __future__ import annotations
 
 import threading
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import ModuleType
@@ -13,8 +14,10 @@ from types import ModuleType
 import numpy as np
 
 from saltus.codegen.clocks import table_data
-from saltus.errors import ParameterError
+from saltus.errors import SaltusWarning
+from saltus.flow.counts import whole as whole_number
 from saltus.flow.methods import Method
+from saltus.flow.room import Contacts
 from saltus.flow.threads import on_threads, usable_processors
 from saltus.interrupt import Interrupted, Stop
 from saltus.kernels import status as st
@@ -23,6 +26,8 @@ from saltus.system.system import System
 
 #: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show progress.
 CHUNK = 1024
+#: Threads of one call.
+MOST_THREADS = 4096
 #: Steps of the lanes between two looks at the keyboard, for two states: some ten milliseconds.
 SLICE = 50_000
 #: Contacts that a chunk's table holds before it is emptied, besides room for those of one step.
@@ -135,22 +140,28 @@ def run(
     Interrupted
         On Ctrl-C, with the partial Outcome.
     """
-    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
-        raise ParameterError(f"threads must be a whole number of at least 1, not {threads!r}.")
+    threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
     module = method.kernels(system)
     outcome, whole = allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     shared = {"options": method.numbers(periods), "data": table_data(system)}
     chunks = [_cut(request, whole, first, shared) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
-    stop = Stop()
+    stop, room = Stop(), Contacts(len(system.states), request.record_from is not None)
     try:
-        _run_chunks(chunks, module, stop, progress, workers)
+        _run_chunks(chunks, module, stop, room, progress, workers)
     except KeyboardInterrupt:
         outcome.complete = False
         interrupted = Interrupted()
         interrupted.partial = _finish(outcome, whole, chunks, request.t_end)
         raise interrupted from None
+    if room.stopped:
+        warnings.warn(
+            f"the contacts of this call, {room.kept} by now, filled half of the free memory: trajectories that were under way stopped with "
+            "status budget_events. Keep those of the last periods only (keep=), or run fewer starts or periods in one call.",
+            SaltusWarning,
+            stacklevel=4,
+        )
     return _finish(outcome, whole, chunks, request.t_end)
 
 
@@ -209,13 +220,14 @@ def _open_tables(chunk: _Chunk, module: ModuleType) -> None:
     chunk.arrays["rec_f"] = np.zeros((size, st.RECORD_FLOATS + chunk.arrays["state"].shape[1] + 1))
 
 
-def _empty_table(chunk: _Chunk) -> None:
+def _empty_table(chunk: _Chunk, room: Contacts) -> None:
     """Move a chunk's contacts from its table to its list."""
     arrays, used = chunk.arrays, int(chunk.arrays["rec_used"][0])
     if used:
         integers = arrays["rec_i"][:used].copy()
         integers[:, st.REC_TRAJECTORY] += chunk.first
         chunk.contacts.append((integers, arrays["rec_f"][:used].copy()))
+        room.take(used)
         arrays["rec_used"][0] = 0
 
 
@@ -248,14 +260,18 @@ def slice_of(states: int) -> int:
     return max(SLICE * 4 // max(states, 2) ** 2, 1)
 
 
-def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: Stop) -> None:
-    """Move a chunk to its end in slices; empties its table of contacts after each."""
+def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: Stop, room: Contacts) -> None:
+    """Move a chunk to its end in slices; empties its table of contacts after each. Where there is room for no more, it ends there."""
     arrays = chunk.arrays
     steps = slice_of(arrays["state"].shape[1])
     while not stop.is_set():
         outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), steps, *workspace)
-        _empty_table(chunk)
+        _empty_table(chunk, room)
         if outcome == st.FINISHED:
+            return
+        if room.full:
+            arrays["status"][arrays["status"] == st.RUNNING] = st.BUDGET_EVENTS
+            room.stopped = True
             return
 
 
@@ -271,7 +287,9 @@ def _behind(arrays: dict[str, np.ndarray]) -> float:
     return float(np.sum(np.where(arrays["status"] == st.RUNNING, at, 1.0)))
 
 
-def _run_chunks(chunks: list[_Chunk], module: ModuleType, stop: Stop, progress: Callable[[float], None] | None, workers: int) -> None:
+def _run_chunks(
+    chunks: list[_Chunk], module: ModuleType, stop: Stop, room: Contacts, progress: Callable[[float], None] | None, workers: int
+) -> None:
     """All chunks, on threads even if it is one: Python raises Ctrl-C in the main thread, which would cut a table of contacts in two."""
     local = threading.local()
 
@@ -279,7 +297,7 @@ def _run_chunks(chunks: list[_Chunk], module: ModuleType, stop: Stop, progress: 
         if not hasattr(local, "workspace"):
             local.workspace = module.workspace()
         _open_tables(chunk, module)
-        _advance(chunk, module, local.workspace, stop)
+        _advance(chunk, module, local.workspace, stop, room)
 
     show = None if progress is None else lambda _: progress(_share_done(chunks))
     on_threads(work, chunks, lambda *_: None, workers, show, stop)

@@ -11,6 +11,7 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 
+from saltus.codegen.clocks import table_data
 from saltus.codegen.plain_series import series_module
 from saltus.flow import polynomials
 from saltus.flow.family import Family
@@ -81,7 +82,8 @@ class MotionSeries:
         self._asked = np.r_[guards : len(watched.guards), 0 : self._own]
         self._module: ModuleType = series_module(watched, ORDER)
         k, module = len(family), self._module
-        self._constants, self._turns = np.zeros((max(module.NCONST, 1), k)), np.zeros((module.TURN + module.NTURNS, k))
+        self._tables = table_data(watched)
+        self._constants, self._turns = np.zeros((max(module.NCONST, 1), k)), np.zeros((module.CLOCK_ROWS, k))
         self._drifts = np.zeros(k, bool)
         for i, row in enumerate(family.parameters):
             module.constants(row, self._constants, i)
@@ -96,7 +98,8 @@ class MotionSeries:
     def of(self, nodes: Nodes, cubic: bool) -> list[Pieces]:
         """The pieces that begin at nodes and fill them; for cubics the first terms of each will do."""
         result, state, left = [], nodes.state.T.copy(), nodes.length.copy()
-        side = np.where((nodes.mode[None] >> np.arange(self._guards)[:, None]) & 1 == 1, 1.0, -1.0)
+        side = np.full((self._module.NGUARDS + self._module.SINGULAR, len(left)), -1.0)  # -1: no term is left out
+        side[: self._guards] = np.where((nodes.mode[None] >> np.arange(self._guards)[:, None]) & 1 == 1, 1.0, -1.0)
         new = np.ones(len(left), bool)
         for _ in range(MOST_PIECES):
             work, h = self._step(nodes, state, side, new)
@@ -116,7 +119,7 @@ class MotionSeries:
     def _step(self, nodes: Nodes, state: np.ndarray, side: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """All terms at some places, and how far they reach. At new nodes the sides of guards of the quantities' own are found first."""
         module, motion = self._module, nodes.motion
-        constants, clock = self._constants[:, motion], self._clock(nodes)
+        constants, (clock, room) = self._constants[:, motion], self._clock(nodes)
         work = np.zeros((module.ROWS, len(motion)))
         with np.errstate(all="ignore"):
             module.jets(state, side, constants, clock, work)
@@ -129,17 +132,25 @@ class MotionSeries:
             h = module.step_length(work, LOG2_TOLERANCE)
             if module.PROBED:
                 h = self._probed(nodes, side, constants, clock, work, h)
-        return work, h
+        return work, np.minimum(h, room)
 
-    def _clock(self, nodes: Nodes) -> np.ndarray:
-        """Phase, time at phase zero, and the phases of all harmonics there."""
+    def _clock(self, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
+        """Phase, time at phase zero, the phases of all harmonics there, what the clocks hold; and the time to the next break of one."""
         module, motion = self._module, nodes.motion
         clock = self._turns[:, motion]
         clock[module.TAU], clock[module.BASE] = nodes.phase, nodes.period * self._family.period[motion]
         for i in np.flatnonzero(self._drifts[motion]):
             row = motion[i]
             module.turns(self._family.parameters[row], 0.0, self._family.period[row], int(nodes.period[i]), i, clock)
-        return clock
+        room = np.full(len(motion), np.inf)
+        if module.NCLOCKS:
+            numbers, held = np.zeros((module.NUMBERS + 1) * module.NCLOCKS), np.zeros(module.HELD * module.NCLOCKS)
+            for at, who in enumerate(motion.tolist()):
+                period, count = self._family.period[who], int(nodes.period[at])
+                module.place_clocks(self._family.parameters[who], 0.0, period, count, numbers, self._tables)
+                room[at] = module.set_clocks(nodes.phase[at], count * period, numbers, self._tables, False, held) - nodes.phase[at]
+                clock[module.CLOCK_ROW :, at] = held
+        return clock, room
 
     def _probed(
         self, nodes: Nodes, side: np.ndarray, constants: np.ndarray, clock: np.ndarray, work: np.ndarray, h: np.ndarray
@@ -156,7 +167,7 @@ class MotionSeries:
 
     def _until_own_boundary(self, work: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lengths up to the first boundary of the quantities' own, and the guards float64[guards, n] that flip there."""
-        flips = np.zeros((self._guards, len(h)), bool)
+        flips = np.zeros((self._module.NGUARDS + self._module.SINGULAR, len(h)), bool)
         for guard in range(self._own, self._guards):
             which, place = polynomials.sign_changes(self._gap(work, guard) * h ** np.arange(ORDER + 1)[:, None])
             which, place = which[place > BEGAN], place[place > BEGAN]

@@ -58,8 +58,8 @@ class Lines:
 
     def show(self, share: float) -> None:
         """Say the share done, if it is time to."""
-        now, quarter = self._clock(), int(4 * min(share, 0.999))
-        if now - self._begun < self.PATIENCE or (quarter <= self._passed and now - self._told < self.EVERY):
+        now, quarter = self._clock(), int(4 * share)
+        if share >= 1.0 or now - self._begun < self.PATIENCE or (quarter <= self._passed and now - self._told < self.EVERY):
             return
         left = (now - self._begun) * (1 / share - 1) if share > 0 else None
         self._passed, self._told = max(quarter, self._passed), now

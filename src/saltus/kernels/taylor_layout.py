@@ -59,6 +59,8 @@ COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
 MOST_BOUNCES = 100
 HUGE = 1.0e300
+#: Highest term of a series that is summed by Horner's rule (even, and at most ORDER - 3).
+HORNER = min(8, ORDER - 4 - ORDER % 2)
 #: A probed step is at most this share of a period, or of an unforced span (MATLAB's default too).
 LONGEST_SHARE = 0.1
 #: Defect that a sound step may have, in units of the tolerance and of the rounding of the right-hand side's terms: the derivative of the

@@ -278,14 +278,21 @@ def size_of_terms(lanes, g, share):
 
 @inner
 def state_after(work, base, d):
-    """Value of a series at d. Even and odd terms apart, for half the latency; the last two sums are Horner's, as is the rounding."""
+    """Value of a series at d. Even and odd terms apart, for half the latency; the leading terms by Horner's rule.
+
+    Powers of d * d, which is rounded, would multiply the leading terms by the same wrong factor in every step of one length, and energy
+    would drift with time.
+    """
     u, top_even, top_odd = d * d, ORDER - ORDER % 2, ORDER - 1 + ORDER % 2
     even, odd = load(work, base + top_even, LANES), load(work, base + top_odd, LANES)
-    for k in range(top_even - 2, 0, -2):
+    for k in range(top_even - 2, HORNER, -2):
         even = fma(even, u, load(work, base + k, LANES))
-    for k in range(top_odd - 2, 0, -2):
+    for k in range(top_odd - 2, HORNER, -2):
         odd = fma(odd, u, load(work, base + k, LANES))
-    return fma(fma(even, d, odd), d, load(work, base, LANES))
+    value = fma(even, d, odd)  # HORNER is even: the last odd term stands just above it
+    for k in range(HORNER, -1, -1):
+        value = fma(value, d, load(work, base + k, LANES))
+    return value
 
 
 @inner

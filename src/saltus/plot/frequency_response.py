@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.errors import ParameterError, UnitError
+from saltus.errors import ParameterError, UnitError, nearest
 from saltus.plot import axes as draw
 from saltus.plot import kinds
 from saltus.plot import response_points as points
@@ -19,8 +20,16 @@ from saltus.results.schema import states_of
 from saltus.units import to_si
 
 _CALLER = "plot.frequency_response"
-Quantity = Literal["rms", "peak"]
-_LABELS = {"rms": "steady rms of {}", "peak": "peak |{}|"}
+Quantity = Literal[
+    "rms", "peak", "maximum", "minimum", "peak_to_peak", "mean", "rms_about_mean", "amplitude", "phase", "transmissibility"
+]  # fmt: skip
+_LABELS = {
+    "rms": "steady rms of {}", "peak": "peak |{}|", "maximum": "largest {}", "minimum": "smallest {}", "peak_to_peak": "peak to peak of {}",
+    "mean": "mean of {}", "rms_about_mean": "rms of {} about its mean", "amplitude": "first harmonic of {}", "phase": "phase of {} [deg]",
+    "transmissibility": "{}",
+}  # fmt: skip
+#: Quantities that begin at zero.
+_SIZES = ("rms", "peak", "peak_to_peak", "rms_about_mean", "amplitude", "transmissibility")
 Measured = str | os.PathLike[str] | xr.Dataset | None
 
 
@@ -28,6 +37,7 @@ def frequency_response(
     ds: points.Source,
     *,
     quantity: Quantity = "rms",
+    output: str | None = None,
     measured: Measured = None,
     events: bool = True,
     legend: bool = True,
@@ -40,8 +50,12 @@ def frequency_response(
     ds : Dataset, or mapping of str to Dataset
         What ``sl.frequency_response`` returned; a part of it, such as ``ds.sel(frequency=slice(14, 17))``, is drawn alone. Several by name
         are drawn over each other, a colour and a marker for each: ``{"exact": a, "ode45": b}``.
-    quantity : {"rms", "peak"}
-        Root mean square, or largest magnitude, of the first state.
+    quantity : str
+        ``"rms"`` (about zero), ``"peak"`` (largest magnitude), ``"maximum"``, ``"minimum"``, ``"peak_to_peak"``, ``"mean"``,
+        ``"rms_about_mean"``; ``"amplitude"`` or ``"phase"`` of the first harmonic A cos(2 pi f t + phase); or ``"transmissibility"``, once
+        :func:`saltus.transmissibility` has added it. For amplitude and phase under each other give two Axes one after the other.
+    output : str, optional
+        A state, or an output that was asked for; default the first state.
     measured : path or Dataset, optional
         Measured points to draw with it: a CSV with the columns ``frequency [Hz]`` and ``amplitude [mm]``, any units, or a Dataset with
         these two variables and their attribute ``units``.
@@ -65,8 +79,8 @@ def frequency_response(
     """
     if quantity not in get_args(Quantity):
         raise ParameterError(f"{_CALLER}: quantity={quantity!r}. Known: {', '.join(get_args(Quantity))}.")
-    variable = f"response_{quantity}"
-    datasets = points.shown(ds, _CALLER, [variable])
+    datasets = [_chosen(one, quantity, output) for one in points.shown(ds, _CALLER, [])]
+    variable = "drawn"
     marks = None if measured is None else _measured(measured, datasets[0], variable)
     with draw.panels(ax, 1, (6.3, 3.4), _CALLER) as (panel,):
         across, up = points.parameter_axis(panel, datasets), points.state_scale([one.ds[variable] for one in datasets])
@@ -75,13 +89,39 @@ def frequency_response(
             named |= (_compare if one.name else _kinds)(panel, one, one.ds[variable].values * up.factor, across)
         if marks is not None:
             _draw_measured(panel, marks[datasets[0].axis].values * across.factor, marks["amplitude"].values * up.factor)
-        panel.set_ylim(bottom=0)
-        panel.set_ylabel(up.label(_LABELS[quantity].format(states_of(datasets[0].ds)[0])))
+        if quantity in _SIZES:
+            panel.set_ylim(bottom=0)
+        if quantity == "phase":
+            panel.set_yticks(range(-180, 181, 90))
+        named_output = datasets[0].ds[variable].attrs["long_name"]
+        panel.set_ylabel(
+            _LABELS[quantity].format(named_output) if quantity == "phase" else up.label(_LABELS[quantity].format(named_output))
+        )
         if events:
             points.draw_events(panel, datasets, across)
         if legend:
             points.legend(panel, named)
     return panel
+
+
+def _chosen(one: points.Shown, quantity: str, output: str | None) -> points.Shown:
+    """The responses with what is drawn of them as the variable ``drawn``."""
+    ds = one.ds
+    first = states_of(ds)[0]
+    if quantity == "transmissibility":
+        if quantity not in ds:
+            raise ParameterError(f'{_CALLER}: there is no transmissibility yet. Add it: ds = sl.transmissibility(ds, "{first}", "base").')
+        return replace(one, ds=ds.assign(drawn=ds[quantity]))
+    if f"response_{quantity}" in ds and output in (None, first):
+        return replace(one, ds=ds.assign(drawn=ds[f"response_{quantity}"].assign_attrs(long_name=first)))
+    known = ds["output"].values.tolist() if "output" in ds else []
+    name = first if output is None else output
+    if name not in known:
+        raise ParameterError(f"{_CALLER}: the Dataset has no output {name!r}. {nearest(str(name), known)}")
+    chosen = ds.sel(output=name)
+    unit = "1" if quantity == "phase" else chosen["output_units"].item()
+    values = np.rad2deg(chosen["output_phase"].values) if quantity == "phase" else chosen[f"output_{quantity}"].values
+    return replace(one, ds=ds.assign(drawn=("response", values, {"units": unit, "long_name": name})))
 
 
 def _size(count: int) -> float:

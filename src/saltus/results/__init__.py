@@ -10,7 +10,7 @@ from saltus.results.frames import contacts, samples
 from saltus.results.load import load
 from saltus.results.methods import methods_dataset
 from saltus.results.provenance import attributes, content_hash, describe
-from saltus.results.responses import Events, Responses, Starts, responses_dataset
+from saltus.results.responses import Events, OutputNumbers, Responses, Starts, responses_dataset
 from saltus.results.result import Result
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Contacts",
     "Events",
     "Guards",
+    "OutputNumbers",
     "Responses",
     "Result",
     "ResultFileError",

@@ -6,8 +6,10 @@ from saltus.results.variable import GUARDS, Variable
 
 _RESPONSE = ("response",)
 _MULTIPLIER = ("response", "multiplier")
+_OUTPUT = ("response", "output")
 
-#: What has no dims here has those of the parameters, and ``start``. ``<first>``: the unit of the first state; ``<gap>``: that of the gaps.
+#: What has no dims here has those of the parameters, and ``start``. ``<first>``: the unit of the first state; ``<gap>``: that of the gaps;
+#: ``<output>``: that in ``output_units``, which an output has of its own.
 RESPONSES_VARIABLES = {
     "response_of": Variable((), "1", "response that the start leads to", "i4"),
     "rms": Variable((), "<first>", "root mean square of the first state in the response"),
@@ -35,6 +37,17 @@ RESPONSES_VARIABLES = {
     "response_share": Variable(_RESPONSE, "1", "share of the starts"),
     "response_share_low": Variable(_RESPONSE, "1", "share of the starts, lower end of the 95 % interval"),
     "response_share_high": Variable(_RESPONSE, "1", "share of the starts, upper end of the 95 % interval"),
+    "output": Variable(("output",), "", "output: a state, or a function of the motion", "str"),
+    "output_units": Variable(("output",), "", "unit of the output", "str"),
+    "output_maximum": Variable(_OUTPUT, "<output>", "largest value"),
+    "output_minimum": Variable(_OUTPUT, "<output>", "smallest value"),
+    "output_peak": Variable(_OUTPUT, "<output>", "largest magnitude"),
+    "output_peak_to_peak": Variable(_OUTPUT, "<output>", "largest less smallest value"),
+    "output_mean": Variable(_OUTPUT, "<output>", "mean"),
+    "output_rms": Variable(_OUTPUT, "<output>", "root mean square about zero"),
+    "output_rms_about_mean": Variable(_OUTPUT, "<output>", "root mean square about the mean"),
+    "output_amplitude": Variable(_OUTPUT, "<output>", "amplitude A of the first harmonic A cos(2 pi f t + phase), f the forcing frequency"),
+    "output_phase": Variable(_OUTPUT, "rad", "phase of the first harmonic A cos(2 pi f t + phase), t the time of the equations"),
     "event": Variable(("event",), "1", "event", "i8"),
     "event_kind": Variable(("event",), "", "what happens to the branch between two values", "str"),
     "event_branch": Variable(("event",), "1", "branch to which it happens", "i8"),

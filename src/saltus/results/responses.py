@@ -61,6 +61,23 @@ class Starts:
 
 
 @dataclass(frozen=True)
+class OutputNumbers:
+    """What is read off m responses, of K outputs each.
+
+    Attributes
+    ----------
+    names, units : sequence of str, length K
+        The outputs, and their units; ``""`` where one isn't known.
+    numbers : mapping of str to array, shape (m, K)
+        By the name of the variable without ``output_``.
+    """
+
+    names: Sequence[str]
+    units: Sequence[str]
+    numbers: Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
 class Responses:
     """All different steady responses at all values of the parameters, m of them.
 
@@ -75,12 +92,15 @@ class Responses:
         The same number where the same orbit was followed from value to value.
     samples : sequence of array, shape (n, D) each, optional
         Sampled states of a bifurcation diagram [units of the states]; n may differ between responses.
+    outputs : OutputNumbers, optional
+        What is read off each.
     """
 
     attractors: AttractorTable
     place: np.ndarray
     branch: np.ndarray
     samples: Sequence[np.ndarray] | None = None
+    outputs: OutputNumbers | None = None
 
 
 @dataclass(frozen=True)
@@ -164,6 +184,8 @@ def responses_dataset(
         raise ParameterError(f"response_of has the shape {response_of.shape}; the axes and the starts need {expected}.")
     build.put_grid(response_of, responses.attractors, (*dims, "start"))
     build.put_responses(responses, {name: np.asarray(values, dtype=float) for name, values in axes.items()})
+    if responses.outputs is not None:
+        build.put_outputs(responses.outputs)
     if responses.samples is not None:
         if sample not in SAMPLES:
             raise ParameterError(f"sample={sample!r}. Known: {', '.join(SAMPLES)}.")
@@ -229,6 +251,16 @@ class _Builder(Builder):
             for end, column in zip(("", "_low", "_high"), table.fractions, strict=True):
                 self.put(f"response_share{end}", column)
         self.put_points(table.points, ("response", "phase"), schema.response_name, table.points_when)
+
+    def put_outputs(self, outputs: OutputNumbers) -> None:
+        """Add what is read off each response; the units of outputs differ, so they stand in a variable of their own."""
+        self.put("output", list(outputs.names), coord=True)
+        self.put("output_units", list(outputs.units), coord=True)
+        shared = outputs.units[0] if len(set(outputs.units)) == 1 else ""
+        for name, values in outputs.numbers.items():
+            spec = self.table[f"output_{name}"]
+            labels = {"units": shared if spec.units == "<output>" else spec.units, "long_name": spec.long_name}
+            self.data[f"output_{name}"] = xr.Variable(spec.dims, np.asarray(values, dtype=float), labels)
 
     def put_events(self, events: Events) -> None:
         """Add what happens to the branches."""

@@ -60,7 +60,18 @@ def responses(ds: xr.Dataset) -> Table:
     names = [str(name) for name in ds.variables if ds[name].dims == ("response",)]
     first = ["response", *(response_name(name) for name in parameters_of(ds))]
     names.sort(key=lambda name: first.index(name) if name in first else len(first))
-    return {_header(ds, name).removeprefix("response_"): ds[name].values for name in names}
+    return {_header(ds, name).removeprefix("response_"): ds[name].values for name in names} | _outputs(ds)
+
+
+def _outputs(ds: xr.Dataset) -> Table:
+    """A column for each number of each output: ``stop force amplitude [N]``."""
+    table = {}
+    for i, output in enumerate(ds["output"].values.tolist() if "output" in ds else []):
+        for name in (str(name) for name in ds.data_vars if ds[name].dims == ("response", "output")):
+            unit = "rad" if name == "output_phase" else ds["output_units"].values[i]
+            header = f"{output} {name.removeprefix('output_').replace('_', ' ')}"
+            table[f"{header} [{unit}]" if unit not in ("", "1") else header] = ds[name].values[:, i]
+    return table
 
 
 def events(ds: xr.Dataset) -> Table:

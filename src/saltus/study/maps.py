@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.analysis.basins import label_all
-from saltus.analysis.plan import CHUNK, BasinPlan, basin_plan
+from saltus.analysis.plan import CHUNK, BasinPlan, basin_plan, memory
 from saltus.analysis.serial import cell_types, found_data, found_from, settling_arrays, settling_from
 from saltus.analysis.settling import Settling, settle
 from saltus.flow.threads import usable_processors
@@ -162,5 +162,5 @@ def estimate(plan: BasinPlan, found: Found, resources_: Resources) -> str:
     settle(map_, plan.starts(cells), found, plan.periods)
     seconds = (time.perf_counter() - begin) / len(cells) * plan.cells / (resources_.workers or resources_.threads or usable_processors())
     size = len(plan.system.states)
-    memory, disk = 2.5e8 + plan.cells * (120.0 + 24.0 * size), plan.cells * (9.0 + 8.0 * size)
-    return f"{plan.cells} cells: about {seconds:.0f} s here, {memory / 1e9:.1f} GB of memory, {disk / 1e6:.0f} MB on the disk"
+    needed, disk = memory(plan.cells, size), plan.cells * (9.0 + 8.0 * size)
+    return f"{plan.cells} cells: about {seconds:.0f} s here, {needed / 1e9:.1f} GB of memory, {disk / 1e6:.0f} MB on the disk"

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, TraceError
+from saltus.system.clocks import cycles_of
 from saltus.system.derivatives import time_derivative
 from saltus.system.evaluate import evaluate, sides
-from saltus.system.expression import depends_on
+from saltus.system.expression import Expr, depends_on, relations_in, walk
 from saltus.units import to_si
 
 if TYPE_CHECKING:
@@ -63,6 +64,9 @@ def check_periodic(system: System) -> None:
     entries = [*system.field, *(guard.gap for guard in system.guards)]
     if period is None or not any(depends_on(entry, ("time",)) for entry in entries):
         return
+    for number, entry in enumerate(entries):
+        if not _clocks_repeat(entry, system, period):
+            raise TraceError(_not_periodic(system, number, period))
     expressions = entries + [time_derivative(entry) for entry in entries]
     random = np.random.default_rng(20210)
     sizes = np.array([0.0, 0.0, 1e-4, 1e-2, 1.0, 1.0])[:, None]
@@ -79,6 +83,19 @@ def check_periodic(system: System) -> None:
             differs = np.abs(a - b) > 1e-7 * scale
         if differs.any():
             raise TraceError(_not_periodic(system, number % len(entries), period))
+
+
+def _clocks_repeat(entry: Expr, system: System, period: float) -> bool:
+    """Whether all that time alone decides below an expression has a whole number of cycles in a period: by formula, samples miss pulses."""
+    for node in walk(entry, conditions=False):
+        gaps = [relation.gap for relation in relations_in(node.payload)] if node.op == "select" else []
+        for clock in [*gaps, *([node] if node.op in ("mod", "table") else [])]:
+            rate, repeats = cycles_of(clock)
+            (value,) = evaluate([rate], values=system.values)
+            cycles = abs(value * period)
+            if cycles and not (repeats and abs(cycles - np.round(cycles)) <= 1e-9 * cycles):
+                return False
+    return True
 
 
 def _not_periodic(system: System, entry: int, period: float) -> str:

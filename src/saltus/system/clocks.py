@@ -87,6 +87,25 @@ def switch_of(gap: Expr) -> Level | Wave | Pulse | None:
     return Wave(line[0], ex.add(line[1], math.pi / 2) if wave.op == "cos" else line[1], factor, shift)
 
 
+def cycles_of(node: Expr) -> tuple[Expr, bool]:
+    """(rate, whether it counts cycles) of a switch (its gap), a remainder or a table; a level and a table that ends don't repeat."""
+    if node.op in ("mod", "table"):
+        line = affine(node.args[0])
+        assert line is not None, "a system holds remainders and tables of rate*t + offset only"
+        if node.op == "mod":
+            return ex.div(line[0], node.args[1]), True
+        points, repeats = node.payload.points, node.payload.periodic
+        return (ex.div(line[0], float(points[-1] - points[0])) if repeats else line[0]), repeats
+    match switch_of(node):
+        case Level(rate, _):
+            return rate, False
+        case Wave(rate, _, _, _):
+            return ex.div(rate, 2 * math.pi), True
+        case Pulse(rate, _, cycle, _, _):
+            return ex.div(rate, cycle), True
+    raise TypeError(node)
+
+
 def switch(gap: Expr) -> Condition | bool:
     """The condition ``gap > 0`` of a gap that depends on time and parameters only; pieces inside the gap become cases of the condition.
 

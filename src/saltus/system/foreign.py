@@ -36,6 +36,8 @@ ADVICE: dict[str, str] = {
     "square": "Write x**2.", "pow": "Write x**2.", "power": "Write x**2.", "signum": "Write sl.sign.",
     "step": "Write sl.heaviside(t - t0).",
     "select": "Write sl.where or sl.piecewise.", "Piecewise": "Write sl.piecewise((value, condition), otherwise=...).",
+    "interp": "Write sl.table(x, points, values).", "CubicSpline": "Write sl.table(x, points, values, kind='spline').",
+    "remainder": "Write sl.mod(t, T).", "fmod": "Write sl.mod(t, T).", "floor": "Of a time it is (t - sl.mod(t, T))/T.",
     "erf": "There is none; sl.tanh is the nearest smooth step.", "log10": "Write sl.log(x)/math.log(10).",
     "expm1": "Write sl.exp(x) - 1.", "log1p": "Write sl.log(1 + x).",
     "impact": f"An instantaneous impact isn't supported yet: {_STOP}.",

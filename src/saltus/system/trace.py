@@ -86,6 +86,8 @@ def system(
     """
     if callable(states):
         raise TraceError('write @sl.system(states="x v"), with the names of the states, not bare @sl.system.')
+    if not isinstance(states, str | list | tuple):
+        raise TraceError(f'states must be names, such as states="x v", not {states!r:.80}.')
     names = tuple(states.replace(",", " ").split()) if isinstance(states, str) else tuple(states)
 
     def decorate(function: Callable[..., Any]) -> System:

@@ -113,3 +113,27 @@ def test_what_progress_may_be():
     assert reporter(print)[0] is print
     with pytest.raises(sl.SaltusError, match="progress must be"):
         reporter("bar")
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: sl.Taylor(order="x"),
+        lambda: sl.Taylor(order=10**400),
+        lambda: sl.Taylor(max_steps=float("nan")),
+        lambda: sl.Taylor(max_steps=float("inf")),
+        lambda: sl.Taylor(lanes=[2]),
+        lambda: sl.Taylor(tolerance="small"),
+        lambda: sl.ODE45(rtol=[1e-3]),
+        lambda: sl.ODE45(events=[1]),
+        lambda: sl.system(states=5),
+        lambda: sl.system(states=None),
+        lambda: sl.stroboscope(rig, (0, 0), 10**19, keep=1),
+        lambda: sl.stroboscope(rig, (0, 0), 2, keep="x"),
+        lambda: sl.simulate(rig, (0, 0), periods=2**64, samples=1),
+        lambda: sl.simulate(rig, (0, 0), periods=1, threads="many"),
+    ],
+)
+def test_wrong_types_and_sizes_are_refused_in_words(call):
+    with pytest.raises(sl.SaltusError):
+        call()

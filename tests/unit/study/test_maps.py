@@ -114,7 +114,7 @@ def test_faults_say_where_and_what_to_write(text, told, tmp_path):
 
 def test_a_grid_beyond_memory_is_refused():
     with pytest.raises(SaltusError, match="are more than"):
-        job(replaced("count = 6", "count = 1000000000000000"))
+        job(replaced("count = 6", "count = 2000000000"))
 
 
 def test_a_wrong_unit():
@@ -215,11 +215,24 @@ def test_time_left():
     assert Report("a", 10, 10, 0.0, 0).seconds_left is None
 
 
-def test_dask_only_if_asked_for():
-    assert not Resources(threads=2).cluster
-    assert not Resources(shard=(0, 2)).cluster
-    assert Resources(workers=1).cluster
-    assert Resources(scheduler="local").cluster
+@pytest.mark.parametrize(
+    ("resources", "where"),
+    [
+        (Resources(threads=2), "threads"),
+        (Resources(shard=(0, 2)), "threads"),
+        (Resources(workers=1), "processes"),
+        (Resources(scheduler="local"), "processes"),
+    ],
+)
+def test_dask_only_if_asked_for(resources, where, monkeypatch):
+    import saltus.study.maps as maps
+
+    monkeypatch.setattr(maps, "label_all", lambda *_: done.append("threads"))
+    monkeypatch.setattr(maps, "run_on_processes", lambda *_: done.append("processes"))
+    done = []
+    with maps._runner(resources) as run:
+        run(None, None, [], None, None)
+    assert done == [where]
 
 
 def test_plans_are_plain_data():

@@ -226,7 +226,7 @@ def of_parameters(t, x, v, *, a=1.0, b=2.0):
     ("function", "line", "teaches"),
     [
         (branching, "if x > gap:", "sl.piecewise"),
-        (numpy_call, "return v, -np.floor", "np.floor on a traced value.*sl.cos"),
+        (numpy_call, "return v, -np.floor", "np.floor on a traced value.*sl.mod"),
         (math_call, "return v, -math.cos", "sl.cos"),
         (sympy_call, "return v, -sympy.cos", "sl.cos"),
         (unknown_name, "return v, -stiffness", "NameError.*stiffness"),

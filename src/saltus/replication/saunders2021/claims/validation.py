@@ -62,12 +62,12 @@ def table2_time(data: Data) -> Finding:
     claimed = float(data["fig2/exact"]["contact_time_error"].max())
     return Finding(
         f"Times are off by {error[0]:.1e} s at the first contact and by up to {error.max():.1e} s.",
-        f"The same contacts with an error of at most {claimed:.0e} s.",
+        f"The same contacts with an estimated error of up to {claimed:.0e} s.",
         (check(f"times are right to 1000 units of machine precision, {limit:.0e} s a second (worst {error.max():.1e} s in "
                f"{float(run['contact_time'].max()):.1f} s)", (error <= limit * np.maximum(run["contact_time"].values[: error.size], 1e-3)).all()),
          check(f"the residual |x − j| / |v| tells the error of the time within a factor of 1000 (it is {np.median(error):.0e} s, not "
                f"{np.median(residuals(run) / np.abs(run['contact_velocity'].values)):.0e} s)", not np.median(error) > 1000.0 * np.median(residuals(run) / np.abs(run["contact_velocity"].values)))),
-        f"Exact times by Taylor series; a second run with shorter steps differs by {claimed:.0e} s at most.",
+        f"Exact times by Taylor series; from further runs with shorter steps their error is estimated as up to {claimed:.0e} s.",
         "odezero puts the state of ode45's interpolant on the boundary; the error of the step before it (RelTol = 1e-4) is in the time.",
     )  # fmt: skip
 

@@ -1,0 +1,71 @@
+"""Outputs: what engineers read off a motion besides its states - a force, an acceleration, the motion of a base."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from saltus.errors import ParameterError
+from saltus.system.expression import Expr
+from saltus.system.guards import Guard
+from saltus.system.quantity import quantity
+from saltus.system.system import System
+from saltus.units import check_declared
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """The states of a system, and functions of its motion.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of all of them, the states first.
+    units : tuple of str
+        Coherent SI unit of each, ``""`` where it isn't known.
+    formulas : tuple of Expr
+        Of the functions; conditions hold bits.
+    guards : tuple of Guard
+        What these bits number: those of the system, then those that only the functions need.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    formulas: tuple[Expr, ...]
+    guards: tuple[Guard, ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Outputs:
+    """The outputs of a system: its states, then what the user asks for.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    given : mapping of str to callable, or to (callable, unit)
+        Functions of (t, states, parameters), arguments found by name; see :func:`saltus.system.quantity.quantity`.
+
+    Raises
+    ------
+    ParameterError, UnitError, TraceError
+        If a name is taken, a unit can't be read, or a function can't be traced or doesn't repeat with the forcing.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise ParameterError(
+            f'outputs must be functions by name, such as outputs={{"spring force": lambda x, k: k*x}}, not {given!r}. '
+            f"States are read off without being asked for."
+        )
+    extended, formulas, units = system, [], [system.units[name] for name in system.states]
+    for name, one in (given or {}).items():
+        if not isinstance(name, str) or not name or name in system.states:
+            raise ParameterError(f"an output can't be called {name!r}: give a text that isn't a state of {system.name}.")
+        function, unit = one if isinstance(one, tuple) and len(one) == 2 else (one, "")
+        formula, guards = quantity(extended, function, f"the output {name!r}")
+        extended = replace(extended, guards=guards)
+        formulas.append(formula)
+        units.append(check_declared(unit, name) if unit else "")
+    return Outputs((*system.states, *(given or {})), tuple(units), tuple(formulas), extended.guards)

@@ -1,0 +1,57 @@
+"""`transmissibility`: how much of one output of a response arrives in another."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+import xarray as xr
+
+from saltus.errors import ParameterError, nearest
+from saltus.results.schema import RESPONSES, check
+
+#: What two outputs are compared by.
+By = Literal["amplitude", "rms", "rms_about_mean"]
+
+
+def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude") -> xr.Dataset:
+    """Ratio of two outputs of each response, such as the motion of a mass to that of its base.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What ``frequency_response`` or ``bifurcation_diagram`` returned.
+    output, to : str
+        Outputs of it, states or functions: numerator and denominator.
+    by : {"amplitude", "rms", "rms_about_mean"}
+        First harmonics, or root mean squares, which count what a nonlinear response sends to other frequencies too.
+
+    Returns
+    -------
+    Dataset
+        ``ds`` with ``transmissibility`` on response, and ``transmissibility_phase`` [rad], by which the first harmonic of ``output`` leads
+        that of ``to``.
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` holds no responses, or no such output.
+    """
+    check(ds, caller="transmissibility", kinds=[RESPONSES])
+    known = ds["output"].values.tolist() if "output" in ds else []
+    for name in (output, to):
+        if name not in known:
+            raise ParameterError(f"transmissibility: {name!r} is no output. {nearest(str(name), known)} Ask for functions by outputs=.")
+    if by not in get_args(By):
+        raise ParameterError(f"transmissibility: by={by!r}. Known: {', '.join(get_args(By))}.")
+    upper, lower = ds.sel(output=output), ds.sel(output=to)
+    units = [one["output_units"].item() for one in (upper, lower)]
+    unit = "" if "" in units else "1" if units[0] == units[1] else f"{units[0]}/({units[1]})"
+    with np.errstate(all="ignore"):
+        ratio = upper[f"output_{by}"].values / lower[f"output_{by}"].values
+    phase = np.angle(np.exp(1j * (upper["output_phase"].values - lower["output_phase"].values)))
+    labels = {"units": unit, "long_name": f"{output} / {to}"}
+    return ds.assign(
+        transmissibility=("response", ratio, labels),
+        transmissibility_phase=("response", phase, {"units": "rad", "long_name": f"phase by which {output} leads {to}"}),
+    )
