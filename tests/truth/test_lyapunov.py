@@ -280,7 +280,7 @@ def test_lorenz_and_roessler_have_their_published_exponents():
 def test_other_motions_of_the_lorenz_system():
     """An equilibrium at rho = 10 has the eigenvalues of the Jacobian; at 160 there is a cycle."""
     ds = sl.lyapunov(butterfly, (1.0, 1.0, 20.0), flow=FINE, every=0.5, periods=1000, values={"rho": [10.0, 160.0]})
-    assert ds["kind"].values.tolist() == ["equilibrium", "periodic"]
+    assert ds["kind"].values.tolist() == ["equilibrium", "limit_cycle"]
     x = math.sqrt(8 / 3 * 9)
     rates = np.linalg.eigvals(np.array([[-10, 10, 0], [1, -1, -x], [x, x, -8 / 3]])).real
     assert np.abs(ds["lyapunov_exponent"].values[0] - np.sort(rates)[::-1]).max() < 1e-5

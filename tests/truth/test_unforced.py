@@ -111,3 +111,37 @@ def test_an_unstable_equilibrium_is_found_and_captures_nothing():
     np.testing.assert_allclose(found.place, 0.0, atol=1e-12)
     assert found.stable.tolist() == [False, True]
     assert found.holds(np.full((2, 2), 0.01)).tolist() == [False, True]
+
+
+@pytest.mark.parametrize("every", [0.3, 2 * np.pi / 5, 4.0])
+def test_attractors_are_named_whatever_the_time_between_looks(every):
+    """A fifth of the cycle's period is a time at which the looks repeat."""
+    ds = sl.attractors(planar, STARTS, every=every, method=FAST, periods=512)
+    assert ds.attractor_type.values.tolist() == ["limit_cycle"]
+    assert ds.attractor_cycle.item() == pytest.approx(2 * np.pi, rel=1e-12)
+    assert ds.attractor_peak.item() == pytest.approx(1.0, rel=1e-12)
+    assert ds.attractor_multiplier_real.values[0].tolist() == pytest.approx([1.0, np.exp(-4 * np.pi)], rel=1e-6)
+    assert ds.basin.values.tolist() == [0, 0]
+
+
+def test_an_equilibrium_is_named_and_its_table_has_eigenvalues():
+    ds = sl.attractors(planar.with_values(mu=-0.3), STARTS, every=1.0, method=FAST)
+    assert ds.attractor_type.values.tolist() == ["equilibrium"]
+    assert ds.attractor_eigenvalue_real.values.tolist() == [pytest.approx([-0.3, -0.3])]
+    assert ds.attractor_exponent.item() == pytest.approx(-0.3)
+    assert "equilibrium, peak" in sl.describe(ds)
+
+
+# -- folds ---------------------------------------------------------------------------------------------------------------------
+@sl.system(states="x v", forced_at="frequency")
+def soft(t, x, v, *, force=0.06, frequency=0.85 / (2 * np.pi), damping=0.1):
+    """The escape equation."""
+    return v, force * sl.cos(2 * np.pi * frequency * t) - damping * v - x + x * x
+
+
+def test_the_fold_of_the_escape_equation_is_named():
+    """A sweep by a Runge-Kutta method of fixed steps, apart from saltus, stays on the orbit at 0.068 and leaves it at 0.069."""
+    ds = sl.bifurcation_diagram(soft, {"force": (0.05, 0.072, 12)}, (0.0, 0.0), follow=True, method=FAST, periods=1000)
+    assert "fold" in ds.event_kind.values.tolist()
+    place = ds.event_force.values[ds.event_kind.values == "fold"]
+    assert 0.068 < place.item() < 0.069

@@ -23,8 +23,8 @@ from saltus.flow.methods import Method
 
 #: Farthest that an orbit moves between two values, in units of its own range.
 LINK = 0.35
-#: A leading multiplier that is real and beyond this may be on its way to +1; one that is complex and beyond that to the unit circle.
-FOLDING, TURNING = 0.5, 0.95
+#: A leading multiplier that is complex and beyond this is on its way to the unit circle.
+TURNING = 0.95
 #: Times that the interval in which a branch ends is halved, and how many times its last width the law is measured over.
 HALVINGS, OVER = 14, 64
 #: Farthest that the law's extrapolation may lie from the interval, in its widths.
@@ -104,7 +104,7 @@ def why_they_end(
     ends, branch = ends[inside], branch[inside]
     words = [_told_by_neighbours(found, int(end), int(found.place[end]) + way, _leading(found, int(end))) for end in ends]
     places = np.array([middle(values, int(found.place[end]), int(found.place[end]) + way) for end in ends])
-    asked = np.array([i for i, word in enumerate(words) if word == "end" and _may_be_located(found, int(ends[i]))], np.int64)
+    asked = np.array([i for i, word in enumerate(words) if word == "end"], np.int64)
     if len(asked):
         for i, (word, place) in zip(asked, _located(found, grid, method, ends[asked], way, threads), strict=True):
             words[i], places[i] = word, place if np.isfinite(place) else places[i]
@@ -157,12 +157,6 @@ def middle(values: np.ndarray, a: int, b: int) -> float:
 
 
 # -- folds and Hopf bifurcations -----------------------------------------------------------------------------------------------
-def _may_be_located(found: Found, response: int) -> bool:
-    """Whether the leading multiplier is one that may be on its way to +1 (an eigenvalue to the imaginary axis)."""
-    leading = _leading(found, response)
-    return bool(found.kind[response] == EQUILIBRIUM or (leading.real > FOLDING and abs(leading.imag) <= 1e-9))
-
-
 class _Follower:
     """Some responses, followed by Newton's method to any value of the parameter between two of the grid."""
 

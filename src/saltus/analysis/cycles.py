@@ -23,6 +23,8 @@ SAMPLES, ZOOM = 4096, 8
 MOST_WINDOWS = 6
 #: Samples follow the motion where its direction turns by less than 18 degrees from one to the next, for so large a share of them.
 TURN, FOLLOWED = 0.95, 0.9
+#: A return farther than this, in units of the scale, may be none: a longer window is looked at, unless this one holds so many turns.
+FAR, ENOUGH = 0.05, 8
 #: Returns that samples can't tell apart: the error of the cubic between them, in units of the scale.
 SAMPLED = 1e-6
 #: Steps that locate the return; Newton steps, and a step that is the last one, in units of the scale.
@@ -91,11 +93,11 @@ def returns(family: Family, start: np.ndarray, window: float) -> Returns:
     result = Returns(np.full(k, np.nan), np.full(k, np.inf), np.ones((k, size)))
     length, rows, refined = np.full(k, float(window)), np.arange(k), np.zeros(k, bool)
     for _ in range(MOST_WINDOWS):
-        time, apart, scale, followed = _seen(family.rows(rows), start[rows], length[rows])
+        time, apart, scale, followed, turns = _seen(family.rows(rows), start[rows], length[rows])
         result.scale[rows] = scale
         done = followed & np.isfinite(apart)
         result.time[rows[done]], result.apart[rows[done]] = time[done], apart[done]
-        longer = followed & ~done & ~refined[rows]
+        longer = followed & ((turns == 0) | (turns < ENOUGH) & (apart > FAR)) & ~refined[rows]
         refined[rows[~followed]] = True
         length[rows] *= np.where(followed, ZOOM, 1.0 / ZOOM)
         rows = rows[~followed | longer]
@@ -107,8 +109,8 @@ def returns(family: Family, start: np.ndarray, window: float) -> Returns:
     return result
 
 
-def _seen(family: Family, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """From samples over a window each: time and distance of the return, range of the states, and whether the samples follow the motion."""
+def _seen(family: Family, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, ...]:
+    """From samples over a window each: time and distance of the return, range of the states, whether samples follow the motion, turns."""
     k, size = start.shape
     index = np.arange(SAMPLES)
     samples = family.every(length).run(start, 1, Schedule(0 * index, index / SAMPLES)).samples
@@ -134,7 +136,7 @@ def _seen(family: Family, start: np.ndarray, length: np.ndarray) -> tuple[np.nda
     first = np.argmax(apart <= np.maximum(4.0 * best, SAMPLED)[:, None], axis=1)
     rows = np.arange(k)
     time = (1 + first + np.where(np.isfinite(share[rows, first]), share[rows, first], 0.0)) * length / SAMPLES
-    return time, np.where(np.isfinite(best), apart[rows, first], np.inf), scale, followed
+    return time, np.where(np.isfinite(best), apart[rows, first], np.inf), scale, followed, rises.sum(axis=1)
 
 
 def _cubic(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray, share: np.ndarray) -> np.ndarray:

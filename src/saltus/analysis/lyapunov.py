@@ -91,7 +91,8 @@ def lyapunov(
         Dims ``trajectory``, ``exponent`` (descending), ``flow_exponent``, ``running``. ``lyapunov_exponent`` with ``lyapunov_error``
         (standard error) and the 95 % interval ``lyapunov_low``, ``lyapunov_high``: of an orbit the effect of rounding; of any other
         motion from batch means whose batches grow until they are independent (Flyvbjerg & Petersen 1989), ``independent_batches`` of them,
-        by Student's t. ``kind``: ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium`` or ``unclear``; ``response_period``: n of
+        by Student's t. ``kind``: ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or
+        ``unclear``; ``response_period``: n of
         nT, or 0. ``exponent_sum`` beside ``mean_divergence``, which must agree: the mean trace of the Jacobian and what contacts
         add, found without the tangent. ``near_graze``: 1 if the motion after the transient grazes a boundary, or is an orbit that
         misses one by less than a thousandth of its size: then deviations that could be seen in practice don't grow as infinitesimal

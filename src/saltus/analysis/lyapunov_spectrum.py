@@ -47,7 +47,7 @@ class Spectrum:
     orbits : list of Orbit or None
         The periodic orbit to which each settles.
     kinds : list of str
-        ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium`` or ``unclear``.
+        ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``.
     ends : int64[m]
         Blocks after which running means are kept,
     running : Means
@@ -180,4 +180,4 @@ def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
         return "unclear"
     if forced:
         return "quasi_periodic"
-    return "quasi_periodic" if len(mean) > 2 and abs(second[1]) <= limit[1] else "periodic"
+    return "quasi_periodic" if len(mean) > 2 and abs(second[1]) <= limit[1] else "limit_cycle"

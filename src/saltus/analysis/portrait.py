@@ -6,14 +6,19 @@ import math
 
 import numpy as np
 
+from saltus.analysis.equilibria import autonomous, find_equilibria
+from saltus.analysis.limit_cycles import LIMIT_CYCLE, cycle_of
 from saltus.analysis.orbit_measures import Measures, measure, unknown
 from saltus.analysis.orbits import Orbit
 from saltus.analysis.recurrence import Found
+from saltus.analysis.unforced import rest
 from saltus.flow.maps import Map, Stroboscope
 from saltus.results import AttractorTable
 
 #: Periods of an attractor that never repeats: what its numbers are taken from, and what is kept of it.
 WANDERED = 256
+#: Name of what rests; and a point of a limit cycle at which the first state doesn't turn: it is least at point 0.
+EQUILIBRIUM, ASIDE = "equilibrium", 23
 
 
 def portraits(map_: Map, found: Found) -> AttractorTable:
@@ -26,6 +31,8 @@ def portraits(map_: Map, found: Found) -> AttractorTable:
     found : Found
         The attractors.
     """
+    if isinstance(map_, Stroboscope) and autonomous(map_.system):
+        return _unforced(map_, found)
     size, per_second = len(map_.states), 1.0 / map_.period
     period = np.array([*(orbit.period for orbit in found.orbits), *(0 for _ in found.wandering)], np.int64)
     start = np.array([*(orbit.points[0] for orbit in found.orbits), *(one.points[-1] for one in found.wandering)]).reshape(-1, size)
@@ -44,6 +51,42 @@ def portraits(map_: Map, found: Found) -> AttractorTable:
         exponent=per_second * np.array([*map(_orbit_exponent, found.orbits), *(one.exponent for one in found.wandering)]),
         exponent_error=per_second * np.array([*(0.0 for _ in found.orbits), *(one.exponent_error for one in found.wandering)]),
         points=points,
+    )
+
+
+def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
+    """The table of a system without forcing: equilibria, limit cycles, and what never repeats."""
+    size, rests = len(map_.states), len(found.orbits)
+    kind = np.array([*(EQUILIBRIUM for _ in found.orbits), *(one.kind for one in found.wandering)], dtype=np.str_)
+    start = np.array([*(orbit.points[0] for orbit in found.orbits), *(one.points[-1] for one in found.wandering)]).reshape(-1, size)
+    points = [*(orbit.points[:1] for orbit in found.orbits), *(one.points[:WANDERED] for one in found.wandering)]
+    cycle, multipliers, eigenvalues = np.full(len(kind), np.nan), *np.full((2, len(kind), size), np.nan + 0j)
+    exponent, error = np.array([(0.0, 0.0)] * rests + [(one.exponent, one.exponent_error) for one in found.wandering]).reshape(-1, 2).T
+    exponent, error = exponent / map_.period, error / map_.period
+    still = find_equilibria(map_.family(rests), start[:rests], np.maximum(np.abs(start[:rests]), 1e-300))
+    for i in range(rests):
+        points[i] = start[i : i + 1] = still.place[i : i + 1] if np.isfinite(still.place[i]).all() else start[i : i + 1]
+        eigenvalues[i], exponent[i] = still.eigenvalues[i], still.eigenvalues[i, 0].real
+    for i in np.flatnonzero(kind == LIMIT_CYCLE).tolist():
+        one = cycle_of(map_, found.wandering[i - rests])
+        cycle[i], multipliers[i], points[i], start[i] = one.period[0], one.multipliers[0], one.points[0], one.points[0, ASIDE]
+    family = map_.family(len(kind)).every(np.where(np.isfinite(cycle), cycle, map_.period))
+    numbers = measure(family, start, np.isin(kind, (EQUILIBRIUM, LIMIT_CYCLE)).astype(np.int64), WANDERED)
+    rest(map_.family(rests), start[:rests], np.arange(rests), numbers)
+    return AttractorTable(
+        kind=kind.tolist(),
+        period=np.zeros(len(kind), np.int64),
+        contacts=numbers.contacts,
+        itinerary=numbers.itinerary,
+        peak=numbers.peak[:, 0],
+        rms=numbers.rms[:, 0],
+        margin=numbers.margin,
+        multipliers=multipliers,
+        exponent=exponent,
+        exponent_error=error,
+        points=points,
+        cycle=cycle,
+        eigenvalues=eigenvalues,
     )
 
 

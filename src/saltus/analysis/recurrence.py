@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.capture import Neighbourhoods, neighbourhoods
+from saltus.analysis.equilibria import autonomous
+from saltus.analysis.limit_cycles import LIMIT_CYCLE, limit_cycles
 from saltus.analysis.orbits import Orbit, polish, same
 from saltus.analysis.wandering import REPEATS, TRAIL, Wandering, merge, mismatch, survey
-from saltus.flow.maps import Map, Travel
+from saltus.flow.maps import Map, Stroboscope, Travel
 
 #: Longest period looked for [iterates].
 LONGEST = 64
@@ -112,6 +114,7 @@ def find(
     owner: list[Orbit | Wandering | None] = [None] * len(start)
     settled = np.full(len(start), -1, np.int64)
     travel, going = map_.launch(start, most), np.arange(len(start))
+    turns = isinstance(map_, Stroboscope) and autonomous(map_.system)
     while len(going) and travel.age < most:
         points = travel.advance(ROUND)
         here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
@@ -121,6 +124,8 @@ def find(
                 break
             found.add(map_, orbit, scale)
             here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
+        if turns and len(here):
+            here = here[~_on_cycles(map_, found, points[here], going[here], travel, here, scale, owner, settled)]
         stay = np.zeros(len(going), bool)
         stay[here] = travel.going[here]
         travel.keep(stay)
@@ -194,6 +199,32 @@ def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: floa
     return bool(np.abs((orbit.points - place) / scale).max(axis=1).min() < tolerance)
 
 
+def _on_cycles(
+    map_: Map, found: Found, points: np.ndarray, who: np.ndarray, travel: Travel, rows: np.ndarray, scale: np.ndarray, owner: list,
+    settled: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are looked for. Notes their owners."""
+    cycles = [one for one in found.wandering if one.kind == LIMIT_CYCLE]
+    alone = np.flatnonzero(~_goes_round(cycles, points))
+    some = alone[np.unique(np.linspace(0, len(alone) - 1, min(TRIES, len(alone))).astype(int))] if len(alone) else alone
+    some = some[travel.going[rows[some]]]
+    if len(some) and isinstance(map_, Stroboscope):
+        fresh = limit_cycles(map_, points[some, -1], ROUND * map_.period, scale)
+        found.wandering = merge([*found.wandering, *fresh])
+        cycles = [one for one in found.wandering if one.kind == LIMIT_CYCLE]
+    round_it = _goes_round(cycles, points)
+    for i in np.flatnonzero(round_it):
+        owner[who[i]] = max(cycles, key=lambda one: float(one.share(points[[i]])[0]))
+        settled[who[i]] = travel.age
+    return round_it
+
+
+def _goes_round(cycles: list[Wandering], points: np.ndarray) -> np.ndarray:
+    """Which trajectories float64[k, m, D] keep to one of some limit cycles, bool[k]."""
+    keeps = [one.share(points) >= INSIDE for one in cycles]
+    return np.any(keeps, axis=0) if keeps else np.zeros(len(points), bool)
+
+
 def _survey(map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: Found, owner: list, settled: np.ndarray) -> None:
     """Find out what the trajectories do that never settled: watch them much longer, and call an attractor only what none of them leaves.
 
@@ -247,4 +278,6 @@ def wanders_on(found: Found, trails: np.ndarray, scale: np.ndarray) -> np.ndarra
     """For trajectories float64[k, m, D]: which attractor of those that never repeat each keeps to, -1 if none; none if it repeats."""
     shares = np.stack([one.share(trails) for one in found.wandering], axis=1)
     _, apart = recurrence(trails, scale)
-    return np.where((shares.max(axis=1) >= INSIDE) & (apart > REPEATS), shares.argmax(axis=1), -1)
+    best = shares.argmax(axis=1)
+    turns = np.array([one.kind == LIMIT_CYCLE for one in found.wandering])  # looks at one may well repeat
+    return np.where((shares.max(axis=1) >= INSIDE) & ((apart > REPEATS) | turns[best]), best, -1)

@@ -179,7 +179,7 @@ class _Ramp(Rectangle):
 class _Ruler(Line2D):
     """Handle of a legend: numbers along the ramps above it."""
 
-    def __init__(self, values: Sequence[int], places: Sequence[float]) -> None:
+    def __init__(self, values: Sequence[float], places: Sequence[float]) -> None:
         super().__init__([0, 1], [0, 0])
         self.values, self.places = values, places
 
@@ -223,15 +223,16 @@ def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int
     handles: list[Any] = [_Ramp(shades(color[None], _LEVELS if settling else 1)[0][::2]) for color in colors.values()]
     if settling and colors:
         ticks = settling.ticks()
-        handles.append(_Ruler(ticks, settling.share(np.array(ticks)).tolist()))
-        texts.append("periods to settle")
+        shares_of_ticks, every = settling.share(np.array(ticks)).tolist(), ds.attrs.get("every")
+        handles.append(_Ruler(ticks if every is None else [float(f"{tick * every:.3g}") for tick in ticks], shares_of_ticks))
+        texts.append("periods to settle" if every is None else "s to settle")
     for code, look in maps.UNSETTLED.items():
         if code in shares:
             handles.append(_Ramp(np.array([to_rgb(look.color)])))
             texts.append(f"{look.label}, {maps.share_text(shares[code])}")
     if points and colors and any(len(_stroboscopic(ds, pair, key)) for key in colors):
         handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="#BBBBBB", mec="#222222", mew=0.7))
-        texts.append("Poincaré points of the attractors")
+        texts.append("points of the attractors" if "attractor_cycle" in ds else "Poincaré points of the attractors")
     if handles:
         small = len(handles) > _LONG_LEGEND
         drawing = {_Ramp: _DrawRamp(), _Ruler: _DrawRuler()}

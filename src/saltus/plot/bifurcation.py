@@ -97,7 +97,7 @@ def _kinds(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> di
     of = kinds.of(one.ds)
     for code in np.unique(of).tolist():
         x, y = _flat(one, values, of == code, across)
-        wandering = code >= kinds.QUASI_PERIODIC
+        wandering = not kinds.repeats(code)
         size = _size(x.size) * (0.5 if wandering else 1.0)
         look = {"marker": "o", "ms": max(size, 0.4), "mfc": kinds.color(code), "mec": "none", "gid": f"kind {code}"}
         draw.draw_points(ax, x, y, zorder=2 if wandering else 3, **look)

@@ -134,7 +134,7 @@ def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[st
     of = kinds.of(one.ds)
     for code in sorted(np.unique(of).tolist(), key=lambda code: (code != kinds.CHAOTIC, code)):  # chaos lies under the others
         color, mine = kinds.color(code), of == code
-        if code < kinds.QUASI_PERIODIC:
+        if kinds.repeats(code):
             line = points.branch_lines(one, y, mine)
             ax.plot(line[0] * across.factor, line[1], color=color, lw=0.8, zorder=2, gid=f"branches {code}")
         size = _size(mine.sum()) * (0.7 if code == kinds.CHAOTIC else 1.0)

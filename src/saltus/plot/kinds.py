@@ -14,6 +14,11 @@ from saltus.results.schema import period_text
 OWN_HUES = 8
 #: Codes of the kinds: the period itself up to :data:`OWN_HUES`, then these.
 LONG, QUASI_PERIODIC, CHAOTIC = OWN_HUES + 1, OWN_HUES + 2, OWN_HUES + 3
+#: Of systems without forcing; a limit cycle has the hue of period 1, as there is no other, an equilibrium that of period 2.
+LIMIT_CYCLE, EQUILIBRIUM = OWN_HUES + 4, OWN_HUES + 5
+_HUE_OF = {LIMIT_CYCLE: 1, EQUILIBRIUM: 2}
+_NAMES = {QUASI_PERIODIC: "quasi-periodic", CHAOTIC: "chaotic", LIMIT_CYCLE: "limit cycle", EQUILIBRIUM: "equilibrium"}
+_OWN = {"quasi_periodic": QUASI_PERIODIC, "limit_cycle": LIMIT_CYCLE, "equilibrium": EQUILIBRIUM}
 #: Motion that never repeats is grey, so that no period is taken for it.
 _GREYS = {QUASI_PERIODIC: (0.70, 0.70, 0.70), CHAOTIC: (0.20, 0.20, 0.20)}
 #: Markers of the periods 1, 2, ..., and of longer ones.
@@ -23,22 +28,28 @@ _DOT, _SHADES = 4, 7
 
 
 def codes(kind: Sequence[str] | np.ndarray, period: Sequence[int] | np.ndarray) -> np.ndarray:
-    """Code of each motion, by its kind (``periodic``, ``quasi_periodic``, ``chaotic``) and its period in forcing periods."""
+    """Code of each motion, by its kind and its period in forcing periods."""
     period, kind = np.asarray(period, dtype=np.int64), np.asarray(kind, dtype=np.str_)
-    return np.where(period > 0, np.minimum(period, LONG), np.where(kind == "quasi_periodic", QUASI_PERIODIC, CHAOTIC))
+    others = np.select([kind == word for word in _OWN], list(_OWN.values()), CHAOTIC)
+    return np.where(period > 0, np.minimum(period, LONG), others)
+
+
+def repeats(code: int) -> bool:
+    """Whether motions of a kind repeat, or rest: their branches are lines."""
+    return code not in (QUASI_PERIODIC, CHAOTIC)
 
 
 def color(code: int, dots: bool = True) -> np.ndarray:
     """The colour of a kind, sRGB in 0 to 1: darker for dots and lines than for areas."""
     if code in _GREYS:
         return np.array(_GREYS[code])
-    hue = hues(LONG)[code - 1]
+    hue = hues(LONG)[_HUE_OF.get(code, code) - 1]
     return np.asarray(shades(hue[None], _SHADES)[0, _DOT if dots else _SHADES // 2])
 
 
 def marker(code: int) -> str:
     """The marker of a kind, for readers and printers without colours."""
-    return _MARKERS.get(code, ".")
+    return _MARKERS.get(_HUE_OF.get(code, code), ".")
 
 
 def label(code: int, periods: np.ndarray) -> str:
@@ -46,7 +57,7 @@ def label(code: int, periods: np.ndarray) -> str:
     if code == LONG:
         long = np.unique(periods[periods > OWN_HUES]).tolist()
         return ", ".join(map(period_text, long)) if len(long) <= 3 else f"{period_text(long[0])} to {period_text(long[-1])}"
-    return {QUASI_PERIODIC: "quasi-periodic", CHAOTIC: "chaotic"}.get(code) or period_text(code)
+    return _NAMES.get(code) or period_text(code)
 
 
 def of(ds: xr.Dataset) -> np.ndarray:

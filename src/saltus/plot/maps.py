@@ -15,6 +15,7 @@ from saltus.errors import ParameterError
 from saltus.plot.palette import hues
 from saltus.plot.style import Scale, display_scale
 from saltus.results.schema import kind_of, kind_text
+from saltus.units import from_si
 
 #: Kinds of Dataset, and what returns them.
 SOURCES = {
@@ -93,14 +94,21 @@ def colors_of(ds: xr.Dataset, order: Sequence[int] | None, caller: str) -> dict[
 
 # -- words ---------------------------------------------------------------------------------------------------------------------
 def describe(one: xr.Dataset) -> str:
-    """An attractor in a few words: ``24T, 60 contacts``; ``chaotic, 2.4 contacts per T``."""
+    """An attractor in a few words: ``24T, 60 contacts``; ``chaotic, 2.4 contacts per T``; ``limit cycle, 0.3 s, 4 contacts``."""
     period, contacts = int(one["attractor_period"]), float(one["attractor_contacts"])
     name = kind_text(str(one["attractor_type"].item()), period)
     if not math.isfinite(contacts):
         return name
     if period > 0:
         return f"{name}, {contacts:.4g} contact{'' if contacts == 1 else 's'}"
-    return f"{name}, {contacts:.3g} contacts per T"
+    kind = str(one["attractor_type"].item())
+    if kind == "equilibrium":
+        return name
+    if "attractor_cycle" not in one:
+        return f"{name}, {contacts:.3g} contacts per T"
+    if kind != "limit_cycle":
+        return name
+    return f"{name}, {from_si(float(one['attractor_cycle']), 's', 3)}, {contacts:.4g} contact{'' if contacts == 1 else 's'}"
 
 
 def share_text(fraction: float) -> str:

@@ -24,7 +24,7 @@ NEEDS = ("response_of", "response_branch", "response_type", "response_period")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 #: Name and marker of what happens to a branch between two values. That a branch isn't found any more is no mark: the picture shows it.
 _EVENTS = {
-    "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"), "neimark_sacker": ("Neimark-Sacker", "o"),
+    "hopf": ("Hopf", "p"), "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"), "neimark_sacker": ("Neimark-Sacker", "o"),
     "chaos": ("onset of chaos", "s"), "graze": ("graze", "^"),
 }  # fmt: skip
 #: Where the marks of events stand, in heights of the Axes.

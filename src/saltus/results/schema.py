@@ -256,8 +256,8 @@ def period_text(n: int, none: str = "not periodic") -> str:
 
 
 def kind_text(kind: str, n: int) -> str:
-    """A motion in a word: ``T``, ``3T``, ``quasi-periodic``, ``chaotic``."""
-    return period_text(n) if n > 0 else kind.replace("_", "-")
+    """A motion in a word: ``T``, ``3T``, ``quasi-periodic``, ``chaotic``, ``equilibrium``, ``limit cycle``."""
+    return period_text(n) if n > 0 else kind.replace("_", " " if kind == "limit_cycle" else "-")
 
 
 def states_of(ds: xr.Dataset) -> tuple[str, ...]:

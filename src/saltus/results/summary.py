@@ -63,7 +63,10 @@ def _attractors(ds: xr.Dataset) -> list[str]:
     for i in range(min(count, _LINES)):
         one = ds.isel(attractor=i)
         period = int(one["attractor_period"])
-        name = f"{one['attractor_type'].item()}{f' {period}T' if period else ''}".replace("_", "-")
+        kind = str(one["attractor_type"].item())
+        name = f"{kind} {period}T".replace("_", "-") if period else kind_text(kind, 0)
+        if kind == "limit_cycle" and "attractor_cycle" in one:
+            name += f", period {float(one['attractor_cycle']):.4g} s"
         share = f", {float(one['attractor_fraction']):.2%} of the starts" if "attractor_fraction" in one else ""
         lines.append(f"  {i}: {name}, peak {float(one['attractor_peak']):.4g} {unit}".rstrip() + share)
     return lines + ([f"  and {count - _LINES} more"] if count > _LINES else [])
