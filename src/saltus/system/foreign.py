@@ -53,7 +53,7 @@ ADVICE: dict[str, str] = {
     **dict.fromkeys(("frf", "FRF", "bode", "sweep"), "Write sl.frequency_response(system, (first, last, number))."),
     "backbone": "Write sl.frequency_response for each of several forces: the backbone joins the peaks.",
     "chirp": "Write sl.sin(2*sl.pi*(f0*t + rate*t**2/2)) in the equation.",
-    **dict.fromkeys(("orbit_diagram", "orbitdiagram", "bifurcation"), "Write sl.bifurcation_diagram(system, {name: (first, last, number)})."),
+    **dict.fromkeys(("orbit_diagram", "orbitdiagram", "bifurcation"), "Write sl.bifurcation_diagram(system, {name: (low, high, number)})."),
     **dict.fromkeys(("lyapunovspectrum", "lyapunov_spectrum", "lyapunov_exponent"), "Write sl.lyapunov(system, start, periods=...)."),
 }  # fmt: skip
 
