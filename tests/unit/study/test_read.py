@@ -97,7 +97,8 @@ def test_schema_tells_editors_the_keys():
     schema = Study.model_json_schema()
     json.dumps(schema)
     assert set(schema["properties"]) == {
-        "study", "system", "method", "simulate", "compare", "poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram", "basins",
+        "study", "system", "method", "simulate", "compare", "poincare", "spectrum", "impacts", "energy", "lyapunov",
+        "frequency_response", "bifurcation_diagram", "basins",
     }  # fmt: skip
     assert schema["$defs"]["Simulate"]["additionalProperties"] is False
     assert schema["$defs"]["SystemTable"]["additionalProperties"] != {}, "values are numbers or text"
