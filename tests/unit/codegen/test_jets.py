@@ -59,7 +59,8 @@ def lane_jets(system: System, states, times, values, order=ORDER, period=1.0):
     head = generated(system, order)
     clock, work = np.zeros((CLOCK_ROWS, LANES)), np.zeros((head["ROWS"], LANES))
     constants = np.zeros((max(head["NCONST"], 1), LANES))
-    side = np.ones((max(head["NGUARDS"], 1), LANES))
+    guards = head["NGUARDS"]
+    side = -np.ones((max(guards + head["NSINGULAR"], 1), LANES))  # behind the guards: nothing is set aside
     for lane in range(LANES):
         count = int(times[lane] // period)
         clock[TAU, lane], clock[BASE, lane] = times[lane] - count * period, count * period
@@ -67,7 +68,7 @@ def lane_jets(system: System, states, times, values, order=ORDER, period=1.0):
         head["turns"](values[lane], 0.0, period, count, lane, clock)
         gaps = np.zeros(max(head["NGUARDS"], 1))
         head["gaps"](times[lane], states[:, lane], values[lane], np.zeros(0), gaps)
-        side[:, lane] = np.where(gaps < 0, -1.0, 1.0)
+        side[:guards, lane] = np.where(gaps < 0, -1.0, 1.0)[:guards]
     with np.errstate(all="ignore"):  # pieces that are undefined on the other side
         head["jets"](np.array(states, float), side, constants, clock, work)
     return head, work
