@@ -63,7 +63,7 @@ def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
     cycle, multipliers, eigenvalues = np.full(len(kind), np.nan), *np.full((2, len(kind), size), np.nan + 0j)
     exponent, error = np.array([(0.0, 0.0)] * rests + [(one.exponent, one.exponent_error) for one in found.wandering]).reshape(-1, 2).T
     exponent, error = exponent / map_.period, error / map_.period
-    still = find_equilibria(map_.family(rests), start[:rests], np.maximum(np.abs(start[:rests]), 1e-300))
+    still = find_equilibria(map_.family(rests), start[:rests], np.ones((rests, size)))
     for i in range(rests):
         points[i] = start[i : i + 1] = still.place[i : i + 1] if np.isfinite(still.place[i]).all() else start[i : i + 1]
         eigenvalues[i], exponent[i] = still.eigenvalues[i], still.eigenvalues[i, 0].real

@@ -12,7 +12,7 @@ import numpy as np
 from saltus.analysis.settled import LAST, settled
 from saltus.results.schema import period_text
 from saltus.study.questions.simulate_table import response_texts
-from saltus.study.table import TextTable
+from saltus.study.table import Column, TextTable, quantity, table, words
 from saltus.units import from_si
 
 if TYPE_CHECKING:
@@ -120,24 +120,28 @@ def _handles(axes: Iterable[Axes]) -> Iterator[tuple[Any, str]]:
 
 
 def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: str) -> TextTable:
-    rows = []
-    for i, text in enumerate(response_texts(run)):
-        one, row = run.isel(trajectory=i), found.isel(trajectory=i)
-        n = int(row["response_period"])
-        contacts = f"{float(row['contacts_per_response']):g} in {text}" if n else "-"
-        beside = _beside(n, neighbours[:, i].tolist())
-        peak, rms = (from_si(float(row[name]), "m", 4) for name in ("x_peak", "x_rms"))
-        status = str(one["status"].item())
-        rows.append((_start(i), text if status == "ok" else f"{text} ({status})", beside, contacts, peak, rms, str(int(one["steps"]))))
+    texts, periods = response_texts(run), found["response_period"].values.tolist()
+    statuses = run["status"].values.astype(str).tolist()
+    beside = [_beside(n, neighbours[:, i].tolist()) for i, n in enumerate(periods)]
+    counts = [float(count) if n else None for n, count in zip(periods, found["contacts_per_response"].values, strict=True)]
+    x, v = zip(*STARTS, strict=True)
+    columns = [
+        Column("start x, v", _start, {"start x [m]": x, "start v [m/s]": v}),
+        words("settles to", [text if status == "ok" else f"{text} ({status})" for text, status in zip(texts, statuses, strict=True)]),
+        words("1 nm off", beside),
+        Column("contacts", lambda i: "-" if counts[i] is None else f"{counts[i]:g} in {texts[i]}", {"contacts in a response": counts}),
+        quantity("peak |x|", found["x_peak"].values, "m"),
+        quantity("rms x", found["x_rms"].values, "m"),
+        words("steps", run["steps"].values),
+    ]
     periodic = found["response_period"] > 0
     notes = [
         f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. Stability isn't examined."
         + (f" States repeat to {float(found['mismatch'].where(periodic).max()):.0e} of their range." if periodic.any() else "")
     ]
-    if any(row[2] not in ("same", "-") for row in rows):
+    if set(beside) - {"same", "-"}:
         notes.append("Where a start 1 nm away settles to something else, no experiment and no other program need agree.")
-    columns = ("start x, v", "settles to", "1 nm off", "contacts", "peak |x|", "rms x", "steps")
-    return TextTable(title, columns, tuple(rows), tuple(notes))
+    return table(title, columns, notes)
 
 
 def _beside(n: int, neighbours: list[int]) -> str:

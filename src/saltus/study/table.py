@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import csv
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from saltus.fence import csv_cell
+from saltus.units import from_si
 
 #: Rows printed at most; the files hold them all.
 ROWS = 24
@@ -25,12 +29,15 @@ class TextTable:
         One text a column.
     notes : tuple of str
         Sentences that belong under the table.
+    data : tuple of tuple of str
+        What a CSV file holds, headings first: plain numbers in SI, the unit in the heading. Without it that is what is shown.
     """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+    data: tuple[tuple[str, ...], ...] = ()
 
     def write_csv(self, path: Path) -> Path:
         """Write the table as CSV, the notes as comment lines above it."""
@@ -38,5 +45,102 @@ class TextTable:
 
         with replacing(path) as (part,), part.open("w", newline="", encoding="utf-8") as file:
             file.writelines(f"# {' '.join(note.split())}\n" for note in (self.title, *self.notes))
-            csv.writer(file).writerows([map(csv_cell, row) for row in (self.columns, *self.rows)])
+            csv.writer(file).writerows([map(csv_cell, row) for row in self.data or (self.columns, *self.rows)])
         return path
+
+
+# -- tables of numbers ---------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Column:
+    """A column as it is shown, and the columns of numbers behind it.
+
+    Attributes
+    ----------
+    heading : str
+        What stands above it on the screen.
+    text : callable
+        The text of a row on the screen, by the number of the row.
+    data : mapping of str to sequence
+        By heading, with the unit: numbers in SI, or words. A number that isn't there is None or NaN, and an empty cell.
+    """
+
+    heading: str
+    text: Callable[[int], str]
+    data: Mapping[str, Sequence[Any]]
+
+
+def quantity(heading: str, values: Any, unit: str, digits: int = 4, name: str | None = None) -> Column:
+    """Numbers with a unit, each shown as people write it: ``0.4 mm``. ``name`` is the heading in the file, if it is another."""
+    numbers = _floats(values)
+    return Column(heading, lambda i: from_si(numbers[i], unit, digits), {titled(name or heading, unit): numbers})
+
+
+def interval(heading: str, low: Any, high: Any, text: Callable[[float], str], unit: str = "") -> Column:
+    """A range, shown as ``2 to 4``, or as ``4`` where both ends look the same; ``-`` where there is none."""
+    ends = _floats(low), _floats(high)
+
+    def shown(i: int) -> str:
+        found = [text(end[i]) for end in ends if math.isfinite(end[i])]
+        return " to ".join(dict.fromkeys(found)) or "-"
+
+    return Column(heading, shown, {titled(f"{heading} {side}", unit): end for side, end in zip(("from", "to"), ends, strict=True)})
+
+
+def number(heading: str, values: Any, form: str = "", unit: str = "", name: str | None = None) -> Column:
+    """Numbers in one form, the unit in the heading; ``-`` where there is none."""
+    found = [None if value is None or value != value else value for value in _items(values)]
+
+    def shown(i: int) -> str:
+        return "-" if found[i] is None else format(found[i], form)
+
+    return Column(titled(heading, unit), shown, {titled(name or heading, unit): found})
+
+
+def words(heading: str, values: Any, name: str | None = None) -> Column:
+    """Words, or whole numbers that stand for something."""
+    found = _items(values)
+    return Column(heading, lambda i: str(found[i]), {name or heading: found})
+
+
+def with_error(heading: str, values: Any, errors: Any, form: str = ".4g", unit: str = "") -> Column:
+    """Numbers with their standard errors, shown as ``0.5 ± 0.01``."""
+    found, off = _floats(values), _floats(errors)
+
+    def shown(i: int) -> str:
+        if not math.isfinite(found[i]):
+            return "-"
+        return f"{found[i]:{form}} ± {off[i]:.1g}" if math.isfinite(off[i]) else f"{found[i]:{form}}"
+
+    return Column(titled(heading, unit), shown, {titled(heading, unit): found, titled(f"{heading} error", unit): off})
+
+
+def table(title: str, columns: Sequence[Column], notes: Sequence[str] = (), shown: Sequence[int] | None = None) -> TextTable:
+    """A table from its columns; ``shown`` are the numbers of the rows for the screen, by default the first :data:`ROWS`."""
+    data = {heading: values for column in columns for heading, values in column.data.items()}
+    rows = list(zip(*data.values(), strict=True))
+    chosen = range(min(len(rows), ROWS)) if shown is None else shown
+    return TextTable(
+        title,
+        tuple(column.heading for column in columns),
+        tuple(tuple(column.text(i) for column in columns) for i in chosen),
+        tuple(notes),
+        (tuple(data), *(tuple(map(_cell, row)) for row in rows)),
+    )
+
+
+def titled(heading: str, unit: str) -> str:
+    """A heading with its unit."""
+    return f"{heading} [{unit}]" if unit not in ("", "1") else heading
+
+
+def _cell(value: Any) -> str:
+    """A value as a program reads it, with every digit."""
+    return "" if value is None or value != value else repr(value) if isinstance(value, float) else str(value)
+
+
+def _items(values: Any) -> list[Any]:
+    return values.tolist() if hasattr(values, "tolist") else list(values)
+
+
+def _floats(values: Any) -> list[float]:
+    return [float(value) for value in _items(values)]

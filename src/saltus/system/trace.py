@@ -30,8 +30,8 @@ _HOW_TO = "Write the equation with + - * / **, comparisons inside sl.piecewise(.
 
 
 def system(
+    states: str | Sequence[str] = "",
     *,
-    states: str | Sequence[str],
     forced_at: str | None = None,
     units: Mapping[str, str] | None = None,
     name: str | None = None,
@@ -258,6 +258,11 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
         return f"{title} ({where}): {error}"
     if isinstance(error, AttributeError) and str(error).startswith("saltus has no "):
         return f"{title} ({where}): {error}"
+    if isinstance(error, NameError) and error.name:
+        known = inspect.signature(function).parameters
+        return f"{title} ({where}): {error.name!r} is no state, no parameter, and not defined outside either. {nearest(error.name, known)}"
+    if isinstance(error, TypeError) and "for ^" in str(error):
+        return f"{title} ({where}): a power is written x**2; ^ is something else in Python."
     return f"{title} ({where}) can't be traced: {type(error).__name__}: {str(error).rstrip('.?! ')}. {_HOW_TO}"
 
 

@@ -65,13 +65,13 @@ def test_axes_may_be_arrays_and_must_ascend():
     given = np.array([-1e-3, 0.0, 5e-3])
     np.testing.assert_array_equal(plan({"x": given, "v": V}).axes["x"], given)
     for wrong in (given[::-1], given[:1], np.array([0, np.nan]), np.array([0, np.inf]), np.zeros((2, 2)), np.array([0.0, 0.0])):
-        with pytest.raises(ParameterError, match="starts along x must ascend"):
+        with pytest.raises(ParameterError, match=r"starts along x must ascend|Give finite starts|must be a range"):
             plan({"x": wrong, "v": V})
 
 
 def test_an_axis_of_text_is_refused_in_words():
-    with pytest.raises(ParameterError, match="x"):
-        plan({"x": np.array(["1 mm", "2 mm"]), "v": V})
+    with pytest.raises((ParameterError, UnitError), match="x"):
+        plan({"x": np.array(["one", "two"]), "v": V})
 
 
 def test_whole_periods_may_be_written_as_a_float():

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-
 import numpy as np
+import pandas as pd
 import pytest
 
 import saltus as sl
@@ -235,9 +234,12 @@ def test_two_maps_and_their_agreement(tmp_path):
     assert [table.title for table in run.outcome.tables] == ["16 Hz", "7 Hz", "a: 16 Hz / b: 7 Hz"]
     both = load(run.folder / "7-hz-agreement.nc")
     assert (both.attrs["name_a"], both.attrs["name_b"]) == ("16 Hz", "7 Hz")
-    with (run.folder / "7-hz.csv").open(encoding="utf-8") as file:
-        _, *rows = csv.reader(line for line in file if not line.startswith("#"))
-    assert len(rows) == load(run.folder / "7-hz.nc").sizes["attractor"] == 1
+    found, ds = pd.read_csv(run.folder / "7-hz.csv", comment="#"), load(run.folder / "7-hz.nc")
+    assert len(found) == ds.sizes["attractor"] == 1
+    assert found["peak |x| [m]"].tolist() == ds["attractor_peak"].values.tolist()
+    assert found["share of starts"].tolist() == ds["attractor_fraction"].values.tolist()
+    agreement = pd.read_csv(run.folder / "7-hz-agreement.csv", comment="#")
+    assert agreement["share in b"].dropna().tolist() == both["match_fraction_b"].values[both["match_b"].values >= 0].tolist()
     assert [one.note["name"] for one in stores(run.folder)] == ["16 Hz", "7 Hz"]
     assert Run(run.folder, PAIR).computed == 0
 

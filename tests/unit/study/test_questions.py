@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -124,6 +125,29 @@ def test_tables_tell_branches_and_kinds(whole):
     assert sum(int(row[2]) for row in branches.rows) == ds.sizes["response"]
     assert tables["A map"].columns == ("type", "share", "contact stiffness", "frequency")
     assert sum(float(row[1].rstrip(" %")) for row in tables["A map"].rows) == pytest.approx(100, abs=0.1)
+
+
+def test_csv_of_every_question_is_plain_numbers_in_si(whole):
+    """What pandas reads are the numbers of the Dataset, to the last digit, with the unit in the heading."""
+    read = {name: pd.read_csv(whole.folder / f"{name}.csv", comment="#") for name in ("table", "frequency-response", "soft", "a-map")}
+    run = load(whole.folder / "run.nc")
+    assert read["table"]["x at the end [m]"].tolist() == [float(run["end_x"])]
+    assert read["table"]["trajectory"].tolist() == [0]
+    ds, table = load(whole.folder / "frequency-response.nc"), read["frequency-response"]
+    first = ds.isel(response=ds["response_branch"].values == 0)
+    for name, value in (
+        ("frequency from [Hz]", first["response_frequency"].min()), ("frequency to [Hz]", first["response_frequency"].max()),
+        ("largest rms of x [m]", first["response_rms"].max()), ("peak |x| [m]", first["response_peak"].max()),
+        ("contacts in T from", first["response_contacts"].min()), ("to a graze [m]", first["response_margin"].min()),
+        ("largest exponent [1/s]", first["response_exponent"].max()),
+    ):  # fmt: skip
+        assert table[name][0] == float(value), name
+    assert len(table) == len(np.unique(ds["response_branch"]))
+    assert read["soft"]["contact stiffness from [N/m]"].min() == pytest.approx(1e3)
+    assert read["a-map"]["share"].sum() == pytest.approx(1)
+    for name, frame in read.items():
+        wordy = set(frame.columns[~frame.dtypes.map(pd.api.types.is_numeric_dtype)])
+        assert wordy <= {"type", "status", "response"}, name
 
 
 def test_progress_is_told_for_each(whole):
@@ -282,7 +306,7 @@ def test_every_key_tells_what_it_is():
                 assert field.get("description"), f"{name}.{key}"
                 assert field.get("examples"), f"{name}.{key}"
         assert table["description"], name
-    for key in ("lyapunov", "frequency_response", "bifurcation_diagram"):
+    for key in ("poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram"):
         forms = schema["properties"][key]["anyOf"]
         assert {"$ref" in forms[0], forms[1].get("type") == "array"} == {True}
 

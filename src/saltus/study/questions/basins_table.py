@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from saltus.results.schema import axes_of, kind_text
-from saltus.study.table import TextTable
-from saltus.units import from_si
+from saltus.study.table import Column, TextTable, number, quantity, table, with_error, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,28 +16,25 @@ if TYPE_CHECKING:
 
 def attractor_table(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each attractor of a map: type, contacts, size, stability, margin, share."""
-    rows = []
-    for i in ds["attractor"].values.tolist():
-        one = ds.isel(attractor=i)
-        kind, n = str(one["attractor_type"].item()), int(one["attractor_period"])
-        size = math.hypot(float(one["attractor_multiplier_real"][0]), float(one["attractor_multiplier_imag"][0]))
-        unit, gap = one["attractor_peak"].attrs.get("units", ""), one["attractor_margin"].attrs.get("units", "")
-        rows.append((
-            str(i), kind_text(kind, n), _or_dash(float(one["attractor_contacts"]), "g"),
-            from_si(float(one["attractor_peak"]), unit, 4), from_si(float(one["attractor_rms"]), unit, 4),
-            _or_dash(size, ".4f"),
-            f"{float(one['attractor_exponent']):.4g} ± {float(one['attractor_exponent_error']):.1g}",
-            from_si(float(one["attractor_margin"]), gap, 3),
-            f"{100 * float(one['attractor_fraction']):.2f} ± "
-            f"{50 * float(one['attractor_fraction_high'] - one['attractor_fraction_low']):.2g} %",
-        ))  # fmt: skip
+    found = {name.removeprefix("attractor_"): ds[name] for name in map(str, ds.data_vars) if name.startswith("attractor_")}
+    units = {name: one.attrs.get("units", "") for name, one in found.items()}
+    kinds = [kind_text(str(kind), int(n)) for kind, n in zip(found["type"].values, found["period"].values, strict=True)]
+    sizes = np.hypot(found["multiplier_real"].values[:, 0], found["multiplier_imag"].values[:, 0]) if kinds else np.empty(0)
+    share, low, high = (found[f"fraction{end}"].values.tolist() for end in ("", "_low", "_high"))
     first = str(ds.attrs["states"]).split()[0]
-    columns = ("", "type", "contacts", f"peak |{first}|", f"rms {first}", "|multiplier|", "exponent [1/s]", "to a graze", "share of starts")
-    return TextTable(title, columns, tuple(rows), _notes(ds))
-
-
-def _or_dash(value: float, form: str) -> str:
-    return format(value, form) if math.isfinite(value) else "-"
+    columns = [
+        words("", ds["attractor"].values, "attractor"),
+        words("type", kinds),
+        number("contacts", found["contacts"].values.astype(float), "g"),
+        quantity(f"peak |{first}|", found["peak"].values, units["peak"]),
+        quantity(f"rms {first}", found["rms"].values, units["rms"]),
+        number("|multiplier|", np.where(np.isfinite(sizes), sizes, np.nan), ".4f"),
+        with_error("exponent", found["exponent"].values, found["exponent_error"].values, unit="1/s"),
+        quantity("to a graze", found["margin"].values, units["margin"], 3),
+        Column("share of starts", lambda i: f"{100 * share[i]:.2f} ± {50 * (high[i] - low[i]):.2g} %",
+               {"share of starts": share, "share from": low, "share to": high}),
+    ]  # fmt: skip
+    return table(title, columns, _notes(ds), range(len(kinds)))
 
 
 def _notes(ds: xr.Dataset) -> tuple[str, ...]:
@@ -64,18 +60,22 @@ def _notes(ds: xr.Dataset) -> tuple[str, ...]:
 
 def agreement_table(ds: xr.Dataset) -> TextTable:
     """A row for each pair of attractors of two maps, and the share of the starts on which the maps agree."""
-    rows = []
-    for i in range(ds.sizes["pair"]):
-        one = {name: ds[f"match_{name}"].values[i] for name in ("a", "b", "type", "period", "fraction_a", "fraction_b", "orbit_distance")}
-        kind = kind_text(str(one["type"]), int(one["period"]))
-        shares = [f"{100 * float(one[f'fraction_{side}']):.2f} %" if int(one[side]) >= 0 else "-" for side in "ab"]
-        distance = float(one["orbit_distance"])
-        rows.append((kind, *(str(one[side]) if int(one[side]) >= 0 else "-" for side in "ab"), *shares,
-                     _or_dash(distance, ".1e")))  # fmt: skip
+    match = {
+        name: ds[f"match_{name}"].values.tolist() for name in ("a", "b", "type", "period", "fraction_a", "fraction_b", "orbit_distance")
+    }
+    columns = [words("type", [kind_text(str(kind), int(n)) for kind, n in zip(match["type"], match["period"], strict=True)])]
+    columns += [number(side, [n if n >= 0 else None for n in match[side]]) for side in "ab"]
+    columns += [_share(f"share in {side}", match[f"fraction_{side}"], match[side]) for side in "ab"]
+    columns.append(number("distance of orbits", [d if math.isfinite(d) else None for d in match["orbit_distance"]], ".1e"))
     a, b = (str(ds.attrs.get(f"name_{side}", side)) for side in "ab")
     values = ds["agreement"].values
     settled = values >= 0
     share = f"{100 * float((values[settled] == 1).mean()):.2f} %" if settled.any() else "none"
-    columns = ("type", "a", "b", "share in a", "share in b", "distance of orbits")
     note = f"The maps agree on {share} of the {int(settled.sum())} starts that settle in both."
-    return TextTable(f"a: {a} / b: {b}", columns, tuple(rows), (note,))
+    return table(f"a: {a} / b: {b}", columns, (note,), range(ds.sizes["pair"]))
+
+
+def _share(heading: str, shares: list[float], numbers: list[int]) -> Column:
+    """Shares of the starts of those that are in a map."""
+    found = [share if n >= 0 else math.nan for share, n in zip(shares, numbers, strict=True)]
+    return Column(heading, lambda i: "-" if numbers[i] < 0 else f"{100 * found[i]:.2f} %", {heading: found})

@@ -7,31 +7,32 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from saltus.results.schema import kind_text
-from saltus.study.table import ROWS, TextTable
+from saltus.study.table import ROWS, TextTable, interval, number, table, words
 
 if TYPE_CHECKING:
     import xarray as xr
 
 #: Exponents that get a column of their own.
 COLUMNS = 4
+#: What the sum of the exponents is set beside.
+_SUMS = {"sum": "exponent_sum", "mean divergence": "mean_divergence"}
 
 
 def exponent_table(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each trajectory: kind of motion, exponents, interval of the largest, their sum beside the mean divergence."""
     unit = ds["lyapunov_exponent"].attrs.get("units", "")
-    shown, several = min(ds.sizes["exponent"], COLUMNS), ds.sizes["exponent"] > 1 and "mean_divergence" in ds
-    rows = []
-    for i in range(min(ds.sizes["trajectory"], ROWS)):
-        one = ds.isel(trajectory=i)
-        exponents = [f"{value:.6g}" for value in one["lyapunov_exponent"].values[:shown]]
-        interval = f"{float(one['lyapunov_low'][0]):.6g} to {float(one['lyapunov_high'][0]):.6g}"
-        sums = [f"{float(one[name]):.6g}" for name in ("exponent_sum", "mean_divergence")] if several else []
-        near = {0: "", 1: "near a graze"}[int(one["near_graze"])] if "near_graze" in one else ""
-        kind = kind_text(str(one["kind"].item()), int(one["response_period"]) if "response_period" in one else 0)
-        rows.append((str(i), kind, *exponents, interval, *sums, near))
-    columns = ("", "motion", *(f"exponent {k + 1} [{unit}]" for k in range(shown)), "95 % interval of the largest",
-               *(("sum", "mean divergence") if several else ()), "")  # fmt: skip
-    return TextTable(title, columns, tuple(rows), _notes(ds, len(rows)))
+    count, shown = ds.sizes["trajectory"], min(ds.sizes["exponent"], COLUMNS)
+    periods = ds["response_period"].values.tolist() if "response_period" in ds else [0] * count
+    kinds = [kind_text(str(kind), int(n)) for kind, n in zip(ds["kind"].values, periods, strict=True)]
+    columns = [words("", range(count), "trajectory"), words("motion", kinds)]
+    columns += [number(f"exponent {k + 1}", ds["lyapunov_exponent"].values[:, k], ".6g", unit) for k in range(shown)]
+    low, high = (ds[name].values[:, 0] for name in ("lyapunov_low", "lyapunov_high"))
+    columns.append(interval("95 % interval of the largest", low, high, "{:.6g}".format, unit))
+    if ds.sizes["exponent"] > 1 and "mean_divergence" in ds:
+        columns += [number(label, ds[name].values, ".6g", unit) for label, name in _SUMS.items()]
+    near = ds["near_graze"].values if "near_graze" in ds else np.zeros(count, dtype=np.int64)
+    columns.append(words("", ["near a graze" if one else "" for one in near], "near a graze"))
+    return table(title, columns, _notes(ds, min(count, ROWS)))
 
 
 def _notes(ds: xr.Dataset, shown: int) -> tuple[str, ...]:

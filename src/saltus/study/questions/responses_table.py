@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.results.schema import NO_BASIN, event_name, kind_text, parameters_of, response_name, states_of
-from saltus.study.table import ROWS, TextTable
+from saltus.study.table import ROWS, Column, TextTable, interval, number, quantity, table, words
 from saltus.units import from_si
 
 if TYPE_CHECKING:
@@ -24,45 +26,51 @@ def tables(title: str, ds: xr.Dataset) -> list[TextTable]:
 
 # -- one parameter -------------------------------------------------------------------------------------------------------------
 def _branches(title: str, ds: xr.Dataset) -> TextTable:
-    """A row for each branch, the longest ones if there are many, in the order in which they begin."""
+    """A row for each branch in the order in which they begin; on the screen the longest ones if there are many."""
     (axis,) = parameters_of(ds)
     branch = ds["response_branch"].values
     numbers, sizes = np.unique(branch, return_counts=True)
-    shown = np.sort(numbers[np.argsort(-sizes, kind="stable")[:ROWS]])
-    unit = ds[axis].attrs.get("units", "")
-    rows = tuple(_branch_row(int(number), ds.isel(response=np.flatnonzero(branch == number)), axis, unit) for number in shown)
-    first = states_of(ds)[0]
-    columns = ("branch", "type", "values", f"{axis.replace('_', ' ')} from", "to", "contacts in T", f"largest rms of {first}", "at",
-               f"peak |{first}|", "to a graze", "largest exponent [1/s]")  # fmt: skip
-    return TextTable(title, columns, rows, _notes(ds, len(numbers) - len(shown)))
+    shown = np.sort(np.argsort(-sizes, kind="stable")[:ROWS]).tolist()
+    each = [ds.isel(response=np.flatnonzero(branch == number)) for number in numbers]
+    tops = [int(np.nan_to_num(one["response_rms"].values, nan=-math.inf).argmax()) for one in each]
+    first, along = states_of(ds)[0], axis.replace("_", " ")
+    values, (unit, size, gap) = response_name(axis), (ds[name].attrs.get("units", "") for name in (axis, "response_rms", "response_margin"))
+
+    def ends(name: str, pick: Callable[[np.ndarray], Any]) -> list[float]:
+        return [float(pick(one[name].values)) for one in each]
+
+    def at_top(name: str) -> list[float]:
+        return [float(one[name].values[top]) for one, top in zip(each, tops, strict=True)]
+
+    columns = [
+        words("branch", numbers),
+        words("type", [_types(one) for one in each]),
+        words("values", sizes),
+        quantity(f"{along} from", ends(values, np.min), unit, 5),
+        quantity("to", ends(values, np.max), unit, 5, name=f"{along} to"),
+        interval("contacts in T", ends("response_contacts", _least), ends("response_contacts", _most), "{:.3g}".format),
+        quantity(f"largest rms of {first}", at_top("response_rms"), size),
+        quantity("at", at_top(values), unit, 5, name=f"{along} at the largest rms"),
+        quantity(f"peak |{first}|", ends("response_peak", _most), size),
+        quantity("to a graze", ends("response_margin", _least), gap, 3),
+        number("largest exponent", ends("response_exponent", _most), ".4g", "1/s"),
+    ]
+    return table(title, columns, _notes(ds, len(numbers) - len(shown)), shown)
 
 
-def _branch_row(number: int, one: xr.Dataset, axis: str, unit: str) -> tuple[str, ...]:
-    values, rms = one[response_name(axis)].values, one["response_rms"]
-    top = int(np.nan_to_num(rms.values, nan=-math.inf).argmax())
-    size = rms.attrs.get("units", "")
-    return (
-        str(number), _types(one), str(one.sizes["response"]), from_si(float(values.min()), unit, 5), from_si(float(values.max()), unit, 5),
-        _span(one["response_contacts"].values), from_si(float(rms[top]), size, 4), from_si(float(values[top]), unit, 5),
-        from_si(float(one["response_peak"].max()), size, 4),
-        from_si(float(one["response_margin"].min()), one["response_margin"].attrs.get("units", ""), 3),
-        f"{float(one['response_exponent'].max()):.4g}",
-    )  # fmt: skip
+def _least(values: np.ndarray) -> float:
+    """The least of the numbers that are there; NaN of none."""
+    return float(values[~np.isnan(values)].min(initial=math.inf)) if not np.isnan(values).all() else math.nan
+
+
+def _most(values: np.ndarray) -> float:
+    return -_least(-values)
 
 
 def _types(ds: xr.Dataset) -> str:
     """``T``, or ``T, 2T`` where a branch changes its kind."""
     pairs = zip(ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True)
     return ", ".join(dict.fromkeys(kind_text(kind, n) for kind, n in pairs))
-
-
-def _span(values: np.ndarray) -> str:
-    """``4``, or ``2 to 4``."""
-    finite = values[np.isfinite(values)]
-    if not finite.size:
-        return "-"
-    ends = [f"{value:.3g}" for value in (finite.min(), finite.max())]
-    return " to ".join(dict.fromkeys(ends))
 
 
 def _notes(ds: xr.Dataset, more: int) -> tuple[str, ...]:
@@ -94,12 +102,14 @@ def _kinds(title: str, ds: xr.Dataset) -> TextTable:
     pairs = zip(ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True)
     names = np.array([kind_text(kind, n) for kind, n in pairs], dtype=np.str_)
     cells = np.append(names, "")[np.where(of < 0, len(names), of)]
-    rows = []
-    for kind in sorted(set(names.tolist()), key=lambda kind: (len(kind), kind)):
-        places = np.nonzero((cells == kind).any(axis=-1))
-        spans = []
-        for axis, index in zip(parameters_of(ds), places, strict=True):
-            values, unit = ds[axis].values[index], ds[axis].attrs.get("units", "")
-            spans.append(f"{from_si(float(values.min()), unit, 4)} to {from_si(float(values.max()), unit, 4)}" if index.size else "-")
-        rows.append((kind, f"{100 * float((cells == kind).mean()):.2f} %", *spans))
-    return TextTable(title, ("type", "share", *(axis.replace("_", " ") for axis in parameters_of(ds))), tuple(rows), _notes(ds, 0))
+    kinds = sorted(set(names.tolist()), key=lambda kind: (len(kind), kind))
+    columns = [
+        words("type", kinds),
+        Column("share", lambda i: f"{100 * shares[i]:.2f} %", {"share": (shares := [float((cells == kind).mean()) for kind in kinds])}),
+    ]
+    for dim, axis in enumerate(parameters_of(ds)):
+        values, unit = ds[axis].values, ds[axis].attrs.get("units", "")
+        where = [values[np.nonzero((cells == kind).any(axis=-1))[dim]] for kind in kinds]
+        low, high = ([of(found) for found in where] for of in (_least, _most))
+        columns.append(interval(axis.replace("_", " "), low, high, partial(from_si, unit=unit, digits=4), unit))
+    return table(title, columns, _notes(ds, 0))

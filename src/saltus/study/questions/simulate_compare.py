@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.errors import StudyError
 from saltus.study.questions.printed import Row, rows
-from saltus.study.table import TextTable
+from saltus.study.table import Column, TextTable, table, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Columns that the files must have.
 COLUMNS = ("event_number", "time_s")
+#: The column that they may have.
+RESIDUAL = "position_minus_boundary_m"
 
 
 def contact_table(
@@ -49,33 +51,31 @@ def contact_table(
     StudyError
         If a row isn't one of numbers, or names a contact that the run doesn't have.
     """
-    residual, legs = residuals(run), _legs(run)
-    table, before = [], 0
-    for row in printed:
-        number = row.whole("event_number")
-        ours, theirs = _time(run, number, row), row.number("time_s")
-        line = [row.text("marker"), str(number), _seconds(ours), _seconds(theirs), _small(ours - theirs), _small(residual[number - 1])]
-        line.append(_small(abs(row.number("position_minus_boundary_m"))) if row.text("position_minus_boundary_m") else "")
-        line.append(_seconds(exact[number]) if number in exact else "")
-        line.append(_small(_time(reference, number, row) - exact[number]) if reference is not None and number in exact else "")
-        line.append(" ".join(map(str, legs[before:number])))
-        table.append(tuple(line))
-        before = number
-    method = run.attrs["method"]
-    second = reference.attrs["method"] if reference is not None else "reference"
-    columns = (
-        "",
-        "contact",
-        f"{method} [s]",
-        "printed [s]",
-        "difference",
-        "|x - j| [m]",
-        "printed [m]",
-        "exact [s]",
-        f"{second} - exact",
-        "steps",
-    )
-    return TextTable(title, columns, tuple(table), _notes(run, exact, reference))
+    numbers = [row.whole("event_number") for row in printed]
+    ours, theirs = [_time(run, row) for row in printed], [row.number("time_s") for row in printed]
+    known = [exact.get(n) for n in numbers]
+    second = [None if reference is None or time is None else _time(reference, row) - time for row, time in zip(printed, known, strict=True)]
+    beside = [abs(row.number(RESIDUAL)) if row.text(RESIDUAL) else None for row in printed]
+    legs = [" ".join(map(str, _legs(run)[before:n])) for before, n in zip([0, *numbers], numbers, strict=False)]
+    method, other = run.attrs["method"], reference.attrs["method"] if reference is not None else "reference"
+    columns = [
+        words("", [row.text("marker") for row in printed], "marker"),
+        words("contact", numbers),
+        _column(f"{method} [s]", ours, _seconds),
+        _column("printed [s]", theirs, _seconds),
+        _column("difference", [a - b for a, b in zip(ours, theirs, strict=True)], _small, "difference [s]"),
+        _column("|x - j| [m]", residuals(run)[np.array(numbers, dtype=int) - 1].tolist(), _small),
+        _column("printed [m]", beside, _small),
+        _column("exact [s]", known, _seconds),
+        _column(f"{other} - exact", second, _small, f"{other} - exact [s]"),
+        words("steps", legs),
+    ]
+    return table(title, columns, _notes(run, exact, reference), range(len(printed)))
+
+
+def _column(heading: str, values: Sequence[float | None], form: Callable[[float], str], name: str | None = None) -> Column:
+    """Numbers of which some may not be there."""
+    return Column(heading, lambda i: "" if (value := values[i]) is None else form(value), {name or heading: values})
 
 
 def printed_rows(data: bytes, path: Path) -> list[Row]:
@@ -83,8 +83,8 @@ def printed_rows(data: bytes, path: Path) -> list[Row]:
     found = rows(data, path, COLUMNS)
     for row in found:
         row.whole("event_number"), row.number("time_s")
-        if row.text("position_minus_boundary_m"):
-            row.number("position_minus_boundary_m")
+        if row.text(RESIDUAL):
+            row.number(RESIDUAL)
     return found
 
 
@@ -109,7 +109,9 @@ def _notes(run: xr.Dataset, exact: Mapping[int, float], reference: xr.Dataset | 
     return tuple(notes)
 
 
-def _time(run: xr.Dataset, number: int, row: Row) -> float:
+def _time(run: xr.Dataset, row: Row) -> float:
+    """Time of the contact that a row names."""
+    number = row.whole("event_number")
     if not 1 <= number <= run.sizes["contact"]:
         raise StudyError(f"[compare] {row.place} names contact {number}, but {run.attrs['method']} had {run.sizes['contact']}. Run longer.")
     return float(run["contact_time"][number - 1])

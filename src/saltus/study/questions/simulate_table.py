@@ -10,8 +10,7 @@ from saltus.analysis.settled import settled
 from saltus.errors import ParameterError
 from saltus.kernels.status import STATUS
 from saltus.results.schema import end_name, period_text, states_of
-from saltus.study.table import ROWS, TextTable
-from saltus.units import from_si
+from saltus.study.table import ROWS, TextTable, quantity, table, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,15 +30,14 @@ def run_table(title: str, run: xr.Dataset) -> TextTable:
     counts = [
         name for name in ("events", "grazes", "grazes_unresolved", "steps") if name == "events" or name == "steps" or batch[name].any()
     ]
-    responses = response_texts(run)
-    rows = []
-    for i in range(min(batch.sizes["trajectory"], ROWS)):
-        one = batch.isel(trajectory=i)
-        ends = [from_si(float(one[end_name(name)]), one[name].attrs.get("units", ""), 5) for name in states_of(run)]
-        rows.append((str(i), str(one["status"].item()), *(str(int(one[name])) for name in counts), *ends, *responses[i : i + 1]))
-    columns = ("", "status", *({"events": "contacts"}.get(name, name.replace("_", " ")) for name in counts),
-               *(f"{name} at the end" for name in states_of(run)), *(("response",) if responses else ()))  # fmt: skip
-    return TextTable(title, columns, tuple(rows), _notes(batch, len(rows)))
+    responses, total = response_texts(run), batch.sizes["trajectory"]
+    columns = [words("", range(total), "trajectory"), words("status", batch["status"].values.astype(str))]
+    columns += [words({"events": "contacts"}.get(name, name.replace("_", " ")), batch[name].values) for name in counts]
+    columns += [
+        quantity(f"{name} at the end", batch[end_name(name)].values, batch[name].attrs.get("units", ""), 5) for name in states_of(run)
+    ]
+    columns += [words("response", responses)] * bool(responses)
+    return table(title, columns, _notes(batch, min(total, ROWS)))
 
 
 def response_texts(run: xr.Dataset) -> list[str]:
