@@ -182,15 +182,16 @@ def test_twins_of_a_symmetric_rig_are_two_attractors():
 
 
 # -- oscillators of the literature ---------------------------------------------------------------------------------------------
-def test_double_well_has_two_equilibria_with_known_multipliers():
-    """x'' + x'/4 - x + x^3 = 0: at x = +-1 the roots of s^2 + s/4 + 2; the multipliers are exp(s), every = 1 s."""
+def test_double_well_has_two_equilibria_with_known_eigenvalues():
+    """x'' + x'/4 - x + x^3 = 0: at x = +-1 the roots of s^2 + s/4 + 2."""
     ds = attractors(free, [[0.5, 0.0], [-0.5, 0.0], [1.0 + 1e-9, 0.0], [-1.0, 0.0]], every=1.0, progress=False)
     assert ds.attractor_type.values.tolist() == ["equilibrium"] * 2
     assert sorted(ds.attractor_x.values[:, 0]) == pytest.approx([-1.0, 1.0], abs=1e-14)
     right = int(ds.attractor_x.values[:, 0].argmax())
     assert ds.basin.values.tolist() == [right, 1 - right, right, 1 - right]
     for i in range(2):
-        assert multipliers(ds, i) == pytest.approx(np.sort_complex(np.exp(np.roots([1, 0.25, 2]))), abs=1e-12)
+        eigenvalues = ds.attractor_eigenvalue_real.values[i] + 1j * ds.attractor_eigenvalue_imag.values[i]
+        assert np.sort_complex(eigenvalues) == pytest.approx(np.sort_complex(np.roots([1, 0.25, 2])), abs=1e-12)
     assert ds.attractor_exponent.values == pytest.approx(-0.125, abs=1e-12)
     assert ds.attractor_peak.values == pytest.approx(1.0, abs=1e-12)
     assert ds.attractor_contacts.values.tolist() == [0, 0]
