@@ -91,11 +91,14 @@ def set_aside(lanes):
 
 
 @inner
-def away_from_boundaries(lanes, h):
-    """h, shortened: to a share of the way to a boundary whose terms act; where they are set aside, until leaving them out is negligible."""
+def away_from_boundaries(lanes, h, finer):
+    """h, shortened: to a share of the way to a boundary whose terms act; where they are set aside, until leaving them out is negligible.
+
+    ``finer`` is the longest step where terms act. It is no share of h: steps that end in a share of what is left never end.
+    """
     for j in range(NSINGULAR):
         aside = load(lanes.side, NGUARDS + j, LANES) > 0.0
-        h = select(acts(lanes, j) & (~aside), smaller(REACH * way(lanes, SINGULAR_GUARD[j]), FINER * h), h)
+        h = select(acts(lanes, j) & (~aside), smaller(REACH * way(lanes, SINGULAR_GUARD[j]), smaller(finer, h)), h)
         aside = aside & (load(lanes.run, ACTIVE, LANES) > 0.5)
         if any_lane(aside):
             h = select(aside, negligible_step(lanes, h, j, aside), h)
