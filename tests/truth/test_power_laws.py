@@ -113,16 +113,6 @@ def piecewise_solution(system, start, contacts, end, first_side):
     return state
 
 
-def test_a_run_that_ends_in_a_contact_ends():
-    """Also where steps within the contact are less than half of what the series allow, as they are at low orders."""
-    ends = 0.01 + duration_of(0.1, 1e6, 1.5) * np.linspace(0.1, 0.9, 5)
-    for end in ends:
-        run = run_of(power_stop, (-1e-3, 0.1), end, method=sl.Taylor(order=12, lanes=2))
-        assert (run.status.item(), run.end_time.item()) == ("ok", end)
-        energy = run.end_v.item() ** 2 / 2 + 1e6 * run.end_x.item() ** 2.5 / 2.5
-        assert abs(energy / 0.005 - 1) < 64 * EPS
-
-
 def test_energy_is_kept_over_a_thousand_contacts():
     """A ball on a Hertz floor: lift pulls it to the boundary. 6e4 steps that each round by 1e-16 at random make 1e-13."""
     system = power_stop.with_values(lift=9.81, stiffness=1e7)

@@ -372,10 +372,8 @@ def step_all(lanes, batch, slow):
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
     if NCLOCKS > 0:
         room = smaller(load(lanes.run, BREAK, LANES) - load(lanes.clock, TAU, LANES), room)
-    longest_step = step_length(lanes.work, batch.options[LOG2_TOLERANCE])
-    h = smaller(longest_step, room)
-    if NSINGULAR > 0:
-        h = away_from_boundaries(lanes, h, FINER * longest_step)
+    h = step_length(lanes.work, batch.options[LOG2_TOLERANCE])
+    h = away_from_boundaries(lanes, h, room) if NSINGULAR > 0 else smaller(h, room)
     if PROBED:
         h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), batch.options[LOG2_TOLERANCE])
     store(lanes.run, STEP, h)

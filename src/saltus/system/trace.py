@@ -20,7 +20,7 @@ from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, s
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
 from saltus.system.names import why_no_name, why_no_text, why_no_title
-from saltus.system.singular import check_finite, lifted
+from saltus.system.singular import check_finite, check_gaps, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
@@ -204,6 +204,7 @@ def _traced(
         field, guards = find_guards(derivatives)
         field = lifted(field, guards)
         check_finite(field, guards, states)
+        check_gaps(guards)
         return field, guards
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
