@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest
 from saltus.results.schema import RESPONSES, check
 
@@ -14,6 +15,7 @@ from saltus.results.schema import RESPONSES, check
 By = Literal["amplitude", "rms", "rms_about_mean"]
 
 
+@verb
 def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude") -> xr.Dataset:
     """Ratio of two outputs of each response, such as the motion of a mass to that of its base.
 
