@@ -26,6 +26,28 @@ box = { x = ["-5 mm", "5 mm"], v = ["-1 m/s", "1 m/s"] }
 vary.contact_stiffness = { first = "1e3 N/m", last = "1e9 N/m", count = 400, scale = "log" }
 [lyapunov]
 start = { x = "0 mm", v = "0 m/s" }
+[[poincare]]
+name = "a level"
+surface = { x = "0.3 mm" }
+direction = 1
+periods = 20
+transient = 30
+[[poincare]]
+name = "turning points"
+surface = "x turns"
+periods = 20
+[spectrum]
+start = { x = "1 mm", v = "0 m/s" }
+periods = 24
+states = ["x"]
+window = "hann"
+[impacts]
+periods = 20
+contact_side = { upper_gap = 1 }
+bins = 20
+[energy]
+periods = 20
+transient = 30
 [basins]
 axes.x = { first = "-5 mm", last = "5 mm", count = 200 }
 axes.v = { first = "-1 m/s", last = "1 m/s", count = 200 }
@@ -58,11 +80,13 @@ VALUES = [f'"{text}"' for text in TEXTS] + NUMBERS + TABLES_AND_LISTS
 KEYS = [
     "name", "model", "case", "force", "x", "v", "start", "periods", "keep", "samples", "t_end", "values", "map", "compare",
     "axes", "axes.x", "axes.y", "count", "first", "scale", "order", "__class__", "model_config", "self", "__pydantic_extra__",
+    "surface", "surface.x", "direction", "transient", "states", "window", "last", "bins", "contact_side", "intervals",
     "box", "seed", "every", "at", "vary.gap", "sample", '""', '"a b"', r'"\u0000"', "ζ", "values.force", "forced_at", "__init__",
     "with_values", "system", "start.x", "method", "flow", "printed", "measured", "exact",
 ]  # fmt: skip
 TABLES = [
     "study", "system", "method", "simulate", "compare", "lyapunov", "frequency_response", "bifurcation_diagram", "basins", "basins.map",
+    "poincare", "spectrum", "impacts", "energy", "poincare.surface",
     "basins.axes", "x", "basins.axes.x", "study.study", '""', r'"\u0000"', "system.values", "method.Taylor",
 ]  # fmt: skip
 CHARACTERS = [

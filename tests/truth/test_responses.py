@@ -185,6 +185,18 @@ def test_a_graze_is_where_the_margin_vanishes():
         assert contacts[0] != contacts[1]
 
 
+def test_an_end_by_a_graze_is_no_fold():
+    """Below the graze the motion is linear: its multipliers don't change. Beyond, contacts as stiff as these make it unstable at once."""
+    rig = sl.models.delangre("c", cubic=0.0, frequency="4.2 Hz", lower_gap="2 mm", upper_gap="2 mm", contact_stiffness="1 kN/mm")
+    ds = sl.bifurcation_diagram(rig, {"force": ("1.5 N", "2.1 N", 7)}, start=(0.0, 0.0), follow=True)
+    graze = 2e-3 / (amplitude(4.2) / 4)
+    without = ds.response_force.values[ds.response_branch == 0]
+    assert (ds.response_contacts.values[ds.response_branch == 0] == 0).all()
+    assert without.max() < graze < without.max() + 0.1
+    assert "fold" not in ds.event_kind.values.tolist()
+    assert ds.event_kind.values[ds.event_branch == 0].tolist() == ["end"]
+
+
 # -- methods -------------------------------------------------------------------------------------------------------------------
 def test_turning_points_of_ode45_come_to_the_exact_ones_as_its_tolerance_shrinks():
     rig = sl.models.delangre("c", force="4 N", frequency="17 Hz")

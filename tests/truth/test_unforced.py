@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import root
 
 import saltus as sl
+from saltus.analysis.bifurcations import HALVINGS
 from saltus.analysis.cycles import find_cycles, returns
 from saltus.analysis.equilibria import find_equilibria
 from saltus.flow.family import Family
@@ -134,14 +136,57 @@ def test_an_equilibrium_is_named_and_its_table_has_eigenvalues():
 
 # -- folds ---------------------------------------------------------------------------------------------------------------------
 @sl.system(states="x v", forced_at="frequency")
-def soft(t, x, v, *, force=0.06, frequency=0.85 / (2 * np.pi), damping=0.1):
-    """The escape equation."""
-    return v, force * sl.cos(2 * np.pi * frequency * t) - damping * v - x + x * x
+def oscillator(t, x, v, *, force=0.06, frequency=0.85 / (2 * np.pi), damping=0.1, quadratic=-1.0, cubic=0.0):
+    """The escape equation; Duffing's with ``quadratic`` = 0 and ``cubic`` = 1."""
+    return v, force * sl.cos(2 * np.pi * frequency * t) - damping * v - x - quadratic * x * x - cubic * x**3
 
 
-def test_the_fold_of_the_escape_equation_is_named():
-    """A sweep by a Runge-Kutta method of fixed steps, apart from saltus, stays on the orbit at 0.068 and leaves it at 0.069."""
-    ds = sl.bifurcation_diagram(soft, {"force": (0.05, 0.072, 12)}, (0.0, 0.0), follow=True, method=FAST, periods=1000)
-    assert "fold" in ds.event_kind.values.tolist()
-    place = ds.event_force.values[ds.event_kind.values == "fold"]
-    assert 0.068 < place.item() < 0.069
+def independent_fold(system, name, orbit, last, place):
+    """Where y = P(y) and det(dP/dy - 1) = 0, by an independent solver and its variational equation, from an orbit at a value before it."""
+
+    def turn(y, where):
+        value = dict(system.values) | {name: where}
+
+        def rates(t, u):
+            x, v = u[:2]
+            slope = np.array([[0.0, 1.0], [-1 - 2 * value["quadratic"] * x - 3 * value["cubic"] * x * x, -value["damping"]]])
+            drive = value["force"] * np.cos(2 * np.pi * value["frequency"] * t)
+            rate = drive - value["damping"] * v - x - value["quadratic"] * x * x - value["cubic"] * x**3
+            return np.concatenate([[v, rate], (slope @ u[2:].reshape(2, 2)).ravel()])
+
+        u = solve_ivp(rates, (0, 1 / value["frequency"]), [*y, 1.0, 0.0, 0.0, 1.0], "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        return u[:2] - y, u[2:].reshape(2, 2) - np.eye(2)
+
+    def condition(unknown):
+        apart, slope = turn(unknown[:2], unknown[2])
+        return [*apart, np.linalg.det(slope)]
+
+    for left in (0.5, 0.2, 0.05, 0.01):  # the orbit moves by the square root of what is left
+        where = place + left * (last - place)
+        orbit = root(lambda y, where=where: turn(y, where), orbit, jac=True, tol=1e-12).x
+    solution = root(condition, [*orbit, where], tol=1e-12)
+    assert np.abs(solution.fun).max() < 1e-10
+    return solution.x[2]
+
+
+DUFFING = oscillator.with_values(quadratic=0.0, cubic=1.0, force=0.3)
+ESCAPE = oscillator.with_values(quadratic=-1.0)
+
+
+@pytest.mark.parametrize(
+    ("system", "name", "values", "start", "follow"),
+    [
+        pytest.param(ESCAPE, "force", (0.05, 0.072, 12), (0.0, 0.0), True, id="escape_small"),
+        pytest.param(ESCAPE, "force", (0.0455, 0.05, 10), (0.2, 0.44), False, id="escape_large"),
+        pytest.param(DUFFING, "frequency", (1.5 / (2 * np.pi), 2.0 / (2 * np.pi), 6), (0.967, 1.512), True, id="duffing_upper"),
+    ],
+)
+def test_a_fold_is_where_an_independent_solver_finds_it(system, name, values, start, follow):
+    """The escape equation has two on one curve, at a force of 0.0688 and of 0.0472: each is one branch's end."""
+    ds = sl.bifurcation_diagram(system, {name: values}, start, follow=follow, method=FAST, periods=1000)
+    assert ds.event_kind.values.tolist() == ["fold"]
+    place, step = ds[f"event_{name}"].item(), (values[1] - values[0]) / (values[2] - 1)
+    responses = np.flatnonzero(ds.response_branch == ds.event_branch.item())
+    last = ds.isel(response=responses[np.abs(ds[f"response_{name}"].values[responses] - place).argmin()])
+    exact = independent_fold(system, name, (last.response_x.values[0], last.response_v.values[0]), last[f"response_{name}"].item(), place)
+    assert abs(place - exact) < 2.0**-HALVINGS * step, "within the interval in which it was sought"

@@ -25,8 +25,10 @@ from saltus.flow.methods import Method
 LINK = 0.35
 #: A leading multiplier that is complex and beyond this is on its way to the unit circle.
 TURNING = 0.95
-#: Times that the interval in which a branch ends is halved, and how many times its last width the law is measured over.
+#: Times that the step towards the end of a branch is halved, and how many times its last width the law is measured over.
 HALVINGS, OVER = 14, 64
+#: Steps towards the end of a branch at most.
+STEPS = 100
 #: Farthest that the law's extrapolation may lie from the interval, in its widths.
 BESIDE = 3.0
 
@@ -186,23 +188,39 @@ class _Follower:
         for i in np.flatnonzero(which):
             self.points[i], self.time[i] = arrived.points[i, : arrived.period[i]], arrived.time[i]
 
+    def to_the_end(self, last: np.ndarray, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Follow each while it attracts, from values float64[k] towards others beyond, in steps that halve where Newton's method fails.
+
+        Returns the last value found, the width within which nothing more was found, and whether it was followed so far, bool[k]. A step
+        that fails is tried again from nearer: Newton's method fails far from an orbit, too.
+        """
+        last, step = last.copy(), 0.5 * (beyond - last)
+        least = np.abs(beyond - last) * 0.5**HALVINGS
+        going = np.ones(len(last), bool)
+        for _ in range(STEPS):
+            value = np.where(going, last + step, last)
+            arrived, same = self.at(value)
+            goes_on = going & same & arrived.stable
+            self.move(arrived, goes_on)
+            last = np.where(goes_on, value, last)
+            there = np.abs(beyond - last) < least
+            narrow = ~goes_on & (np.abs(step) <= 1.5 * least)
+            going &= ~(there | narrow)
+            step = np.where(going & ~goes_on, 0.5 * step, step)
+            if not going.any():
+                break
+        return last, step, ~there & ~going
+
 
 def _located(found: Found, grid: Grid, method: Method, ends: np.ndarray, way: int, threads: int | None) -> list[tuple[str, float]]:
     """Kind and place of what ends branches whose leading multiplier is real and positive, or that rest."""
     (values,) = grid.axes.values()
-    last, first = values[found.place[ends]].copy(), values[found.place[ends] + way].copy()
     follower = _Follower(found, grid, method, ends, threads)
-    for _ in range(HALVINGS):
-        value = 0.5 * (last + first)
-        arrived, same = follower.at(value)
-        goes_on = same & arrived.stable
-        follower.move(arrived, goes_on)
-        last, first = np.where(goes_on, value, last), np.where(goes_on, first, value)
-    width = first - last
+    last, width, narrow = follower.to_the_end(values[found.place[ends]], values[found.place[ends] + way])
     farther = last - np.clip(OVER * np.abs(width), 0.0, np.abs(last - values[found.place[ends]])) * np.sign(width)
     near, _ = follower.at(last)
     far, same = follower.at(farther)
-    _, beyond = follower.at(first + width)
+    _, beyond = follower.at(last + 2.0 * width)
     result = []
     for i, end in enumerate(ends):
         rests = found.kind[end] == EQUILIBRIUM
@@ -212,7 +230,7 @@ def _located(found: Found, grid: Grid, method: Method, ends: np.ndarray, way: in
         distance = np.abs([one.real, other.real]) if rests else np.abs([1.0 - one, 1.0 - other])
         law = distance if rests and oscillates else distance**2  # linear through a Hopf bifurcation, a square root at a fold
         place = last[i] + law[0] * (last[i] - farther[i]) / (law[1] - law[0]) if law[1] > law[0] else np.nan
-        here = bool(same[i]) and abs(place - last[i] - 0.5 * width[i]) <= (0.5 + BESIDE) * abs(width[i])
+        here = bool(same[i] and narrow[i]) and abs(place - last[i] - 0.5 * width[i]) <= (0.5 + BESIDE) * abs(width[i])
         word = "hopf" if rests and oscillates and beyond[i] else "fold" if not oscillates and not beyond[i] else "end"
         result.append((word, float(place)) if here else ("end", np.nan))
     return [(word, place if word != "end" and method.exact else np.nan) for word, place in result]

@@ -97,19 +97,19 @@ def poincare(
         )
     if direction not in (-1, 0, 1):
         raise ParameterError(f"direction must be 0, 1 or -1, not {direction!r}.")
-    crossed = _crossed(system, surface, values if isinstance(values, Mapping) else {})
-    seen = stretch(crossed.system, start, values, periods, t_end, t_start, transient)
+    found = crossed(system, surface, values if isinstance(values, Mapping) else {})
+    seen = stretch(found.system, start, values, periods, t_end, t_start, transient)
 
     def dataset(outcome: Outcome) -> xr.Dataset:
-        return _dataset(system, method, seen, crossed, direction, outcome)
+        return _dataset(system, method, seen, found, direction, outcome)
 
-    result = computed(crossed.system, method, seen.request(crossed.system, Schedule.none(), record=True), dataset, threads, progress)
+    result = computed(found.system, method, seen.request(found.system, Schedule.none(), record=True), dataset, threads, progress)
     warn(result)
     return result
 
 
 @dataclass(frozen=True)
-class _Crossed:
+class Crossed:
     """The system with the surface among its guards, which of them it is, and the unit of its function; the surface in words."""
 
     system: System
@@ -118,8 +118,8 @@ class _Crossed:
     text: str
 
 
-def _crossed(system: System, surface: Any, values: Mapping[str, Any]) -> _Crossed:
-    """What the user means by a surface; ``values`` may hold its level."""
+def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
+    """What the user means by a surface; ``values`` may hold its level. Raises as :func:`poincare` does."""
     if callable(surface):
         return _last(with_surface(system, surface), "", "")
     if isinstance(surface, tuple | list):
@@ -132,7 +132,7 @@ def _crossed(system: System, surface: Any, values: Mapping[str, Any]) -> _Crosse
     if among(surface, names):
         owner = system.guards[names.index(surface)].state
         number = names.index(surface)
-        return _Crossed(system, number, system.units[owner] if owner else "", equation_of(number, system.guards))
+        return Crossed(system, number, system.units[owner] if owner else "", equation_of(number, system.guards))
     turns = {f"{name} turns": name for name in system.states}
     if among(surface, turns):
         return _last(turning_surface(system, turns[surface]), schema.rate_unit(system.units[turns[surface]]), surface)
@@ -142,13 +142,13 @@ def _crossed(system: System, surface: Any, values: Mapping[str, Any]) -> _Crosse
     )
 
 
-def _last(system: System, unit: str, text: str) -> _Crossed:
+def _last(system: System, unit: str, text: str) -> Crossed:
     """The surface is the last guard; without words of its own its equation says what it is."""
     number = len(system.guards) - 1
-    return _Crossed(system, number, unit, text or equation_of(number, system.guards))
+    return Crossed(system, number, unit, text or equation_of(number, system.guards))
 
 
-def _dataset(system: System, method: Method, seen: Stretch, crossed: _Crossed, direction: int, outcome: Outcome) -> xr.Dataset:
+def _dataset(system: System, method: Method, seen: Stretch, crossed: Crossed, direction: int, outcome: Outcome) -> xr.Dataset:
     """The crossings that were asked for, under their names."""
     table, numbers = outcome.record_integers, outcome.record_floats
     who, guard = table[:, st.REC_TRAJECTORY], table[:, st.REC_GUARD]

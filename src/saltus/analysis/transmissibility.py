@@ -48,7 +48,7 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
         raise ParameterError(f"transmissibility: by={by!r}. Known: {', '.join(get_args(By))}.")
     upper, lower = ds.sel(output=output), ds.sel(output=to)
     units = [one["output_units"].item() for one in (upper, lower)]
-    unit = "" if "" in units else "1" if units[0] == units[1] else f"{units[0]}/({units[1]})"
+    unit = "" if "" in units else "1" if units[0] == units[1] else f"{units[0]}/{_factor(units[1])}"
     with np.errstate(all="ignore"):
         ratio = upper[f"output_{by}"].values / lower[f"output_{by}"].values
     phase = np.angle(np.exp(1j * (upper["output_phase"].values - lower["output_phase"].values)))
@@ -57,3 +57,8 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
         transmissibility=("response", ratio, labels),
         transmissibility_phase=("response", phase, {"units": "rad", "long_name": f"phase by which {output} leads {to}"}),
     )
+
+
+def _factor(unit: str) -> str:
+    """A unit as it stands in a denominator."""
+    return f"({unit})" if any(sign in unit for sign in "*/ ") else unit

@@ -9,8 +9,10 @@ from contextlib import AbstractContextManager, nullcontext
 from contextvars import ContextVar
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
+
 from saltus.codegen.announce import silent
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, nearest, shown
 from saltus.interrupt import Interrupted
 from saltus.system.system import System
 
@@ -67,9 +69,14 @@ def _check(name: str, signature: inspect.Signature, args: tuple[Any, ...], kwarg
             if word not in known:
                 raise ParameterError(f"sl.{name} has no argument {word!r}. {_instead(word, known, args, kwargs)}")
     try:
-        signature.bind(*args, **kwargs)
+        given = signature.bind(*args, **kwargs).arguments
     except TypeError as error:
         raise ParameterError(f"sl.{name}: {error}. Write sl.{name}({_call(known)}).") from None
+    if "start" in known and isinstance(given.get("periods"), list | tuple | dict | np.ndarray):
+        raise ParameterError(
+            f"sl.{name}: the start comes second, and the time is one number: sl.{name}(system, start, t_end=10). "
+            f"periods can't be {shown(given['periods'])}."
+        )
 
 
 def _instead(word: str, known: Mapping[str, inspect.Parameter], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str:

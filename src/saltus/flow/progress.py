@@ -55,13 +55,17 @@ class Lines:
         self._tell, self._clock = tell, clock
         self._begun = self._told = clock()
         self._passed = 0
+        self._first: tuple[float, float] | None = None
 
     def show(self, share: float) -> None:
         """Say the share done, if it is time to."""
         now, quarter = self._clock(), int(4 * share)
+        if self._first is None:
+            self._first = now, share
         if share >= 1.0 or now - self._begun < self.PATIENCE or (quarter <= self._passed and now - self._told < self.EVERY):
             return
-        left = (now - self._begun) * (1 / share - 1) if share > 0 else None
+        since, before = self._first  # what came before, such as compiling, isn't the pace of the work
+        left = (now - since) * (1 - share) / (share - before) if share > before else None
         self._passed, self._told = max(quarter, self._passed), now
         self._tell(f"{share:.0%} done in {now - self._begun:.0f} s" + (f", about {left:.0f} s left" if left is not None else ""))
 

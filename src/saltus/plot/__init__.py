@@ -1,5 +1,8 @@
 """Pictures: a Dataset in, Axes out. Nothing is computed here, and nothing is shown: that is left to the caller."""
 
+from typing import Any
+
+from saltus.errors import nearest
 from saltus.plot.agreement import agreement
 from saltus.plot.basins import basins
 from saltus.plot.bifurcation import bifurcation_diagram
@@ -19,3 +22,9 @@ __all__ = [
     "OKABE_ITO", "agreement", "basins", "bifurcation_diagram", "energy", "exponents", "frequency_response", "gallery", "history",
     "impacts", "methods", "phase", "section", "spectrum", "style", "type_map",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith("__"):
+        raise AttributeError(name)
+    raise AttributeError(f"no picture is called {name!r}. {nearest(name, __all__)}")

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from saltus.errors import ParameterError, UnitError, nearest
 from saltus.plot import axes as draw
@@ -92,7 +93,7 @@ def frequency_response(
         if quantity in _SIZES:
             panel.set_ylim(bottom=0)
         if quantity == "phase":
-            panel.set_yticks(range(-180, 181, 90))
+            panel.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 1.5, 3, 4.5, 9, 10]))
         named_output = datasets[0].ds[variable].attrs["long_name"]
         panel.set_ylabel(
             _LABELS[quantity].format(named_output) if quantity == "phase" else up.label(_LABELS[quantity].format(named_output))

@@ -13,16 +13,20 @@ from pydantic import BaseModel, ValidationError
 from saltus.errors import nearest
 from saltus.fence import SHOWN, shown
 from saltus.study.questions.basins import Axis, Basins, Map
+from saltus.study.questions.energy import Energy
+from saltus.study.questions.impacts import Impacts
 from saltus.study.questions.lyapunov import Lyapunov
+from saltus.study.questions.poincare import Poincare
 from saltus.study.questions.responses import BifurcationDiagram, FrequencyResponse
 from saltus.study.questions.simulate import Compare, Simulate
+from saltus.study.questions.spectrum import Spectrum
 from saltus.study.spec import Study
 from saltus.study.spec_parts import METHODS, Header, Range, SystemTable
 
 TABLES: dict[str, type[BaseModel]] = {
     "study": Header, "system": SystemTable, "simulate": Simulate, "compare": Compare, "basins": Basins, "map": Map, "axes": Axis,
     "lyapunov": Lyapunov, "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram, "frequency": Range,
-    "vary": Range,
+    "vary": Range, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts, "energy": Energy,
 }  # fmt: skip
 #: Parts of a place that name the branch of a union, not a key.
 _BRANCHES = re.compile(r"float|str|(list|dict)\[.*\]|function-.*")

@@ -11,6 +11,10 @@ from saltus.results.files import remove_old_drafts
 from saltus.study.copies import keep_copy
 from saltus.study.inputs import Inputs
 from saltus.study.questions import basins, lyapunov, responses, simulate
+from saltus.study.questions.energy import Balance
+from saltus.study.questions.impacts import Statistics
+from saltus.study.questions.poincare import Section
+from saltus.study.questions.spectrum import Lines
 from saltus.study.running import Outcome, Report, Resources, Running
 from saltus.study.setting import Setting, system_of
 from saltus.study.spec import Study
@@ -22,6 +26,10 @@ if TYPE_CHECKING:
 #: What makes a question of each table.
 _PLANS: dict[str, Callable[[Any, Setting], list[Question]]] = {
     "simulate": simulate.questions,
+    "poincare": Section.questions,
+    "spectrum": Lines.questions,
+    "impacts": Statistics.questions,
+    "energy": Balance.questions,
     "lyapunov": lyapunov.questions,
     "frequency_response": responses.frequency_responses,
     "bifurcation_diagram": responses.bifurcation_diagrams,

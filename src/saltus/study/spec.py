@@ -7,15 +7,19 @@ from collections.abc import Iterator
 from pydantic import Field, model_validator
 
 from saltus.study.questions.basins import Basins
+from saltus.study.questions.energy import Energy
+from saltus.study.questions.impacts import Impacts
 from saltus.study.questions.lyapunov import Lyapunov
+from saltus.study.questions.poincare import Poincare
 from saltus.study.questions.responses import BifurcationDiagram, FrequencyResponse
 from saltus.study.questions.simulate import REFERENCE, RUN, Compare, Simulate
+from saltus.study.questions.spectrum import Spectrum
 from saltus.study.spec_parts import Header, Method, Named, SystemTable, Table, Taylor, distinct_names, one_or_many
 
 #: Tables that ask something, in the order in which they are answered: the quick ones first.
-QUESTIONS = ("simulate", "lyapunov", "frequency_response", "bifurcation_diagram", "basins")
+QUESTIONS = ("simulate", "poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram", "basins")
 #: Those that may be asked several times, as arrays of tables.
-SEVERAL = ("lyapunov", "frequency_response", "bifurcation_diagram")
+SEVERAL = ("poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram")
 
 
 class Study(Table):
@@ -26,6 +30,10 @@ class Study(Table):
     method: Method = Taylor(name="Taylor")
     simulate: Simulate | None = None
     compare: Compare | None = None
+    poincare: one_or_many(Poincare) = Field(default_factory=list)  # type: ignore[valid-type]
+    spectrum: one_or_many(Spectrum) = Field(default_factory=list)  # type: ignore[valid-type]
+    impacts: one_or_many(Impacts) = Field(default_factory=list)  # type: ignore[valid-type]
+    energy: one_or_many(Energy) = Field(default_factory=list)  # type: ignore[valid-type]
     lyapunov: one_or_many(Lyapunov) = Field(default_factory=list)  # type: ignore[valid-type]
     frequency_response: one_or_many(FrequencyResponse) = Field(default_factory=list)  # type: ignore[valid-type]
     bifurcation_diagram: one_or_many(BifurcationDiagram) = Field(default_factory=list)  # type: ignore[valid-type]

@@ -46,7 +46,15 @@ ADVICE: dict[str, str] = {
     "friction": "Write mu*normal*sl.tanh(v/eps), with eps small against the sliding speed: it sticks by creeping.",
     "continuation": "There is no continuation by arc length; sl.frequency_response and sl.bifurcation_diagram follow branches.",
     "solve": "Write sl.simulate(system, start, t_end=...).", "solve_ivp": "Write sl.simulate(system, start, t_end=...).",
-    "integrate": "Write sl.simulate(system, start, t_end=...).",
+    **dict.fromkeys(("integrate", "odeint", "run", "solve_ode"), "Write sl.simulate(system, start, t_end=...)."),
+    **dict.fromkeys(("ode45", "RK45", "ode23", "ode15s", "DOP853"), "Write sl.simulate(system, start, t_end=..., method=sl.ODE45())."),
+    **dict.fromkeys(("interp1d", "interp1", "lookup"), "Write sl.table(x, points, values)."),
+    **dict.fromkeys(("fft", "psd", "periodogram", "welch"), "Write sl.spectrum(run)."),
+    **dict.fromkeys(("frf", "FRF", "bode", "sweep"), "Write sl.frequency_response(system, (first, last, number))."),
+    "backbone": "Write sl.frequency_response for each of several forces: the backbone joins the peaks.",
+    "chirp": "Write sl.sin(2*sl.pi*(f0*t + rate*t**2/2)) in the equation.",
+    **dict.fromkeys(("orbit_diagram", "orbitdiagram", "bifurcation"), "Write sl.bifurcation_diagram(system, {name: (low, high, number)})."),
+    **dict.fromkeys(("lyapunovspectrum", "lyapunov_spectrum", "lyapunov_exponent"), "Write sl.lyapunov(system, start, periods=...)."),
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, s
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
 from saltus.system.names import why_no_name, why_no_text, why_no_title
-from saltus.system.singular import check_finite, lifted
+from saltus.system.singular import check_finite, check_gaps, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
@@ -30,8 +30,8 @@ _HOW_TO = "Write the equation with + - * / **, comparisons inside sl.piecewise(.
 
 
 def system(
+    states: str | Sequence[str] = "",
     *,
-    states: str | Sequence[str],
     forced_at: str | None = None,
     units: Mapping[str, str] | None = None,
     name: str | None = None,
@@ -217,6 +217,7 @@ def _traced(
         field, guards = find_guards(derivatives)
         field = lifted(field, guards)
         check_finite(field, guards, states)
+        check_gaps(guards)
         return field, guards
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
@@ -270,6 +271,11 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
         return f"{title} ({where}): {error}"
     if isinstance(error, AttributeError) and str(error).startswith("saltus has no "):
         return f"{title} ({where}): {error}"
+    if isinstance(error, NameError) and error.name:
+        known = inspect.signature(function).parameters
+        return f"{title} ({where}): {error.name!r} is no state, no parameter, and not defined outside either. {nearest(error.name, known)}"
+    if isinstance(error, TypeError) and "for ^" in str(error):
+        return f"{title} ({where}): a power is written x**2; ^ is something else in Python."
     return f"{title} ({where}) can't be traced: {type(error).__name__}: {str(error).rstrip('.?! ')}. {_HOW_TO}"
 
 

@@ -34,6 +34,16 @@ def test_too_few_and_too_many():
         sl.simulate(rig, (0, 0), 1, None, 1, 1)
 
 
+def test_the_order_of_scipy_is_answered_by_that_of_saltus():
+    with pytest.raises(sl.SaltusError, match=r"the start comes second, and the time is one number: sl.simulate\(system, start"):
+        sl.simulate(rig, (0, 10), (1e-3, 0))
+
+
+def test_a_picture_that_is_not_there_is_answered_by_one_that_is():
+    with pytest.raises(AttributeError, match="Did you mean 'basins'"):
+        sl.plot.basin  # noqa: B018
+
+
 def test_every_public_verb_is_one():
     from saltus import analysis
 
@@ -108,6 +118,12 @@ def test_short_work_says_nothing_and_slow_work_says_that_it_lives():
     assert told([(t, 0.0) for t in range(0, 701, 10)]) == ["0% done in 300 s", "0% done in 600 s"]
 
 
+def test_the_time_left_does_not_count_what_came_before_the_work():
+    compiled = 100.0
+    assert told([(compiled, 0.0), (compiled + 10, 0.25), (compiled + 20, 0.5)])[-1] == "50% done in 120 s, about 20 s left"
+    assert told([(compiled, 0.3)]) == ["30% done in 100 s"]
+
+
 def test_what_progress_may_be():
     assert reporter(False)[0] is None
     assert reporter(print)[0] is print
@@ -126,6 +142,7 @@ def test_what_progress_may_be():
         lambda: sl.Taylor(tolerance="small"),
         lambda: sl.ODE45(rtol=[1e-3]),
         lambda: sl.ODE45(events=[1]),
+        lambda: sl.system(lambda t, x: -x),
         lambda: sl.system(states=5),
         lambda: sl.system(states=None),
         lambda: sl.stroboscope(rig, (0, 0), 10**19, keep=1),

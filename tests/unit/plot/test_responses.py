@@ -83,6 +83,17 @@ def test_lines_join_neighbours_on_a_branch_only(peak):
     assert max(steps) < 0.3  # [mm]; the branches lie 0.4 mm apart
 
 
+@pytest.mark.parametrize(("low", "high"), [(-180, 180), (-170, 5), (88, 93), (-62, -20)])
+def test_phases_have_ticks_wherever_they_lie(peak, low, high):
+    phases = np.deg2rad(np.linspace(low, high, peak.sizes["response"]))
+    with_phase = peak.drop_dims("output", errors="ignore").assign_coords(output=["x"])
+    with_phase = with_phase.assign(output_phase=(("response", "output"), phases[:, None]), output_units=("output", ["m"]))
+    ax = frequency_response(with_phase, quantity="phase")
+    seen = [tick for tick in ax.get_yticks() if ax.get_ylim()[0] <= tick <= ax.get_ylim()[1]]
+    assert len(seen) >= 3
+    assert (low, high) != (-180, 180) or {-180, -90, 0, 90, 180} <= set(seen)
+
+
 def test_peaks_instead(peak):
     ax = frequency_response(peak, quantity="peak")
     assert np.allclose(all_points(ax).imag.max(), 1e3 * peak["response_peak"].values.max())

@@ -306,7 +306,7 @@ def test_every_key_tells_what_it_is():
                 assert field.get("description"), f"{name}.{key}"
                 assert field.get("examples"), f"{name}.{key}"
         assert table["description"], name
-    for key in ("lyapunov", "frequency_response", "bifurcation_diagram"):
+    for key in ("poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram"):
         forms = schema["properties"][key]["anyOf"]
         assert {"$ref" in forms[0], forms[1].get("type") == "array"} == {True}
 

@@ -56,7 +56,7 @@ def test_not_toml(text, parts):
         (HEAD + "nme = 3", "[study] has no key 'nme'. Did you mean 'name'?"),
         (WHOLE + "sampels = 3", "[simulate] has no key 'sampels'. Did you mean 'samples'?"),
         (HEAD + "[simulat]", "the file has no table 'simulat'. Did you mean 'simulate'?"),
-        (HEAD, "a study asks something: it has a table [simulate], [lyapunov], [frequency_response], [bifurcation_diagram] or [basins]."),
+        (HEAD, "a study asks something: it has a table [simulate], [poincare], [spectrum], [impacts], [energy], [lyapunov], "),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),
         (WHOLE.replace("3", "3.0"), "[simulate] periods = 3.0 must be a whole number. For example: periods = 60"),
@@ -97,7 +97,8 @@ def test_schema_tells_editors_the_keys():
     schema = Study.model_json_schema()
     json.dumps(schema)
     assert set(schema["properties"]) == {
-        "study", "system", "method", "simulate", "compare", "lyapunov", "frequency_response", "bifurcation_diagram", "basins",
+        "study", "system", "method", "simulate", "compare", "poincare", "spectrum", "impacts", "energy", "lyapunov",
+        "frequency_response", "bifurcation_diagram", "basins",
     }  # fmt: skip
     assert schema["$defs"]["Simulate"]["additionalProperties"] is False
     assert schema["$defs"]["SystemTable"]["additionalProperties"] != {}, "values are numbers or text"
