@@ -13,6 +13,7 @@ from saltus.system.expression import ELEMENTARY, And, Bit, Condition, Expr, Not,
 from saltus.system.guards import Guard, bits_in
 from saltus.system.names import why_no_name, why_no_text, why_no_title
 from saltus.system.tables import Table
+from saltus.units import check_declared
 
 if TYPE_CHECKING:
     from saltus.system.system import System
@@ -119,10 +120,12 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         _require(len(args) == _OPERANDS[op] and all(0 <= i < len(nodes) for i in args), f"wrong operands of {op!r}")
         nodes.append(_node(op, tuple(nodes[i] for i in args), payload, names, nodes))
     guards = tuple(
-        Guard(str(name), nodes[gap], state, None if boundary is None else nodes[boundary]) for name, gap, state, boundary in data["guards"]
+        Guard(name, nodes[gap], state, None if boundary is None else nodes[boundary]) for name, gap, state, boundary in data["guards"]
     )
     field = tuple(nodes[i] for i in data["field"])
     _require(len(field) == len(states), "the number of derivatives and of states differ")
+    for guard in guards:
+        _require(why_no_text(guard.name) is None, f"{guard.name!r} is no name of a boundary: {why_no_text(guard.name)}")
     _require(all(guard.state is None or guard.state in states for guard in guards), "a guard names an unknown state")
     for number, guard in enumerate(guards):
         _require(bits_in([guard.gap]) <= set(range(number)), "a gap depends on a later guard")
@@ -134,7 +137,7 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         "source": data["source"],
         "states": states,
         "values": {name: float(data["values"][name]) for name in parameters},
-        "units": {name: str(data["units"][name]) for name in (*states, *parameters)},
+        "units": {name: check_declared(data["units"][name], name) for name in (*states, *parameters)},
         "forced_at": data["forced_at"],
         "field": field,
         "guards": guards,
