@@ -113,8 +113,8 @@ def markdown() -> str:
     blocks = []
     for place, model in tables():
         rows = key_rows(model)
-        named = "" if "name" not in model.model_fields else typing.get_args(model.model_fields["name"].annotation)
-        title = f"{place} name = {toml(named[0])}" if named else place
+        named = model.model_fields["name"].annotation if "name" in model.model_fields else None
+        title = f"{place} name = {toml(typing.get_args(named)[0])}" if typing.get_origin(named) is typing.Literal else place
         summary = (model.__doc__ or "").strip().split(": ", 1)[-1]
         body = [f"| {' | '.join(row)} |" for row in rows]
         blocks.append(

@@ -44,8 +44,13 @@ def shown(value: object, limit: int = 80) -> str:
     return text if len(text) <= limit else f"{text[: limit - 4]}...{text[-1]}"
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def among(value: object, words: Iterable[str]) -> bool:
+    """Whether a value is text, and one of some words. Lists and arrays, for which ``in`` fails or asks each entry, are none of them."""
+    return isinstance(value, str) and value in words
+
+
+def nearest(name: object, known: Iterable[str]) -> str:
     """A sentence that offers the nearest known name, or lists all of them."""
     known = list(known)
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5) if isinstance(name, str) else []
     return f"Did you mean {close[0]!r}?" if close else f"Known: {', '.join(sorted(known))}."

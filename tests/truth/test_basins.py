@@ -220,7 +220,7 @@ def test_axes_the_other_way_round_give_the_same_map(five):
 def test_wells_mirror_each_other():
     """An even number of starts a side: none on the ridge. (x, v) -> (-x, -v) swaps the wells, cell by cell."""
     ds = sl.basins(free, x=(-2, 2, 24), v=(-2, 2, 24), every=1.0, progress=False)
-    assert ds.attractor_type.values.tolist() == ["periodic"] * 2
+    assert ds.attractor_type.values.tolist() == ["equilibrium"] * 2
     np.testing.assert_array_equal(ds.basin.values, 1 - ds.basin.values[::-1, ::-1])
     assert ds.attractor_fraction.values.tolist() == [0.5, 0.5]
     np.testing.assert_array_equal(ds.periods_to_settle.values, ds.periods_to_settle.values[::-1, ::-1])
@@ -232,7 +232,7 @@ def test_wells_mirror_each_other():
 def test_the_ridge_between_the_wells_is_no_third_basin():
     """An odd number of starts a side: the one in the middle stays on the saddle."""
     ds = sl.basins(free, x=(-2, 2, 5), v=(-2, 2, 5), every=1.0, progress=False)
-    assert ds.attractor_type.values.tolist() == ["periodic"] * 2
+    assert ds.attractor_type.values.tolist() == ["equilibrium"] * 2
     assert ds.basin.values[2, 2] == -2
 
 

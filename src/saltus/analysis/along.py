@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest
 from saltus.flow.counts import whole
 
 #: Values along a range, by what users write for the scale.
@@ -48,8 +48,8 @@ def along(name: str, given: Any, number: Callable[[Any], float], what: str, exam
         )
     first, last, count, *rest = given
     scale = rest[0] if rest else "linear"
-    if scale not in SCALES:
-        raise ParameterError(f"the scale of {name} is {scale!r}. {nearest(str(scale), SCALES)}")
+    if not among(scale, SCALES):
+        raise ParameterError(f"the scale of {name} is {scale!r}. {nearest(scale, SCALES)}")
     count = whole(count, f"the number of {what} along {name}", least)
     if count > MOST_VALUES:
         raise ParameterError(f"{count} {what} along {name} are more than {MOST_VALUES:.0e}. Take a coarser grid.")
@@ -59,9 +59,17 @@ def along(name: str, given: Any, number: Callable[[Any], float], what: str, exam
     return np.geomspace(low, high, count) if scale == "log" else np.linspace(low, high, count)
 
 
+def _axes(given: Any) -> int:
+    """Number of axes of lists or an array; -1 for lists of unequal length, and for what can't be made an array."""
+    try:
+        return np.ndim(given)
+    except (TypeError, ValueError):
+        return -1
+
+
 def _listed(name: str, given: Any, number: Callable[[Any], float], what: str, example: str) -> np.ndarray:
     """The values of a list or array, each a number or a text with a unit."""
-    if isinstance(given, str | bytes | dict | set | frozenset) or not hasattr(given, "__len__") or np.ndim(given) != 1:
+    if isinstance(given, str | bytes | dict | set | frozenset) or not hasattr(given, "__len__") or _axes(given) != 1:
         raise ParameterError(
             f"{name} = {given!r} must be a range (first, last, number of {what}), such as {example}, or a list or array of {what}."
         )

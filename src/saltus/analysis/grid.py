@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,8 +11,8 @@ import numpy as np
 
 from saltus.analysis.along import along
 from saltus.analysis.recurrence import LONGEST
-from saltus.analysis.starts import check_system, ensemble, looks_every
-from saltus.errors import ParameterError, nearest
+from saltus.analysis.starts import check_system, ensemble, looks_every, single
+from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
@@ -114,6 +115,8 @@ def grid_of(
     if values is not None:
         if not isinstance(values, Mapping):
             raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
+        for name, value in values.items():
+            single(system, name, value)
         system = system.with_values(**values)
     points = {name: axis(system, name, given) for name, given in axes.items()}
     if len(points) not in (1, 2):
@@ -139,7 +142,7 @@ def axis(system: System, name: str, given: Any) -> np.ndarray:
     if name not in system.values:
         raise ParameterError(f"{system.name} has no parameter {name!r}. {nearest(name, system.values)}")
     example = f'{name}=("{system.parameter_text(name)}", ..., 200) or (..., 200, "log")'
-    values = along(name, given, lambda value: float(system.resolve(name, value)), "values", example)
+    values = along(name, given, lambda value: single(system, name, value), "values", example)
     if not len(values) or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
         raise ParameterError(f"the values of {name} must ascend and be finite, such as {example}.")
     return values
@@ -151,8 +154,8 @@ def _starts(system: System, start: Any, box: Any, seed: int) -> tuple[np.ndarray
         return np.zeros((1, len(system.states))), (SWEEPS[start],), False
     if isinstance(start, str):
         word, _, number = start.partition(" ")
-        if word != "random" or not number.strip().isdigit() or int(number) < 1:
-            raise ParameterError(f"start={start!r} isn't known. {nearest(start, (*SWEEPS, 'random 20'))} Or give states.")
+        if word != "random" or not re.fullmatch("0*[1-9][0-9]{0,11}", number.strip()):
+            raise ParameterError(f"start={shown(start)} isn't known. {nearest(start, (*SWEEPS, 'random 20'))} Or give states.")
         return _random(system, int(number), box, seed), (), True
     if box is not None:
         raise ParameterError('box= is for random starts: start="random 20".')

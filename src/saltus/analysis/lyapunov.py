@@ -15,7 +15,7 @@ from saltus.analysis.messages import warn
 from saltus.analysis.neighbour_exponents import NeighbourExponents
 from saltus.analysis.starts import Ensemble, check_system, ensemble
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest
 from saltus.flow.counts import whole
 from saltus.flow.family import Family
 from saltus.flow.methods import Method, check_method
@@ -147,10 +147,10 @@ def _check_words(method: Any, unit: Any, system: System) -> None:
         raise ParameterError(
             f'method says how exponents are measured: "variational" or "wolf". How to integrate is flow=sl.{method.name}(...).'
         )
-    if method not in METHODS:
-        raise ParameterError(f"there is no method {method!r}. {nearest(str(method), METHODS)}")
-    if unit not in UNITS:
-        raise ParameterError(f"exponents aren't given in {unit!r}. {nearest(str(unit), UNITS)}")
+    if not among(method, METHODS):
+        raise ParameterError(f"there is no method {method!r}. {nearest(method, METHODS)}")
+    if not among(unit, UNITS):
+        raise ParameterError(f"exponents aren't given in {unit!r}. {nearest(unit, UNITS)}")
     if UNITS[unit][0] and system.forced_at is None:
         raise ParameterError(f"{system.name} has no forcing period, so {unit!r} has no meaning. Take unit={unit.replace('period', 's')!r}.")
 

@@ -14,7 +14,7 @@ from saltus.analysis.messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.stretch import Stretch, common, computed, stretch, with_each
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.kernels import status as st
@@ -97,7 +97,7 @@ def poincare(
         )
     if direction not in (-1, 0, 1):
         raise ParameterError(f"direction must be 0, 1 or -1, not {direction!r}.")
-    found = crossed(system, surface, values or {})
+    found = crossed(system, surface, values if isinstance(values, Mapping) else {})
     seen = stretch(found.system, start, values, periods, t_end, t_start, transient)
 
     def dataset(outcome: Outcome) -> xr.Dataset:
@@ -129,15 +129,15 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
         level = leveled.guards[-1].name
         return _last(leveled, system.units[surface[0]], "" if level in values else f"{surface[0]} = {leveled.parameter_text(level)}")
     names = [guard.name for guard in system.guards]
-    if surface in names:
+    if among(surface, names):
         owner = system.guards[names.index(surface)].state
         number = names.index(surface)
         return Crossed(system, number, system.units[owner] if owner else "", equation_of(number, system.guards))
     turns = {f"{name} turns": name for name in system.states}
-    if surface in turns:
+    if among(surface, turns):
         return _last(turning_surface(system, turns[surface]), schema.rate_unit(system.units[turns[surface]]), surface)
     raise ParameterError(
-        f"{system.name} has no guard {surface!r}. {nearest(str(surface), (*names, *turns))} Or give a function, or a level such as "
+        f"{system.name} has no guard {surface!r}. {nearest(surface, (*names, *turns))} Or give a function, or a level such as "
         f'("{system.states[0]}", 0.0).'
     )
 

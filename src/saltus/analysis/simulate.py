@@ -14,7 +14,7 @@ from saltus.analysis import time_errors as measure
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, among
 from saltus.flow import engine
 from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
@@ -97,7 +97,7 @@ def simulate(
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, t_end, t_start)
     plan = _plan(system, group, length, samples, keep)
-    if time_errors not in ("measured", "local"):
+    if not among(time_errors, ("measured", "local")):
         raise ParameterError(f'time_errors must be "measured" or "local", not {time_errors!r}.')
     show, close = reporter(progress)
     outcome = None

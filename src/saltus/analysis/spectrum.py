@@ -12,7 +12,7 @@ import xarray as xr
 
 from saltus.analysis.settled import settled
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest
 from saltus.results import schema, spectrum_dataset
 
 #: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the first).
@@ -73,8 +73,8 @@ def spectrum(
     F. J. Harris, On the use of windows for harmonic analysis with the discrete Fourier transform, Proc. IEEE 66 (1978) 51-83.
     """
     schema.check(run, caller="spectrum", kinds=[schema.TRAJECTORY])
-    if window is not None and window not in WINDOWS:
-        raise ParameterError(f"spectrum: window={window!r}. {nearest(str(window), WINDOWS)}")
+    if window is not None and not among(window, WINDOWS):
+        raise ParameterError(f"spectrum: window={window!r}. {nearest(window, WINDOWS)}")
     names = _states(run, state)
     stretch = _forced_stretch(run, last) if "period" in run.variables else _free_stretch(run, last)
     chosen = [window or ("none" if n else "hann") for n in stretch.response]

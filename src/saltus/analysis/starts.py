@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.along import along
-from saltus.errors import ParameterError, SaltusError, nearest
+from saltus.errors import ParameterError, SaltusError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.system import expression as ex
 from saltus.system.overlaps import check_overlaps
@@ -179,7 +179,17 @@ def _values(system: System, name: str, value: Any) -> Any:
     if not isinstance(value, tuple):
         return system.resolve(name, value)
     example = f'values={{"{name}": ("{system.parameter_text(name)}", ..., 20)}}'
-    return along(name, value, lambda one: float(system.resolve(name, one)), "values", example)
+    return along(name, value, lambda one: single(system, name, one), "values", example)
+
+
+def single(system: System, name: str, value: Any) -> float:
+    """The value of a parameter [SI] at an end of a range, or in a list of them. Raises ParameterError for many in place of one."""
+    number = system.resolve(name, value)
+    if np.ndim(number):
+        raise ParameterError(
+            f"{name} = {shown(value)} must be one number, or a text with a unit, where it is an end of a range or in a list."
+        )
+    return float(number)
 
 
 def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
@@ -206,7 +216,7 @@ def _as_array(start: Any) -> np.ndarray:
     try:
         rows = np.asarray(start)
         return rows if rows.dtype.kind in "fiu" else np.asarray(start, dtype=object)
-    except ValueError:
+    except (TypeError, ValueError):
         raise ParameterError("a start must be a row of numbers, or rows of one length.") from None
 
 

@@ -18,7 +18,7 @@ from saltus.analysis.neighbours import CROWD, Evolutions, Search, crowd_distance
 from saltus.analysis.series import LEAST_POINTS, check_length, columns_of, interval_of, samples_of
 from saltus.analysis.verb import verb
 from saltus.analysis.wandering import UNCLEAR
-from saltus.errors import ParameterError, SaltusWarning, nearest
+from saltus.errors import ParameterError, SaltusWarning, among, nearest
 from saltus.flow.counts import whole
 from saltus.results import exponents_dataset
 
@@ -134,8 +134,8 @@ def wolf(
     Wolf, Swift, Swinney & Vastano, Physica D 16 (1985) 285-317; Fraser & Swinney, Phys. Rev. A 33 (1986) 1134-1140; Kennel, Brown &
     Abarbanel, Phys. Rev. A 45 (1992) 3403-3411.
     """
-    if unit not in UNITS:
-        raise ParameterError(f"the exponent isn't given in {unit!r}. {nearest(str(unit), UNITS)}")
+    if not among(unit, UNITS):
+        raise ParameterError(f"the exponent isn't given in {unit!r}. {nearest(unit, UNITS)}")
     columns = columns_of(series, embed)
     interval = interval_of(sampling_interval, len(columns))
     single = columns.shape[1] == 1 if embed is None else embed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, fields
 from types import ModuleType
 from typing import Any
@@ -34,7 +35,11 @@ def _pace(given: int | None, periods: float) -> tuple[float, float]:
 
 
 def _check_positive(name: str, value: Any) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating) or not 0 < value < math.inf:
+    if (
+        isinstance(value, bool | np.timedelta64)
+        or not isinstance(value, int | float | np.integer | np.floating)
+        or not 0 < value <= sys.float_info.max
+    ):
         raise ParameterError(f"{name} must be a positive number, not {value!r}.")
 
 

@@ -15,6 +15,7 @@ from saltus.codegen.clocks import table_data
 from saltus.codegen.plain_series import series_module
 from saltus.flow import polynomials
 from saltus.flow.family import Family
+from saltus.flow.set_aside import Boundaries
 from saltus.kernels.isolation import ROUNDING
 from saltus.system.system import System
 
@@ -112,6 +113,7 @@ class MotionSeries:
             if not going.any():
                 break
             nodes = replace(nodes, phase=nodes.phase + h).rows(going)
+            side[self._module.NGUARDS :] = -1.0
             state, side, left = state[:, going], np.where(flips, -side, side)[:, going], left[going]
             new = np.zeros(len(left), bool)
         return result
@@ -121,18 +123,20 @@ class MotionSeries:
         module, motion = self._module, nodes.motion
         constants, (clock, room) = self._constants[:, motion], self._clock(nodes)
         work = np.zeros((module.ROWS, len(motion)))
+        beside = Boundaries(module, state, side, constants, clock)
         with np.errstate(all="ignore"):
-            module.jets(state, side, constants, clock, work)
+            aside = beside.jets(work)
             for guard in range(self._own, self._guards):
                 terms = self._gap(work, guard)
                 terms[0] = np.where(np.abs(terms[0]) <= self._noise(work, guard), 0.0, terms[0])
                 side[guard] = np.where(new, np.where(polynomials.leading_signs(terms)[0] < 0.0, -1.0, 1.0), side[guard])
             if self._own < self._guards:
-                module.jets(state, side, constants, clock, work)
+                aside |= beside.jets(work)
             h = module.step_length(work, LOG2_TOLERANCE)
             if module.PROBED:
                 h = self._probed(nodes, side, constants, clock, work, h)
-        return work, np.minimum(h, room)
+            h = beside.shortened(work, np.minimum(h, np.minimum(room, nodes.length)), aside)
+        return work, h
 
     def _clock(self, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
         """Phase, time at phase zero, the phases of all harmonics there, what the clocks hold; and the time to the next break of one."""

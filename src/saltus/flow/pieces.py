@@ -58,7 +58,7 @@ def pieces(family: Family, start: np.ndarray, periods: int, quantities: Sequence
         without = np.setdiff1d(np.arange(len(start)), whole.motion[np.isfinite(whole.terms).all(axis=(0, 1))])
         bad = np.union1d(without, whole.motion[~np.isfinite(whole.terms).all(axis=(0, 1))])
         bad = bad[np.isfinite(outcome.state[bad]).all(axis=1)]
-        if len(bad):  # a law without a series where it begins, such as x**1.5 at x = 0
+        if len(bad):  # a pole, or a law whose series isn't known where it begins
             cubics = _pieces(family.rows(bad), start[bad], periods, watched, len(guards), True)[0]
             kept = whole.rows(~np.isin(whole.motion, bad))
             whole = _joined([[kept, replace(cubics, motion=bad[cubics.motion])]])

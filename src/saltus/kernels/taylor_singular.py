@@ -91,15 +91,18 @@ def set_aside(lanes):
 
 
 @inner
-def away_from_boundaries(lanes, h):
-    """h, shortened: to a share of the way to a boundary whose terms act; where they are set aside, until leaving them out is negligible."""
+def away_from_boundaries(lanes, h, room):
+    """h, shortened: to a share of the way to a boundary whose terms act; where they are set aside, until leaving them out is negligible.
+
+    At most the room, which is no reason to shorten: a share of what is left would never reach the end.
+    """
     for j in range(NSINGULAR):
         aside = load(lanes.side, NGUARDS + j, LANES) > 0.0
         h = select(acts(lanes, j) & (~aside), smaller(REACH * way(lanes, SINGULAR_GUARD[j]), FINER * h), h)
         aside = aside & (load(lanes.run, ACTIVE, LANES) > 0.5)
         if any_lane(aside):
-            h = select(aside, negligible_step(lanes, h, j, aside), h)
-    return h
+            h = select(aside, negligible_step(lanes, smaller(h, room), j, aside), h)
+    return smaller(h, room)
 
 
 @inner

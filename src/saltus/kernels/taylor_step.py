@@ -372,9 +372,8 @@ def step_all(lanes, batch, slow):
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
     if NCLOCKS > 0:
         room = smaller(load(lanes.run, BREAK, LANES) - load(lanes.clock, TAU, LANES), room)
-    h = smaller(step_length(lanes.work, batch.options[LOG2_TOLERANCE]), room)
-    if NSINGULAR > 0:
-        h = away_from_boundaries(lanes, h)
+    h = step_length(lanes.work, batch.options[LOG2_TOLERANCE])
+    h = away_from_boundaries(lanes, h, room) if NSINGULAR > 0 else smaller(h, room)
     if PROBED:
         h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), batch.options[LOG2_TOLERANCE])
     store(lanes.run, STEP, h)

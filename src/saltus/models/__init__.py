@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest
 from saltus.models.aeroelastic import ENERGY as _AEROELASTIC_ENERGY
 from saltus.models.aeroelastic import aeroelastic
 from saltus.models.chain import ENERGY as _CHAIN_ENERGY
@@ -44,7 +44,7 @@ def find(name: str) -> Callable[..., System]:
     ParameterError
         If there is none; the message offers the nearest name.
     """
-    if name not in MODELS:
+    if not among(name, MODELS):
         raise ParameterError(f"no model is called {name!r}. {nearest(name, MODELS)}")
     return MODELS[name]
 

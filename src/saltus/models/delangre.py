@@ -16,7 +16,7 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest
 from saltus.system import System, cos, pi, piecewise, system
 
 _SOURCE = (
@@ -69,8 +69,8 @@ def delangre(case: str = "b", **values: Any) -> System:
     stable orbit of one forcing period that swings 5.440 mm either way and meets the springs 4 times a period. The exponents of every
     orbit add up to -2 zeta omega_n = -1.884955592 /s.
     """
-    if case not in CASES:
-        raise ParameterError(f"the rig has no case {case!r}. {nearest(str(case), CASES)}")
+    if not among(case, CASES):
+        raise ParameterError(f"the rig has no case {case!r}. {nearest(case, CASES)}")
     lower_gap, upper_gap = CASES[case]
     return _rig().with_values(**{"lower_gap": lower_gap, "upper_gap": upper_gap, **values})
 

@@ -139,9 +139,9 @@ def _free_region(boundaries: Sequence[Boundary]) -> int:
 
 
 def _contact_label(boundary: Boundary) -> str:
-    """``upper_gap`` bounds the ``upper contact``."""
+    """``upper_gap`` bounds the ``upper contact``; ``pitch = pitch_gap`` is no such name."""
     stem = boundary.name.removesuffix("_gap")
-    return f"{stem.replace('_', ' ')} contact" if stem != boundary.name and stem else f"beyond {boundary.label}"
+    return f"{stem.replace('_', ' ')} contact" if stem != boundary.name and stem.isidentifier() else f"beyond {boundary.label}"
 
 
 def _by_mode(ds: xr.Dataset) -> Regions:

@@ -67,8 +67,8 @@ def _read(path: Path) -> xr.Dataset:
     except ResultFileError:
         raise
     except RefusedError as refused:
-        if not path.exists():
-            raise ResultFileError(f"there is no file {path} (looked in {path.parent.resolve()}).") from None
+        if not os.path.exists(path):  # asked so, a name that is too long is one that isn't there
+            raise ResultFileError(f"there is no file {path} (looked in {os.path.abspath(path.parent)}).") from None
         raise ResultFileError(f"{path} {refused} Name a .nc file that saltus.save wrote.") from None
     except Exception as error:  # a damaged file makes the readers raise almost anything, struct.error and KeyError among it
         raise ResultFileError(f"{path} is damaged: {type(error).__name__}: {error}. Restore it from a copy or compute it again.") from error

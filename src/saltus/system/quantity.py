@@ -79,7 +79,12 @@ def _arguments(system: System, function: Quantity, title: str) -> tuple[list[Exp
     """Symbols for the arguments of a function, by their names."""
     states = _own_states(system)
     known = {"t": TIME, **{name: parameter(name) for name in system.values}, **{name: state(name) for name in states}}
-    arguments = list(inspect.signature(function).parameters.values())
+    try:
+        arguments = list(inspect.signature(function).parameters.values())
+    except ValueError:  # of a class or function of C
+        raise TraceError(
+            f"{title}: Python doesn't tell what arguments {function!r:.80} takes. Write a function of names, such as x."
+        ) from None
     plain = [a.name for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
     if tuple(plain[1:]) == states:
         known[plain[0]] = TIME  # written as an equation, whatever the time is called there

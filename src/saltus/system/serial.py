@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import SaltusError
+from saltus.errors import SaltusError, among
 from saltus.system.clocks import affine, switch
 from saltus.system.expression import ELEMENTARY, And, Bit, Condition, Expr, Not, Or, Relation, constant, varies, walk
 from saltus.system.guards import Guard, bits_in
@@ -96,7 +96,7 @@ def arguments(data: Mapping[str, Any]) -> dict[str, Any]:
     SaltusError
         If the data isn't a system of this format: every node, name and number is checked, because code is generated from it.
     """
-    if not isinstance(data, Mapping) or data.get("format") != FORMAT:
+    if not isinstance(data, Mapping) or not among(data.get("format"), (FORMAT,)):
         found = data.get("format") if isinstance(data, Mapping) else type(data).__name__
         raise SaltusError(f"this isn't a system written by this version of saltus (format {found!r}, expected {FORMAT!r}). Trace it again.")
     try:

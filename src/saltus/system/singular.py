@@ -80,6 +80,20 @@ def check_finite(field: Sequence[Expr], guards: Sequence[Guard], states: Sequenc
                 )
 
 
+def check_gaps(guards: Sequence[Guard]) -> None:
+    """Raise a TraceError if a gap has a power, root or logarithm of a piece that vanishes: there the gap is zero, and on no side."""
+    boundaries = _Boundaries(guards)
+    for guard in guards:
+        for node in ex.walk(guard.gap):
+            whole = node.op == "pow" and node.args[1].op == "const" and float(node.args[1].payload).is_integer()
+            if node.op in ("pow", "sqrt", "log") and not whole and boundaries.lifted(node) is not node:
+                raise TraceError(
+                    f"the guard {guard.name!r} asks for the sign of a law that has no Taylor series where its own piece begins. Write it "
+                    f"as one piece with all of its conditions: for a contact without tension, d = x - gap and "
+                    f"sl.piecewise((K*d**1.5*(1 + c*v), (d > 0) & (1 + c*v > 0)), otherwise=0)."
+                )
+
+
 def lifted(field: Iterable[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
     """The same field with powers, roots and logarithms of pieces, ``sl.max(d, 0)**1.5``, as pieces of powers.
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import TraceError, nearest
+from saltus.errors import TraceError, among, nearest, shown
 from saltus.system import expression as ex
 from saltus.system.clocks import affine
 from saltus.system.expression import Expr, Operand
@@ -59,7 +59,10 @@ class Table:
 
     def __call__(self, x: Any) -> Any:
         """Values at x, an array of any shape."""
-        x = np.asarray(x, dtype=np.float64)
+        try:
+            x = np.asarray(x, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise TraceError(f"sl.table: it is looked up at {shown(x)}, which is no number. Write sl.table(x, points, values).") from None
         first, last = self.points[0], self.points[-1]
         if self.periodic:
             x = first + np.mod(x - first, last - first)
@@ -146,13 +149,13 @@ def table(
 def _make(points: Any, values: Any, kind: str, outside: str, name: str) -> Table:
     """The curve, checked."""
     for what, word, known in (("kind", kind, KINDS), ("outside", outside, OUTSIDE)):
-        if word not in known:
-            raise TraceError(f"sl.table: {what}={word!r}. {nearest(str(word), known)}")
+        if not among(word, known):
+            raise TraceError(f"sl.table: {what}={word!r}. {nearest(word, known)}")
     if not (isinstance(name, str) and name.isidentifier()):
         raise TraceError(f"sl.table: name={name!r} is no name. Use letters, digits and _.")
     try:
         x, y = (np.array(data, dtype=np.float64) for data in (points, values))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise TraceError("sl.table: points and values must be numbers [SI], as lists or arrays.") from None
     if x.ndim != 1 or x.shape != y.shape or len(x) < 2:
         raise TraceError(f"sl.table: points and values must be lists of one length, at least 2; theirs are {x.shape} and {y.shape}.")

@@ -20,7 +20,7 @@ from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, s
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.guards import find_guards
 from saltus.system.names import why_no_name, why_no_text, why_no_title
-from saltus.system.singular import check_finite, lifted
+from saltus.system.singular import check_finite, check_gaps, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
@@ -90,8 +90,17 @@ def system(
         raise TraceError(f'states must be names, such as states="x v", not {states!r:.80}.')
     names = tuple(states.replace(",", " ").split()) if isinstance(states, str) else tuple(states)
 
+    if units is not None and not isinstance(units, Mapping):
+        raise TraceError(f'units must be a mapping of names to units, such as units={{"x": "m"}}, not {units!r:.80}.')
+    if forced_at is not None and not isinstance(forced_at, str):
+        raise TraceError(f'forced_at must be the name of a parameter, such as forced_at="frequency", not {forced_at!r:.80}.')
+    if name is not None and not isinstance(name, str):
+        raise TraceError(f"the name of a system can't be {name!r:.80}: {why_no_title(name)}.")
+
     def decorate(function: Callable[..., Any]) -> System:
-        title, told = name or function.__name__.strip("<>"), inspect.getdoc(function) or ""
+        if not callable(function):
+            raise TraceError(f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, ...), not {function!r:.80}.")
+        title, told = name or getattr(function, "__name__", "system").strip("<>"), inspect.getdoc(function) or ""
         for what, text, why in (("name", title, why_no_title), ("source", source, why_no_text), ("docstring", told, why_no_text)):
             if why(text) is not None:
                 raise TraceError(f"the {what} of a system can't be {text!r:.80}: {why(text)}.")
@@ -128,7 +137,11 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
     positional: list[inspect.Parameter] = []
     parameters: dict[str, Any] = {}
     together = False
-    for argument in inspect.signature(function).parameters.values():
+    try:
+        signature = inspect.signature(function)
+    except ValueError:  # of a class or function of C
+        raise TraceError(f"{title}: Python doesn't tell what arguments {function!r:.80} takes. Write a function, {wanted}.") from None
+    for argument in signature.parameters.values():
         if argument.kind == argument.VAR_POSITIONAL and len(positional) == 1:
             together = True
         elif argument.kind in (argument.VAR_POSITIONAL, argument.VAR_KEYWORD):
@@ -204,6 +217,7 @@ def _traced(
         field, guards = find_guards(derivatives)
         field = lifted(field, guards)
         check_finite(field, guards, states)
+        check_gaps(guards)
         return field, guards
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error

@@ -59,15 +59,16 @@ def lane_jets(system: System, states, times, values, order=ORDER, period=1.0):
     head = generated(system, order)
     clock, work = np.zeros((CLOCK_ROWS, LANES)), np.zeros((head["ROWS"], LANES))
     constants = np.zeros((max(head["NCONST"], 1), LANES))
-    side = np.ones((max(head["NGUARDS"], 1), LANES))
+    guards = head["NGUARDS"]
+    side = -np.ones((max(guards + head["NSINGULAR"], 1), LANES))  # behind the guards: nothing is set aside
     for lane in range(LANES):
         count = int(times[lane] // period)
         clock[TAU, lane], clock[BASE, lane] = times[lane] - count * period, count * period
         head["constants"](values[lane], constants, lane)
         head["turns"](values[lane], 0.0, period, count, lane, clock)
         gaps = np.zeros(max(head["NGUARDS"], 1))
-        head["gaps"](times[lane], states[:, lane], values[lane], gaps)
-        side[:, lane] = np.where(gaps < 0, -1.0, 1.0)
+        head["gaps"](times[lane], states[:, lane], values[lane], np.zeros(0), gaps)
+        side[:guards, lane] = np.where(gaps < 0, -1.0, 1.0)[:guards]
     with np.errstate(all="ignore"):  # pieces that are undefined on the other side
         head["jets"](np.array(states, float), side, constants, clock, work)
     return head, work
@@ -133,7 +134,7 @@ ONE_STATE = {
     "min and max": lambda m, t, x, a, b: m.min(x * x, 3.0, a + t) - m.max(m.exp(-x), b * x),
     "linear pieces": lambda m, t, x, a, b: m.piecewise((a * (x - 1.5), x > 1.5), (b * (x - 0.7), x < 0.7), otherwise=t) - x,
     "root or logarithm": lambda m, t, x, a, b: m.piecewise(
-        (m.sqrt(m.abs(x - 1.5)), x > 1.5), otherwise=m.log(m.abs(1.5 - x)) + x ** (a - 0.1)
+        (m.sqrt(m.abs(x - 1.5)), x > 1.5), otherwise=(1.5 - x) * m.log(m.abs(1.5 - x)) + x ** (a - 0.1)
     ),
 }  # fmt: skip
 
@@ -164,18 +165,18 @@ def test_jets(name):
 
 
 def test_pieces_that_are_undefined_on_the_other_side_do_not_leak():
-    """sqrt(x - 1.5) and log(1.5 - x), written without abs: each lane reads its own piece; the other one is NaN there."""
+    """sqrt(x - 1.5) and (1.5 - x) log(1.5 - x), written without abs: each lane reads its own piece; the other one is NaN there."""
 
     @sl.system(states="x")
     def torn(t, x, *, edge=1.5):
-        return sl.piecewise((sl.sqrt(x - edge), x > edge), otherwise=sl.log(edge - x) / (edge - x))
+        return sl.piecewise((sl.sqrt(x - edge), x > edge), otherwise=sl.log(edge - x) * (edge - x))
 
     _, work = lane_jets(torn, STATES, TIMES, np.full((LANES, 1), 1.5))
     for lane in range(LANES):
         beyond = STATES[0, lane] > 1.5
 
         def field(t, x, beyond=beyond):
-            return (mp.sqrt(x - 1.5) if beyond else mp.log(1.5 - x) / (1.5 - x),)
+            return (mp.sqrt(x - 1.5) if beyond else mp.log(1.5 - x) * (1.5 - x),)
 
         (exact,) = exact_jets(field, STATES[:, lane], TIMES[lane])
         assert_same(work[: ORDER + 1, lane], exact)

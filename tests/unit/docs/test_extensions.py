@@ -32,6 +32,9 @@ def test_every_key_of_a_study_stands_in_the_tables():
             assert f"| `{name}` |" in text
     assert {"[study]", "[system]", "[simulate]", "[basins]", "[[basins.map]]", "[basins.axes.<name>]"} <= {place for place, _ in tables()}
     assert "anything" not in text, "a type has no words"
+    headings = [line for line in text.splitlines() if line.startswith("#")]
+    assert {'### `[method] name = "Taylor"`', "### `[[lyapunov]]`", "### `[[poincare]]`", "### `[[basins.map]]`"} <= set(headings)
+    assert not any("Annotated" in line for line in headings)
 
 
 def test_every_variable_of_every_result_stands_in_the_dictionary():

@@ -73,6 +73,7 @@ def dataset(names, values):
         (["lower_gap", "upper_gap"], [0.2, 0.8], ["lower contact", "free", "upper contact"]),
         (["first_gap", "second_gap"], [0.4, 1.0], ["free", "first contact", "second contact"]),
         (["stop"], [0.3], ["free", "beyond stop"]),
+        (["a = a_gap"], [0.3], ["free", "beyond a = a gap"]),
         (["stop"], [-0.3], ["beyond stop", "free"]),
         (["stop"], [0.0], ["free", "beyond stop"]),
         (["lower_gap"], [0.0], ["lower contact", "free"]),

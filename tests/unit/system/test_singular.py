@@ -78,6 +78,14 @@ def test_a_force_that_is_infinite_on_its_boundary_is_refused(law):
         traced(law)
 
 
+def test_a_sign_of_a_power_of_a_piece_is_refused_and_the_same_law_as_one_piece_is_not():
+    """Hunt and Crossley's contact without tension: as max(force, 0) its gap is zero wherever there is no contact."""
+    with pytest.raises(TraceError, match=r"asks for the sign of a law .*sl\.piecewise\(\(K\*d\*\*1\.5"):
+        traced(lambda x, v, K, g, n: n * sl.max(K * sl.max(x - g, 0) ** 1.5 * (1 + v), 0))
+    law = traced(lambda x, v, K, g, n: n * sl.piecewise((K * (x - g) ** 1.5 * (1 + v), (x > g) & (1 + v > 0)), otherwise=0))
+    assert len(law.guards) == 2
+
+
 def test_a_power_of_a_piece_is_a_piece_of_powers():
     """The other branch has no power of zero, whose series would be no number."""
     system = traced(lambda x, v, K, g, n: n * K * sl.max(x - g, 0) ** 1.5)

@@ -229,7 +229,7 @@ def of_parameters(t, x, v, *, a=1.0, b=2.0):
         (numpy_call, "return v, -np.floor", "np.floor on a traced value.*sl.mod"),
         (math_call, "return v, -math.cos", "sl.cos"),
         (sympy_call, "return v, -sympy.cos", "sl.cos"),
-        (unknown_name, "return v, -stiffness", "NameError.*stiffness"),
+        (unknown_name, "return v, -stiffness", "'stiffness' is no state, no parameter"),
         (modulo, "return v, x % 1", "sl.mod of x"),
         (chained, "return v, piecewise", "a < x < b"),
         (too_few, "", "returns 1 value, but there are 2 states"),

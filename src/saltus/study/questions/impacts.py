@@ -27,7 +27,7 @@ class Impacts(Followed):
     contact_side: dict[str, Literal[-1, 1]] = Field(
         default_factory=dict,
         description="For guards by name: the sign of the gap in contact. By default the side on which the state of rest doesn't lie.",
-        examples=[{"guard": 1}],
+        examples=[{"upper_gap": 1}],
     )
 
 

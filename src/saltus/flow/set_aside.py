@@ -1,0 +1,117 @@
+"""Series of motions beside a boundary where a law has none, such as ``d**1.5`` where a contact begins: the steps of the compiled flow.
+
+As in kernels/taylor_singular.py, in NumPy and without the flow's care for its last digits: the flow knows the states at contacts already.
+Behind the boundary a series reaches at most as far as the boundary is away. On it the terms without a series are set aside, for a time in
+which they change nothing.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+
+from saltus.flow import polynomials
+from saltus.kernels.isolation import ROUNDING
+
+#: Share of the way to a boundary that a series is used for.
+REACH = 0.9
+#: Change of a state by all that is left out, as a share of it.
+NEGLIGIBLE = 2.0**-46
+#: A gap of so many rounding errors can be told from zero.
+TOLD = 1024.0
+#: Trials for the length over which terms may be left out.
+TRIALS = 60
+
+
+class Boundaries:
+    """The boundaries of a series module on which terms have no series, for motions at given places.
+
+    Parameters
+    ----------
+    module : ModuleType
+        From :func:`saltus.codegen.plain_series.series_module`.
+    state, side, constants, clock : float64[:, n]
+        What its ``jets`` take: one column for each motion.
+    """
+
+    def __init__(self, module: ModuleType, state: np.ndarray, side: np.ndarray, constants: np.ndarray, clock: np.ndarray):
+        self._module, self._state, self._side, self._constants, self._clock = module, state, side, constants, clock
+
+    def jets(self, work: np.ndarray) -> np.ndarray:
+        """Fill in all terms; returns whether some were set aside, bool[n]. What acts near its own boundary is set aside."""
+        module, aside = self._module, np.zeros(work.shape[1], bool)
+        for _ in range(module.SINGULAR + 1):
+            module.jets(self._state, self._side, self._constants, self._clock, work)
+            found = np.zeros_like(aside)
+            for j in range(module.SINGULAR):
+                near = self._near(work, j) & (self._side[module.NGUARDS + j] < 0.0)
+                self._side[module.NGUARDS + j, near] = 1.0
+                found |= near
+            aside |= found
+            if not found.any():
+                break
+        return aside
+
+    def shortened(self, work: np.ndarray, h: np.ndarray, aside: np.ndarray) -> np.ndarray:
+        """Lengths float64[n] no longer than the terms hold for."""
+        module = self._module
+        for j in range(module.SINGULAR):
+            there = self._acts(work, j) & (self._side[module.NGUARDS + j] < 0.0)
+            h = np.where(there, np.minimum(h, REACH * self._way(work, j)), h)
+        if aside.any():
+            h = h.copy()
+            h[aside] = self._negligible(work[:, aside], h[aside], aside)
+        return h
+
+    def _gap(self, work: np.ndarray, j: int) -> np.ndarray:
+        g = self._module.SINGULAR_GUARD[j]
+        return np.maximum(self._side[g] * work[self._module.GAP_ROW + g], 0.0)
+
+    def _way(self, work: np.ndarray, j: int) -> np.ndarray:
+        """Time in which the quadratic part of a gap changes by the gap itself."""
+        first, gap = self._module.GUARD_ROW[self._module.SINGULAR_GUARD[j]], self._gap(work, j)
+        rate, bend = np.abs(work[first + 1]), np.abs(work[first + 2])
+        return np.where(gap > 0.0, 2.0 * gap / (rate + np.sqrt(rate * rate + 4.0 * bend * gap)), 0.0)
+
+    def _forces(self, work: np.ndarray, j: int) -> np.ndarray:
+        """What the terms of a boundary add to the rates of the states."""
+        module = self._module
+        first = module.CALM_ROW + j * module.NMOVED
+        return np.abs(work[1 : module.NMOVED * _terms(module) : _terms(module)] - work[first : first + module.NMOVED])
+
+    def _acts(self, work: np.ndarray, j: int) -> np.ndarray:
+        return np.any(~(self._forces(work, j) <= 0.0), axis=0)
+
+    def _near(self, work: np.ndarray, j: int) -> np.ndarray:
+        """Where terms act and their boundary can't be told from here, or they change nothing until they are there."""
+        module, count = self._module, _terms(self._module)
+        told = self._gap(work, j) > TOLD * ROUNDING * work[module.SCALE_ROW + module.SINGULAR_GUARD[j]]
+        size = np.abs(self._state[: module.NMOVED])
+        weak = np.all(self._way(work, j) * self._forces(work, j) <= 0.25 * NEGLIGIBLE * size, axis=0)
+        finite = np.all(np.isfinite(work[: module.NSTATES * count]), axis=0)
+        return (self._acts(work, j) & weak) | ~(told & finite)
+
+    def _negligible(self, work: np.ndarray, h: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """Lengths over which what was set aside changes no state by more than NEGLIGIBLE; looked at in the middle, where a gap is open."""
+        module, count = self._module, _terms(self._module)
+        series = np.stack([work[i * count : (i + 1) * count] for i in range(module.NSTATES)], axis=1)  # [terms, states, n]
+        rates = polynomials.derivative(series)
+        side, constants, clock = self._side[:, which].copy(), self._constants[:, which], self._clock[:, which].copy()
+        side[module.NGUARDS :] = -1.0
+        phase, there = clock[module.TAU].copy(), np.zeros_like(work)
+        for _ in range(TRIALS):
+            clock[module.TAU] = phase + 0.5 * h
+            module.jets(polynomials.value(series, 0.5 * h), side, constants, clock, there)
+            defect = np.abs(there[1 : module.NSTATES * count : count] - polynomials.value(rates, 0.5 * h))
+            change = (defect * h / (np.abs(series[0]) + h * np.abs(series[1]))).max(axis=0) / NEGLIGIBLE
+            fits = change <= 1.0
+            if fits.all():
+                break
+            h = np.where(fits, h, h * np.clip(np.nan_to_num(0.5 * change**-0.4, nan=0.1), 1e-3, 0.5))
+        return h
+
+
+def _terms(module: ModuleType) -> int:
+    terms: int = module.ORDER + 1
+    return terms
