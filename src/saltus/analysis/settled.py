@@ -69,7 +69,11 @@ def settled(run: xr.Dataset, *, tolerance: float = TOLERANCE, last: int | None =
 def _phases(run: xr.Dataset) -> np.ndarray:
     """t/T at the samples, whole periods exact."""
     if "period" not in run.variables:
-        raise ParameterError("settled needs a forced system: without a period there is nothing to repeat after. Declare forced_at=.")
+        raise ParameterError(
+            "settled needs a forced system: without a forcing period there is nothing to repeat after. For an oscillation by itself ask "
+            'sl.attractors(system, start, every="1 s"), which names equilibria and limit cycles with their periods; for a forced system '
+            "declare forced_at=."
+        )
     phases = np.asarray(run["period"].values, dtype=float)
     nearest = np.round(phases)
     return np.where(np.abs(phases - nearest) < 1e-9 * np.maximum(1.0, nearest), nearest, phases)

@@ -328,3 +328,18 @@ def test_a_result_of_another_kind_in_the_way_is_computed_over(tmp_path):
     run = Run(folder, HEAD + SIMULATE)
     assert "computed again" in run.said[0]
     assert load(save(load(folder / "run.nc"), tmp_path / "copy.nc")).attrs["title"] == "one of each"
+
+
+def test_a_system_without_forcing_is_looked_at_every_so_often(tmp_path):
+    text = """
+    [study]
+    name = "wing"
+    [system]
+    model = "aeroelastic"
+    [bifurcation_diagram]
+    vary.airspeed = { first = "10 m/s", last = "14 m/s", count = 3 }
+    """
+    (question,) = questions_of(parse(text + 'every = "250 ms"'), None, Inputs(tmp_path))
+    assert question.arguments["every"] == 0.25
+    with pytest.raises(StudyError, match="every"):
+        questions_of(parse(text), None, Inputs(tmp_path))

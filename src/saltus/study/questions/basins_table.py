@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,8 +55,18 @@ def _notes(ds: xr.Dataset) -> tuple[str, ...]:
     if attrs["unresolved_cells"]:
         notes.append(f"{attrs['unresolved_cells']} starts met a graze shallower than the local error: either outcome is possible.")
     if attrs["unsettled_cells"]:
-        notes.append(f"{attrs['unsettled_cells']} starts lead to no known attractor within the periods allowed.")
+        notes.append(f"{attrs['unsettled_cells']} starts lead to no known attractor within the periods allowed.{_own_errors(attrs)}")
     return tuple(notes)
+
+
+def _own_errors(attrs: Mapping[str, object]) -> str:
+    """What a method of low accuracy may have to do with starts that don't settle; "" for one of high accuracy."""
+    if str(attrs.get("method", "")) != "ODE45":
+        return ""
+    return (
+        " Errors of ode45 itself can keep a motion from repeating, so that it scatters about an orbit or goes from one to another: that is "
+        "noise, no attractor. Where a smaller rtol, or Taylor, settles these starts, it was so."
+    )
 
 
 def agreement_table(ds: xr.Dataset) -> TextTable:

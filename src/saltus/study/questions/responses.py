@@ -74,6 +74,7 @@ class BifurcationDiagram(Named):
     box: dict[str, Interval] | None = BOX
     follow: bool = Field(False, description="Whether each start goes on, from value to value upwards, where it stood.", examples=[True])
     periods: int = PERIODS
+    every: Quantity | None = Field(None, description="Time between two looks, for a system without forcing.", examples=["1 s"])
     seed: int = SEED
     method: Method | None = METHOD
     values: dict[str, Quantity] = VALUES
@@ -107,6 +108,7 @@ def bifurcation_diagrams(table: BifurcationDiagram, setting: Setting) -> list[Qu
     system = setting.system(table.values, f"{place}.values")
     vary = {name: quantities.grid(system, name, given, f"{place}.vary") for name, given in table.vary.items()}
     arguments = {"vary": vary, **_followed(system, table, place), "sample": table.sample}
+    arguments["every"] = None if table.every is None else quantities.number(table.every, "s", place, "every")
     _check(system, vary, arguments, place)
     return [Responses(table.title, table.stem, system, setting.method(table.method), arguments, place)]
 
@@ -124,7 +126,8 @@ def _check(system: System, axes: dict[str, Any], arguments: dict[str, Any], plac
     from saltus.analysis.grid import grid_of
 
     try:
-        grid_of(system, _arrays(axes), arguments["start"], arguments["box"], None, arguments["seed"], arguments["follow"])
+        start, box, seed, follow = (arguments[name] for name in ("start", "box", "seed", "follow"))
+        grid_of(system, _arrays(axes), start, box, None, seed, follow, arguments.get("every"))
     except SaltusError as error:
         raise StudyError(f"[{place}] {error}") from error
 
