@@ -29,26 +29,26 @@ def prepare(p, c):
     c[6], c[7], c[8] = p[7] * (1.0 - 18.0 / (w * w)), w, p[0]
 
 @kernel
-def drive(t, c, q):
+def drive(t, c, h, q):
     q[0] = c[6] * math.cos(c[7] * t) / c[8]
 
 @kernel
-def field(t, y, c, q, out):
+def field(t, y, c, q, h, out):
     below, above = y[0] - c[0], y[0] - c[1]
     beyond = below if not below > 0.0 else (above if above > 0.0 else 0.0)
     out[0] = y[1]
     out[1] = -c[3] * y[1] - c[4] * y[0] - c[5] * (y[0] * y[0] * y[0]) - c[2] * beyond + q[0]
 
 @kernel
-def gaps(t, y, c, q, out):
+def gaps(t, y, c, q, h, out):
     out[0], out[1] = y[0] - c[0], y[0] - c[1]
 
 @kernel
-def jump(t, y, p, before, after, g):
+def jump(t, y, p, h, before, after, g):
     pass
 
 @kernel
-def gap_rates(t, y, dy, c, q, out):
+def gap_rates(t, y, dy, c, q, h, out):
     out[0], out[1] = dy[0], dy[0]
 """
 # x' = a + b x^2 with boundaries at s_0 and at s_1 + r t; p = a b s_0 s_1 r.
@@ -61,32 +61,45 @@ def prepare(p, c):
         c[i] = p[i]
 
 @kernel
-def drive(t, c, q):
+def drive(t, c, h, q):
     q[0] = c[4] * t
 
 @kernel
-def field(t, y, c, q, out):
+def field(t, y, c, q, h, out):
     out[0] = c[0] + c[1] * (y[0] * y[0])
 
 @kernel
-def gaps(t, y, c, q, out):
+def gaps(t, y, c, q, h, out):
     out[0], out[1] = y[0] - c[2], y[0] - c[3] - q[0]
 
 @kernel
-def jump(t, y, p, before, after, g):
+def jump(t, y, p, h, before, after, g):
     pass
 
 @kernel
-def gap_rates(t, y, dy, c, q, out):
+def gap_rates(t, y, dy, c, q, h, out):
     out[0], out[1] = dy[0], dy[0] - c[4]
+"""
+# Neither has a clock: nothing is decided by time alone.
+NO_CLOCKS = """
+NCLOCKS, CLOCK_KIND, CLOCK_TABLE = 0, (0,), (0,)
+
+@kernel
+def numbers_of_clocks(p, n):
+    pass
+
+"""
+# Compiled for the test, not kept.
+KEPT = """
+from numba import njit as kept
 """
 B4 = {"mass": 3.0, "zeta": 0.03, "fn": 5.0, "alpha": 7e8, "kc": 1.4e4, "j1": 0.0, "j2": 0.4e-3, "force": 4.0, "f": 15.0}
 
 
 def build(head, folder):
-    templates = (resources.files("saltus.kernels") / f"{name}.py" for name in ("dormand_prince", "odezero", "ode45"))
+    templates = (resources.files("saltus.kernels") / f"{name}.py" for name in ("clocks", "dormand_prince", "odezero", "ode45"))
     path = folder / "kernels.py"
-    path.write_text(PREAMBLE + head + "".join(template.read_text() for template in templates))
+    path.write_text(KEPT + PREAMBLE + head + NO_CLOCKS + "".join(template.read_text() for template in templates))
     spec = importlib.util.spec_from_file_location("ode45_draft", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
