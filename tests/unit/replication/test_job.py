@@ -78,7 +78,7 @@ def test_a_damaged_file_is_computed_again(shelf, what):
     job = Job("one", {"value": 1.0}, compute)
     shelf.result(job, {}, lambda _: None)
     file = shelf.files(job)[what]
-    file.write_bytes(file.read_bytes()[:-40])
+    file.write_bytes(file.read_bytes()[: -len(file.read_bytes()) // 3])
     shelf.result(job, {}, lambda _: None)
     assert CALLS == [1.0, 1.0]
 
