@@ -21,7 +21,7 @@ def everything():
     @sl.system(states="x v")
     def everything(t, x, v, *, a=0.3):
         turn, push = rates(sl, t, x, v, a)
-        return turn, push + sl.piecewise((sl.sqrt(x + 2.0) / 10, x > -2), otherwise=sl.log(-2.0 - x))
+        return turn, push + sl.piecewise((sl.sqrt(x + 2.0) / 10, x > -2), otherwise=(x + 2.0) * sl.log(-2.0 - x))
 
     return everything
 
