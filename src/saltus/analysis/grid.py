@@ -77,7 +77,6 @@ class Grid:
     def family(self, method: Method, threads: int | None = None) -> Family:
         """A map for every point of the grid."""
         family = Family(self.system, method, self.rows, self.every, threads)
-        family.begin_tangent()
         return family
 
 

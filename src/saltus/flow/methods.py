@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.codegen.module import in_background, lane_width, ode45_module, taylor_module
+from saltus.codegen.module import lane_width, ode45_module, taylor_module
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.system.system import System
@@ -58,10 +58,6 @@ class Method:
     def kernels(self, system: System) -> ModuleType:
         """The compiled module of this method for a system."""
         raise NotImplementedError
-
-    def begin_kernels(self, system: System) -> None:
-        """Start to compile for a system, or to load what is compiled, while this thread goes on: for what will be needed soon."""
-        in_background(self.kernels, system)
 
     def numbers(self, periods: float) -> np.ndarray:
         """The options as the kernel reads them, for a run of so many periods."""
