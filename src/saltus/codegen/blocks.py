@@ -8,8 +8,8 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-#: Lines of a block. Functions that are not much longer stay whole.
-LENGTH = 1500
+#: Lines of a function that stays whole, and of a block of one that doesn't.
+WHOLE, LENGTH = 1000, 250
 
 _VALUE = re.compile(r"%r\d+\b")
 
@@ -25,7 +25,7 @@ class Line(NamedTuple):
 def in_blocks(name: str, result: str, parameters: str, attributes: str, lines: list[Line], lanes: int) -> str:
     """The text of a function ``result name(parameters)`` with these lines, the last of which returns."""
     head = f"{result} @{name}({parameters}) {attributes} {{\n"
-    if len(lines) <= 1.5 * LENGTH or result != "void":
+    if len(lines) <= WHOLE or result != "void":
         return f"define {head}" + "".join(f"  {line.text}\n" for line in lines) + "}\n"
     blocks = [lines[i : i + LENGTH] for i in range(0, len(lines), LENGTH)]
     slots = _slots(blocks)
