@@ -9,12 +9,12 @@ import json
 import os
 import sys
 
-from saltus.codegen import machine, templates
+from saltus.codegen import building, machine
 
 if __name__ == "__main__":
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what anything prints is no part of the answer
     template, texts, called, target = json.load(sys.stdin)
-    code = templates.bitcode(template) if template else None
+    code = building.bitcode(template) if template else None
     with answer:
         answer.write(machine.object_code(code, texts, frozenset(called), machine.Target(*target)))

@@ -27,7 +27,7 @@ from saltus.interrupt import check_stop
 #: Time between two looks whether the work is to stop [s].
 LOOK = 0.1
 #: Seconds of LLVM's work for a million characters of an equation, and for a template: for people who wait.
-SECONDS_PER_MEGABYTE, SECONDS_OF_TEMPLATE = 1.0, 4.0
+SECONDS_PER_MEGABYTE, SECONDS_OF_TEMPLATE, SECONDS_OF_LOWERING = 1.0, 4.0, 20.0
 #: What takes longer is made by another process; what takes longer than this is announced [s].
 LONG, ANNOUNCED = 0.5, 1.0
 #: Objects that are held in memory.
@@ -106,8 +106,33 @@ def built(order: Order) -> bytes:
 
 def made(order: Order) -> bytes:
     """Compile in this process."""
-    template = templates.bitcode(order.template) if order.template else None
+    template = bitcode(order.template) if order.template else None
     return machine.object_code(template, order.texts, frozenset(order.called))
+
+
+def bitcode(name: str) -> bytes:
+    """The templates' bitcode: what the package brings, or, if the templates were edited since, made of them now.
+
+    Raises
+    ------
+    CacheError
+        If it would have to be made, and can't.
+    """
+    if templates.is_current(name):
+        return templates.bitcode(name)
+    key = templates.source_hash(name)[:32]
+    found = cache.read(key)
+    if found is None:
+        announce(f"the templates, which were edited since {name}.bc.xz was made: once", SECONDS_OF_LOWERING)
+        command = [sys.executable, "-P", "-m", "saltus.codegen.lowering", "--print", name]
+        found = _answer_of(command, b"", f"{name} from the templates")
+        if found is None:
+            raise CacheError(
+                f"saltus/kernels was edited since its bitcode {name}.bc.xz was made. Making it needs Numba: pip install 'saltus[build]', "
+                "then python -m saltus.codegen.lowering."
+            )
+        cache.keep(key, f"{name}, bitcode", found)
+    return found
 
 
 @contextmanager
@@ -133,14 +158,22 @@ def _made_elsewhere(order: Order) -> bytes | None:
     Interrupted
         If the work that this thread does a part of was asked to stop.
     """
-    path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-P", "-m", "saltus.codegen.build_one"]  # -P: not what lies in the working folder
+    if order.template:
+        bitcode(order.template)  # made and kept first, if it must be
+    given = json.dumps([order.template, order.texts, order.called, machine.target()]).encode()
+    return _answer_of(command, given, order.title)
+
+
+def _answer_of(command: list[str], given: bytes, title: str) -> bytes | None:
+    """What a process writes that is given these bytes; None if there is none, or it doesn't succeed."""
+    path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
     try:
-        with tempfile.TemporaryFile() as given:  # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
-            given.write(json.dumps([order.template, order.texts, order.called, machine.target()]).encode())
-            given.seek(0)
+        with tempfile.TemporaryFile() as file:  # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
+            file.write(given)
+            file.seek(0)
             process = subprocess.Popen(
-                command, stdin=given, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path},
+                command, stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path},
                 start_new_session=True,  # Ctrl-C is for this process
             )  # fmt: skip
     except OSError:  # no processes here
@@ -152,7 +185,7 @@ def _made_elsewhere(order: Order) -> bytes | None:
         _end(process)
     if process.returncode < 0:
         raise CacheError(
-            f"the process that compiled {order.title} was ended by signal {-process.returncode}, as when memory runs out. Try again."
+            f"the process that compiled {title} was ended by signal {-process.returncode}, as when memory runs out. Try again."
         )
     return data if process.returncode == 0 and data else None
 

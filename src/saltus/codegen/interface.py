@@ -13,7 +13,7 @@ from types import MappingProxyType
 ARRAY, WHOLE, REAL = "ptr", "i64", "double"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # each stands for itself
 class Interface:
     """What the head of one method supplies.
 
@@ -74,7 +74,10 @@ TAYLOR = Interface(
     flags=("PROBED", "TANGENT"),
     tables=MappingProxyType(
         dict.fromkeys(
-            ("STEP_ROW", "SERIES_ROW", "GUARD_ROW", "GUARD_SERIES", "SNAP_STATE", "SNAP_CONST", "SINGULAR_GUARD", "CLOCK_KIND", "CLOCK_TABLE"),
+            (
+                "STEP_ROW", "SERIES_ROW", "GUARD_ROW", "GUARD_SERIES", "SNAP_STATE", "SNAP_CONST", "SINGULAR_GUARD", "CLOCK_KIND",
+                "CLOCK_TABLE",
+            ),
             WHOLE,
         )
         | {"GUARD_SIGN": REAL}

@@ -6,8 +6,8 @@ generic   the templates' machine code serves all equations and is on disk; only 
 shape     sizes and tables are known to the compiler; one for all equations of one shape
 full      the equation too: one piece of code
 
-A flow begins generic. Once it has worked for `STEADY_AFTER` seconds it is made again by another process, kept on disk, and exchanged between
-two calls; the next process finds it there and begins with it.
+A flow begins generic. Once it has worked for `STEADY_AFTER` seconds another process makes it again; it is kept on disk, and exchanged
+between two calls. The next process finds it there and begins with it.
 """
 
 from __future__ import annotations
@@ -142,7 +142,8 @@ class Kernels:
         texts = [constants_ir(baked if tier == GENERIC else self._constants, self.interface)]
         if tier == FULL:
             texts.append(self._equation_text)
-        return Order(self.template, tuple(texts), (entry,), f"{self.title}, {tier}" if tier == FULL else f"{self.template}, {tier}", self._said(tier))
+        title = f"{self.title if tier == FULL else self.template}, {tier}"
+        return Order(self.template, tuple(texts), (entry,), title, self._said(tier))
 
     def _said(self, tier: str) -> str:
         return "what all equations share, for this processor: once" if tier == GENERIC else ""
@@ -150,8 +151,9 @@ class Kernels:
     def _equation(self) -> Order:
         """The equation alone, with the sizes and tables that generic code reads."""
         rest = {name: value for name, value in self._constants.items() if name not in _BAKED}
-        called = (*(f"saltus_{name}" for name in (*self.interface.functions, *rest)),)
-        return Order("", (constants_ir(rest, self.interface), self._equation_text), called, self.title, f"{self.what}: once for each new equation")
+        called = tuple(f"saltus_{name}" for name in (*self.interface.functions, *rest))
+        texts = (constants_ir(rest, self.interface), self._equation_text)
+        return Order("", texts, called, self.title, f"{self.what}: once for each new equation")
 
     @cached_property
     def _equation_text(self) -> str:
@@ -169,5 +171,4 @@ def layout_of(interface: Interface, constants: dict[str, Constant]) -> dict[str,
 def _open_constants(interface: Interface, constants: dict[str, Constant], layout: dict[str, Any]) -> dict[str, Constant]:
     """Everything that the templates read: sizes, flags, tables, and what the layout works out from them."""
     names = [*interface.sizes, *interface.flags, *interface.tables]
-    derived = templates.manifest()["open"].get(interface.layout, [])
-    return {name: constants[name] for name in names} | {name: layout[name] for name in derived}
+    return {name: constants[name] for name in names} | {name: layout[name] for name in templates.open_names_of(interface)}

@@ -38,7 +38,7 @@ class Value(NamedTuple):
     text: str
 
 
-class Untranslatable(TypeError):
+class UntranslatableError(TypeError):
     """A form of Python that heads aren't written in: a fault of the generator."""
 
 
@@ -99,56 +99,73 @@ class _Body:
     # -- expressions ------------------------------------------------------------------------------------------------------------
     def value(self, node: ast.expr) -> Value:
         """Translate an expression."""
-        match node:
-            case ast.Constant(value=bool(truth)):
+        rule = getattr(self, f"_{type(node).__name__.lower()}", None)
+        if rule is None:
+            raise UntranslatableError(ast.unparse(node))
+        return rule(node)
+
+    def _constant(self, node: ast.Constant) -> Value:
+        match node.value:
+            case bool(truth):
                 return Value(TRUTH, "true" if truth else "false")
-            case ast.Constant(value=int(whole)):
+            case int(whole):
                 return Value(INTEGER, str(whole))
-            case ast.Constant(value=float(number)):
+            case float(number):
                 return Value(NUMBER, literal(number))
-            case ast.Name(id=name) if name in self.names:
-                return self.names[name]
-            case ast.Attribute(value=ast.Name(id="math"), attr="pi"):
-                return Value(NUMBER, literal(math.pi))
-            case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=number)):
-                return self.value(ast.Constant(-number))
-            case ast.UnaryOp(op=ast.USub(), operand=operand):
-                value = self.value(operand)
-                return self.new(value.kind, f"fneg {self.types[value.kind]} {value.text}")
-            case ast.UnaryOp(op=ast.Invert() | ast.Not(), operand=operand):
-                value = self.value(operand)
-                return self.new(value.kind, f"xor {self.types[value.kind]} {value.text}, {self._all_true(value.kind)}")
-            case ast.BinOp():
-                return self._operation(node)
-            case ast.Compare(left=left, ops=[op], comparators=[right]):
-                return self._comparison(self.value(left), op, self.value(right))
-            case ast.BoolOp(op=op, values=values):
-                word = "and" if isinstance(op, ast.And) else "or"
-                total = self.value(values[0])
-                for other in values[1:]:
-                    total = self.new(TRUTH, f"{word} i1 {total.text}, {self.value(other).text}")
-                return total
-            case ast.IfExp(test=test, body=body, orelse=orelse):
-                condition, a, b = self.value(test), self.number(self.value(body)), self.number(self.value(orelse))
-                return self.new(NUMBER, f"select i1 {condition.text}, double {a.text}, double {b.text}")
-            case ast.Subscript(value=ast.Name(id=array), slice=index):
-                return self.new(NUMBER, f"load double, ptr {self._place(array, index, 1)}, align 8")
-            case ast.Call(func=ast.Attribute(value=ast.Name(id="math"), attr=name), args=arguments):
-                return self._call(name, NUMBER, [self.number(self.value(a)) for a in arguments])
-            case ast.Call(func=ast.Name(id=name), args=arguments):
-                return self._function(name, arguments)
-        raise Untranslatable(ast.unparse(node))
+        raise UntranslatableError(ast.unparse(node))
+
+    def _name(self, node: ast.Name) -> Value:
+        if node.id not in self.names:
+            raise UntranslatableError(node.id)
+        return self.names[node.id]
+
+    def _attribute(self, node: ast.Attribute) -> Value:
+        if ast.unparse(node) != "math.pi":
+            raise UntranslatableError(ast.unparse(node))
+        return Value(NUMBER, literal(math.pi))
+
+    def _unaryop(self, node: ast.UnaryOp) -> Value:
+        if isinstance(node.op, ast.USub):
+            if isinstance(node.operand, ast.Constant):
+                return self._constant(ast.Constant(ast.literal_eval(node)))
+            value = self.value(node.operand)
+            return self.new(value.kind, f"fneg {self.types[value.kind]} {value.text}")
+        value = self.value(node.operand)
+        return self.new(value.kind, f"xor {self.types[value.kind]} {value.text}, {self._all_true(value.kind)}")
+
+    def _boolop(self, node: ast.BoolOp) -> Value:
+        word = "and" if isinstance(node.op, ast.And) else "or"
+        total = self.value(node.values[0])
+        for other in node.values[1:]:
+            total = self.new(TRUTH, f"{word} i1 {total.text}, {self.value(other).text}")
+        return total
+
+    def _ifexp(self, node: ast.IfExp) -> Value:
+        condition, a, b = self.value(node.test), self.number(self.value(node.body)), self.number(self.value(node.orelse))
+        return self.new(NUMBER, f"select i1 {condition.text}, double {a.text}, double {b.text}")
+
+    def _subscript(self, node: ast.Subscript) -> Value:
+        assert isinstance(node.value, ast.Name)
+        return self.new(NUMBER, f"load double, ptr {self._place(node.value.id, node.slice, 1)}, align 8")
+
+    def _call(self, node: ast.Call) -> Value:
+        match node.func:
+            case ast.Attribute(value=ast.Name(id="math"), attr=name):
+                return self._library(name, NUMBER, [self.number(self.value(a)) for a in node.args])
+            case ast.Name(id=name):
+                return self._function(name, node.args)
+        raise UntranslatableError(ast.unparse(node))
 
     @staticmethod
     def _all_true(kind: str) -> str:
         return "true" if kind == TRUTH else "splat (i1 true)"
 
-    def _operation(self, node: ast.BinOp) -> Value:
+    def _binop(self, node: ast.BinOp) -> Value:
         if isinstance(node.left, ast.Constant) and isinstance(node.right, ast.Attribute):  # 2.0 / math.pi
-            return Value(NUMBER, literal(node.left.value / math.pi))
+            return Value(NUMBER, literal(ast.literal_eval(node.left) / math.pi))
         a, b, op = self.value(node.left), self.value(node.right), type(node.op)
         if op is ast.Pow:
-            return self._call("pow", NUMBER, [self.number(a), self.number(b)])
+            return self._library("pow", NUMBER, [self.number(a), self.number(b)])
         if a.kind == b.kind and a.kind in (MASK, TRUTH, INTEGER) and op in _BITWISE:
             return self.new(a.kind, f"{_BITWISE[op]} {self.types[a.kind]} {a.text}, {b.text}")
         if a.kind == b.kind == INTEGER:
@@ -156,11 +173,12 @@ class _Body:
         kind, a, b = self._alike(a, b)
         return self.new(kind, f"{_ARITHMETIC[op]} {self.types[kind]} {a.text}, {b.text}")
 
-    def _comparison(self, a: Value, op: ast.cmpop, b: Value) -> Value:
+    def _compare(self, node: ast.Compare) -> Value:
+        a, b, op = self.value(node.left), self.value(node.comparators[0]), type(node.ops[0])
         if a.kind == b.kind == INTEGER:
-            return self.new(TRUTH, f"icmp {_COMPARE_WHOLE[type(op)]} i64 {a.text}, {b.text}")
+            return self.new(TRUTH, f"icmp {_COMPARE_WHOLE[op]} i64 {a.text}, {b.text}")
         kind, a, b = self._alike(a, b)
-        return self.new(MASK if kind == LANE else TRUTH, f"fcmp {_COMPARE[type(op)]} {self.types[kind]} {a.text}, {b.text}")
+        return self.new(MASK if kind == LANE else TRUTH, f"fcmp {_COMPARE[op]} {self.types[kind]} {a.text}, {b.text}")
 
     def _function(self, name: str, arguments: list[ast.expr]) -> Value:
         """A function of kernels/lanes.py, of trigonometry.py, or of Python."""
@@ -173,9 +191,9 @@ class _Body:
             case "float":
                 return self.number(values[0])
             case "round":  # to a whole number, as Python's
-                return self.new(INTEGER, f"fptosi double {self._call('rint', NUMBER, values).text} to i64")
+                return self.new(INTEGER, f"fptosi double {self._library('rint', NUMBER, values).text} to i64")
             case "abs":
-                return self._call("fabs", NUMBER, [self.number(values[0])])
+                return self._library("fabs", NUMBER, [self.number(values[0])])
             case "select":
                 mask, a, b = values[0], self.lane(values[1]), self.lane(values[2])
                 vector = self.types[LANE]
@@ -184,12 +202,12 @@ class _Body:
                 given = ", ".join(f"{self.types[v.kind]} {v.text}" for v in values)
                 return self.new(NUMBER, f"call double @saltus_turned({given})")
             case "fma" | "magnitude" | "root" | "nearest_integer":
-                return self._call(name, LANE, [self.lane(v) for v in values])
+                return self._library(name, LANE, [self.lane(v) for v in values])
         if name.startswith("libm_"):
             return self._lane_by_lane(name.removeprefix("libm_"), [self.lane(v) for v in values])
-        raise Untranslatable(name)
+        raise UntranslatableError(name)
 
-    def _call(self, name: str, kind: str, values: list[Value]) -> Value:
+    def _library(self, name: str, kind: str, values: list[Value]) -> Value:
         type_ = self.types[kind]
         intrinsic = _INTRINSIC.get(name, name if name == "rint" else "")
         full = f"llvm.{intrinsic}.{f'v{self.lanes}f64' if kind == LANE else 'f64'}" if intrinsic else name
@@ -200,7 +218,7 @@ class _Body:
         result, vector = Value(LANE, "poison"), self.types[LANE]
         for i in range(self.lanes):
             ones = [self.new(NUMBER, f"extractelement {vector} {v.text}, i32 {i}") for v in values]
-            one = self._call(name, NUMBER, ones)
+            one = self._library(name, NUMBER, ones)
             result = self.new(LANE, f"insertelement {vector} {result.text}, double {one.text}, i32 {i}")
         return result
 
@@ -208,7 +226,7 @@ class _Body:
     def _place(self, array: str, index: ast.expr, width: int) -> str:
         """Address of an entry, or of a row of lanes."""
         if array not in self._pointers:
-            raise Untranslatable(array)
+            raise UntranslatableError(array)
         match index:
             case ast.Tuple(elts=[row, ast.Name(id="lane")]):
                 start = self.new(ARRAY, f"getelementptr i8, ptr %{array}, i64 {8 * self.lanes * _whole(row, self.names)}")
@@ -220,49 +238,60 @@ class _Body:
     def run(self, statements: list[ast.stmt]) -> None:
         """Translate statements."""
         for statement in statements:
-            self._statement(statement)
+            match statement:
+                case ast.Pass() | ast.Expr(value=ast.Constant()):
+                    pass
+                case ast.Assign(targets=[target], value=value):
+                    self._assign(target, value)
+                case ast.AugAssign(target=ast.Subscript(value=ast.Name(id=array), slice=index), op=ast.Add(), value=value):
+                    self._add_to(self._place(array, index, 1), value)
+                case ast.Expr(value=ast.Call(func=ast.Name(id="store"), args=[ast.Name(id=array), row, value])):
+                    found = self.lane(self.value(value))
+                    self.do(f"store {self.types[LANE]} {found.text}, ptr {self._place(array, row, self.lanes)}, align 8")
+                case ast.If(test=test, body=body, orelse=[]):
+                    self._if(test, body)
+                case ast.Return(value=value):
+                    self._leave(value)
+                case _:
+                    raise UntranslatableError(ast.unparse(statement))
 
-    def _statement(self, statement: ast.stmt) -> None:
-        match statement:
-            case ast.Pass() | ast.Expr(value=ast.Constant()):
-                pass
-            case ast.Assign(targets=[ast.Name(id=name)], value=value):
+    def _assign(self, target: ast.expr, value: ast.expr) -> None:
+        match target, value:
+            case ast.Name(id=name), _:
                 self.names[name] = self.value(value)
-            case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Tuple(elts=values)):
-                found = [self.value(value) for value in values]
-                self.names |= {name.id: value for name, value in zip(names, found, strict=True)}  # type: ignore[attr-defined]
-            case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Call(func=ast.Name(id=function), args=arguments)):
-                self._call_for_two([name.id for name in names], function, [self.value(a) for a in arguments])  # type: ignore[attr-defined]
-            case ast.Assign(targets=[ast.Subscript(value=ast.Name(id=array), slice=index)], value=value):
-                found = self.number(self.value(value))
-                self.do(f"store double {found.text}, ptr {self._place(array, index, 1)}, align 8")
-            case ast.AugAssign(target=ast.Subscript(value=ast.Name(id=array), slice=index), op=ast.Add(), value=value):
-                place = self._place(array, index, 1)
-                before, more = self.new(NUMBER, f"load double, ptr {place}, align 8"), self.number(self.value(value))
-                total = self.new(NUMBER, f"fadd double {before.text}, {more.text}")
-                self.do(f"store double {total.text}, ptr {place}, align 8")
-            case ast.Expr(value=ast.Call(func=ast.Name(id="store"), args=[ast.Name(id=array), row, value])):
-                found = self.lane(self.value(value))
-                self.do(f"store {self.types[LANE]} {found.text}, ptr {self._place(array, row, self.lanes)}, align 8")
-            case ast.If(test=test, body=[ast.Return(value=value)], orelse=[]):
+            case ast.Tuple(elts=names), ast.Tuple(elts=values):
+                found = [self.value(one) for one in values]
+                self.names |= {ast.unparse(name): one for name, one in zip(names, found, strict=True)}
+            case ast.Tuple(elts=names), ast.Call(func=ast.Name(id=function), args=arguments):
+                self._call_for_two([ast.unparse(name) for name in names], function, [self.value(a) for a in arguments])
+            case ast.Subscript(value=ast.Name(id=array), slice=index), _:
+                number = self.number(self.value(value))
+                self.do(f"store double {number.text}, ptr {self._place(array, index, 1)}, align 8")
+            case _:
+                raise UntranslatableError(ast.unparse(target))
+
+    def _add_to(self, place: str, value: ast.expr) -> None:
+        before, more = self.new(NUMBER, f"load double, ptr {place}, align 8"), self.number(self.value(value))
+        total = self.new(NUMBER, f"fadd double {before.text}, {more.text}")
+        self.do(f"store double {total.text}, ptr {place}, align 8")
+
+    def _if(self, test: ast.expr, body: list[ast.stmt]) -> None:
+        match test, body:
+            case ast.Call(func=ast.Name(id="any_lane"), args=[mask]), _:
+                self._where_any(self.value(mask), body)
+            case _, [ast.Return(value=value)]:
                 condition, label = self.value(test), self._label()
                 self.do(f"br i1 {condition.text}, label %leave{label}, label %go{label}")
                 self.do(f"leave{label}:")
                 self._leave(value)
                 self.do(f"go{label}:")
-            case ast.If(test=ast.Call(func=ast.Name(id="any_lane"), args=[mask]), body=body, orelse=[]):
-                self._where_any(self.value(mask), body)
-            case ast.If(test=test, body=body, orelse=[]):
+            case _:
                 condition, before = self.value(test), dict(self.names)
                 self.run(body)
                 for name, old in before.items():
                     if (new := self.names[name]) != old:
                         a, b = self.number(new), self.number(old)
                         self.names[name] = self.new(NUMBER, f"select i1 {condition.text}, double {a.text}, double {b.text}")
-            case ast.Return(value=value):
-                self._leave(value)
-            case _:
-                raise Untranslatable(ast.unparse(statement))
 
     def _leave(self, value: ast.expr | None) -> None:
         match value:
@@ -316,27 +345,28 @@ def _whole(node: ast.expr, names: Mapping[str, Value]) -> int:
             return int(names[name].text)
         case ast.BinOp(left=left, op=ast.Add(), right=right):
             return _whole(left, names) + _whole(right, names)
-    raise Untranslatable(ast.unparse(node))
+    raise UntranslatableError(ast.unparse(node))
 
 
-def _function(
-    tree: ast.FunctionDef, arguments: tuple[str, ...], result: str, lanes: int, constants: Mapping[str, Value], attributes: str, declared: set[str]
-) -> str:
+class _Signature(NamedTuple):
+    """What the arguments of a function are, what it returns, and its attributes."""
+
+    arguments: tuple[str, ...]
+    result: str
+    attributes: str
+
+
+def _function(tree: ast.FunctionDef, signature: _Signature, lanes: int, constants: Mapping[str, Value], declared: set[str]) -> str:
     """One function as IR text, in blocks if it is long."""
-    names = [argument.arg for argument in tree.args.args]
     kinds = {WHOLE: INTEGER, REAL: NUMBER}
-    given = {
-        name: Value(kinds.get(type_, LANE), f"%{name}") for name, type_ in zip(names, arguments, strict=True) if type_ != ARRAY
-    }  # fmt: skip
-    pointers = [name for name, type_ in zip(names, arguments, strict=True) if type_ == ARRAY]
-    body = _Body(lanes, pointers, {**constants, **given}, declared)
+    arguments = list(zip((argument.arg for argument in tree.args.args), signature.arguments, strict=True))
+    given = {name: Value(kinds.get(type_, LANE), f"%{name}") for name, type_ in arguments if type_ != ARRAY}
+    body = _Body(lanes, [name for name, type_ in arguments if type_ == ARRAY], {**constants, **given}, declared)
     body.run(tree.body)
-    if result == "void":
+    if signature.result == "void":
         body.do("ret void")
-    elif not isinstance(tree.body[-1], ast.Return):
-        raise Untranslatable(tree.name)
-    text = ", ".join(f"{type_} %{name}" for name, type_ in zip(names, arguments, strict=True))
-    return in_blocks(f"saltus_{tree.name}", result, text, attributes, body.lines, lanes)
+    parameters = ", ".join(f"{type_} %{name}" for name, type_ in arguments)
+    return in_blocks(f"saltus_{tree.name}", signature.result, parameters, signature.attributes, body.lines, lanes)
 
 
 @cache
@@ -346,13 +376,12 @@ def _trigonometry(lanes: int) -> tuple[str, frozenset[str]]:
     numbers = _numbers_of(tree)
     vector, declared = f"<{lanes} x double>", set[str]()
     pair, doubles = f"{{ {vector}, {vector} }}", "{ double, double }"
-    kinds = {
-        "sincos": ((vector,), pair), "two_product": ((REAL, REAL), doubles), "turned": ((REAL, REAL, WHOLE), REAL),
-    }  # fmt: skip
+    kinds = {"sincos": ((vector,), pair), "two_product": ((REAL, REAL), doubles), "turned": ((REAL, REAL, WHOLE), REAL)}
     texts = [
-        _function(node, *kinds[node.name], lanes, numbers, "alwaysinline nounwind", declared)
-        for node in tree.body if isinstance(node, ast.FunctionDef) and node.name in kinds
-    ]  # fmt: skip
+        _function(node, _Signature(*kinds[node.name], "alwaysinline nounwind"), lanes, numbers, declared)
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef) and node.name in kinds
+    ]
     return "\n".join(texts), frozenset(declared)
 
 
@@ -394,7 +423,7 @@ def equation_ir(functions: str, constants: Mapping[str, int | float | bool | tup
         assert isinstance(node, ast.FunctionDef)
         result = "i64" if node.name in interface.truths else "void"
         attributes = "nounwind alignstack(64)" if node.name in ("jets", "rates") else "nounwind"
-        texts.append(_function(node, interface.functions[node.name], result, lanes, known, attributes, needed))
+        texts.append(_function(node, _Signature(interface.functions[node.name], result, attributes), lanes, known, needed))
     return "\n".join([shared, *texts, *sorted(needed)]) + "\n"
 
 

@@ -28,7 +28,7 @@ class Target(NamedTuple):
 
 @cache
 def target() -> Target:
-    """This machine; ``$SALTUS_PROCESSOR``, such as ``x86-64-v3``, names an older processor of its family instead."""
+    """The machine at hand; ``$SALTUS_PROCESSOR``, such as ``x86-64-v3``, names an older processor of its family instead."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     triple = llvm.get_process_triple()

@@ -6,6 +6,7 @@ import os
 from functools import lru_cache
 from importlib import resources
 from types import ModuleType
+from typing import Any, Protocol
 
 from saltus.codegen import machine, templates
 from saltus.codegen.head import Head
@@ -26,6 +27,20 @@ from saltus.kernels.trigonometry import sincos, turned
 """
 
 
+class Flow(Protocol):
+    """What the engine needs of a compiled flow."""
+
+    #: Columns of `carry`; records that one step may write at most.
+    CARRY: int
+    STEP_RECORDS: int
+
+    def workspace(self) -> tuple:
+        """The memory that one call works in; one set for each thread."""
+
+    def propagate(self, *values: Any) -> int:
+        """Move the trajectories of a batch (kernels/batch.py)."""
+
+
 def jit_disabled() -> bool:
     """Whether ``SALTUS_DISABLE_JIT=1`` asks for plain Python: slow, for debuggers and for the coverage of the kernels."""
     return os.environ.get("SALTUS_DISABLE_JIT", "0") not in ("", "0")
@@ -40,20 +55,20 @@ def lane_width() -> int:
 
 
 @lru_cache(maxsize=64)
-def taylor_module(system: System, order: int, lanes: int) -> Kernels | ModuleType:
+def taylor_module(system: System, order: int, lanes: int) -> Flow:
     """The compiled Taylor flow of a system. Parameters are arguments: new values never recompile."""
     title = f"{system.name}, Taylor order {order}, {lanes} lanes"
     return _flow(TAYLOR, f"taylor_{lanes}", taylor_head(system, order, lanes), title, f"{_described(system)} for Taylor")
 
 
 @lru_cache(maxsize=64)
-def ode45_module(system: System) -> Kernels | ModuleType:
+def ode45_module(system: System) -> Flow:
     """The compiled ode45 of a system."""
     return _flow(ODE45, "ode45", ode45_head(system), f"{system.name}, ode45", f"{_described(system)} for ODE45")
 
 
 @lru_cache(maxsize=1)
-def capture_module() -> Kernels | ModuleType:
+def capture_module() -> Any:
     """The compiled test of capture, the same for all systems."""
     return _flow(CAPTURE, "capture", Head({}, ""), "capture", "the test of capture")
 
@@ -65,7 +80,7 @@ def _described(system: System) -> str:
     return f"{system.name} with a surface" if len(acting_guards(system)) < len(system.guards) else system.name
 
 
-def _flow(interface: Interface, template: str, head: Head, title: str, what: str) -> Kernels | ModuleType:
+def _flow(interface: Interface, template: str, head: Head, title: str, what: str) -> Any:
     return _interpreted(interface, head) if jit_disabled() else Kernels(interface, template, head, title, what)
 
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import io
 import json
 import lzma
-import tokenize
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -23,42 +21,53 @@ BITCODE: dict[str, tuple[Interface, int]] = {
 }  # fmt: skip
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")
-#: What makes bitcode of them, in codegen/.
-_MAKERS = ("interface", "lowering/lane_types", "lowering/open_names", "lowering/frontend", "lowering/bitcode")
+#: Rises when codegen/lowering makes other bitcode of the same templates.
+LOWERING = 1
 
 
 @cache
 def text(name: str) -> str:
     """A template, or a kernel that templates import."""
-    return resources.files("saltus.kernels").joinpath(f"{name}.py").read_text(encoding="utf-8").replace("from __future__ import annotations\n", "\n")
+    source = resources.files("saltus.kernels").joinpath(f"{name}.py").read_text(encoding="utf-8")
+    return source.replace("from __future__ import annotations\n", "\n")
+
+
+def _texts(name: str) -> list[str]:
+    """The texts that a bitcode is made of."""
+    interface, _ = BITCODE[name]
+    return [text(one) for one in (*filter(None, [interface.layout]), *interface.templates, *_SHARED)]
+
+
+def _hash(name: str, texts: list[str]) -> str:
+    interface, lanes = BITCODE[name]
+    return hashlib.sha256("\0".join([*texts, repr(interface), str(lanes), str(LOWERING)]).encode()).hexdigest()
 
 
 @cache
 def source_hash(name: str) -> str:
     """Hash of all that a bitcode is made of, comments and docstrings left out: what says whether it is still what the templates give."""
-    interface, lanes = BITCODE[name]
-    names = [*filter(None, [interface.layout]), *interface.templates, *_SHARED]
-    makers = [resources.files("saltus.codegen").joinpath(f"{maker}.py").read_text(encoding="utf-8") for maker in _MAKERS]
-    parts = [*(_code_of(text(one)) for one in names), *map(_code_of, makers), str(lanes)]
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+    return _hash(name, [_code_of(one) for one in _texts(name)])
+
+
+@cache
+def text_hash(name: str) -> str:
+    """The same with every character: quick, and what isn't changed at all is current."""
+    return _hash(name, _texts(name))
+
+
+class _WithoutDocstrings(ast.NodeTransformer):
+    def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
+        return None if isinstance(node.value, ast.Constant) else node
 
 
 def _code_of(source: str) -> str:
     """A Python text without comments, docstrings and its own layout."""
-    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
-    kept, before = [], tokenize.NEWLINE
-    for kind, word, *_ in tokens:
-        docstring = kind == tokenize.STRING and before in (tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.NL)
-        if kind not in (tokenize.COMMENT, tokenize.NL, tokenize.ENCODING) and not docstring:
-            kept.append(word if kind not in (tokenize.INDENT, tokenize.DEDENT) else str(kind))
-        if kind not in (tokenize.COMMENT, tokenize.NL):
-            before = kind
-    return " ".join(kept)
+    return ast.unparse(_WithoutDocstrings().visit(ast.parse(source)))
 
 
 @cache
 def manifest() -> dict[str, Any]:
-    """What is known of the bitcode: hashes of its sources and of itself, versions that made it, names of the layouts that depend on sizes."""
+    """What is known of the bitcode: hashes of its sources and of itself, and what made it."""
     return json.loads(resources.files("saltus.kernels").joinpath("bitcode/manifest.json").read_text(encoding="utf-8"))
 
 
@@ -77,14 +86,30 @@ def bitcode(name: str) -> bytes:
     return lzma.decompress(data)
 
 
-def identity(name: str) -> str:
-    """What a bitcode is called in the names of what is made of it."""
-    return str(manifest()["bitcode"][name]["sha256"])
-
-
+@cache
 def is_current(name: str) -> bool:
     """Whether a bitcode is what the templates of this installation give."""
-    return manifest()["bitcode"][name]["sources"] == source_hash(name)
+    known = manifest()["bitcode"][name]
+    return known["texts"] == text_hash(name) or known["sources"] == source_hash(name)
+
+
+def identity(name: str) -> str:
+    """What a bitcode is called in the names of what is made of it."""
+    return str(manifest()["bitcode"][name]["sha256"]) if is_current(name) else source_hash(name)
+
+
+@cache
+def open_names_of(interface: Interface) -> tuple[str, ...]:
+    """The names of a layout whose values depend on what is open, in the order in which they are computed."""
+    if not interface.layout:
+        return ()
+    unknown, found = {*interface.sizes, *interface.flags, *interface.tables}, list[str]()
+    for node in ast.parse(text(interface.layout)).body:
+        if isinstance(node, ast.Assign) and unknown & {name.id for name in ast.walk(node.value) if isinstance(name, ast.Name)}:
+            names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+            found += names
+            unknown |= set(names)
+    return tuple(found)
 
 
 @cache

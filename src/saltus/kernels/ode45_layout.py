@@ -27,6 +27,7 @@ CARRY = ERRORS + NSTATES
 #: Records that one step may write at most.
 STEP_RECORDS = NGUARDS
 
+
 def workspace():
     """The memory that one call of `propagate` works in; one for each thread."""
     return (np.zeros(WORK),)

@@ -25,19 +25,22 @@ def made(name: str) -> tuple[bytes, dict]:
     interface, lanes = templates.BITCODE[name]
     module, entry, inlined = frontend.module_of(interface, lanes)
     data = lzma.compress(bitcode(module, entry, f"saltus_{interface.entry}", inlined), preset=9 | lzma.PRESET_EXTREME)
-    return data, {"sources": templates.source_hash(name), "sha256": hashlib.sha256(data).hexdigest()}
+    return data, {"sources": templates.source_hash(name), "texts": templates.text_hash(name), "sha256": hashlib.sha256(data).hexdigest()}
 
 
 def main() -> None:
     """Make what isn't current, or all of it."""
     from saltus.codegen import templates
-    from saltus.codegen.lowering import frontend
 
     parser = argparse.ArgumentParser(prog="python -m saltus.codegen.lowering", description=__doc__)
     parser.add_argument("names", nargs="*", help=f"of {', '.join(templates.BITCODE)}; default: those that aren't current")
     parser.add_argument("--all", action="store_true", help="all of them")
     parser.add_argument("--folder", type=Path, default=FOLDER, help="where they are written (default: into the package)")
+    parser.add_argument("--print", metavar="NAME", help="write one bitcode to standard output instead, not compressed")
     given = parser.parse_args()
+    if given.print:
+        sys.stdout.buffer.write(lzma.decompress(made(given.print)[0]))
+        return
     path = given.folder / "manifest.json"
     known = json.loads(path.read_text()) if path.exists() else {"bitcode": {}}
     stale = [name for name in templates.BITCODE if known["bitcode"].get(name, {}).get("sources") != templates.source_hash(name)]
@@ -52,7 +55,6 @@ def main() -> None:
     import numba
 
     known["made_with"] = {"numba": numba.__version__, "llvmlite": llvmlite.__version__}
-    known["open"] = {i.layout: frontend.open_names_of(i) for i, _ in templates.BITCODE.values() if i.layout}
     path.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n")
 
 

@@ -25,7 +25,7 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
     inlined : set of str
         Functions that are to be inlined, by the names that they have in the templates.
     """
-    names = _names(module, entry, symbol)
+    names = _names(module, symbol)
     text = str(module).replace("alwaysinline", "nounwind")  # Numba hands it down from callers to callees; kernels raise nothing
     text = re.sub(r'@("[^"]+"|[\w.$]+)', lambda name: f"@{names.get(name[1].strip(chr(34)), name[1])}", text)
     clean = llvm.parse_assembly(text + _caller(module.get_function(entry), symbol, names[entry]))
@@ -44,7 +44,7 @@ def _own_name(name: str) -> str:
     return name.split(".")[1] if "." in name else name
 
 
-def _names(module: llvm.ModuleRef, entry: str, symbol: str) -> dict[str, str]:
+def _names(module: llvm.ModuleRef, symbol: str) -> dict[str, str]:
     """What the functions of a module are called from now on: their name in the templates, and a number."""
     names = {}
     for i, function in enumerate(module.functions):

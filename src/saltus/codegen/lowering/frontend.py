@@ -6,7 +6,6 @@ import ast
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import resources
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -17,16 +16,12 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from saltus.codegen.interface import Interface
 from saltus.codegen.lowering import lane_types, open_names  # noqa: F401  (lane_types: for what it registers)
+from saltus.codegen.templates import open_names_of, text
 from saltus.kernels import batch, clocks_layout, lanes, parts, status
 
 _OPTIONS = dict(nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 #: Modules that hold no kernels of their own: numbers, and operations that lane_types.py lowers.
 _PLAIN = {module.__name__.rsplit(".", 1)[-1]: vars(module) for module in (batch, clocks_layout, lanes, parts, status)}
-
-
-def template(name: str) -> str:
-    """The text of a template."""
-    return resources.files("saltus.kernels").joinpath(f"{name}.py").read_text()
 
 
 class _Opener(ast.NodeTransformer):
@@ -84,11 +79,13 @@ class _Space:
 
     def fill(self, names: dict[str, Any], module: str, opener: _Opener) -> dict[str, Any]:
         """Run what is to be compiled of a module in these names."""
-        tree = ast.parse(template(module))
+        tree = ast.parse(text(module))
         for node in tree.body:
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("saltus.kernels.") and node.module != "saltus.kernels.marks":
-                source = self.imported(str(node.module).rsplit(".", 1)[-1])
-                names.update({alias.asname or alias.name: source[alias.name] for alias in node.names})
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith("saltus.kernels."):
+                home = str(node.module).removeprefix("saltus.kernels.")
+                if home != "marks":
+                    source = self.imported(home)
+                    names.update({alias.asname or alias.name: source[alias.name] for alias in node.names})
         kept = ast.Module(list(_kernels_only(tree)), [])
         self.inlined |= {node.name for node in kept.body if isinstance(node, ast.FunctionDef) and _mark(node) == "inner"}
         exec(compile(ast.fix_missing_locations(opener.visit(kept)), f"{module}.py", "exec"), names)
@@ -134,19 +131,8 @@ def _layout(interface: Interface, lanes: int) -> tuple[dict[str, Any], list[str]
     space: dict[str, Any] = dict.fromkeys(interface.sizes, 20) | dict.fromkeys(interface.flags, False) | {"LANES": lanes}
     if not interface.layout:
         return space, []
-    exec(compile(template(interface.layout), f"{interface.layout}.py", "exec"), space)
+    exec(compile(text(interface.layout), f"{interface.layout}.py", "exec"), space)
     return space, open_names_of(interface)
-
-
-def open_names_of(interface: Interface) -> list[str]:
-    """The names of a layout whose values depend on what is open, in the order in which they are computed."""
-    unknown, found = {*interface.sizes, *interface.flags, *interface.tables}, []
-    for node in ast.parse(template(interface.layout)).body:
-        if isinstance(node, ast.Assign) and unknown & {name.id for name in ast.walk(node.value) if isinstance(name, ast.Name)}:
-            names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
-            found += names
-            unknown |= set(names)
-    return found
 
 
 @contextmanager

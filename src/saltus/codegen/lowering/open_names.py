@@ -33,7 +33,7 @@ def size(name: str, kind: type = int) -> Any:
         return builder.icmp_signed("!=", value, ir.Constant(_WHOLE, 0)) if kind is bool else value
 
     @intrinsic
-    def one(typingctx):  # noqa: ARG001  (Numba's interface)
+    def one(typingctx):
         return (types.boolean if kind is bool else numba_type)(), generate
 
     return one
@@ -48,7 +48,7 @@ def table(name: str, kind: str) -> Any:
         return builder.load(builder.gep(place, [ir.Constant(_WHOLE, 0), arguments[0]]))
 
     @intrinsic
-    def at(typingctx, index):  # noqa: ARG001
+    def at(typingctx, index):
         return numba_type(types.int64), generate
 
     return at
