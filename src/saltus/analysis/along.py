@@ -82,4 +82,10 @@ def _listed(name: str, given: Any, number: Callable[[Any], float], what: str, ex
         for value in (values.min(), values.max()) if len(values) else ():
             number(float(value))  # what the name allows is checked there
         return values
-    return np.array([number(value) for value in list(given)], float)
+    items = list(given)
+    if len(items) in (3, 4) and all(isinstance(one, str) for one in items[:2]) and not isinstance(items[2], str):
+        raise ParameterError(
+            f"{name} = {items!r} is a list, which holds the {what} themselves, but {items[2]!r} has no unit. A range is a tuple: "
+            f"{name}={tuple(items)!r}."
+        )
+    return np.array([number(value) for value in items], float)

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, UnitError
+from saltus.system.dimensions import units_of
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
 from saltus.system.quantity import quantity
 from saltus.system.system import System
-from saltus.units import check_declared
+from saltus.units import check_declared, dimension
 
 
 @dataclass(frozen=True)
@@ -67,5 +68,15 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
         formula, guards = quantity(extended, function, f"the output {name!r}")
         extended = replace(extended, guards=guards)
         formulas.append(formula)
-        units.append(check_declared(unit, name) if unit else "")
+        units.append(_unit(system, formula, name, check_declared(unit, name) if unit else ""))
     return Outputs((*system.states, *(given or {})), tuple(units), tuple(formulas), extended.guards)
+
+
+def _unit(system: System, formula: Expr, name: str, declared: str) -> str:
+    """The unit of an output: that which was declared, or what its formula comes to."""
+    (found,) = units_of(system.states, system.units, system.field, [formula])
+    if declared and found and dimension(found) != dimension(declared):
+        raise UnitError(
+            f"the output {name!r} is said to be in {declared}, but its formula is in {found}. Correct one, or leave the unit out."
+        )
+    return declared or found

@@ -12,6 +12,7 @@ import numpy as np
 from saltus.analysis.along import along
 from saltus.errors import ParameterError, SaltusError, nearest, shown
 from saltus.flow.counts import whole
+from saltus.flow.family import NO_PERIOD
 from saltus.system import expression as ex
 from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System
@@ -116,10 +117,7 @@ def looks_every(system: System, every: Any) -> float | None:
             raise ParameterError(f"{system.name} is forced: it is looked at once a forcing period. Leave every= out.")
         return None
     if every is None:
-        raise ParameterError(
-            f'{system.name} has no forcing period. Give every=, the time between two looks at the motion, such as every="0.1 s": '
-            f"about a turn of it. Answers don't depend on it."
-        )
+        raise ParameterError(f"{system.name} {NO_PERIOD}")
     seconds = to_si(every, "s", "every")
     if not 0 < seconds < math.inf:
         raise ParameterError(f"every must be a positive time, not {every!r}.")
@@ -204,9 +202,10 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
         return {name: _numbers(system, name, start[name]) for name in system.states}
     rows = start if isinstance(start, np.ndarray) else _as_array(start)
     if rows.shape == () or rows.shape[-1] != len(system.states) or rows.ndim > 2:
+        this = f"has shape {rows.shape}" if rows.shape else f"is {shown(start)}"
         raise ParameterError(
             f"a start of {system.name} is {len(system.states)} numbers ({', '.join(system.states)}), or an array of such rows; "
-            f"this one has shape {rows.shape}."
+            f"this one {this}."
         )
     return {name: _numbers(system, name, rows[..., i]) for i, name in enumerate(system.states)}
 
@@ -261,6 +260,8 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
     """
     begin = _time(t_start, "t_start")
     n = group.size
+    if periods is None and t_end is None and system.forced_at is None:
+        raise ParameterError(f'{system.name} has no forcing period: give t_end=, such as t_end="10 s".')
     if (periods is None) == (t_end is None):
         raise ParameterError("give periods= (whole forcing periods) or t_end= (seconds), and only one of them.")
     if periods is not None:

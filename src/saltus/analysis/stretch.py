@@ -19,7 +19,6 @@ from saltus.flow.methods import Method
 from saltus.flow.progress import reporter
 from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
-from saltus.results import Guards
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -123,7 +122,7 @@ def common(seen: Stretch, system: System, method: Method, outcome: Outcome) -> d
     return dict(
         states=system.states,
         units=seen.system.units,
-        guards=Guards(own.names[:count], own.states[:count], own.boundaries[:count]),
+        guards=own.first(count),
         status=[st.STATUS[int(code)][0] for code in outcome.status],
         each={**{name: outcome.counters[:, st.COUNTERS.index(name)] for name in names}, "end_time": outcome.time},
         end={name: outcome.state[:, i] for i, name in enumerate(system.states)},

@@ -30,6 +30,10 @@ _ELSEWHERE: Mapping[str, str] = {
     **dict.fromkeys(("n", "n_periods", "nperiods", "cycles"), "periods="),
     **dict.fromkeys(("solver", "integrator"), "method="),
 }
+#: What verbs take for states that the user names, as one would write it.
+_RANGES = {"axes": 'x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)', "box": 'x=("-5 mm", "5 mm"), v=("-1 m/s", "1 m/s")'}
+#: What tells how long to go on; which of them a verb has depends on whether it looks at whole periods only.
+_LENGTHS = ("t_end", "periods", "every")
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 
 
@@ -87,14 +91,27 @@ def _instead(word: str, known: Mapping[str, inspect.Parameter], args: tuple[Any,
         return f"It is a parameter of {system.name}: give it by {by}system.with_values({word}=...)."
     if isinstance(system, System) and word in system.states and "start" in known:
         return f"It is a state of {system.name}: give it by start={{{', '.join(f'{state!r}: ...' for state in system.states)}}}."
-    there = _ELSEWHERE.get(word.lower())
-    if there is not None and there.partition("=")[0] in known:
+    there = _ELSEWHERE.get(word.lower(), f"{word}=" if word in _LENGTHS else "")
+    if there.partition("=")[0] in known:
         return f"Write {there}."
+    if there.partition("=")[0] in _LENGTHS:
+        return _length(known)
     return nearest(word, known)
+
+
+def _length(known: Mapping[str, inspect.Parameter]) -> str:
+    """How a verb is told how long to go on."""
+    ways = {
+        "t_end": "t_end= [s]",
+        "periods": "periods= (forcing periods)" if "every" not in known else "periods= (forcing periods, or looks every= seconds apart of "
+        "a system without forcing)",
+    }  # fmt: skip
+    return f"How long it goes on is told by {' or '.join(text for name, text in ways.items() if name in known)}."
 
 
 def _call(known: Mapping[str, inspect.Parameter]) -> str:
     """How it is called, with the arguments that it can't do without."""
     needed = [p.name for p in known.values() if p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
-    rest = [p.name for p in known.values() if p.default is not p.empty][:2]
-    return ", ".join([*needed, *(f"{name}=..." for name in rest), "..."])
+    ranges = [_RANGES[p.name] for p in known.values() if p.kind == p.VAR_KEYWORD and p.name in _RANGES]
+    rest = [] if ranges else [p.name for p in known.values() if p.default is not p.empty][:2]
+    return ", ".join([*needed, *ranges, *(f"{name}=..." for name in rest), "..."])

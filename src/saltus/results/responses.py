@@ -274,7 +274,7 @@ class _Builder(Builder):
         """Add the guards; boundaries have the dims of the parameters where these move them."""
         self.put("guard", list(guards.names), coord=True)
         self.put("guard_state", [state or "" for state in guards.states])
-        self.put("guard_units", [self.units.get(state, "") if state else "" for state in guards.states])
+        self.put("guard_units", guards.units_among(self.units))
         labels = {"units": self.gap_unit, "long_name": self.table["guard_boundary"].long_name}
         boundaries = np.asarray(guards.boundaries, dtype=float)
         self.data["guard_boundary"] = xr.Variable(("guard", *dims)[: boundaries.ndim], boundaries, labels)
