@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.results import schema
 from saltus.results.assemble import Guards
 from saltus.results.basins import AttractorTable
@@ -188,7 +188,7 @@ def responses_dataset(
         build.put_outputs(responses.outputs)
     if responses.samples is not None:
         if sample not in SAMPLES:
-            raise ParameterError(f"sample={sample!r}. Known: {', '.join(SAMPLES)}.")
+            raise ParameterError(f"sample={shown(sample)}. Known: {', '.join(SAMPLES)}.")
         build.put_points(responses.samples, ("response", "sample"), schema.sample_name, SAMPLES[sample])
     if len(responses.attractors):  # without responses nothing can happen to them, and netCDF-3 has room for one empty dim only
         build.put_events(events or Events({name: np.zeros(0) for name in axes}, [], np.zeros(0, np.int64)))
