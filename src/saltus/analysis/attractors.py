@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import qmc
 
 from saltus.analysis import uncertainty
 from saltus.analysis.answers import gap_unit, provenance
+from saltus.analysis.halton import halton
 from saltus.analysis.plan import SCOUTS, memory
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import find
@@ -145,7 +145,7 @@ def basin_fractions(
     scale = _spread(map_, start[:SPREAD_STARTS])
     show, close = reporter(progress)
     try:
-        scouts = fill(system, _draw(ranges, qmc.Halton(len(ranges), scramble=False).random(min(SCOUTS, samples))), fixed)
+        scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
         found = find(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)

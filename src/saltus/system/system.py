@@ -17,6 +17,7 @@ from saltus.system.derivatives import gradient
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
 from saltus.system.overlaps import check_overlaps
+from saltus.system.periodic import check_periodic
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +61,7 @@ class System:
         for name, value in self.values.items():
             checks.check_range(name, value, self.forced_at)
         check_overlaps(self, self.values)
-        checks.check_periodic(self)
+        check_periodic(self)
 
     # -- values -----------------------------------------------------------------------------------------------------------------
     def with_values(self, **values: Any) -> System:
@@ -79,7 +80,16 @@ class System:
             If a text value has the wrong unit.
         """
         new = {name: checks.resolve_one(self._known(name), value, self.units[name], self.forced_at) for name, value in values.items()}
-        return replace(self, values={**self.values, **new})
+        if not new:
+            return self
+        copy = replace(self, values={**self.values, **new})
+        object.__setattr__(copy, "_origin", self.origin)
+        return copy
+
+    @property
+    def origin(self) -> System:
+        """The system that this one is a copy of with other values, itself if it is none: what follows from the equations is kept there."""
+        return vars(self).get("_origin", self)
 
     def resolve(self, name: str, value: Any) -> Any:
         """A value for a parameter, in SI and checked; the system itself stays as it is.
@@ -163,13 +173,17 @@ class System:
 
     def equations(self) -> list[str]:
         """The equations as text, one line each; long parts that are used twice come first, named."""
+        return list(self.origin._lines)
+
+    @functools.cached_property
+    def _lines(self) -> list[str]:
         from saltus.system.display import equation_lines
 
         return equation_lines(self)
 
     def fingerprint(self) -> str:
         """Hash of the equations (64 hexadecimal digits): the same for other values, another name and in another process."""
-        return self._fingerprint
+        return self.origin._fingerprint
 
     @functools.cached_property
     def _fingerprint(self) -> str:
