@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.units import to_si
+
+if TYPE_CHECKING:
+    from saltus.system.system import System
 
 
 def check_range(name: str, value: Any, forced_at: str | None) -> None:
