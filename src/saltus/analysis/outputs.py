@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from saltus.errors import ParameterError, UnitError
+from saltus.errors import ParameterError, UnitError, shown
 from saltus.system.dimensions import units_of
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
@@ -57,15 +57,15 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
     """
     if given is not None and not isinstance(given, Mapping):
         raise ParameterError(
-            f'outputs must be functions by name, such as outputs={{"spring force": lambda x, k: k*x}}, not {given!r}. '
+            f'outputs must be functions by name, such as outputs={{"spring force": lambda x, k: k*x}}, not {shown(given)}. '
             f"States are read off without being asked for."
         )
     extended, formulas, units = system, [], [system.units[name] for name in system.states]
     for name, one in (given or {}).items():
         if not isinstance(name, str) or not name or name in system.states:
-            raise ParameterError(f"an output can't be called {name!r}: give a text that isn't a state of {system.name}.")
+            raise ParameterError(f"an output can't be called {shown(name)}: give a text that isn't a state of {system.name}.")
         function, unit = one if isinstance(one, tuple) and len(one) == 2 else (one, "")
-        formula, guards = quantity(extended, function, f"the output {name!r}")
+        formula, guards = quantity(extended, function, f"the output {shown(name)}")
         extended = replace(extended, guards=guards)
         formulas.append(formula)
         units.append(_unit(system, formula, name, check_declared(unit, name) if unit else ""))
@@ -77,6 +77,6 @@ def _unit(system: System, formula: Expr, name: str, declared: str) -> str:
     (found,) = units_of(system.states, system.units, system.field, [formula])
     if declared and found and dimension(found) != dimension(declared):
         raise UnitError(
-            f"the output {name!r} is said to be in {declared}, but its formula is in {found}. Correct one, or leave the unit out."
+            f"the output {shown(name)} is said to be in {declared}, but its formula is in {found}. Correct one, or leave the unit out."
         )
     return declared or found

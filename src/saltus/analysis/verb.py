@@ -11,8 +11,11 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from saltus.arguments import Kinds
 from saltus.codegen.announce import silent
 from saltus.errors import ParameterError, nearest, shown
+from saltus.flow.counts import whole
+from saltus.flow.engine import MOST_THREADS
 from saltus.interrupt import Interrupted
 from saltus.system.system import System
 
@@ -40,16 +43,19 @@ _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 def verb(function: Callable[P, R]) -> Callable[P, R]:
     """Make a function a public verb.
 
-    Arguments that it doesn't have are answered by those that it has; ``progress=False`` silences what is said about compiling; Ctrl-C that
-    comes before anything is finished is an :class:`Interrupted` too.
+    Arguments that it doesn't have are answered by those that it has, and those of another kind by what they must be; ``progress=False``
+    silences what is said about compiling; Ctrl-C that comes before anything is finished is an :class:`Interrupted` too.
     """
-    signature = inspect.signature(function)
+    signature, kinds = inspect.signature(function), Kinds(function)
 
     @functools.wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> R:
         if _INSIDE.get():
             return function(*args, **kwargs)
-        _check(function.__name__, signature, args, kwargs)
+        given = _check(function.__name__, signature, args, kwargs)
+        kinds.check(f"sl.{function.__name__}", given)
+        if given.get("threads") is not None:
+            whole(given["threads"], "threads", 1, MOST_THREADS)
         quiet: AbstractContextManager[Any] = silent() if kwargs.get("progress") is False else nullcontext()
         token = _INSIDE.set(True)
         try:
@@ -65,13 +71,13 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
     return called
 
 
-def _check(name: str, signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> None:
-    """Raise ParameterError unless the arguments fit."""
+def _check(name: str, signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The arguments by name. Raises ParameterError unless there are such."""
     known = signature.parameters
     if not any(parameter.kind == parameter.VAR_KEYWORD for parameter in known.values()):
         for word in kwargs:
             if word not in known:
-                raise ParameterError(f"sl.{name} has no argument {word!r}. {_instead(word, known, args, kwargs)}")
+                raise ParameterError(f"sl.{name} has no argument {shown(word)}. {_instead(word, known, args, kwargs)}")
     try:
         given = signature.bind(*args, **kwargs).arguments
     except TypeError as error:
@@ -81,6 +87,7 @@ def _check(name: str, signature: inspect.Signature, args: tuple[Any, ...], kwarg
             f"sl.{name}: the start comes second, and the time is one number: sl.{name}(system, start, t_end=10). "
             f"periods can't be {shown(given['periods'])}."
         )
+    return given
 
 
 def _instead(word: str, known: Mapping[str, inspect.Parameter], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str:

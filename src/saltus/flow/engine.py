@@ -141,13 +141,13 @@ def run(
         On Ctrl-C, with the partial Outcome.
     """
     threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
-    module = method.kernels(system)
+    module = method.kernels(system.origin)
     outcome, whole = allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     shared = {"options": method.numbers(periods), "data": table_data(system)}
     chunks = [_cut(request, whole, first, shared) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
-    stop, room = Stop(), Contacts(len(system.states), request.record_from is not None)
+    stop, room = Stop(), Contacts(len(system.states))
     try:
         _run_chunks(chunks, module, stop, room, progress, workers)
     except KeyboardInterrupt:

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.flow import engine
 from saltus.flow.engine import Request, Schedule
 from saltus.flow.family import NO_PERIOD, Family
@@ -100,7 +100,7 @@ class Stroboscope:
         self.system, self.method, self.states, self._threads = system, method, system.states, threads
         self.period = float(system.period() if every is None else every)
         if not 0 < self.period < math.inf:
-            raise ParameterError(f"every must be a positive time, not {every!r}.")
+            raise ParameterError(f"every must be a positive time, not {shown(every)}.")
         self._parameters = np.array([list(system.values.values())])
         self._tangent = tangent_system(system)
         method.begin_kernels(self._tangent)

@@ -11,8 +11,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results import schema
-from saltus.results.provenance import content_hash, to_json
-from saltus.results.result import Result
+from saltus.results.finish import array_variable, finish
 from saltus.results.variable import Variable
 
 
@@ -118,7 +117,7 @@ class Builder:
         elif each:
             array = array[0]
         target = self.coords if coord else self.data
-        target[name] = xr.Variable(dims, array, {"units": self.unit(spec.units), "long_name": spec.long_name})
+        target[name] = array_variable(dims, array, {"units": self.unit(spec.units), "long_name": spec.long_name})
 
     def unit(self, text: str) -> str:
         """A unit of the table, with that of the gaps filled in."""
@@ -165,10 +164,7 @@ class Builder:
 
     def dataset(self, attrs: Mapping[str, Any]) -> xr.Dataset:
         """The Dataset, with the hash of its numbers."""
-        plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
-        ds = Result(self.data, self.coords, {**plain, **self.attrs})
-        ds.attrs["result_hash"] = content_hash(ds)
-        return ds
+        return finish(self.data, self.coords, {**attrs, **self.attrs})
 
 
 def trajectory_dataset(

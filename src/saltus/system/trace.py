@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest
+from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest, shown
 from saltus.system import checks
 from saltus.system.dimensions import DimensionCheck
 from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
@@ -130,7 +130,7 @@ def system(
         known_units = _units(names, defaults, forced_at, dict(units or {}), title)
         if forced_at is not None and known_units[forced_at] not in ("Hz", "rad/s"):
             raise UnitError(
-                f"{title}: forced_at={forced_at!r} is in {known_units[forced_at]!r}, but a forcing frequency is in 'Hz' or 'rad/s'."
+                f"{title}: forced_at={shown(forced_at)} is in {known_units[forced_at]!r}, but a forcing frequency is in 'Hz' or 'rad/s'."
             )
         values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
         dimensions = DimensionCheck(names, known_units) if check_units else None
@@ -205,10 +205,10 @@ def _units(
     for name in declared:
         if name not in states and name not in defaults:
             raise ParameterError(
-                f"{title}: units= names {name!r}, which is neither a state nor a parameter. {nearest(name, (*states, *defaults))}"
+                f"{title}: units= names {shown(name)}, which is neither a state nor a parameter. {nearest(name, (*states, *defaults))}"
             )
     if forced_at is not None and forced_at not in defaults:
-        raise ParameterError(f"{title}: forced_at={forced_at!r} is no parameter. {nearest(forced_at, defaults)}")
+        raise ParameterError(f"{title}: forced_at={shown(forced_at)} is no parameter. {nearest(forced_at, defaults)}")
     units = {}
     for name in (*states, *defaults):
         if name in declared:

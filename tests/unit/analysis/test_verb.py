@@ -71,9 +71,9 @@ def test_a_picture_that_is_not_there_is_answered_by_one_that_is():
 
 
 def test_every_public_verb_is_one():
-    from saltus import analysis
-
-    for name in analysis.__all__:
+    verbs = [name for name, home in sl._HOMES.items() if home.startswith("saltus.analysis.")]
+    assert len(verbs) >= 17
+    for name in verbs:
         with pytest.raises(sl.SaltusError, match=f"sl.{name}"):
             getattr(sl, name)(**{"no such argument": 1}) if name not in ("basins", "basin_fractions") else getattr(sl, name)()
 
