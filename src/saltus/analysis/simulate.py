@@ -116,7 +116,7 @@ def simulate(
     finally:
         close()
     result = _dataset(system, method, group, length, plan, outcome, errors)
-    warn(result, length)
+    warn(result, length, system)
     return result
 
 
