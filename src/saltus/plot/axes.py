@@ -140,10 +140,27 @@ def legend(ax: Axes, regions: Regions, **place: Any) -> None:
         ax.legend([first[label] for label in order], order, **place)
 
 
+def status_text(ds: xr.Dataset) -> str:
+    """How a trajectory ended, where it stopped early or rests on a graze that isn't decided; else empty."""
+    status = str(ds["status"].values)
+    if status == "ok":
+        return ""
+    stopped = status != "graze_unresolved" and "end_time" in ds
+    return f"status: {status}" + (f", stopped at {float(ds['end_time']):.6g} s" if stopped else "")
+
+
 def note_status(ax: Axes, ds: xr.Dataset) -> None:
     """Say in the picture when a trajectory stopped early, or rests on a graze that isn't decided."""
-    status = str(ds["status"].values)
-    if status != "ok":
-        stopped = status != "graze_unresolved" and "end_time" in ds
-        where = f", stopped at {float(ds['end_time']):.6g} s" if stopped else ""
-        ax.text(0.99, 0.02, f"status: {status}{where}", transform=ax.transAxes, ha="right", va="bottom", fontsize=7, color="#A00000")
+    text = status_text(ds)
+    if text:
+        ax.text(0.99, 0.02, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=7, color="#A00000")
+
+
+def say(ax: Axes, text: str, *datasets: xr.Dataset) -> None:
+    """A sentence in place of an empty frame, with how the trajectories ended."""
+    singles = [one for ds in datasets for one in ([ds.sel(trajectory=i) for i in ds["trajectory"]] if "trajectory" in ds.dims else [ds])]
+    ends = [status_text(one) for one in singles]
+    ax.set_axis_off()
+    ax.text(0.02, 0.95, text, transform=ax.transAxes, va="top", linespacing=1.6)
+    if any(ends):
+        ax.text(0.02, 0.05, "\n".join(dict.fromkeys(filter(None, ends))), transform=ax.transAxes, va="bottom", fontsize=7, color="#A00000")
