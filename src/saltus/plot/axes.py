@@ -36,7 +36,8 @@ def panels(ax: Any, count: int, size: tuple[float, float], caller: str) -> Itera
 
 def _given(ax: Any, count: int, caller: str) -> list[Axes]:
     """The Axes that the user handed over, one for each panel."""
-    axes = [ax] if isinstance(ax, Axes) else list(np.ravel(np.asarray(ax, dtype=object)))
+    several = isinstance(ax, list | tuple | np.ndarray)
+    axes = list(np.ravel(np.asarray(ax, dtype=object))) if several else [ax]
     if not all(isinstance(one, Axes) for one in axes):
         raise ParameterError(f"{caller}: ax={type(ax).__name__}. Give matplotlib Axes, such as plt.subplots() makes.")
     if len(axes) != count:

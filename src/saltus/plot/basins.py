@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
+from saltus.arguments import checked
 from saltus.plot import axes as draw
 from saltus.plot import maps
 from saltus.plot.palette import shades
@@ -30,6 +31,7 @@ _BEYOND = 0.02
 _LONG_LEGEND = 14
 
 
+@checked
 def basins(
     ds: xr.Dataset,
     ax: Any = None,

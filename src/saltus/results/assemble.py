@@ -67,11 +67,22 @@ class Guards:
         State that the guard bounds, where its gap is that state minus a value.
     boundaries : array, shape (guard,) or (guard, trajectory)
         That value [unit of the state], NaN where there is none. The second shape where it differs between trajectories.
+    units : sequence of str
+        Coherent SI unit of each gap, ``""`` where it isn't known; empty for those of the states.
     """
 
     names: Sequence[str]
     states: Sequence[str | None]
     boundaries: np.ndarray
+    units: Sequence[str] = ()
+
+    def units_among(self, states: Mapping[str, str]) -> list[str]:
+        """Unit of each gap, given those of the states."""
+        return list(self.units) or [states.get(state, "") if state else "" for state in self.states]
+
+    def first(self, count: int) -> Guards:
+        """So many of them."""
+        return Guards(self.names[:count], self.states[:count], self.boundaries[:count], self.units[:count])
 
 
 # -- assembly ------------------------------------------------------------------------------------------------------------------
@@ -85,7 +96,7 @@ class Builder:
         self.table, self.batch, self.units = schema.TABLES[kind], batch, units
         self.data: dict[str, Any] = {}
         self.coords: dict[str, Any] = {}
-        self.guard_units = [units.get(state, "") if state else "" for state in guards.states]
+        self.guard_units = guards.units_among(units)
         self.attrs: dict[str, Any] = {"saltus_result": kind, "schema_version": schema.VERSION, "states": " ".join(states)}
         if not batch and count != 1:
             raise ParameterError(f"a Dataset without the dim trajectory holds one trajectory, not {count}. Pass batch=True.")

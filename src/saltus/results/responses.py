@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.results import schema
 from saltus.results.assemble import Guards
 from saltus.results.basins import AttractorTable
@@ -189,7 +189,7 @@ def responses_dataset(
         build.put_outputs(responses.outputs)
     if responses.samples is not None:
         if sample not in SAMPLES:
-            raise ParameterError(f"sample={sample!r}. Known: {', '.join(SAMPLES)}.")
+            raise ParameterError(f"sample={shown(sample)}. Known: {', '.join(SAMPLES)}.")
         build.put_points(responses.samples, ("response", "sample"), schema.sample_name, SAMPLES[sample])
     if len(responses.attractors):  # without responses nothing can happen to them, and netCDF-3 has room for one empty dim only
         build.put_events(events or Events({name: np.zeros(0) for name in axes}, [], np.zeros(0, np.int64)))
@@ -275,7 +275,7 @@ class _Builder(Builder):
         """Add the guards; boundaries have the dims of the parameters where these move them."""
         self.put("guard", list(guards.names), coord=True)
         self.put("guard_state", [state or "" for state in guards.states])
-        self.put("guard_units", [self.units.get(state, "") if state else "" for state in guards.states])
+        self.put("guard_units", guards.units_among(self.units))
         labels = {"units": self.gap_unit, "long_name": self.table["guard_boundary"].long_name}
         boundaries = np.asarray(guards.boundaries, dtype=float)
         self.data["guard_boundary"] = array_variable(("guard", *dims)[: boundaries.ndim], boundaries, labels)

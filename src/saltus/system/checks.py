@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.units import to_si
+
+if TYPE_CHECKING:
+    from saltus.system.system import System
 
 
 def check_range(name: str, value: Any, forced_at: str | None) -> None:
@@ -44,3 +47,28 @@ def resolve_one(name: str, value: Any, unit: str, forced_at: str | None) -> floa
     if not isinstance(result, float):
         raise ParameterError(f"{name} got {result.size} values, but a system holds one. Give many by values= of the analysis.")
     return result
+
+
+def point(system: System, t: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Times and states [SI] as arrays of numbers that fit together; the states come first.
+
+    Raises
+    ------
+    ParameterError
+        If they are something else.
+    """
+    known = ", ".join(system.states)
+    try:
+        time, states = (np.asarray(given, dtype=np.float64) for given in (t, y))
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"t must be a time [s] and y the states {known} [SI], as numbers or arrays of them.") from None
+    if states.ndim == 0 or len(states) != len(system.states):
+        count = len(states) if states.ndim else "no row"
+        raise ParameterError(f"{system.name} has the states {known}, but y holds {count} of them. Give one entry or row for each.")
+    try:
+        np.broadcast_shapes(time.shape, states.shape[1:])
+    except ValueError:
+        raise ParameterError(
+            f"t of the shape {time.shape} and y of the shape {states.shape} don't fit: t is one time, or one for each column of y."
+        ) from None
+    return time, states

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.system import checks, serial
 from saltus.system.derivatives import gradient
 from saltus.system.expression import Expr
@@ -114,8 +114,8 @@ class System:
 
     def _known(self, name: str) -> str:
         """The name of a parameter, checked."""
-        if name not in self.values:
-            raise ParameterError(f"{self.name} has no parameter {name!r}. {nearest(name, self.values)}")
+        if not among(name, self.values):
+            raise ParameterError(f"{self.name} has no parameter {shown(name)}. {nearest(name, self.values)}")
         return name
 
     def period(self, values: Mapping[str, Any] | None = None) -> Any:
@@ -128,6 +128,8 @@ class System:
         """
         if self.forced_at is None:
             return None
+        if values is not None and not isinstance(values, Mapping):
+            raise ParameterError(f"values must be a mapping, such as {{{self.forced_at!r}: 15.0}}, not {shown(values)}.")
         frequency = (values or {}).get(self.forced_at, self.values[self.forced_at])
         return (2 * math.pi if self.units[self.forced_at] == "rad/s" else 1.0) / frequency
 
@@ -163,13 +165,11 @@ class System:
         Raises
         ------
         ParameterError
-            If ``y`` has another number of states.
+            If ``t`` or ``y`` holds something else than numbers, their shapes don't fit, or ``y`` has another number of states.
         """
         from saltus.system.evaluate import field
 
-        if len(y) != len(self.states):
-            raise ParameterError(f"{self.name} has the states {', '.join(self.states)}, but y holds {len(y)} of them.")
-        return field(self, t, y)
+        return field(self, *checks.point(self, t, y))
 
     def equations(self) -> list[str]:
         """The equations as text, one line each; long parts that are used twice come first, named."""
@@ -192,8 +192,8 @@ class System:
     # -- units and looks --------------------------------------------------------------------------------------------------------
     def state_unit(self, name: str) -> str:
         """Unit of a state; ``""`` if not declared. Raises ParameterError for an unknown state."""
-        if name not in self.states:
-            raise ParameterError(f"{self.name} has no state {name!r}. {nearest(name, self.states)}")
+        if not among(name, self.states):
+            raise ParameterError(f"{self.name} has no state {shown(name)}. {nearest(name, self.states)}")
         return self.units[name]
 
     def parameter_text(self, name: str) -> str:
