@@ -238,9 +238,12 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if contacts := [part for chunk in chunks for part in chunk.contacts]:
         table, numbers = (np.concatenate(half) for half in zip(*contacts, strict=True))
-        order = np.lexsort((np.arange(len(table)), table[:, st.REC_TRAJECTORY]))
-        order = order[~_returns_where_sliding_begins(table[order], numbers[order], outcome.status)]
-        outcome.record_integers, outcome.record_floats = table[order], numbers[order]
+        order = np.argsort(table[:, st.REC_TRAJECTORY], kind="stable")
+        table, numbers = table[order], numbers[order]
+        if (outcome.status == st.SLIDING).any():
+            kept = ~_returns_where_sliding_begins(table, numbers, outcome.status)
+            table, numbers = table[kept], numbers[kept]
+        outcome.record_integers, outcome.record_floats = table, numbers
         times = outcome.record_floats[:, -1]
         np.minimum(times, outcome.time[outcome.record_integers[:, st.REC_TRAJECTORY]], out=times)
     return outcome
