@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from itertools import pairwise
 from typing import Any, Literal
 
 import matplotlib.pyplot as plt
@@ -19,6 +20,8 @@ from saltus.plot.style import QUIET, RASTERISE_ABOVE, Scale, style, styled
 Direction = Literal["x", "y"]
 #: A gap is drawn into the limits if the axis grows by no more than this: an orbit far inside its gap must stay visible.
 _WIDEN = 2.0
+#: Room that the name of a gap takes above a picture, in widths of the Axes.
+_NAME = 0.45
 
 
 @contextmanager
@@ -125,7 +128,10 @@ def _name_gaps(ax: Axes, direction: Direction, names: list[tuple[float, str, boo
     top.set_gid(tag)
     top.spines[:].set_visible(False)
     top.tick_params(length=0, pad=1, labelsize=7, labelcolor=QUIET)
-    top.set_xticks([place for place, _, _ in names], [text for _, text, _ in names], linespacing=1.1)
+    low, high = ax.get_xlim()
+    close = [a[2] == b[2] and b[0] - a[0] < _NAME * (high - low) for a, b in pairwise(names)]
+    texts = [text + "\n\n" * raised for (_, text, _), raised in zip(names, [*close, False], strict=True)]  # one above the other
+    top.set_xticks([place for place, _, _ in names], texts, linespacing=1.1)
     for tick, (_, _, left) in zip(top.xaxis.get_major_ticks(), names, strict=True):
         tick.label2.set_horizontalalignment("right" if left else "left")
 

@@ -97,7 +97,9 @@ def _section(ds: xr.Dataset, pair: tuple[str, str]) -> str:
     except (ValueError, TypeError, AttributeError):  # of another program
         return ""
     units = [ds[f"attractor_{name}"].attrs.get("units", "") if f"attractor_{name}" in ds else "" for name in fixed]
-    return ", ".join(f"{name} = {from_si(value, unit, 4)}" for (name, value), unit in zip(fixed.items(), units, strict=True))
+    return ", ".join(
+        f"{name.replace('_', ' ')} = {from_si(value, unit, 4)}" for (name, value), unit in zip(fixed.items(), units, strict=True)
+    )
 
 
 # -- cells ---------------------------------------------------------------------------------------------------------------------

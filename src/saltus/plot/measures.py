@@ -45,9 +45,10 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
     """
     caller = "plot.impacts"
     check(ds, caller=caller, kinds=[IMPACTS])
-    counts, labels = ds["speed_histogram"], None
+    counts = ds["speed_histogram"]
+    labels: np.ndarray | None = None
     if "trajectory" in counts.dims:
-        labels = selection.chosen(ds, trajectory, caller) if trajectory is not None else ds["trajectory"].values
+        labels = np.asarray(selection.chosen(ds, trajectory, caller)) if trajectory is not None else ds["trajectory"].values
         counts = counts.sel(trajectory=labels).sum("trajectory")
     low, high = ds["speed_low"].values, ds["speed_high"].values
     scale = display_scale(ds["speed_low"].attrs.get("units", ""), float(np.abs(high).max()))
