@@ -141,13 +141,13 @@ def run(
         On Ctrl-C, with the partial Outcome.
     """
     threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
-    module = method.kernels(system)
+    module = method.kernels(system.origin)
     outcome, whole = allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     shared = {"options": method.numbers(periods), "data": table_data(system)}
     chunks = [_cut(request, whole, first, shared) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
-    stop, room = Stop(), Contacts(len(system.states), request.record_from is not None)
+    stop, room = Stop(), Contacts(len(system.states))
     try:
         _run_chunks(chunks, module, stop, room, progress, workers)
     except KeyboardInterrupt:
@@ -238,9 +238,12 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if contacts := [part for chunk in chunks for part in chunk.contacts]:
         table, numbers = (np.concatenate(half) for half in zip(*contacts, strict=True))
-        order = np.lexsort((np.arange(len(table)), table[:, st.REC_TRAJECTORY]))
-        order = order[~_returns_where_sliding_begins(table[order], numbers[order], outcome.status)]
-        outcome.record_integers, outcome.record_floats = table[order], numbers[order]
+        order = np.argsort(table[:, st.REC_TRAJECTORY], kind="stable")
+        table, numbers = table[order], numbers[order]
+        if (outcome.status == st.SLIDING).any():
+            kept = ~_returns_where_sliding_begins(table, numbers, outcome.status)
+            table, numbers = table[kept], numbers[kept]
+        outcome.record_integers, outcome.record_floats = table, numbers
         times = outcome.record_floats[:, -1]
         np.minimum(times, outcome.time[outcome.record_integers[:, st.REC_TRAJECTORY]], out=times)
     return outcome

@@ -9,6 +9,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib import metadata
 from typing import Any
 
@@ -83,6 +84,7 @@ def to_json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
+@cache  # reading it takes a millisecond, and what this process runs doesn't change
 def version(package: str) -> str:
     """Version of an installed package, ``"not installed"`` for one that isn't (a source tree on the path)."""
     try:
