@@ -161,8 +161,6 @@ class _Body:
         return "true" if kind == TRUTH else "splat (i1 true)"
 
     def _binop(self, node: ast.BinOp) -> Value:
-        if isinstance(node.left, ast.Constant) and isinstance(node.right, ast.Attribute):  # 2.0 / math.pi
-            return Value(NUMBER, literal(ast.literal_eval(node.left) / math.pi))
         a, b, op = self.value(node.left), self.value(node.right), type(node.op)
         if op is ast.Pow:
             return self._library("pow", NUMBER, [self.number(a), self.number(b)])
@@ -257,15 +255,21 @@ class _Body:
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         match target, value:
-            case ast.Name(id=name), _:
-                self.names[name] = self.value(value)
-            case ast.Tuple(elts=names), ast.Tuple(elts=values):
-                found = [self.value(one) for one in values]
-                self.names |= {ast.unparse(name): one for name, one in zip(names, found, strict=True)}
+            case ast.Tuple(elts=targets), ast.Tuple(elts=values):
+                for one, found in zip(targets, [self.value(one) for one in values], strict=True):
+                    self._give(one, found)
             case ast.Tuple(elts=names), ast.Call(func=ast.Name(id=function), args=arguments):
                 self._call_for_two([ast.unparse(name) for name in names], function, [self.value(a) for a in arguments])
-            case ast.Subscript(value=ast.Name(id=array), slice=index), _:
-                number = self.number(self.value(value))
+            case _:
+                self._give(target, self.value(value))
+
+    def _give(self, target: ast.expr, value: Value) -> None:
+        """A value to a name, or to an entry of an array."""
+        match target:
+            case ast.Name(id=name):
+                self.names[name] = value
+            case ast.Subscript(value=ast.Name(id=array), slice=index):
+                number = self.number(value)
                 self.do(f"store double {number.text}, ptr {self._place(array, index, 1)}, align 8")
             case _:
                 raise UntranslatableError(ast.unparse(target))

@@ -29,8 +29,6 @@ class Target(NamedTuple):
 @cache
 def target() -> Target:
     """The machine at hand; ``$SALTUS_PROCESSOR``, such as ``x86-64-v3``, names an older processor of its family instead."""
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
     triple = llvm.get_process_triple()
     chosen = os.environ.get("SALTUS_PROCESSOR")
     if chosen:
@@ -79,7 +77,10 @@ def object_code(template: bytes | None, texts: Sequence[str], called: Collection
 
 @lru_cache(maxsize=4)
 def _target_machine(made_for: Target) -> llvm.TargetMachine:
-    if made_for.triple != llvm.get_process_triple():
+    if made_for.triple == llvm.get_process_triple():
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+    else:
         llvm.initialize_all_targets()
         llvm.initialize_all_asmprinters()
     found = llvm.Target.from_triple(made_for.triple)

@@ -34,6 +34,9 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
             function.linkage = "external" if function.name == symbol else "internal"
             if _own_name(function.name) in inlined - RARE | {"numba"}:
                 function.add_function_attribute("alwaysinline")
+    for variable in clean.global_variables:
+        if not variable.is_declaration:
+            variable.linkage = "internal"  # what Numba keeps for exceptions: nobody reads it
     clean.verify()
     _shrink(clean)
     clean.name = symbol
