@@ -73,6 +73,11 @@ class Neighbourhoods:
         """The same, owner i now being ids[i]."""
         return Neighbourhoods(self.centres, self.weights, ids[self.owners])
 
+    def of(self, kept: np.ndarray) -> Neighbourhoods:
+        """Those of the owners int64[m] that are kept, ascending; owner kept[i] now being i."""
+        rows = np.isin(self.owners, kept)
+        return Neighbourhoods(self.centres[rows], self.weights[rows], np.searchsorted(kept, self.owners[rows]))
+
     def _extents(self) -> np.ndarray:
         """Half the extent of each along the first coordinate, float64[m]: sqrt of the corner of (W'W)^-1."""
         return np.sqrt(np.linalg.inv(self.weights.transpose(0, 2, 1) @ self.weights)[:, 0, 0]) * (1 + 1e-9)

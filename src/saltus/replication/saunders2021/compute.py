@@ -15,9 +15,9 @@ from saltus import analysis
 from saltus.analysis.answers import gap_unit, provenance
 from saltus.analysis.basins import label_all
 from saltus.analysis.capture import Neighbourhoods
+from saltus.analysis.found import Found
 from saltus.analysis.orbits import Orbit, polish, same
 from saltus.analysis.portrait import portraits
-from saltus.analysis.recurrence import Found
 from saltus.analysis.settling import Settling
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
