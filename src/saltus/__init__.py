@@ -18,25 +18,22 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from saltus import models, plot
-    from saltus.analysis import (
-        attractors,
-        basin_fractions,
-        basins,
-        bifurcation_diagram,
-        compare,
-        compare_methods,
-        energy_balance,
-        frequency_response,
-        impact_statistics,
-        lyapunov,
-        poincare,
-        settled,
-        simulate,
-        spectrum,
-        stroboscope,
-        transmissibility,
-        wolf,
-    )
+    from saltus.analysis.attractors import attractors, basin_fractions
+    from saltus.analysis.basins import basins
+    from saltus.analysis.bifurcation_diagram import bifurcation_diagram
+    from saltus.analysis.compare import compare
+    from saltus.analysis.compare_methods import compare_methods
+    from saltus.analysis.energy import energy_balance
+    from saltus.analysis.frequency_response import frequency_response
+    from saltus.analysis.impacts import impact_statistics
+    from saltus.analysis.lyapunov import lyapunov
+    from saltus.analysis.poincare import poincare
+    from saltus.analysis.settled import settled
+    from saltus.analysis.simulate import simulate
+    from saltus.analysis.spectrum import spectrum
+    from saltus.analysis.stroboscope import stroboscope
+    from saltus.analysis.transmissibility import transmissibility
+    from saltus.analysis.wolf import wolf
     from saltus.errors import SaltusError
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import contacts, describe, load, samples, save, to_csv, to_mat
@@ -57,6 +54,7 @@ if TYPE_CHECKING:
         log,
         max,
         min,
+        mod,
         pi,
         piecewise,
         sign,
@@ -64,6 +62,7 @@ if TYPE_CHECKING:
         sinh,
         sqrt,
         system,
+        table,
         tan,
         tanh,
         where,
@@ -71,9 +70,23 @@ if TYPE_CHECKING:
 
 #: Public name: module that holds it.
 _HOMES = {
-    **dict.fromkeys(("attractors", "basin_fractions", "basins", "bifurcation_diagram", "compare"), "saltus.analysis"),
-    **dict.fromkeys(("compare_methods", "energy_balance", "frequency_response", "impact_statistics", "poincare"), "saltus.analysis"),
-    **dict.fromkeys(("lyapunov", "settled", "simulate", "spectrum", "stroboscope", "transmissibility", "wolf"), "saltus.analysis"),
+    "attractors": "saltus.analysis.attractors",
+    "basin_fractions": "saltus.analysis.attractors",
+    "basins": "saltus.analysis.basins",
+    "bifurcation_diagram": "saltus.analysis.bifurcation_diagram",
+    "compare": "saltus.analysis.compare",
+    "compare_methods": "saltus.analysis.compare_methods",
+    "energy_balance": "saltus.analysis.energy",
+    "frequency_response": "saltus.analysis.frequency_response",
+    "impact_statistics": "saltus.analysis.impacts",
+    "lyapunov": "saltus.analysis.lyapunov",
+    "poincare": "saltus.analysis.poincare",
+    "settled": "saltus.analysis.settled",
+    "simulate": "saltus.analysis.simulate",
+    "spectrum": "saltus.analysis.spectrum",
+    "stroboscope": "saltus.analysis.stroboscope",
+    "transmissibility": "saltus.analysis.transmissibility",
+    "wolf": "saltus.analysis.wolf",
     "SaltusError": "saltus.errors",
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"), "saltus.results"),

@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable
+from typing import Any
+
+#: Characters of a message: some 20 lines of a terminal.
+LONGEST = 2000
+#: Digits up to which a whole number is written out. Python refuses to write those of 4300 or more.
+_DIGITS = 60
 
 
 class SaltusError(Exception):
-    """Base of everything that saltus raises on purpose."""
+    """Base of everything that saltus raises on purpose.
+
+    A message is at most :data:`LONGEST` characters long: of a longer one, which repeats what somebody gave, the middle is left out.
+    """
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*(_cut(part) if isinstance(part, str) else part for part in args))
 
 
 class TraceError(SaltusError):
@@ -38,9 +51,38 @@ class UnusedParameterWarning(SaltusWarning):
     """A parameter of a system stands in none of its equations."""
 
 
+def _cut(message: str) -> str:
+    """A message without its middle, if it is too long: it begins with what is wrong, and ends with what to do."""
+    if len(message) <= LONGEST:
+        return message
+    first, last = LONGEST * 2 // 3, LONGEST // 4
+    return f"{message[:first]} ... ({len(message) - first - last} characters left out) ... {message[-last:]}"
+
+
+class _Repr(reprlib.Repr):
+    """``repr`` of anything that somebody may give: numbers and texts of NumPy as plain ones, never an exception, never without an end."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxdict = self.maxlist = self.maxtuple = self.maxset = self.maxfrozenset = self.maxdeque = 40
+        self.maxstring = self.maxother = 10_000
+
+    def repr1(self, x: Any, level: int) -> str:
+        if type(x).__module__ == "numpy" and not getattr(x, "ndim", 1) and x.dtype.kind in "fiubU":
+            x = x.item()
+        return super().repr1(x, level)
+
+    def repr_int(self, x: int, _level: int) -> str:
+        return repr(x) if abs(x) < 10**_DIGITS else f"a whole number of some {int(x.bit_length() * 0.30103) + 1} digits"
+
+
 def shown(value: object, limit: int = 80) -> str:
-    """A value as a message shows it: at most so many characters of it."""
-    text = repr(value)
+    """A value as a message shows it: at most so many characters of it, on one line."""
+    try:
+        text = _Repr().repr(value)
+    except Exception:  # whatever an object of somebody else does when it is looked at
+        text = f"<{type(value).__name__}>"
+    text = text if isinstance(value, str) else " ".join(text.split())
     return text if len(text) <= limit else f"{text[: limit - 4]}...{text[-1]}"
 
 

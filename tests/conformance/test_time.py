@@ -86,3 +86,19 @@ def test_long_run_with_contacts_is_exactly_periodic_in_its_phase():
     early, late = (sl.stroboscope(rig, (5e-3, 0.0), n, keep=1) for n in (2_000, 100_000))
     assert float(abs(early.x - late.x.values).max()) < 1e-15
     assert float(abs(early.v - late.v.values).max()) < 1e-13
+
+
+def _two_speeds(t, x, *, early=1.0, late=0.0, instant=0.3):
+    """Speed 2 beyond a level, 1 before it; the level itself is another one from an instant on."""
+    level = sl.where(t < instant, early, late)
+    return sl.piecewise((2.0, x > level), otherwise=1.0)
+
+
+@pytest.mark.parametrize(("early", "late", "contacts", "end"), [(1.0, 0.0, [0.3], 1.7), (0.0, 1.0, [0.3, 0.7], 1.6), (0.0, 0.1, [], 2.0)])
+def test_a_boundary_that_jumps_over_the_state_at_a_break_of_time(early, late, contacts, end):
+    """At t = 0.3 the level jumps: over x = 0.3 from above, over x = 0.6 from below (which is met again at 1), or short of x = 0.6."""
+    jumping = sl.system(states="x")(_two_speeds).with_values(early=early, late=late)
+    run = sl.simulate(jumping, (0.0,), t_end=1.0, samples=10, method=sl.Taylor(order=12, lanes=2))
+    assert run.contact_time.values == pytest.approx(contacts, abs=1e-15)
+    assert float(run.end_x) == pytest.approx(end, abs=1e-15)
+    assert str(run.status.values) == "ok"

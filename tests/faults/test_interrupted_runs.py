@@ -35,11 +35,11 @@ def ctrl_c():
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, monkeypatch):
+@pytest.mark.parametrize(("threads", "chunk"), [(1, 8), (2, 8), (2, 24)])
+def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, chunk, monkeypatch):
     """Pressed while a table of contacts is put away, and again and again while the run ends."""
     rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
-    monkeypatch.setattr(engine, "CHUNK", 8)
+    monkeypatch.setattr(engine, "CHUNK", chunk)
     monkeypatch.setattr(engine, "SLICE", 200)
     whole = sl.simulate(rig, START, periods=60, threads=threads)
     cut = engine._cut

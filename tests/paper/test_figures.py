@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from saltus.analysis import plan, settled
+from saltus.analysis import plan
 from saltus.analysis.basins import label_all
+from saltus.analysis.settled import settled
 from saltus.analysis.settling import Settling
 from saltus.results import load
 from saltus.study import maps

@@ -1,4 +1,4 @@
-"""The benchmark of basins runs, and its rivals' labels mean what ours mean. Rivals themselves are left out: they take minutes."""
+"""Benchmarks run, and rivals' labels of basins mean what ours mean. Rivals themselves are left out: they take minutes."""
 
 from pathlib import Path
 
@@ -48,3 +48,17 @@ def test_a_subset_leaves_out_starts_on_a_boundary(basins, small_map):
     assert len(subset.cells) == 30
     assert not (subset.x == 0.0).any()
     assert (subset.labels == small_map[1].basin.values.ravel()[subset.cells]).all()
+
+
+def test_what_it_costs_to_begin(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT)
+    from benchmarks import startup
+
+    monkeypatch.setattr(startup, "PROGRAMS", {"nothing": "pass", "saltus": "import saltus"})
+    monkeypatch.setattr(startup, "PERIODS", (2,))
+    plain = startup.engine.run
+    assert all(cpu > 0 and wall > 0 for _, cpu, wall in startup.processes(1))
+    rows = startup.calls(2)
+    assert [name for name, *_ in rows] == ['2 periods, time_errors="measured"', '2 periods, time_errors="local"']
+    assert all(0 < inside < cpu and wall > 0 for _, cpu, inside, wall in rows)
+    assert startup.engine.run is plain

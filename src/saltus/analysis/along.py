@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, among, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole
 
 #: Values along a range, by what users write for the scale.
@@ -43,13 +43,13 @@ def along(name: str, given: Any, number: Callable[[Any], float], what: str, exam
         return _listed(name, given, number, what, example)
     if len(given) not in (3, 4):
         raise ParameterError(
-            f"{name} = {given!r} must be a range (first, last, number of {what}), such as {example}. A tuple is a range; "
-            f"a list holds the {what} themselves: {list(given)!r}."
+            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as {example}. A tuple is a range; "
+            f"a list holds the {what} themselves: {shown(list(given))}."
         )
     first, last, count, *rest = given
     scale = rest[0] if rest else "linear"
     if not among(scale, SCALES):
-        raise ParameterError(f"the scale of {name} is {scale!r}. {nearest(scale, SCALES)}")
+        raise ParameterError(f"the scale of {name} is {shown(scale)}. {nearest(scale, SCALES)}")
     count = whole(count, f"the number of {what} along {name}", least)
     if count > MOST_VALUES:
         raise ParameterError(f"{count} {what} along {name} are more than {MOST_VALUES:.0e}. Take a coarser grid.")
@@ -59,7 +59,7 @@ def along(name: str, given: Any, number: Callable[[Any], float], what: str, exam
     return np.geomspace(low, high, count) if scale == "log" else np.linspace(low, high, count)
 
 
-def _axes(given: Any) -> int:
+def axes_of(given: Any) -> int:
     """Number of axes of lists or an array; -1 for lists of unequal length, and for what can't be made an array."""
     try:
         return np.ndim(given)
@@ -69,9 +69,9 @@ def _axes(given: Any) -> int:
 
 def _listed(name: str, given: Any, number: Callable[[Any], float], what: str, example: str) -> np.ndarray:
     """The values of a list or array, each a number or a text with a unit."""
-    if isinstance(given, str | bytes | dict | set | frozenset) or not hasattr(given, "__len__") or _axes(given) != 1:
+    if isinstance(given, str | bytes | dict | set | frozenset) or not hasattr(given, "__len__") or axes_of(given) != 1:
         raise ParameterError(
-            f"{name} = {given!r} must be a range (first, last, number of {what}), such as {example}, or a list or array of {what}."
+            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as {example}, or a list or array of {what}."
         )
     values = np.asarray(given)
     if values.dtype.kind in "fiu":
@@ -82,4 +82,10 @@ def _listed(name: str, given: Any, number: Callable[[Any], float], what: str, ex
         for value in (values.min(), values.max()) if len(values) else ():
             number(float(value))  # what the name allows is checked there
         return values
-    return np.array([number(value) for value in list(given)], float)
+    items = list(given)
+    if len(items) in (3, 4) and all(isinstance(one, str) for one in items[:2]) and not isinstance(items[2], str):
+        raise ParameterError(
+            f"{name} = {shown(items)} is a list, which holds the {what} themselves, but {shown(items[2])} has no unit. A range is a tuple: "
+            f"{name}={shown(tuple(items))}."
+        )
+    return np.array([number(value) for value in items], float)

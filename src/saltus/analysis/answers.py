@@ -12,6 +12,7 @@ from saltus.flow.engine import Outcome
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.results import Contacts, Guards, attributes
+from saltus.system.dimensions import units_of
 from saltus.system.evaluate import evaluate
 from saltus.system.system import System
 
@@ -34,7 +35,13 @@ def guards_over(system: System, values: Mapping[str, Any], shape: tuple[int, ...
         places.append(np.broadcast_to(place, shape if np.ndim(place) else ()))
     if any(np.ndim(place) for place in places):
         places = [np.broadcast_to(place, shape) for place in places]
-    return Guards([g.name for g in system.guards], [g.state for g in system.guards], np.array(places, float))
+    return Guards([g.name for g in system.guards], [g.state for g in system.guards], np.array(places, float), gap_units(system))
+
+
+def gap_units(system: System) -> list[str]:
+    """Unit of the gap of each guard, ``""`` where it isn't known."""
+    found = units_of(system.states, system.units, system.field, [guard.gap for guard in system.guards])
+    return [unit if guard.state is None else system.units[guard.state] for guard, unit in zip(system.guards, found, strict=True)]
 
 
 def common(system: System, method: Method, group: Ensemble, outcome: Outcome) -> dict[str, Any]:
@@ -69,7 +76,7 @@ def provenance(system: System, method: Method, values: Mapping[str, float], vari
 
 def gap_unit(system: System) -> str:
     """Unit of the gaps of all guards, ``""`` if they differ or aren't known."""
-    units = {system.units[guard.state] for guard in system.guards if guard.state is not None}
+    units = set(gap_units(system))
     return units.pop() if len(units) == 1 else ""
 
 

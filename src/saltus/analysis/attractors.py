@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import qmc
 
 from saltus.analysis import uncertainty
 from saltus.analysis.answers import gap_unit, provenance
+from saltus.analysis.halton import halton
 from saltus.analysis.noisy import stray_attrs
 from saltus.analysis.plan import SCOUTS, memory
 from saltus.analysis.portrait import portraits
@@ -19,7 +19,7 @@ from saltus.analysis.recurrence import find
 from saltus.analysis.settling import UNCONVERGED, complete, settle_all
 from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
@@ -148,7 +148,7 @@ def basin_fractions(
     scale = _spread(map_, start[:SPREAD_STARTS])
     show, close = reporter(progress)
     try:
-        scouts = fill(system, _draw(ranges, qmc.Halton(len(ranges), scramble=False).random(min(SCOUTS, samples))), fixed)
+        scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
         found = find(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
@@ -171,7 +171,7 @@ def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, fl
         except (TypeError, ValueError) as error:
             raise ParameterError(f'{name} must be (low, high), such as {name}=("-5 mm", "5 mm"): {error}') from None
         if not low < high:
-            raise ParameterError(f"the range of {name} is empty: {low!r} to {high!r}.")
+            raise ParameterError(f"the range of {name} is empty: {shown(low)} to {shown(high)}.")
         ranges[name] = (low, high)
     if not ranges:
         raise ParameterError(f'give a range for at least one state of {", ".join(system.states)}: {system.states[0]}=("-1 mm", "1 mm").')

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
-from scipy.stats import qmc
 
 from saltus.analysis.orbits import JITTER, Orbit
 from saltus.codegen.module import capture_module
@@ -54,7 +53,7 @@ class Neighbourhoods:
         """For trajectories float64[k, n, D]: the attractor that captures each (-1: none), and the index of the point at which it does."""
         label, when = np.full(len(points), -1, np.int64), np.zeros(len(points), np.int64)
         if len(self.centres):
-            capture_module().capture(np.ascontiguousarray(points), self.centres, self.weights, self.owners, self._extents(), label, when)
+            capture_module().propagate(np.ascontiguousarray(points), self.centres, self.weights, self.owners, self._extents(), label, when)
         return label, when
 
     @classmethod
@@ -181,5 +180,7 @@ def sphere(size: int) -> np.ndarray:
         angle = np.arange(2 * DIRECTIONS) * np.pi / DIRECTIONS
         return np.stack([np.cos(angle), np.sin(angle)], axis=1)
     count = 2 ** math.ceil(math.log2(DIRECTIONS * (size - 1) * 2))
+    from scipy.stats import qmc  # 0.7 s that systems of one or two states don't need
+
     normal = qmc.MultivariateNormalQMC(np.zeros(size), seed=1).random(count)
     return normal / np.linalg.norm(normal, axis=1)[:, None]

@@ -17,7 +17,7 @@ from saltus.analysis.frequency_response import frequency_response
 from saltus.analysis.method_errors import cell_agreement, one_period_errors, orbit_distances, response_noise
 from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, among, shown
 from saltus.flow.family import Family
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
 from saltus.results import methods_dataset
@@ -80,9 +80,9 @@ def compare_methods(
         If an argument can't be used.
     """
     check_system(system)
-    name = analysis if isinstance(analysis, str) else getattr(analysis, "__name__", repr(analysis))
-    if name not in _ANALYSES:
-        raise ParameterError(f"methods are compared by {', '.join(sorted(_ANALYSES))}, not by {name}.")
+    name: Any = analysis if isinstance(analysis, str) else getattr(analysis, "__name__", analysis)
+    if not among(name, _ANALYSES):
+        raise ParameterError(f"methods are compared by {', '.join(sorted(_ANALYSES))}, not by {shown(name)}.")
     if "method" in arguments:
         raise ParameterError("give the methods as methods=[...]; method= is for a single analysis.")
     everything = list(dict.fromkeys([check_method(reference or Taylor()), *map(check_method, methods)]))

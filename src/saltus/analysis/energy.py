@@ -17,6 +17,7 @@ from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
+from saltus.flow.room import check_room
 from saltus.results import motion_dataset, schema
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Expr
@@ -115,6 +116,7 @@ def _schedule(seen: Stretch, intervals: int | None) -> Schedule:
     """The ends of all intervals, the beginning of the first one in front."""
     if seen.system.forced_at is None:
         count = INTERVALS if intervals is None else whole(intervals, "intervals")
+        _check_room(seen, count)
         index = np.arange(count + 1)
         share = float((seen.begin[0] - seen.length.t_start) / seen.length.period[0])
         index = index[index / count >= share - 1e-12]
@@ -124,8 +126,15 @@ def _schedule(seen: Stretch, intervals: int | None) -> Schedule:
     last = int(np.min(seen.length.count))
     if np.any(seen.length.phase > 0) or np.any(seen.length.count != last):
         raise ParameterError("an energy balance of a forced system is drawn over whole forcing periods. Give periods= in place of t_end=.")
+    _check_room(seen, last - seen.skipped)
     index = np.arange(seen.skipped, last + 1)
     return Schedule(index, np.zeros(len(index)))
+
+
+def _check_room(seen: Stretch, intervals: int) -> None:
+    """Raise ParameterError if the balance of so many intervals doesn't fit."""
+    numbers = seen.group.size * (2 * len(seen.system.states) + 8) + 2
+    check_room(8.0 * numbers * intervals, f"{seen.group.size} trajectories with {intervals} intervals each", "Draw the balance of fewer.")
 
 
 def _dataset(

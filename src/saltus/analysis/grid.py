@@ -76,9 +76,7 @@ class Grid:
 
     def family(self, method: Method, threads: int | None = None) -> Family:
         """A map for every point of the grid."""
-        family = Family(self.system, method, self.rows, self.every, threads)
-        family.begin_tangent()
-        return family
+        return Family(self.system, method, self.rows, self.every, threads)
 
 
 def grid_of(
@@ -140,7 +138,7 @@ def grid_of(
 def axis(system: System, name: str, given: Any) -> np.ndarray:
     """Values along one parameter [SI], ascending, from (first, last, count[, scale]) or a list or array of values."""
     if name not in system.values:
-        raise ParameterError(f"{system.name} has no parameter {name!r}. {nearest(name, system.values)}")
+        raise ParameterError(f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}")
     example = f'{name}=("{system.parameter_text(name)}", ..., 200) or (..., 200, "log")'
     values = along(name, given, lambda value: single(system, name, value), "values", example)
     if not len(values) or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
@@ -171,13 +169,13 @@ def _random(system: System, count: int, box: Any, seed: int) -> np.ndarray:
     starts = np.zeros((count, len(system.states)))
     for name, ends in box.items():
         if name not in system.states:
-            raise ParameterError(f"{system.name} has no state {name!r}. {nearest(name, system.states)}")
+            raise ParameterError(f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}")
         try:
             low, high = (to_si(end, system.units[name], name) for end in ends)
         except (TypeError, ValueError):
-            raise ParameterError(f"the range of {name} must be (low, high), not {ends!r}.") from None
+            raise ParameterError(f"the range of {name} must be (low, high), not {shown(ends)}.") from None
         if not (np.isfinite([low, high]).all() and low < high):
-            raise ParameterError(f"the range of {name} must ascend and be finite, not {ends!r}.")
+            raise ParameterError(f"the range of {name} must ascend and be finite, not {shown(ends)}.")
         column = system.states.index(name)
         starts[:, column] = low + (high - low) * unit[:, column]
     return starts

@@ -14,7 +14,7 @@ from saltus.analysis.starts import check_system
 from saltus.analysis.stretch import Stretch, common, computed, stretch, with_each
 from saltus.analysis.touchdowns import Touchdowns
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.results import motion_dataset, schema
@@ -121,7 +121,7 @@ def _by_guard(system: System, given: Mapping[str, Any], argument: str) -> dict[i
     names = [guard.name for guard in system.guards]
     for name in given:
         if name not in names:
-            raise ParameterError(f"{argument}= names {name!r}, which is no guard of {system.name}. {nearest(str(name), names)}")
+            raise ParameterError(f"{argument}= names {shown(name)}, which is no guard of {system.name}. {nearest(name, names)}")
     return {names.index(name): value for name, value in given.items()}
 
 
@@ -129,7 +129,7 @@ def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
     """Sign of each gap in contact, int8[guard]: as given, else opposite to that at rest. Gaps of zero are opened a little to ask."""
     for number, side in given.items():
         if side not in (-1, 1):
-            raise ParameterError(f"contact_side of {system.guards[number].name!r} must be 1 or -1, not {side!r}.")
+            raise ParameterError(f"contact_side of {system.guards[number].name!r} must be 1 or -1, not {shown(side)}.")
     values = {name: value or np.finfo(float).tiny for name, value in system.values.items()}
     rest = dict.fromkeys(system.states, 0.0)
     bits: list[bool] = []
@@ -181,7 +181,7 @@ def _edges(bins: Any, speed: np.ndarray) -> np.ndarray:
     """Edges of the bins of speed."""
     if np.ndim(bins) == 0:
         if isinstance(bins, bool) or bins != int(bins) or bins < 1:
-            raise ParameterError(f"bins must be a whole number of at least 1, or the edges of the bins, not {bins!r}.")
+            raise ParameterError(f"bins must be a whole number of at least 1, or the edges of the bins, not {shown(bins)}.")
         largest = float(speed.max(initial=0.0))
         return np.linspace(0.0, largest if largest > 0 else 1.0, int(bins) + 1)
     edges = np.asarray(bins, dtype=float)

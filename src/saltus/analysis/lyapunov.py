@@ -15,7 +15,7 @@ from saltus.analysis.messages import warn
 from saltus.analysis.neighbour_exponents import NeighbourExponents
 from saltus.analysis.starts import Ensemble, check_system, ensemble
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, among, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.family import Family
 from saltus.flow.methods import Method, check_method
@@ -119,10 +119,8 @@ def lyapunov(
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))
     block = None if every is None else to_si(every, "s", "every")
     if block is not None and not 0 < block < math.inf:
-        raise ParameterError(f"every must be a positive time, not {every!r}.")
+        raise ParameterError(f"every must be a positive time, not {shown(every)}.")
     family = Family(system, flow, rows, block, threads)
-    if method == "variational":
-        family.begin_tangent()
     show, close = reporter(progress)
     work = (Exponents if method == "variational" else NeighbourExponents)(family, group.start, periods, transient, block)
 
@@ -148,11 +146,13 @@ def _check_words(method: Any, unit: Any, system: System) -> None:
             f'method says how exponents are measured: "variational" or "wolf". How to integrate is flow=sl.{method.name}(...).'
         )
     if not among(method, METHODS):
-        raise ParameterError(f"there is no method {method!r}. {nearest(method, METHODS)}")
+        raise ParameterError(f"there is no method {shown(method)}. {nearest(method, METHODS)}")
     if not among(unit, UNITS):
-        raise ParameterError(f"exponents aren't given in {unit!r}. {nearest(unit, UNITS)}")
+        raise ParameterError(f"exponents aren't given in {shown(unit)}. {nearest(unit, UNITS)}")
     if UNITS[unit][0] and system.forced_at is None:
-        raise ParameterError(f"{system.name} has no forcing period, so {unit!r} has no meaning. Take unit={unit.replace('period', 's')!r}.")
+        raise ParameterError(
+            f"{system.name} has no forcing period, so {shown(unit)} has no meaning. Take unit={unit.replace('period', 's')!r}."
+        )
 
 
 def _dataset(system: System, flow: Method, group: Ensemble, work: Exponents | NeighbourExponents, unit: str) -> xr.Dataset:

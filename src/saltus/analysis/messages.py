@@ -10,6 +10,8 @@ import xarray as xr
 from saltus.analysis.starts import Span
 from saltus.errors import SaltusWarning
 from saltus.kernels import status as st
+from saltus.system.evaluate import evaluate, sides
+from saltus.system.system import System
 from saltus.units import from_si
 
 #: Statuses after which a trajectory's end is missing, each with advice.
@@ -28,7 +30,11 @@ _ADVICE = {
 SECONDS_PER_STEP = 1e-6
 
 
-def messages(run: xr.Dataset, asked: Span | None = None) -> list[str]:
+#: Times the fastest rate of the equations that the rest of a run is long, from which on they count as singular where it stands.
+SINGULAR = 1e9
+
+
+def messages(run: xr.Dataset, asked: Span | None = None, system: System | None = None) -> list[str]:
     """One sentence or two for each status that isn't a success; empty if all is well.
 
     Parameters
@@ -37,6 +43,8 @@ def messages(run: xr.Dataset, asked: Span | None = None) -> list[str]:
         From :func:`saltus.simulate` or :func:`saltus.stroboscope`.
     asked : Span, optional
         How long it should have run: tells how many steps one that ran out of them still has before it.
+    system : System, optional
+        Its equations: tell whether they are singular where it stands.
     """
     status = np.atleast_1d(run["status"].values)
     texts = []
@@ -45,7 +53,8 @@ def messages(run: xr.Dataset, asked: Span | None = None) -> list[str]:
         here = np.flatnonzero(status == name)
         if len(here):
             if code == st.BUDGET_STEPS and asked is not None:
-                advice = f"{_outlook(run, asked, int(here[0]))} {advice}"
+                stuck = "" if system is None else _singular(run, asked, int(here[0]), system)
+                advice = stuck or f"{_outlook(run, asked, int(here[0]))} {advice}"
             texts.append(f"{len(here)} of {len(status)} trajectories: {name} - {meaning} (first: {_where(run, int(here[0]))}). {advice}")
     return texts
 
@@ -73,6 +82,25 @@ def _outlook(run: xr.Dataset, asked: Span, index: int) -> str:
     )
 
 
+def _singular(run: xr.Dataset, asked: Span, index: int, system: System) -> str:
+    """That no number of steps leads on, if the equations change far faster where a trajectory stands than the rest of its time is long."""
+    place = run.isel(trajectory=index) if "trajectory" in run.dims else run
+    values = {name: place[name].item() if name in place.variables else value for name, value in system.values.items()}
+    time, state = place["end_time"].item(), {name: place[f"end_{name}"].item() for name in system.states}
+    rest = asked.t_start + asked.count[index] * asked.period[index] + asked.phase[index] - time
+    bits = sides(system, time, list(state.values()), values)
+    entries = evaluate([entry for row in system.jacobian for entry in row], t=time, states=state, values=values, bits=bits)
+    matrix = np.array(entries, dtype=float).reshape(len(state), len(state))
+    rate = float(np.abs(np.linalg.eigvals(matrix)).max()) if np.isfinite(matrix).all() else np.inf
+    if not rate * rest > SINGULAR:
+        return ""
+    return (
+        f"The equations change at {rate:.1e} 1/s there: one of their laws has no derivative, as the root of a level h has none at h = 0, "
+        "or is extremely stiff. No number of steps gets over such a root: end the law a little before it, as "
+        "sl.piecewise((-c*sl.sqrt(h), h > 1e-9), otherwise=0.0) does."
+    )
+
+
 def _duration(seconds: float) -> str:
     """A time to wait, in a unit that people feel."""
     for unit, size in (("years", 3.2e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
@@ -86,7 +114,7 @@ def _value(place: xr.Dataset, name: str) -> str:
     return f"{name} = {from_si(end.item(), end.attrs['units'])}" if np.isfinite(end.item()) else f"{name} = {end.item()}"
 
 
-def warn(run: xr.Dataset, asked: Span | None = None) -> None:
+def warn(run: xr.Dataset, asked: Span | None = None, system: System | None = None) -> None:
     """Issue a SaltusWarning for each message, at the line of the user's call."""
-    for text in messages(run, asked):
+    for text in messages(run, asked, system):
         warnings.warn(text, SaltusWarning, stacklevel=3)

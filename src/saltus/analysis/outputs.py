@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, UnitError, shown
+from saltus.system.dimensions import units_of
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
 from saltus.system.quantity import quantity
 from saltus.system.system import System
-from saltus.units import check_declared
+from saltus.units import check_declared, dimension
 
 
 @dataclass(frozen=True)
@@ -56,16 +57,26 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
     """
     if given is not None and not isinstance(given, Mapping):
         raise ParameterError(
-            f'outputs must be functions by name, such as outputs={{"spring force": lambda x, k: k*x}}, not {given!r}. '
+            f'outputs must be functions by name, such as outputs={{"spring force": lambda x, k: k*x}}, not {shown(given)}. '
             f"States are read off without being asked for."
         )
     extended, formulas, units = system, [], [system.units[name] for name in system.states]
     for name, one in (given or {}).items():
         if not isinstance(name, str) or not name or name in system.states:
-            raise ParameterError(f"an output can't be called {name!r}: give a text that isn't a state of {system.name}.")
+            raise ParameterError(f"an output can't be called {shown(name)}: give a text that isn't a state of {system.name}.")
         function, unit = one if isinstance(one, tuple) and len(one) == 2 else (one, "")
-        formula, guards = quantity(extended, function, f"the output {name!r}")
+        formula, guards = quantity(extended, function, f"the output {shown(name)}")
         extended = replace(extended, guards=guards)
         formulas.append(formula)
-        units.append(check_declared(unit, name) if unit else "")
+        units.append(_unit(system, formula, name, check_declared(unit, name) if unit else ""))
     return Outputs((*system.states, *(given or {})), tuple(units), tuple(formulas), extended.guards)
+
+
+def _unit(system: System, formula: Expr, name: str, declared: str) -> str:
+    """The unit of an output: that which was declared, or what its formula comes to."""
+    (found,) = units_of(system.states, system.units, system.field, [formula])
+    if declared and found and dimension(found) != dimension(declared):
+        raise UnitError(
+            f"the output {shown(name)} is said to be in {declared}, but its formula is in {found}. Correct one, or leave the unit out."
+        )
+    return declared or found

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import qmc
 
 from saltus.analysis import uncertainty
 from saltus.analysis.along import along
 from saltus.analysis.answers import gap_unit, provenance
 from saltus.analysis.found import Found
+from saltus.analysis.halton import halton
 from saltus.analysis.noisy import stray_attrs
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import find
@@ -113,7 +113,7 @@ class BasinPlan:
     # -- the three stages -------------------------------------------------------------------------------------------------------
     def scout(self, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
         """The attractors that a fixed quasi-random sample of the box leads to."""
-        unit = qmc.Halton(2, scramble=False).random(self.scouts)
+        unit = halton(self.scouts, 2)
         low, high = (np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max))
         drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
         return find(self.map(threads), fill(self.system, drawn, self.fixed), self.scale, self.periods, progress=progress)[0]

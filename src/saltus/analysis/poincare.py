@@ -14,7 +14,7 @@ from saltus.analysis.messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.stretch import Stretch, common, computed, stretch, with_each
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, among, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.kernels import status as st
@@ -95,8 +95,8 @@ def poincare(
             f'poincare needs a method that locates contacts, and {method.name}(events="ignore") steps over them: a crossing would be where '
             f'a step happens to end. Use sl.Taylor() or sl.ODE45(..., events="locate").'
         )
-    if direction not in (-1, 0, 1):
-        raise ParameterError(f"direction must be 0, 1 or -1, not {direction!r}.")
+    if not isinstance(direction, int | float | np.integer | np.floating) or direction not in (-1, 0, 1):
+        raise ParameterError(f"direction must be 0, 1 or -1, not {shown(direction)}.")
     found = crossed(system, surface, values if isinstance(values, Mapping) else {})
     seen = stretch(found.system, start, values, periods, t_end, t_start, transient)
 
@@ -124,7 +124,7 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
         return _last(with_surface(system, surface), "", "")
     if isinstance(surface, tuple | list):
         if len(surface) != 2 or not isinstance(surface[0], str):
-            raise ParameterError(f'a surface at a level is a pair of a state and a value, such as ("x", "0.3 mm"), not {surface!r}.')
+            raise ParameterError(f'a surface at a level is a pair of a state and a value, such as ("x", "0.3 mm"), not {shown(surface)}.')
         leveled = with_level(system, surface[0], surface[1])
         level = leveled.guards[-1].name
         return _last(leveled, system.units[surface[0]], "" if level in values else f"{surface[0]} = {leveled.parameter_text(level)}")
@@ -137,7 +137,7 @@ def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
     if among(surface, turns):
         return _last(turning_surface(system, turns[surface]), schema.rate_unit(system.units[turns[surface]]), surface)
     raise ParameterError(
-        f"{system.name} has no guard {surface!r}. {nearest(surface, (*names, *turns))} Or give a function, or a level such as "
+        f"{system.name} has no guard {shown(surface)}. {nearest(surface, (*names, *turns))} Or give a function, or a level such as "
         f'("{system.states[0]}", 0.0).'
     )
 

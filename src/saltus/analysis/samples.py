@@ -7,7 +7,7 @@ import numpy as np
 from saltus.analysis.grid import Grid
 from saltus.analysis.orbit_measures import Measures
 from saltus.analysis.responses import WANDERED, Found, own_times, spans_of
-from saltus.errors import ParameterError, among, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome
 from saltus.flow.family import Family
 from saltus.flow.methods import Method
@@ -23,7 +23,7 @@ PIECE = 256
 def check_sample(sample: str, method: Method) -> str:
     """The sample, if it is known and the method can tell it. Raises ParameterError."""
     if not among(sample, SAMPLES):
-        raise ParameterError(f"sample={sample!r} isn't known. {nearest(sample, SAMPLES)}")
+        raise ParameterError(f"sample={shown(sample)} isn't known. {nearest(sample, SAMPLES)}")
     if sample == "contacts" and not method.records_contacts:
         raise ParameterError(f'{method.name} with events="ignore" locates no contacts. Take sample="turning_points".')
     return sample

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.along import axes_of
 from saltus.analysis.batch_means import LEAST
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
 from saltus.units import to_si
 
@@ -22,7 +23,7 @@ def columns_of(series: Any, embed: bool | None) -> np.ndarray:
     """The series float64[n, D], every column divided by its range."""
     try:
         array = np.asarray(series, float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError("the series must be an array of numbers, (samples,) or (samples, states).") from None
     array = array[:, None] if array.ndim == 1 else array
     if array.ndim != 2 or not array.shape[1]:
@@ -45,12 +46,15 @@ def columns_of(series: Any, embed: bool | None) -> np.ndarray:
 
 def interval_of(given: Any, count: int) -> float:
     """Time between samples [s], from itself or from all times."""
-    if isinstance(given, str) or np.ndim(given) == 0:
+    if isinstance(given, str) or axes_of(given) == 0:
         interval = to_si(given, "s", "sampling_interval")
         if not 0 < interval < math.inf:
-            raise ParameterError(f"sampling_interval must be a positive time, not {given!r}.")
+            raise ParameterError(f"sampling_interval must be a positive time, not {shown(given)}.")
         return interval
-    times = np.asarray(given, float)
+    try:
+        times = np.asarray(given, float)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"sampling_interval is one time, or the times of all {count} samples, not {shown(given)}.") from None
     if times.shape != (count,):
         raise ParameterError(f"sampling_interval is one time, or the times of all {count} samples; this has shape {times.shape}.")
     steps, interval = np.diff(times), (times[-1] - times[0]) / (count - 1)

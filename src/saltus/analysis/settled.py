@@ -12,6 +12,7 @@ import xarray as xr
 
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
+from saltus.flow.counts import whole as whole_number
 from saltus.results.schema import TRAJECTORY, check, kind_of, states_of
 
 #: Largest mismatch that counts as a repeat: far above rounding, far below what tells 24T from its neighbour 12T on the rig (1e-2).
@@ -55,7 +56,7 @@ def settled(run: xr.Dataset, *, tolerance: float = TOLERANCE, last: int | None =
     phases = _phases(run)
     whole = np.flatnonzero(phases == np.round(phases))
     kept = max(whole.size - 1, 0)
-    last = min(LAST, kept) if last is None else last
+    last = min(LAST, kept) if last is None else whole_number(last, "last")
     if not 2 <= last <= kept:
         raise ParameterError(
             f"settled looks at 2 whole forcing periods or more: last = {last}, and {kept} were kept. Give keep={max(last, LAST)}."

@@ -14,7 +14,7 @@ from saltus.analysis import time_errors as measure
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, among
+from saltus.errors import ParameterError, among, shown
 from saltus.flow import engine
 from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
@@ -98,7 +98,7 @@ def simulate(
     length = span(system, group, periods, t_end, t_start)
     plan = _plan(system, group, length, samples, keep)
     if not among(time_errors, ("measured", "local")):
-        raise ParameterError(f'time_errors must be "measured" or "local", not {time_errors!r}.')
+        raise ParameterError(f'time_errors must be "measured" or "local", not {shown(time_errors)}.')
     show, close = reporter(progress)
     outcome = None
     try:
@@ -116,7 +116,7 @@ def simulate(
     finally:
         close()
     result = _dataset(system, method, group, length, plan, outcome, errors)
-    warn(result, length)
+    warn(result, length, system)
     return result
 
 

@@ -12,7 +12,8 @@ import xarray as xr
 
 from saltus.analysis.settled import settled
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, among, nearest
+from saltus.errors import ParameterError, among, nearest, shown
+from saltus.flow.counts import whole as whole_number
 from saltus.results import schema, spectrum_dataset
 
 #: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the first).
@@ -74,7 +75,7 @@ def spectrum(
     """
     schema.check(run, caller="spectrum", kinds=[schema.TRAJECTORY])
     if window is not None and not among(window, WINDOWS):
-        raise ParameterError(f"spectrum: window={window!r}. {nearest(window, WINDOWS)}")
+        raise ParameterError(f"spectrum: window={shown(window)}. {nearest(window, WINDOWS)}")
     names = _states(run, state)
     stretch = _forced_stretch(run, last) if "period" in run.variables else _free_stretch(run, last)
     chosen = [window or ("none" if n else "hann") for n in stretch.response]
@@ -117,10 +118,10 @@ class _Stretch:
 
 def _states(run: xr.Dataset, state: str | Sequence[str] | None) -> list[str]:
     known = schema.states_of(run)
-    names = list(known) if state is None else [state] if isinstance(state, str) else list(state)
+    names = list(known) if state is None else list(state) if isinstance(state, Sequence) and not isinstance(state, str) else [state]
     for name in names:
-        if name not in known:
-            raise ParameterError(f"spectrum: this run has no state {name!r}. {nearest(str(name), known)}")
+        if not among(name, known):
+            raise ParameterError(f"spectrum: this run has no state {shown(name)}. {nearest(name, known)}")
     return names
 
 
@@ -129,8 +130,9 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     phases = np.asarray(run["period"].values, dtype=float)
     whole = np.flatnonzero(phases == np.round(phases))
     kept = max(whole.size - 1, 0)
-    if last is not None and not 1 <= last <= kept:
-        raise ParameterError(f"spectrum: last={last!r}, but {kept} whole forcing periods were kept. Simulate with more keep=.")
+    last = last if last is None else whole_number(last, "last")
+    if last is not None and last > kept:
+        raise ParameterError(f"spectrum: last={shown(last)}, but {kept} whole forcing periods were kept. Simulate with more keep=.")
     if not kept:
         raise ParameterError(
             "spectrum needs a whole forcing period of samples, its two ends included. Simulate longer, or give more keep=."

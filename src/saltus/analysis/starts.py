@@ -12,6 +12,7 @@ import numpy as np
 from saltus.analysis.along import along
 from saltus.errors import ParameterError, SaltusError, nearest, shown
 from saltus.flow.counts import whole
+from saltus.flow.family import NO_PERIOD
 from saltus.system import expression as ex
 from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System
@@ -116,13 +117,10 @@ def looks_every(system: System, every: Any) -> float | None:
             raise ParameterError(f"{system.name} is forced: it is looked at once a forcing period. Leave every= out.")
         return None
     if every is None:
-        raise ParameterError(
-            f'{system.name} has no forcing period. Give every=, the time between two looks at the motion, such as every="0.1 s": '
-            f"about a turn of it. Answers don't depend on it."
-        )
+        raise ParameterError(f"{system.name} {NO_PERIOD}")
     seconds = to_si(every, "s", "every")
     if not 0 < seconds < math.inf:
-        raise ParameterError(f"every must be a positive time, not {every!r}.")
+        raise ParameterError(f"every must be a positive time, not {shown(every)}.")
     return seconds
 
 
@@ -141,11 +139,11 @@ def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, fl
         If ``at`` isn't a mapping, names an unknown state, or one of those that move; if a name of those isn't a state.
     """
     if at is not None and not isinstance(at, Mapping):
-        raise ParameterError(f"at must be a mapping of states to starts, not {at!r}.")
+        raise ParameterError(f"at must be a mapping of states to starts, not {shown(at)}.")
     given, moving = at or {}, list(moving)
     for name in (*moving, *given):
         if name not in system.states:
-            raise ParameterError(f"{system.name} has no state {name!r}. {nearest(name, system.states)}")
+            raise ParameterError(f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}")
     twice = [name for name in moving if name in given]
     if twice:
         raise ParameterError(f"{twice[0]} has a range and stands in at= too. Leave it out of one of them.")
@@ -197,16 +195,17 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
     if isinstance(start, Mapping):
         unknown = [name for name in start if name not in system.states]
         if unknown:
-            raise ParameterError(f"{system.name} has no state {unknown[0]!r}. {nearest(unknown[0], system.states)}")
+            raise ParameterError(f"{system.name} has no state {shown(unknown[0])}. {nearest(unknown[0], system.states)}")
         missing = [name for name in system.states if name not in start]
         if missing:
             raise ParameterError(f"the start gives no {missing[0]!r}. Write start={{{', '.join(f'{s!r}: 0.0' for s in system.states)}}}.")
         return {name: _numbers(system, name, start[name]) for name in system.states}
     rows = start if isinstance(start, np.ndarray) else _as_array(start)
     if rows.shape == () or rows.shape[-1] != len(system.states) or rows.ndim > 2:
+        this = f"has shape {rows.shape}" if rows.shape else f"is {shown(start)}"
         raise ParameterError(
             f"a start of {system.name} is {len(system.states)} numbers ({', '.join(system.states)}), or an array of such rows; "
-            f"this one has shape {rows.shape}."
+            f"this one {this}."
         )
     return {name: _numbers(system, name, rows[..., i]) for i, name in enumerate(system.states)}
 
@@ -261,6 +260,8 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
     """
     begin = _time(t_start, "t_start")
     n = group.size
+    if periods is None and t_end is None and system.forced_at is None:
+        raise ParameterError(f'{system.name} has no forcing period: give t_end=, such as t_end="10 s".')
     if (periods is None) == (t_end is None):
         raise ParameterError("give periods= (whole forcing periods) or t_end= (seconds), and only one of them.")
     if periods is not None:
@@ -271,7 +272,7 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
     end = _time(t_end, "t_end")
     length = end - begin
     if not length > 0:
-        raise ParameterError(f"t_end = {t_end!r} must be after t_start = {t_start!r}.")
+        raise ParameterError(f"t_end = {shown(t_end)} must be after t_start = {shown(t_start)}.")
     if system.forced_at is None:
         return Span(begin, np.full(n, length), np.ones(n, np.int64), np.zeros(n), end)
     period = _periods(system, group)
@@ -282,7 +283,7 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
 def _time(value: Any, name: str) -> float:
     seconds = to_si(value, "s", name)
     if not math.isfinite(seconds):
-        raise ParameterError(f"{name} must be a finite time, not {value!r}.")
+        raise ParameterError(f"{name} must be a finite time, not {shown(value)}.")
     return seconds
 
 

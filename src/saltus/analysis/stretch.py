@@ -11,7 +11,7 @@ import xarray as xr
 
 from saltus.analysis import answers
 from saltus.analysis.starts import Ensemble, Span, ensemble, span
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.flow import engine
 from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
@@ -19,7 +19,6 @@ from saltus.flow.methods import Method
 from saltus.flow.progress import reporter
 from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
-from saltus.results import Guards
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -85,13 +84,13 @@ def stretch(system: System, start: Any, values: Any, periods: Any, t_end: Any, t
         skip = to_si(transient, "s", "transient")
         begin = np.full(group.size, length.t_start + skip)
         if not 0 <= skip < float(length.period[0]):
-            raise ParameterError(f"transient = {transient!r} must be a time >= 0 s that ends before t_end = {t_end!r}.")
+            raise ParameterError(f"transient = {shown(transient)} must be a time >= 0 s that ends before t_end = {shown(t_end)}.")
         return Stretch(system, group, length, 0, begin)
     skipped = whole(transient, "transient", 0)
     length = span(system, group, None if periods is None else whole(periods, "periods") + skipped, t_end, t_start)
     begin = length.t_start + skipped * length.period
     if np.any(skipped >= length.count + length.phase / length.period):
-        raise ParameterError(f"transient = {skipped} periods outlast the run up to t_end = {t_end!r}. Give a later t_end.")
+        raise ParameterError(f"transient = {skipped} periods outlast the run up to t_end = {shown(t_end)}. Give a later t_end.")
     return Stretch(system, group, length, skipped, begin)
 
 
@@ -123,7 +122,7 @@ def common(seen: Stretch, system: System, method: Method, outcome: Outcome) -> d
     return dict(
         states=system.states,
         units=seen.system.units,
-        guards=Guards(own.names[:count], own.states[:count], own.boundaries[:count]),
+        guards=own.first(count),
         status=[st.STATUS[int(code)][0] for code in outcome.status],
         each={**{name: outcome.counters[:, st.COUNTERS.index(name)] for name in names}, "end_time": outcome.time},
         end={name: outcome.state[:, i] for i, name in enumerate(system.states)},

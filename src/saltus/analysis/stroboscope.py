@@ -12,6 +12,7 @@ from saltus.analysis import answers
 from saltus.analysis.messages import warn
 from saltus.analysis.starts import ensemble, span
 from saltus.analysis.verb import verb
+from saltus.errors import ParameterError
 from saltus.flow import engine
 from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
@@ -62,6 +63,8 @@ def stroboscope(
     """
     method = check_method(method)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    if system.forced_at is None:
+        raise ParameterError(f"{system.name} has no forcing period to be seen once in. Take sl.simulate with t_end=, or sl.poincare.")
     length = span(system, group, periods, None, t_start)
     whole_periods = whole(periods, "periods")
     first = 0 if keep is None else max(whole_periods + 1 - whole(keep, "keep"), 0)

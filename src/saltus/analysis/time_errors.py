@@ -43,9 +43,9 @@ def measured(
     threads, show
         As for :func:`saltus.flow.engine.run`.
     """
-    copies, n = COPIES if method.exact else 1, len(request.start)
-    nudged = [_nudged(system, request, i if method.exact else None) for i in range(copies)]
-    batches = [nudged] if n <= FEW else [[one] for one in nudged]
+    n, silent = len(request.start), replace(request, schedule=Schedule.none())
+    copies = _nudged(system, silent) if method.exact else [silent]
+    batches = [copies] if n <= FEW else [[one] for one in copies]
     distance = np.zeros(len(outcome.record_integers))
     for done, batch in enumerate(batches):
 
@@ -61,18 +61,19 @@ def measured(
 
 
 # -- nudges ----------------------------------------------------------------------------------------------------------------------
-def _nudged(system: System, request: Request, copy: int | None) -> Request:
-    """The request with starts and values wrong by an ulp; None: as it is. What moves a boundary, or time, stays."""
-    request = replace(request, schedule=Schedule.none())
-    if copy is None:
-        return request
-    signs = np.random.default_rng([SEED, copy]).choice([-1.0, 1.0], len(system.states) + len(system.values))
-    nudge = 1.0 + signs * np.finfo(float).eps
+def _nudged(system: System, request: Request) -> list[Request]:
+    """The request with starts and values wrong by an ulp, differently in each copy. What moves a boundary, or time, stays."""
     places = {leaf.payload for guard in system.guards for leaf in ex.walk(guard.gap) if leaf.op == "param"} | {system.forced_at}
     fixed = np.array([name in places for name in system.values], bool)
-    by_state = np.where(_on_a_boundary(system, request)[:, None], 1.0, nudge[: len(system.states)])
-    by_value = np.where(fixed, 1.0, nudge[len(system.states) :])
-    return replace(request, start=request.start * by_state, parameters=request.parameters * by_value)
+    resting = _on_a_boundary(system, request)[:, None]
+    copies = []
+    for copy in range(COPIES):
+        signs = np.random.default_rng([SEED, copy]).choice([-1.0, 1.0], len(system.states) + len(system.values))
+        nudge = 1.0 + signs * np.finfo(float).eps
+        by_state = np.where(resting, 1.0, nudge[: len(system.states)])
+        by_value = np.where(fixed, 1.0, nudge[len(system.states) :])
+        copies.append(replace(request, start=request.start * by_state, parameters=request.parameters * by_value))
+    return copies
 
 
 def _on_a_boundary(system: System, request: Request) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.results.schema import RESPONSES, check
 
 #: What two outputs are compared by.
@@ -43,9 +43,9 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
     known = ds["output"].values.tolist() if "output" in ds else []
     for name in (output, to):
         if name not in known:
-            raise ParameterError(f"transmissibility: {name!r} is no output. {nearest(str(name), known)} Ask for functions by outputs=.")
-    if by not in get_args(By):
-        raise ParameterError(f"transmissibility: by={by!r}. Known: {', '.join(get_args(By))}.")
+            raise ParameterError(f"transmissibility: {shown(name)} is no output. {nearest(name, known)} Ask for functions by outputs=.")
+    if not among(by, get_args(By)):
+        raise ParameterError(f"transmissibility: by={shown(by)}. Known: {', '.join(get_args(By))}.")
     upper, lower = ds.sel(output=output), ds.sel(output=to)
     units = [one["output_units"].item() for one in (upper, lower)]
     unit = "" if "" in units else "1" if units[0] == units[1] else f"{units[0]}/{_factor(units[1])}"

@@ -11,8 +11,11 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from saltus.arguments import Kinds
 from saltus.codegen.announce import silent
 from saltus.errors import ParameterError, nearest, shown
+from saltus.flow.counts import whole
+from saltus.flow.engine import MOST_THREADS
 from saltus.interrupt import Interrupted
 from saltus.system.system import System
 
@@ -30,22 +33,29 @@ _ELSEWHERE: Mapping[str, str] = {
     **dict.fromkeys(("n", "n_periods", "nperiods", "cycles"), "periods="),
     **dict.fromkeys(("solver", "integrator"), "method="),
 }
+#: What verbs take for states that the user names, as one would write it.
+_RANGES = {"axes": 'x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)', "box": 'x=("-5 mm", "5 mm"), v=("-1 m/s", "1 m/s")'}
+#: What tells how long to go on; which of them a verb has depends on whether it looks at whole periods only.
+_LENGTHS = ("t_end", "periods", "every")
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 
 
 def verb(function: Callable[P, R]) -> Callable[P, R]:
     """Make a function a public verb.
 
-    Arguments that it doesn't have are answered by those that it has; ``progress=False`` silences what is said about compiling; Ctrl-C that
-    comes before anything is finished is an :class:`Interrupted` too.
+    Arguments that it doesn't have are answered by those that it has, and those of another kind by what they must be; ``progress=False``
+    silences what is said about compiling; Ctrl-C that comes before anything is finished is an :class:`Interrupted` too.
     """
-    signature = inspect.signature(function)
+    signature, kinds = inspect.signature(function), Kinds(function)
 
     @functools.wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> R:
         if _INSIDE.get():
             return function(*args, **kwargs)
-        _check(function.__name__, signature, args, kwargs)
+        given = _check(function.__name__, signature, args, kwargs)
+        kinds.check(f"sl.{function.__name__}", given)
+        if given.get("threads") is not None:
+            whole(given["threads"], "threads", 1, MOST_THREADS)
         quiet: AbstractContextManager[Any] = silent() if kwargs.get("progress") is False else nullcontext()
         token = _INSIDE.set(True)
         try:
@@ -61,13 +71,13 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
     return called
 
 
-def _check(name: str, signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> None:
-    """Raise ParameterError unless the arguments fit."""
+def _check(name: str, signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The arguments by name. Raises ParameterError unless there are such."""
     known = signature.parameters
     if not any(parameter.kind == parameter.VAR_KEYWORD for parameter in known.values()):
         for word in kwargs:
             if word not in known:
-                raise ParameterError(f"sl.{name} has no argument {word!r}. {_instead(word, known, args, kwargs)}")
+                raise ParameterError(f"sl.{name} has no argument {shown(word)}. {_instead(word, known, args, kwargs)}")
     try:
         given = signature.bind(*args, **kwargs).arguments
     except TypeError as error:
@@ -77,6 +87,7 @@ def _check(name: str, signature: inspect.Signature, args: tuple[Any, ...], kwarg
             f"sl.{name}: the start comes second, and the time is one number: sl.{name}(system, start, t_end=10). "
             f"periods can't be {shown(given['periods'])}."
         )
+    return given
 
 
 def _instead(word: str, known: Mapping[str, inspect.Parameter], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str:
@@ -87,14 +98,27 @@ def _instead(word: str, known: Mapping[str, inspect.Parameter], args: tuple[Any,
         return f"It is a parameter of {system.name}: give it by {by}system.with_values({word}=...)."
     if isinstance(system, System) and word in system.states and "start" in known:
         return f"It is a state of {system.name}: give it by start={{{', '.join(f'{state!r}: ...' for state in system.states)}}}."
-    there = _ELSEWHERE.get(word.lower())
-    if there is not None and there.partition("=")[0] in known:
+    there = _ELSEWHERE.get(word.lower(), f"{word}=" if word in _LENGTHS else "")
+    if there.partition("=")[0] in known:
         return f"Write {there}."
+    if there.partition("=")[0] in _LENGTHS:
+        return _length(known)
     return nearest(word, known)
+
+
+def _length(known: Mapping[str, inspect.Parameter]) -> str:
+    """How a verb is told how long to go on."""
+    ways = {
+        "t_end": "t_end= [s]",
+        "periods": "periods= (forcing periods)" if "every" not in known else "periods= (forcing periods, or looks every= seconds apart of "
+        "a system without forcing)",
+    }  # fmt: skip
+    return f"How long it goes on is told by {' or '.join(text for name, text in ways.items() if name in known)}."
 
 
 def _call(known: Mapping[str, inspect.Parameter]) -> str:
     """How it is called, with the arguments that it can't do without."""
     needed = [p.name for p in known.values() if p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
-    rest = [p.name for p in known.values() if p.default is not p.empty][:2]
-    return ", ".join([*needed, *(f"{name}=..." for name in rest), "..."])
+    ranges = [_RANGES[p.name] for p in known.values() if p.kind == p.VAR_KEYWORD and p.name in _RANGES]
+    rest = [] if ranges else [p.name for p in known.values() if p.default is not p.empty][:2]
+    return ", ".join([*needed, *ranges, *(f"{name}=..." for name in rest), "..."])

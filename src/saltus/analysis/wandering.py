@@ -26,8 +26,10 @@ REPEATS, SETTLING = 1e-6, 0.05
 UNCLEAR = 0.1
 #: Iterates whose places are noted.
 TRAIL = 4096
-#: Boxes across the range of a state.
-BOXES = 64
+#: Boxes across the range of a state, the finest first: the first at which one half of a trail knows the places of the other is taken.
+BOXES = (64, 32, 16, 8)
+#: Share of every second place of a trail that must lie in the boxes of the others. An attractor of a higher dimension needs larger boxes.
+KNOWN = 0.9
 #: Boxes away from zero beyond which nothing is on an attractor.
 FARTHEST = 2048
 #: Share of the places of one attractor that must lie in the other's boxes for both to be one.
@@ -62,20 +64,35 @@ class Wandering:
         return tuple(np.round(self.points.mean(axis=0) / self.scale, 3).tolist())
 
     @functools.cached_property
-    def boxes(self) -> np.ndarray:
-        """Codes of the boxes that it visits and of their neighbours along each axis, ascending int64."""
-        cells = np.unique(np.floor(self.points / self.scale * BOXES).astype(np.int64), axis=0)
-        size = cells.shape[1]
-        steps = np.concatenate([np.zeros((1, size), np.int64), np.eye(size, dtype=np.int64), -np.eye(size, dtype=np.int64)])
-        return np.unique(_codes((cells[:, None] + steps).reshape(-1, size)))
+    def _places(self) -> tuple[int, np.ndarray]:
+        """Boxes across the range of a state, and the codes of those it visits and of their neighbours."""
+        for across in BOXES:
+            half = _around(self.points[::2], self.scale, across)
+            if _inside(self.points[None, 1::2], self.scale, across, half)[0] >= KNOWN:
+                break
+        return across, _around(self.points, self.scale, across)
 
     def share(self, points: np.ndarray) -> np.ndarray:
         """Share of the points of trajectories float64[k, n, D] that lie in its boxes, float64[k]."""
-        inside = np.isfinite(points).all(axis=2)
-        cells = np.floor(np.where(inside[:, :, None], points, 0.0) / self.scale * BOXES)
-        inside &= (np.abs(cells) < FARTHEST).all(axis=2)
-        codes = _codes(np.where(inside[:, :, None], cells, 0).astype(np.int64))
-        return (inside & np.isin(codes, self.boxes)).mean(axis=1)
+        across, boxes = self._places
+        return _inside(points, self.scale, across, boxes)
+
+
+def _around(points: np.ndarray, scale: np.ndarray, across: int) -> np.ndarray:
+    """Codes of the boxes that points float64[n, D] visit and of their neighbours along each axis, ascending int64."""
+    cells = np.unique(np.floor(points / scale * across).astype(np.int64), axis=0)
+    size = cells.shape[1]
+    steps = np.concatenate([np.zeros((1, size), np.int64), np.eye(size, dtype=np.int64), -np.eye(size, dtype=np.int64)])
+    return np.unique(_codes((cells[:, None] + steps).reshape(-1, size)))
+
+
+def _inside(points: np.ndarray, scale: np.ndarray, across: int, boxes: np.ndarray) -> np.ndarray:
+    """Share of the points of trajectories float64[k, n, D] that lie in boxes, float64[k]."""
+    inside = np.isfinite(points).all(axis=2)
+    cells = np.floor(np.where(inside[:, :, None], points, 0.0) / scale * across)
+    inside &= (np.abs(cells) < FARTHEST).all(axis=2)
+    codes = _codes(np.where(inside[:, :, None], cells, 0).astype(np.int64))
+    return (inside & np.isin(codes, boxes)).mean(axis=1)
 
 
 def _codes(cells: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from saltus.analysis.neighbours import CROWD, Evolutions, Search, crowd_distance
 from saltus.analysis.series import LEAST_POINTS, check_length, columns_of, interval_of, samples_of
 from saltus.analysis.verb import verb
 from saltus.analysis.wandering import UNCLEAR
-from saltus.errors import ParameterError, SaltusWarning, among, nearest
+from saltus.errors import ParameterError, SaltusWarning, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.results import exponents_dataset
 
@@ -135,7 +135,7 @@ def wolf(
     Abarbanel, Phys. Rev. A 45 (1992) 3403-3411.
     """
     if not among(unit, UNITS):
-        raise ParameterError(f"the exponent isn't given in {unit!r}. {nearest(unit, UNITS)}")
+        raise ParameterError(f"the exponent isn't given in {shown(unit)}. {nearest(unit, UNITS)}")
     columns = columns_of(series, embed)
     interval = interval_of(sampling_interval, len(columns))
     single = columns.shape[1] == 1 if embed is None else embed
@@ -223,7 +223,7 @@ def _search(points: np.ndarray, evolve: int, smallest: Any, largest: Any, exclud
     """The distances, checked."""
     for name, value in (("smallest_distance", smallest), ("largest_distance", largest)):
         if value is not None and not (isinstance(value, int | float) and 0 < value < 1):
-            raise ParameterError(f"{name} must be a share of the range, between 0 and 1, not {value!r}.")
+            raise ParameterError(f"{name} must be a share of the range, between 0 and 1, not {shown(value)}.")
     return default_search(points, evolve, exclude, float(smallest), largest)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 
 #: The largest count that means anything here: at a million periods a second, 1e12 take eleven days.
 MOST = 10**12
@@ -17,9 +17,9 @@ def whole(value: Any, name: str, least: int = 1, most: int = MOST) -> int:
     """A whole number. Raises ParameterError for anything else, or one below ``least`` or above ``most``."""
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool | np.timedelta64)
     if not number or (not isinstance(value, int) and not math.isfinite(value)) or value != int(value) or value < least:
-        raise ParameterError(f"{name} must be a whole number of at least {least}{_and_most(most)}, not {_short(value)}.")
+        raise ParameterError(f"{name} must be a whole number of at least {least}{_and_most(most)}, not {shown(value)}.")
     if value > most:
-        raise ParameterError(f"{name} must be at most {_power(most)}, not {_short(value)}.")
+        raise ParameterError(f"{name} must be at most {_power(most)}, not {shown(value)}.")
     return int(value)
 
 
@@ -29,10 +29,3 @@ def _and_most(most: int) -> str:
 
 def _power(most: int) -> str:
     return "1e12" if most == MOST else str(most)
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, int) and abs(value) > 10**30:
-        return "one of so many digits"
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:77]}..."

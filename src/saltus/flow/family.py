@@ -16,6 +16,11 @@ from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System
 from saltus.system.tangent import tangent_system
 
+#: What a system without forcing needs, as the end of a sentence.
+NO_PERIOD = (
+    'has no forcing period: give every=, the time between two looks at the motion, such as every="0.1 s", about a turn of it. '
+    "Answers don't depend on it."
+)
 #: A method tells its noise in units of a box of starts, some ten times the range of a motion in it. Measured for ode45 at (1e-4, 1e-7) on
 #: the rig's responses: its returns scatter by 0.05 to 2 % of their range with location, by 0.3 to 4 % without. More than this share of the
 #: range is no noise.
@@ -44,8 +49,7 @@ class Family:
         self, system: System, method: Method, parameters: np.ndarray, every: float | np.ndarray | None = None, threads: int | None = None
     ):
         if (every is None) == (system.forced_at is None):
-            told = "has no forcing period: give every=, the time between two looks" if every is None else "is forced: leave every= out"
-            raise ParameterError(f"{system.name} {told}.")
+            raise ParameterError(f"{system.name} {NO_PERIOD if every is None else 'is forced: leave every= out.'}")
         self.system, self.method, self.threads = system, method, threads
         self.parameters, self._looks = np.ascontiguousarray(parameters, float), every is not None
         self.states = system.states
@@ -69,10 +73,6 @@ class Family:
     def noise(self, scale: np.ndarray) -> np.ndarray:
         """Mismatch of closed orbits, float64[m], in units of their ranges float64[m, D], that the method's own errors explain."""
         return np.minimum(MOTION * self.method.noise_of(scale), MOST_NOISE)
-
-    def begin_tangent(self) -> None:
-        """Start to compile what :meth:`tangent` needs."""
-        self.method.begin_kernels(tangent_system(self.system))
 
     def rows(self, which: np.ndarray) -> Family:
         """The family of some of the rows: int64[m], with repeats if wanted, or bool[k]."""

@@ -50,7 +50,7 @@ class Flight:
 
     def __init__(self, system: System, method: Method, start: np.ndarray, parameters: np.ndarray, period: np.ndarray, longest: float):
         count = len(start)
-        self._module = method.kernels(system)
+        self._module = method.kernels(system.origin)
         self._workspace = self._module.workspace()
         request = Request(start, parameters, period, 0.0, np.zeros(count, np.int64), np.zeros(count), Schedule.none(), None)
         _, self._arrays = allocate(request, start.shape[1], self._module)

@@ -9,10 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.flow import engine
 from saltus.flow.engine import Request, Schedule
-from saltus.flow.family import Family
+from saltus.flow.family import NO_PERIOD, Family
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
@@ -103,15 +103,13 @@ class Stroboscope:
 
     def __init__(self, system: System, method: Method, every: float | None = None, threads: int | None = None):
         if (every is None) == (system.forced_at is None):
-            told = "has no forcing period: give every=, the time between two looks" if every is None else "is forced: leave every= out"
-            raise ParameterError(f"{system.name} {told}.")
+            raise ParameterError(f"{system.name} {NO_PERIOD if every is None else 'is forced: leave every= out.'}")
         self.system, self.method, self.states, self._threads = system, method, system.states, threads
         self.period = float(system.period() if every is None else every)
         if not 0 < self.period < math.inf:
-            raise ParameterError(f"every must be a positive time, not {every!r}.")
+            raise ParameterError(f"every must be a positive time, not {shown(every)}.")
         self._parameters = np.array([list(system.values.values())])
         self._tangent = tangent_system(system)
-        method.begin_kernels(self._tangent)
         self.noise = method.noise
         self._every = every
 

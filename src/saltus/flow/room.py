@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import functools
 import threading
 from pathlib import Path
 
@@ -10,6 +10,8 @@ from saltus.errors import ParameterError
 
 #: What a call may take of the memory that is free.
 SHARE = 0.5
+#: What is never too much [bytes], so that memory isn't looked at for it.
+LITTLE = 2**24
 #: Free memory [bytes] where the system doesn't tell.
 UNKNOWN = 4 * 2**30
 #: Memory of a contact of D states, from the kernel's table to the Dataset with both runs of measured time errors [bytes]. Measured: 401 for
@@ -45,6 +47,8 @@ def check_room(size: float, what: str, instead: str) -> None:
     instead : str
         What to do in place of it, as a sentence.
     """
+    if size <= LITTLE:
+        return
     room = SHARE * free()
     if size > room:
         raise ParameterError(
@@ -60,14 +64,16 @@ class Contacts:
     ----------
     states : int
         States of the system.
-    wanted : bool
-        Whether contacts are kept at all.
     """
 
-    def __init__(self, states: int, wanted: bool) -> None:
-        self._lock = threading.Lock()
+    def __init__(self, states: int) -> None:
+        self._lock, self._each = threading.Lock(), CONTACT + CONTACT_OF_A_STATE * states
         self.kept, self.stopped = 0, False
-        self.most = SHARE * free() / (CONTACT + CONTACT_OF_A_STATE * states) if wanted else math.inf
+
+    @functools.cached_property
+    def most(self) -> float:
+        """How many there is room for."""
+        return SHARE * free() / self._each
 
     def take(self, count: int) -> None:
         """Note that so many more are kept."""
@@ -77,4 +83,4 @@ class Contacts:
     @property
     def full(self) -> bool:
         """Whether there is room for no more."""
-        return self.kept >= self.most
+        return self.kept * self._each > LITTLE and self.kept >= self.most

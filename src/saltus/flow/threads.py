@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextvars import copy_context
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from saltus.interrupt import Stop, check_stop
 
@@ -39,7 +41,7 @@ def on_threads(
         stop.hold()
         return None if stop.is_set() else (item, work(item))
 
-    with ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool:
+    with _OneThread() if len(items) == 1 else ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool:
         waiting: set[Future] = set()
         try:
             waiting |= {pool.submit(copy_context().run, one, item) for item in items}
@@ -55,3 +57,29 @@ def on_threads(
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
             raise
+
+
+class _OneThread(Executor):
+    """A thread for a single piece of work: a pool takes three times as long to make and to end, which a single trajectory would feel."""
+
+    _thread: threading.Thread | None = None
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future:
+        """Start the piece."""
+        future: Future = Future()
+
+        def run() -> None:
+            try:
+                future.set_result(function(*args, **kwargs))
+            except BaseException as error:
+                future.set_exception(error)
+
+        self._thread = threading.Thread(target=run)
+        self._thread.start()
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002  (it has begun already)
+        """Wait for its end."""
+        if wait and self._thread is not None:
+            with contextlib.suppress(RuntimeError):  # Ctrl-C came before it was started
+                self._thread.join()

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from saltus.errors import ParameterError, among, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.models.aeroelastic import ENERGY as _AEROELASTIC_ENERGY
 from saltus.models.aeroelastic import aeroelastic
 from saltus.models.chain import ENERGY as _CHAIN_ENERGY
@@ -45,7 +45,7 @@ def find(name: str) -> Callable[..., System]:
         If there is none; the message offers the nearest name.
     """
     if not among(name, MODELS):
-        raise ParameterError(f"no model is called {name!r}. {nearest(name, MODELS)}")
+        raise ParameterError(f"no model is called {shown(name)}. {nearest(name, MODELS)}")
     return MODELS[name]
 
 
@@ -79,7 +79,7 @@ def describe() -> dict[str, str]:
 def __getattr__(name: str) -> Any:
     if name.startswith("__"):
         raise AttributeError(name)
-    raise AttributeError(f"no model is called {name!r}. Models: {', '.join(MODELS)}. Write your own equation with @sl.system.")
+    raise AttributeError(f"no model is called {shown(name)}. Models: {', '.join(MODELS)}. Write your own equation with @sl.system.")
 
 
 __all__ = ["MODELS", "aeroelastic", "chain", "delangre", "describe", "energy", "find", "gear_pair"]

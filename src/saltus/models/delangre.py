@@ -16,7 +16,7 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
-from saltus.errors import ParameterError, among, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.system import System, cos, pi, piecewise, system
 
 _SOURCE = (
@@ -70,7 +70,7 @@ def delangre(case: str = "b", **values: Any) -> System:
     orbit add up to -2 zeta omega_n = -1.884955592 /s.
     """
     if not among(case, CASES):
-        raise ParameterError(f"the rig has no case {case!r}. {nearest(case, CASES)}")
+        raise ParameterError(f"the rig has no case {shown(case)}. {nearest(case, CASES)}")
     lower_gap, upper_gap = CASES[case]
     return _rig().with_values(**{"lower_gap": lower_gap, "upper_gap": upper_gap, **values})
 

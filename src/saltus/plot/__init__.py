@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from saltus.errors import nearest
+from saltus.errors import nearest, shown
 from saltus.plot.agreement import agreement
 from saltus.plot.basins import basins
 from saltus.plot.bifurcation import bifurcation_diagram
@@ -27,4 +27,4 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name.startswith("__"):
         raise AttributeError(name)
-    raise AttributeError(f"no picture is called {name!r}. {nearest(name, __all__)}")
+    raise AttributeError(f"no picture is called {shown(name)}. {nearest(name, __all__)}")

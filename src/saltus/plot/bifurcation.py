@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.errors import ParameterError, nearest
+from saltus.arguments import checked
+from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import kinds, regions
 from saltus.plot import response_points as points
@@ -20,10 +21,13 @@ _CALLER = "plot.bifurcation_diagram"
 _SHOWN = {
     "turning_points": "{} at turning points", "contacts": "{} at the contacts", "stroboscope": "{} at the Poincaré points",
 }  # fmt: skip
+#: Diameter of the smallest dots [pt]: more than a pixel of a screen.
+_SMALLEST = 0.6
 #: Where the legend begins, in widths of the Axes, if the names of the gaps stand beside it.
 _BESIDE_GAPS = 1.16
 
 
+@checked
 def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: bool = True, legend: bool = True, ax: Any = None) -> Axes:
     """Sampled values of every response against a parameter: a colour for each period, chaos in small dark dots, gaps dashed.
 
@@ -56,7 +60,7 @@ def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: 
     names = states_of(datasets[0].ds)
     state = names[0] if state is None else state
     if any(state not in states_of(one.ds) for one in datasets):
-        raise ParameterError(f"{_CALLER}: there is no state {state!r}. {nearest(str(state), names)}")
+        raise ParameterError(f"{_CALLER}: there is no state {shown(state)}. {nearest(state, names)}")
     variables = [_variable(one, state) for one in datasets]
     scale = points.state_scale([one.ds[name] for one, name in zip(datasets, variables, strict=True)])
     with draw.panels(ax, 1, (6.3, 3.6), _CALLER) as (panel,):
@@ -99,7 +103,7 @@ def _kinds(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> di
         x, y = _flat(one, values, of == code, across)
         wandering = not kinds.repeats(code)
         size = _size(x.size) * (0.5 if wandering else 1.0)
-        look = {"marker": "o", "ms": max(size, 0.4), "mfc": kinds.color(code), "mec": "none", "gid": f"kind {code}"}
+        look = {"marker": "o", "ms": max(size, _SMALLEST), "mfc": kinds.color(code), "mec": "none", "gid": f"kind {code}"}
         draw.draw_points(ax, x, y, zorder=2 if wandering else 3, **look)
     return points.kind_handles(one, of)
 

@@ -11,7 +11,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from saltus.errors import ParameterError, UnitError, nearest
+from saltus.arguments import checked
+from saltus.errors import ParameterError, UnitError, among, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import kinds
 from saltus.plot import response_points as points
@@ -34,6 +35,7 @@ _SIZES = ("rms", "peak", "peak_to_peak", "rms_about_mean", "amplitude", "transmi
 Measured = str | os.PathLike[str] | xr.Dataset | None
 
 
+@checked
 def frequency_response(
     ds: points.Source,
     *,
@@ -78,8 +80,8 @@ def frequency_response(
     ResultFileError
         If the measured points can't be read.
     """
-    if quantity not in get_args(Quantity):
-        raise ParameterError(f"{_CALLER}: quantity={quantity!r}. Known: {', '.join(get_args(Quantity))}.")
+    if not among(quantity, get_args(Quantity)):
+        raise ParameterError(f"{_CALLER}: quantity={shown(quantity)}. Known: {', '.join(get_args(Quantity))}.")
     datasets = [_chosen(one, quantity, output) for one in points.shown(ds, _CALLER, [])]
     variable = "drawn"
     marks = None if measured is None else _measured(measured, datasets[0], variable)
@@ -118,7 +120,7 @@ def _chosen(one: points.Shown, quantity: str, output: str | None) -> points.Show
     known = ds["output"].values.tolist() if "output" in ds else []
     name = first if output is None else output
     if name not in known:
-        raise ParameterError(f"{_CALLER}: the Dataset has no output {name!r}. {nearest(str(name), known)}")
+        raise ParameterError(f"{_CALLER}: the Dataset has no output {shown(name)}. {nearest(name, known)}")
     chosen = ds.sel(output=name)
     unit = "1" if quantity == "phase" else chosen["output_units"].item()
     values = np.rad2deg(chosen["output_phase"].values) if quantity == "phase" else chosen[f"output_{quantity}"].values
@@ -138,7 +140,7 @@ def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[st
         if kinds.repeats(code):
             line = points.branch_lines(one, y, mine)
             ax.plot(line[0] * across.factor, line[1], color=color, lw=0.8, zorder=2, gid=f"branches {code}")
-        size = _size(mine.sum()) * (0.7 if code == kinds.CHAOTIC else 1.0)
+        size = _size(mine.sum()) * (1.2 if code == kinds.CHAOTIC else 1.0)  # of its marker half is seen
         look = {"marker": kinds.marker(code), "mfc": color, "mec": "none"}
         draw.draw_points(ax, one.values[mine] * across.factor, y[mine], ms=size, zorder=3, gid=f"kind {code}", **look)
     return points.kind_handles(one, of, markers=True)

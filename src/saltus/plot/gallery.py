@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import ScaledTranslation
 
+from saltus.arguments import checked
 from saltus.errors import ParameterError
 from saltus.plot import axes as draw
 from saltus.plot import maps, selection
@@ -32,6 +33,7 @@ _ELSEWHERE = "#D2D2D2"
 _NARROWEST = 0.25
 
 
+@checked
 def gallery(ds: xr.Dataset, runs: xr.Dataset, attractors: Sequence[int] | None = None, *, order: Sequence[int] | None = None) -> Figure:
     """A row for each attractor: time history over its period, phase portrait, Poincare points in the hue that it has in the map.
 

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
-from saltus.errors import ParameterError
+from saltus.arguments import checked
+from saltus.errors import ParameterError, among, shown
 from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
@@ -26,6 +27,7 @@ _MARKERS: dict[str, dict[str, Any]] = {
 }
 
 
+@checked
 def history(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,
@@ -72,16 +74,16 @@ def history(
         If ``run`` is not from ``simulate``, or an argument doesn't fit it.
     """
     check(run, caller=_CALLER, kinds=[TRAJECTORY])
-    if time not in ("s", "T", "both"):
-        raise ParameterError(f"{_CALLER}: time={time!r}. Known: 'both', 's', 'T'.")
+    if not among(time, ("s", "T", "both")):
+        raise ParameterError(f"{_CALLER}: time={shown(time)}. Known: 'both', 's', 'T'.")
     state = states_of(run)[0] if state is None else selection.state_named(run, state, _CALLER)
     wanted = selection.units_of_states(run, units, _CALLER).get(state)
     labels = selection.chosen(run, trajectory, _CALLER)
     singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
     windows = [selection.window(one, periods, _CALLER) for one in singles]
     with draw.panels(ax, len(singles), (6.3, 2.5), _CALLER) as panels:
-        for i, (panel, one, shown) in enumerate(zip(panels, singles, windows, strict=True)):
-            _panel(panel, one, state, shown, time, wanted)
+        for i, (panel, one, part) in enumerate(zip(panels, singles, windows, strict=True)):
+            _panel(panel, one, state, part, time, wanted)
             if len(labels) > 1:
                 panel.set_ylabel(f"trajectory {labels[i]}\n{panel.get_ylabel()}")
             if legend and i == 0:
@@ -94,6 +96,10 @@ def history(
 def _panel(ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], time: str, unit: str | None) -> None:
     """One trajectory in one Axes."""
     curve = selection.path(ds, (state,), *shown)
+    if shown[0] == shown[1]:
+        who = f"Trajectory {int(ds['trajectory'])}" if "trajectory" in ds.coords else "It"
+        draw.say(ax, f"{who} stopped where it began: there is no motion to draw.", ds)
+        return
     values = curve.values[:, 0]
     finite = np.abs(values[np.isfinite(values)])
     y = display_scale(ds[state].attrs.get("units", ""), float(finite.max(initial=0.0)), unit)

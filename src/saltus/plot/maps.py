@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.plot.palette import hues
 from saltus.plot.style import Scale, display_scale
 from saltus.results.schema import kind_of, kind_text
@@ -63,7 +63,7 @@ def check(ds: Any, caller: str, kinds: Sequence[str], needs: Sequence[str]) -> N
         )
     if kind not in kinds:
         better = f" Draw it with {_BETTER[kind]}." if kind in _BETTER else ""
-        raise ParameterError(f"{caller} takes what {wanted} returns; this Dataset is of the kind {kind!r}.{better}")
+        raise ParameterError(f"{caller} takes what {wanted} returns; this Dataset is of the kind {shown(kind)}.{better}")
     missing = [name for name in needs if name not in ds.variables]
     if missing:
         raise ParameterError(f"{caller} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not some variables of it.")
@@ -78,7 +78,10 @@ def ranked(ds: xr.Dataset, order: Sequence[int] | None, caller: str) -> list[int
         If ``order`` names an attractor twice, or one that there isn't.
     """
     known = ds["attractor"].values.tolist()
-    first = [] if order is None else [int(one) for one in np.atleast_1d(order).tolist()]
+    try:
+        first = [] if order is None else [int(one) for one in np.atleast_1d(order).tolist()]
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{caller}: order must hold numbers of attractors, not {shown(order)}.") from None
     strange = [one for one in first if one not in known]
     if strange or len(set(first)) < len(first):
         what = f"there is no attractor {strange[0]}" if strange else "an attractor occurs twice"

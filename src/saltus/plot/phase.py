@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.errors import ParameterError
+from saltus.arguments import checked
+from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
@@ -23,6 +24,7 @@ _CALLER = "plot.phase"
 SETTLED_SHARE = 0.3
 
 
+@checked
 def phase(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,
@@ -77,6 +79,9 @@ def phase(
     curves = [_values(one, pair, shown) for one, shown in zip(singles, windows, strict=True)]
     scales = _scales(run, pair, np.concatenate(curves), selection.units_of_states(run, units, _CALLER))
     with draw.panels(ax, 1, (4.6, 3.1), _CALLER) as (panel,):
+        if kind_of(run) != STROBOSCOPE and all(begin == end for begin, end in windows):
+            draw.say(panel, "It stopped where it began: there is no motion to draw.", *singles)
+            return panel
         for i, (one, shown) in enumerate(zip(singles, windows, strict=True)):
             name = _name(one, run, labels[i]) if len(labels) > 1 else None
             color = CYCLE[i % len(CYCLE)] if name else None
@@ -99,8 +104,8 @@ def _pair(run: xr.Dataset, states: Any) -> tuple[str, str]:
         if len(known) < 2:
             raise ParameterError(f"{_CALLER}: a phase portrait needs two states, this system has only {known[0]!r}. See plot.history.")
         return known[0], known[1]
-    if isinstance(states, str) or len(states) != 2:
-        raise ParameterError(f"{_CALLER}: states={states!r}. Give two names, such as states={known[:2]!r}.")
+    if not isinstance(states, list | tuple | np.ndarray) or len(states) != 2:
+        raise ParameterError(f"{_CALLER}: states={shown(states)}. Give two names, such as states={known[:2]!r}.")
     first, second = (selection.state_named(run, name, _CALLER) for name in states)
     return first, second
 

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.errors import ParameterError, nearest
+from saltus.arguments import checked
+from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
@@ -22,6 +23,7 @@ _OTHERS = {"phase": ("crossing_phase", "phase of the forcing, t/T mod 1"), "time
 _DIRECTIONS = {1: (OKABE_ITO["blue"], "upwards"), -1: (OKABE_ITO["vermillion"], "downwards")}
 
 
+@checked
 def section(
     ds: xr.Dataset,
     x: str | None = None,
@@ -69,6 +71,9 @@ def section(
     points = [_values(ds, name) for name in names]
     scales = [_scale(ds, name, values[rows], wanted.get(name)) for name, values in zip(names, points, strict=True)]
     with draw.panels(ax, 1, (4.6, 3.4), _CALLER) as (panel,):
+        if not rows.any():
+            draw.say(panel, f"Section {ds.attrs.get('surface', '')}: no crossing in the time that was looked at.", ds)
+            return panel
         for mask, color, name in _groups(ds, labels, rows):
             _draw(panel, ds, mask, points, scales, color, name)
         for direction, name, values, scale in zip(("x", "y"), names, points, scales, strict=True):
@@ -85,7 +90,7 @@ def _axes(ds: xr.Dataset, x: str | None, y: str | None) -> tuple[str, str]:
     known = [*states_of(ds), *(["phase"] if forced else []), "time"]
     for name in (x, y):
         if name is not None and name not in known:
-            raise ParameterError(f"{_CALLER}: this section has no {name!r} to draw. {nearest(str(name), known)}")
+            raise ParameterError(f"{_CALLER}: this section has no {shown(name)} to draw. {nearest(name, known)}")
     moving = [name for name in states_of(ds) if np.ptp(ds[name].values) > 0] if ds.sizes["crossing"] else list(states_of(ds))
     free = [name for name in (*moving, *known[len(states_of(ds)) :]) if name not in (x, y)]
     first = x if x is not None else free.pop(0)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.results.schema import contact_name, forcing_period, sample_dim, states_of
 
 Periods = int | float | tuple[float, float] | None
@@ -30,7 +30,7 @@ def chosen(run: xr.Dataset, trajectory: Any, caller: str) -> list[int]:
     """
     if "trajectory" not in run.dims:
         if trajectory not in (None, 0):
-            raise ParameterError(f"{caller}: trajectory={trajectory!r}, but this run holds a single trajectory. Leave trajectory out.")
+            raise ParameterError(f"{caller}: trajectory={shown(trajectory)}, but this run holds a single trajectory. Leave trajectory out.")
         return []
     known = run["trajectory"].values.tolist()
     if trajectory is None:
@@ -39,7 +39,7 @@ def chosen(run: xr.Dataset, trajectory: Any, caller: str) -> list[int]:
         labels = [int(one) if isinstance(one, numbers.Integral) else one for one in np.atleast_1d(trajectory).tolist()]
     strange = [label for label in labels if label not in known]
     if strange:
-        raise ParameterError(f"{caller}: there is no trajectory {strange[0]!r}; this run has {_span(known)}.")
+        raise ParameterError(f"{caller}: there is no trajectory {shown(strange[0])}; this run has {_span(known)}.")
     if not 0 < len(labels) <= MOST:
         raise ParameterError(f"{caller} shows 1 to {MOST} trajectories, not {len(labels)}. Choose, such as trajectory=[{known[0]}].")
     return labels
@@ -59,8 +59,8 @@ def single(run: xr.Dataset, label: int | None) -> xr.Dataset:
 
 def state_named(run: xr.Dataset, name: str, caller: str) -> str:
     """The name, if it is that of a state; else a ParameterError with the nearest one."""
-    if name not in states_of(run):
-        raise ParameterError(f"{caller}: this run has no state {name!r}. {nearest(str(name), states_of(run))}")
+    if not among(name, states_of(run)):
+        raise ParameterError(f"{caller}: this run has no state {shown(name)}. {nearest(name, states_of(run))}")
     return name
 
 
@@ -92,17 +92,22 @@ def window(ds: xr.Dataset, periods: Periods, caller: str, default_share: float =
     axis = sample_axis(ds)
     if not axis.size:
         raise ParameterError(f"{caller}: this run holds no samples.")
-    first, last = float(axis[0]), float(axis[-1])
+    there = np.isfinite(np.stack([ds[name].values for name in states_of(ds)])).all(axis=0)
+    first, last = float(axis[0]), float(axis[there][-1] if there.any() else axis[0])  # one that stopped early has no more
+    if there.sum() < 2:
+        return first, first
     if periods is None:
         length = default_share * (last - first)
         if "period" in ds and default_share < 1:
             length = max(1.0, math.ceil(length - 1e-9))
         return max(first, last - length), last
     if "period" not in ds:
-        raise ParameterError(f"{caller}: periods={periods!r}, but this system isn't forced. Select by time: run.sel(time=slice(1, 2)).")
+        raise ParameterError(
+            f"{caller}: periods={shown(periods)}, but this system isn't forced. Select by time: run.sel(time=slice(1, 2))."
+        )
     begin, end = _interval(periods, last, caller)
     if begin >= last or end <= first:
-        raise ParameterError(f"{caller}: periods={periods!r} is outside this run, which holds periods {first:g} to {last:g}.")
+        raise ParameterError(f"{caller}: periods={shown(periods)} is outside this run, which holds periods {first:g} to {last:g}.")
     return max(begin, first), min(end, last)
 
 
@@ -113,7 +118,9 @@ def _interval(periods: Any, last: float, caller: str) -> tuple[float, float]:
             return last - float(periods), last
     elif isinstance(periods, tuple | list) and len(periods) == 2 and float(periods[0]) < float(periods[1]):
         return float(periods[0]), float(periods[1])
-    raise ParameterError(f"{caller}: periods={periods!r}. Give the number of last periods, such as 5, or begin and end, such as (10, 15).")
+    raise ParameterError(
+        f"{caller}: periods={shown(periods)}. Give the number of last periods, such as 5, or begin and end, such as (10, 15)."
+    )
 
 
 def sample_axis(ds: xr.Dataset) -> np.ndarray:

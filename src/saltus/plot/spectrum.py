@@ -10,7 +10,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from saltus.errors import ParameterError, nearest
+from saltus.arguments import checked
+from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
@@ -24,6 +25,7 @@ _SHOWN = 1e-5
 _ORDERS = 5.0
 
 
+@checked
 def spectrum(
     ds: xr.Dataset,
     state: str | None = None,
@@ -68,7 +70,7 @@ def spectrum(
     known = states_of(ds)
     state = known[0] if state is None else state
     if state not in known:
-        raise ParameterError(f"{_CALLER}: this spectrum has no state {state!r}. {nearest(str(state), known)}")
+        raise ParameterError(f"{_CALLER}: this spectrum has no state {shown(state)}. {nearest(state, known)}")
     labels = selection.chosen(ds, trajectory, _CALLER)
     singles = [ds.sel(trajectory=label) for label in labels] or [ds]
     curves = [np.asarray(one[f"{state}_amplitude"].values, dtype=float) for one in singles]
@@ -77,13 +79,16 @@ def spectrum(
         ds[f"{state}_amplitude"].attrs.get("units", ""), largest, selection.units_of_states(ds, units, _CALLER).get(state)
     )
     with draw.panels(ax, 1, (6.0, 2.8), _CALLER) as (panel,):
+        if not any(np.isfinite(curve).any() for curve in curves):
+            draw.say(panel, "There is no spectrum: the motion stopped before its end.", *singles)
+            return panel
         floor = _SHOWN * largest * scale.factor / 3
         for i, (one, curve) in enumerate(zip(singles, curves, strict=True)):
             name = f"trajectory {labels[i]}" if len(labels) > 1 else None
             _curve(panel, one, curve * scale.factor, floor, CYCLE[i % len(CYCLE)], name)
         panel.set_yscale("log")
         panel.set_ylim(floor, 3 * largest * scale.factor)
-        top = highest if highest is not None else max(_top(one, curve, largest) for one, curve in zip(singles, curves, strict=True))
+        top = float(highest) if highest is not None else max(_top(one, curve, largest) for one, curve in zip(singles, curves, strict=True))
         panel.set_xlim(0.0, top)
         panel.set_xlabel("frequency [Hz]")
         panel.set_ylabel(Scale(scale.factor, scale.unit).label(f"amplitude of {state}"))

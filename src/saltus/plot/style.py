@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, among, shown
 
 #: Eight colours that colour-blind readers tell apart: M. Okabe and K. Ito, Color universal design (2008).
 OKABE_ITO = {
@@ -135,10 +135,10 @@ def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale
         sizes = {prefix + unit: size for prefix, size in known.items()}
         if _ANGLE.match(unit):
             sizes |= {f"m{unit}": 1e-3, _ANGLE.sub("deg", unit): math.pi / 180}
-        if wanted in sizes:
+        if among(wanted, sizes):
             return Scale(1 / sizes[wanted], wanted)
         choice = ", ".join(sizes)
-        raise ParameterError(f"values in {unit or 'an unknown unit'} can't be shown in {wanted!r}. Known: {choice}.")
+        raise ParameterError(f"values in {unit or 'an unknown unit'} can't be shown in {shown(wanted)}. Known: {choice}.")
     for prefix, size in known.items():
         limit = 1.0 if prefix + unit == "m" else _AT_LEAST
         if unit in ("m", "s") and size > 1:

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch
 
-from saltus.errors import ParameterError
+from saltus.arguments import checked
+from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
 from saltus.plot import kinds, maps
 from saltus.plot import response_points as points
@@ -23,6 +24,7 @@ _CALLER = "plot.type_map"
 _UNSETTLED = {-1: ("escaped", "#FFFFFF"), -2: ("not settled", "#D2D2D2"), -3: ("failed", "#B9A9A0"), -4: ("not computed", "#F3F3F3")}
 
 
+@checked
 def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = None) -> Axes:
     """Kind of motion over two parameters: a hue for each period, grey for motion that never repeats, chaos dark.
 
@@ -67,7 +69,7 @@ def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
     if "start" not in ds.dims:
         return ds
     if start not in ds["start"].values.tolist():
-        raise ParameterError(f"{_CALLER}: there is no start {start!r}; this Dataset has {ds.sizes['start']}, counted from 0.")
+        raise ParameterError(f"{_CALLER}: there is no start {shown(start)}; this Dataset has {ds.sizes['start']}, counted from 0.")
     return ds.sel(start=start)
 
 

@@ -11,8 +11,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results import schema
-from saltus.results.provenance import content_hash, to_json
-from saltus.results.result import Result
+from saltus.results.finish import array_variable, finish
 from saltus.results.variable import Variable
 
 
@@ -68,11 +67,22 @@ class Guards:
         State that the guard bounds, where its gap is that state minus a value.
     boundaries : array, shape (guard,) or (guard, trajectory)
         That value [unit of the state], NaN where there is none. The second shape where it differs between trajectories.
+    units : sequence of str
+        Coherent SI unit of each gap, ``""`` where it isn't known; empty for those of the states.
     """
 
     names: Sequence[str]
     states: Sequence[str | None]
     boundaries: np.ndarray
+    units: Sequence[str] = ()
+
+    def units_among(self, states: Mapping[str, str]) -> list[str]:
+        """Unit of each gap, given those of the states."""
+        return list(self.units) or [states.get(state, "") if state else "" for state in self.states]
+
+    def first(self, count: int) -> Guards:
+        """So many of them."""
+        return Guards(self.names[:count], self.states[:count], self.boundaries[:count], self.units[:count])
 
 
 # -- assembly ------------------------------------------------------------------------------------------------------------------
@@ -86,7 +96,7 @@ class Builder:
         self.table, self.batch, self.units = schema.TABLES[kind], batch, units
         self.data: dict[str, Any] = {}
         self.coords: dict[str, Any] = {}
-        self.guard_units = [units.get(state, "") if state else "" for state in guards.states]
+        self.guard_units = guards.units_among(units)
         self.attrs: dict[str, Any] = {"saltus_result": kind, "schema_version": schema.VERSION, "states": " ".join(states)}
         if not batch and count != 1:
             raise ParameterError(f"a Dataset without the dim trajectory holds one trajectory, not {count}. Pass batch=True.")
@@ -107,7 +117,7 @@ class Builder:
         elif each:
             array = array[0]
         target = self.coords if coord else self.data
-        target[name] = xr.Variable(dims, array, {"units": self.unit(spec.units), "long_name": spec.long_name})
+        target[name] = array_variable(dims, array, {"units": self.unit(spec.units), "long_name": spec.long_name})
 
     def unit(self, text: str) -> str:
         """A unit of the table, with that of the gaps filled in."""
@@ -154,10 +164,7 @@ class Builder:
 
     def dataset(self, attrs: Mapping[str, Any]) -> xr.Dataset:
         """The Dataset, with the hash of its numbers."""
-        plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
-        ds = Result(self.data, self.coords, {**plain, **self.attrs})
-        ds.attrs["result_hash"] = content_hash(ds)
-        return ds
+        return finish(self.data, self.coords, {**attrs, **self.attrs})
 
 
 def trajectory_dataset(

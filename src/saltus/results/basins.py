@@ -12,6 +12,7 @@ import xarray as xr
 from saltus.errors import ParameterError
 from saltus.results import schema
 from saltus.results.builder import Builder
+from saltus.results.finish import array_variable
 
 #: The largest count that ``grazes_unresolved`` holds; more are kept as this.
 _MOST_GRAZES = np.iinfo(np.int16).max
@@ -103,7 +104,7 @@ class _Builder(Builder):
             if name in {*self.table, "phase", "multiplier"}:
                 raise ParameterError(f"the state {name!r} has the name of something else in the result. Rename the state in the system.")
             attrs = {"units": self.units.get(name, ""), "long_name": f"{name} at the start"}
-            self.coords[name] = xr.Variable((name,), np.asarray(values, dtype=float), attrs)
+            self.coords[name] = array_variable((name,), np.asarray(values, dtype=float), attrs)
         first, second = axes
         return first, second
 

@@ -10,8 +10,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results import schema
-from saltus.results.provenance import content_hash, to_json
-from saltus.results.result import Result
+from saltus.results.finish import array_variable, finish
 from saltus.results.variable import Variable
 
 
@@ -31,7 +30,7 @@ class Builder:
         if array.dtype.kind == "i" and not np.array_equal(array, values):
             raise ParameterError(f"{name} holds {np.max(np.abs(values))}, which {array.dtype} can't. Split the work into smaller parts.")
         labels = {"units": self._unit(spec), "long_name": spec.long_name, **attrs}
-        (self.coords if coord else self.data)[name] = xr.Variable((*dims, *spec.dims), array, labels)
+        (self.coords if coord else self.data)[name] = array_variable((*dims, *spec.dims), array, labels)
 
     def put_flags(self, name: str, values: Any, meanings: Mapping[int, str], dims: tuple[str, ...]) -> None:
         """Add a variable of codes, with their meanings as the CF conventions write them."""
@@ -49,7 +48,7 @@ class Builder:
             row[: len(one)] = one
         for i, name in enumerate(self.states):
             attrs = {"units": self.units.get(name, ""), "long_name": f"{name} {when}"}
-            self.data[name_of(name)] = xr.Variable(dims, padded[:, :, i], attrs)
+            self.data[name_of(name)] = array_variable(dims, padded[:, :, i], attrs)
 
     def _unit(self, spec: Variable) -> str:
         """The unit of the table, with what follows the system filled in."""
@@ -57,8 +56,5 @@ class Builder:
 
     def dataset(self, attrs: Mapping[str, Any]) -> xr.Dataset:
         """The Dataset, with the hash of its numbers."""
-        plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
         own = {"saltus_result": self.kind, "schema_version": schema.VERSION, "states": " ".join(self.states)}
-        ds = Result(self.data, self.coords, {**plain, **own})
-        ds.attrs["result_hash"] = content_hash(ds)
-        return ds
+        return finish(self.data, self.coords, {**attrs, **own})

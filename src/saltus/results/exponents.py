@@ -10,8 +10,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results import schema
-from saltus.results.provenance import content_hash, to_json
-from saltus.results.result import Result
+from saltus.results.finish import array_variable, finish
 
 #: Meaning of the values of ``near_graze``.
 _NEAR = {0: "clear_of_grazes", 1: "near_graze"}
@@ -64,21 +63,18 @@ def exponents_dataset(
         labels: dict[str, Any] = {"units": {"<rate>": rate, "<gap>": gap_unit}.get(spec.units, spec.units), "long_name": spec.long_name}
         if name == "near_graze":
             labels |= {"flag_values": np.array(sorted(_NEAR), dtype=np.int8), "flag_meanings": " ".join(_NEAR.values())}
-        data[name] = xr.Variable(spec.dims, np.asarray(values, dtype={"str": np.str_}.get(spec.dtype, spec.dtype)), labels)
+        data[name] = array_variable(spec.dims, np.asarray(values, dtype={"str": np.str_}.get(spec.dtype, spec.dtype)), labels)
     coords = {"trajectory": _index(len(data["kind"]))}
     for name, column in (varied or {}).items():
         if name in table:
             raise ParameterError(f"the parameter {name!r} has the name of something else in the result. Rename it in the system.")
-        coords[name] = xr.Variable(
+        coords[name] = array_variable(
             ("trajectory",), np.asarray(column, float), {"units": (units or {}).get(name, ""), "long_name": name.replace("_", " ")}
         )
-    plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in (attrs or {}).items()}
     own = {"saltus_result": schema.EXPONENTS, "schema_version": schema.VERSION, "states": " ".join(states)}
-    ds = Result(data, coords, {**plain, **own})
-    ds.attrs["result_hash"] = content_hash(ds)
-    return ds
+    return finish(data, coords, {**(attrs or {}), **own})
 
 
 def _index(count: int) -> xr.Variable:
     spec = schema.EXPONENTS_VARIABLES["trajectory"]
-    return xr.Variable(spec.dims, np.arange(count), {"units": spec.units, "long_name": spec.long_name})
+    return array_variable(spec.dims, np.arange(count), {"units": spec.units, "long_name": spec.long_name})

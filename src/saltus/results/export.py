@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import xarray as xr
 
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, nearest, shown
 from saltus.fence import csv_cell
 from saltus.results import tables
 from saltus.results.ending import with_ending
@@ -57,7 +57,7 @@ def save(ds: xr.Dataset, path: Target) -> Path:
     path = path_of(path)
     writers = {".nc": to_netcdf, ".csv": to_csv, ".mat": to_mat}
     if path.suffix not in writers:
-        raise ParameterError(f"the file {path.name!r} has no suffix that says how to write it. {nearest(path.suffix, writers)}")
+        raise ParameterError(f"the file {shown(path.name)} has no suffix that says how to write it. {nearest(path.suffix, writers)}")
     return writers[path.suffix](ds, path)
 
 
@@ -113,7 +113,7 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
         If a file can't be written. None is left half-written.
     """
     check(ds, caller="to_csv", kinds=(TRAJECTORY, STROBOSCOPE, RESPONSES))
-    path = Path(path)
+    path = path_of(path)
     if kind_of(ds) == RESPONSES:
         main, side = tables.responses(ds), {"events": tables.events(ds)}
     else:
@@ -166,14 +166,15 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
     from scipy.io.matlab import MatWriteError
 
     check(ds, caller="to_mat", kinds=list(TABLES))
-    with replacing(Path(path)) as (part,):
+    path = path_of(path)
+    with replacing(path) as (part,):
         try:
             savemat(part, _matlab(ds), appendmat=False, oned_as="column")
         except MatWriteError as error:
             raise ParameterError(f"{path}: {error}. Write '.nc', which has no limit, or keep fewer samples.") from error
         with part.open("r+b") as file:  # the header is 116 bytes of text, in which scipy puts the time of day
             file.write(b"MATLAB 5.0 MAT-file, written by saltus".ljust(116))
-    return Path(path)
+    return path
 
 
 def _matlab(ds: xr.Dataset) -> dict[str, Any]:

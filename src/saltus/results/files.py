@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from saltus.errors import ParameterError, SaltusError
+from saltus.errors import ParameterError, SaltusError, shown
 
 #: Names of drafts, and the age [s] from which on nobody is writing one any more.
 _DRAFT = re.compile(r"\.(.+\.)?[0-9a-f]{8}\.part")
@@ -23,8 +23,8 @@ class ResultFileError(SaltusError, OSError):
 
 def path_of(given: object) -> Path:
     """What a caller gave as the path of a file. Raises ParameterError if it is none."""
-    if not isinstance(given, str | os.PathLike):
-        raise ParameterError(f"{given!r} isn't the path of a file. Write it as text, such as 'run.nc'.")
+    if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
+        raise ParameterError(f"{shown(given)} isn't the path of a file. Write it as text, such as 'run.nc'.")
     return Path(given)
 
 
@@ -51,8 +51,6 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
         If the disk is full, the folder is missing or may not be written to, or a path is a link to a file in another folder.
     """
     paths = tuple(_target(path) for path in paths)
-    if not paths[-1].parent.is_dir():
-        raise ResultFileError(f"{paths[-1]} can't be written: there is no folder {paths[-1].parent}. Make it first.")
     temporary = [path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part") for path in paths]
     try:
         yield temporary
@@ -72,11 +70,18 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
 
 def _target(path: Path) -> Path:
     """Where a path leads: through a link, so that the link stays, but not out of its folder, where it might lead to anything."""
-    target = path.resolve()
-    if path.is_symlink() and not target.is_relative_to(path.parent.resolve()):
-        raise ResultFileError(
-            f"{path} is a link to {target}, in another folder: nothing is written through it. Remove it, or name the file."
-        )
+    try:
+        target = path.resolve()
+        if path.is_symlink() and not target.is_relative_to(path.parent.resolve()):
+            raise ResultFileError(
+                f"{path} is a link to {target}, in another folder: nothing is written through it. Remove it, or name the file."
+            )
+        if not target.parent.is_dir():
+            raise ResultFileError(f"{path} can't be written: there is no folder {path.parent}. Make it first.")
+    except OSError as error:
+        if isinstance(error, ResultFileError):
+            raise
+        raise ResultFileError(f"{shown(str(path))} can't be written: {error.strerror or error}. Choose another name.") from None
     return target
 
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from saltus.errors import UnitError
+from saltus.errors import UnitError, shown
 from saltus.fence import TABLE_BYTES, RefusedError, content
 from saltus.fence import text as text_of
-from saltus.results.files import ResultFileError
+from saltus.results.files import ResultFileError, path_of
 from saltus.units import to_si
 
 #: ``frequency [Hz]``
@@ -45,7 +45,7 @@ def read_measured(path: str | os.PathLike[str], axis: str, axis_unit: str, ampli
     ResultFileError
         If the file can't be read, lacks a column or a unit, or holds something that isn't a number.
     """
-    path = Path(path)
+    path = path_of(path)
     try:
         data = content(path, TABLE_BYTES)
     except RefusedError as refused:
@@ -88,7 +88,7 @@ def _column(path: Path, header: list[str], name: str, unit: str, units: dict[str
         match = _HEADER.fullmatch(text)
         found[match["name"] if match else text.strip()] = (i, match["unit"].strip() if match else "")
     if name not in found:
-        raise ResultFileError(f"{path} has no column {name!r}. The first line must be like {_wanted(units)}.")
+        raise ResultFileError(f"{path} has no column {shown(name)}. The first line must be like {_wanted(units)}.")
     index, given = found[name]
     if not given and unit not in ("", "1"):
         raise ResultFileError(f"{path}: the column {name!r} has no unit. Write it in the header: {_wanted(units)}.")

@@ -9,6 +9,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib import metadata
 from typing import Any
 
@@ -20,7 +21,7 @@ from saltus.results.summary import summary
 from saltus.units import from_si
 
 #: Packages whose versions can change the digits of a result or the layout of its file.
-_PACKAGES = ("numpy", "numba", "xarray", "saltus")
+_PACKAGES = ("numpy", "llvmlite", "xarray", "saltus")
 
 
 def attributes(
@@ -83,6 +84,7 @@ def to_json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
+@cache  # reading it takes a millisecond, and what this process runs doesn't change
 def version(package: str) -> str:
     """Version of an installed package, ``"not installed"`` for one that isn't (a source tree on the path)."""
     try:

@@ -26,11 +26,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.results import schema
 from saltus.results.assemble import Guards
 from saltus.results.basins import AttractorTable
 from saltus.results.builder import Builder
+from saltus.results.finish import array_variable
 
 #: What a bifurcation diagram may show of each response.
 SAMPLES = {
@@ -188,7 +189,7 @@ def responses_dataset(
         build.put_outputs(responses.outputs)
     if responses.samples is not None:
         if sample not in SAMPLES:
-            raise ParameterError(f"sample={sample!r}. Known: {', '.join(SAMPLES)}.")
+            raise ParameterError(f"sample={shown(sample)}. Known: {', '.join(SAMPLES)}.")
         build.put_points(responses.samples, ("response", "sample"), schema.sample_name, SAMPLES[sample])
     if len(responses.attractors):  # without responses nothing can happen to them, and netCDF-3 has room for one empty dim only
         build.put_events(events or Events({name: np.zeros(0) for name in axes}, [], np.zeros(0, np.int64)))
@@ -207,7 +208,7 @@ class _Builder(Builder):
         for name, values in axes.items():
             if name in {*self.table, "phase", "multiplier", "sample", *self.states}:
                 raise ParameterError(f"the parameter {name!r} has the name of something else in the result. Rename it in the system.")
-            self.coords[name] = xr.Variable((name,), np.asarray(values, dtype=float), self._labels(name))
+            self.coords[name] = array_variable((name,), np.asarray(values, dtype=float), self._labels(name))
         return tuple(axes)
 
     def _labels(self, name: str) -> dict[str, str]:
@@ -220,7 +221,7 @@ class _Builder(Builder):
             self.put("start_direction", list(starts.directions), coord=True)
         for name, values in starts.states.items():
             attrs = {"units": self.units.get(name, ""), "long_name": f"{name} at the start"}
-            self.coords[schema.start_name(name)] = xr.Variable(("start",), np.asarray(values, dtype=float), attrs)
+            self.coords[schema.start_name(name)] = array_variable(("start",), np.asarray(values, dtype=float), attrs)
 
     def put_grid(self, response_of: np.ndarray, table: AttractorTable, dims: tuple[str, ...]) -> None:
         """Add what each start leads to: the number of the response, and its columns looked up."""
@@ -244,7 +245,7 @@ class _Builder(Builder):
         self.put("response", np.arange(len(table)), coord=True)
         place = np.asarray(responses.place, dtype=np.int64).reshape(len(table), len(axes))
         for (name, values), index in zip(axes.items(), place.T, strict=True):
-            self.data[schema.response_name(name)] = xr.Variable(("response",), values[index], self._labels(name))
+            self.data[schema.response_name(name)] = array_variable(("response",), values[index], self._labels(name))
         for name, column in columns.items():
             self.put(f"response_{name}", column)
         if table.fractions is not None:
@@ -260,7 +261,7 @@ class _Builder(Builder):
         for name, values in outputs.numbers.items():
             spec = self.table[f"output_{name}"]
             labels = {"units": shared if spec.units == "<output>" else spec.units, "long_name": spec.long_name}
-            self.data[f"output_{name}"] = xr.Variable(spec.dims, np.asarray(values, dtype=float), labels)
+            self.data[f"output_{name}"] = array_variable(spec.dims, np.asarray(values, dtype=float), labels)
 
     def put_events(self, events: Events) -> None:
         """Add what happens to the branches."""
@@ -268,16 +269,16 @@ class _Builder(Builder):
         self.put("event_kind", list(events.kind))
         self.put("event_branch", events.branch)
         for name, values in events.values.items():
-            self.data[schema.event_name(name)] = xr.Variable(("event",), np.asarray(values, dtype=float), self._labels(name))
+            self.data[schema.event_name(name)] = array_variable(("event",), np.asarray(values, dtype=float), self._labels(name))
 
     def put_guards(self, guards: Guards, dims: tuple[str, ...]) -> None:
         """Add the guards; boundaries have the dims of the parameters where these move them."""
         self.put("guard", list(guards.names), coord=True)
         self.put("guard_state", [state or "" for state in guards.states])
-        self.put("guard_units", [self.units.get(state, "") if state else "" for state in guards.states])
+        self.put("guard_units", guards.units_among(self.units))
         labels = {"units": self.gap_unit, "long_name": self.table["guard_boundary"].long_name}
         boundaries = np.asarray(guards.boundaries, dtype=float)
-        self.data["guard_boundary"] = xr.Variable(("guard", *dims)[: boundaries.ndim], boundaries, labels)
+        self.data["guard_boundary"] = array_variable(("guard", *dims)[: boundaries.ndim], boundaries, labels)
 
 
 def _per_period(table: AttractorTable) -> np.ndarray:

@@ -269,6 +269,8 @@ def kind_text(kind: str, n: int) -> str:
 
 def states_of(ds: xr.Dataset) -> tuple[str, ...]:
     """Names of the states, in the order of the system."""
+    if not isinstance(ds.attrs.get("states"), str):
+        raise ParameterError("this Dataset has lost the attribute 'states'. Give it as saltus returned it, or a selection of it.")
     return tuple(ds.attrs["states"].split())
 
 

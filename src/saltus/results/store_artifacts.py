@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any, Literal
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.results.durable import StoreError, read, seal, unseal, write_together
 from saltus.results.lock import WHOLE, exclusive
 
@@ -64,5 +64,5 @@ def _opened(data: bytes | None, made_under: str, name: str) -> dict[str, Any] | 
 
 def _file(store: Path, name: str) -> Path:
     if not re.fullmatch(r"[\w-]+", name, re.ASCII):
-        raise ParameterError(f"artifact {name!r}: use letters, digits, _ and -.")
+        raise ParameterError(f"artifact {shown(name)}: use letters, digits, _ and -.")
     return store / "artifacts" / f"{name}.json"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.results.durable import StoreError
 
 
@@ -19,7 +19,7 @@ def texts(identity: Mapping[str, str]) -> dict[str, str]:
     """
     for name, value in identity.items():
         if not isinstance(value, str):
-            raise ParameterError(f"identity {name!r} is {value!r}. Give it as text, so that it can be compared without doubt.")
+            raise ParameterError(f"identity {name!r} is {shown(value)}. Give it as text, so that it can be compared without doubt.")
     return dict(sorted(identity.items()))
 
 

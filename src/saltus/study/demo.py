@@ -74,7 +74,8 @@ def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods:
         If a value can't be used.
     """
     from saltus import models
-    from saltus.analysis import simulate, stroboscope
+    from saltus.analysis.simulate import simulate
+    from saltus.analysis.stroboscope import stroboscope
 
     rig = models.delangre(case, force=force, frequency=frequency)
     x, v = np.array(STARTS).T

@@ -57,9 +57,12 @@ def parse(text: str, name: str = "study") -> Study:
         return Study.model_validate(data)
     except ValidationError as error:
         faults = content_faults(error, data)
+        faults = [*faults[:_FAULTS], *([f"and {len(faults) - _FAULTS} more."] if len(faults) > _FAULTS else [])]
         raise StudyError(f"{name}: " + (faults[0] if len(faults) == 1 else "".join(f"\n  - {fault}" for fault in faults))) from None
 
 
+#: Faults that are told at once.
+_FAULTS = 12
 #: Most characters of texts, by key: titles and paths may be longer than quantities and words, descriptions longer still.
 _LONGEST = {"name": 200, "printed": 400, "exact": 400, "measured": 400, "description": 20_000, "source": 20_000}
 _WORD = 100

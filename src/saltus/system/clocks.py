@@ -7,14 +7,16 @@ boundary, so it is no guard, and nothing is recorded as a contact. Steps end at 
 from __future__ import annotations
 
 import math
+import operator
 import weakref
 from dataclasses import dataclass
 from typing import Any
 
-from saltus.errors import TraceError
+from saltus.errors import TraceError, shown
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
 from saltus.system.expression import And, Condition, Expr, Not, Operand, Or, Relation
+from saltus.system.functions import of_numbers
 
 _SYMBOL = ex.parameter("\0wave")
 _RELATIONS: weakref.WeakValueDictionary[Expr, Relation] = weakref.WeakValueDictionary()
@@ -183,10 +185,10 @@ def mod(a: Operand, cycle: Operand) -> Any:
     1.5
     """
     if not isinstance(a, Expr) and not isinstance(cycle, Expr):
-        return a % cycle
+        return of_numbers("mod", operator.mod, a, cycle)
     value, length = ex.as_expr(a), ex.as_expr(cycle)
     if ex.varies(length):
-        raise TraceError(f"the cycle of sl.mod must be a number or a parameter, not {length!r}.")
+        raise TraceError(f"the cycle of sl.mod must be a number or a parameter, not {shown(length)}.")
     if length.op == "const" and length.payload == 0:
         raise TraceError("the cycle of sl.mod is zero.")
     with ex.observed(None):

@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from saltus.system.expression import Condition, Expr, Operand
-from saltus.system.functions import atan, exp, max, min, pi, piecewise, sqrt, tanh
+from saltus.system.functions import atan, exp, max, min, of_numbers, pi, piecewise, sqrt, tanh
 
 
 def _traced(*values: object) -> bool:
@@ -29,14 +29,14 @@ def sign(a: Operand) -> Any:
     """
     if _traced(a):
         return piecewise((1.0, a > 0), otherwise=-1.0)
-    return 1.0 if a > 0 else -1.0 if a < 0 else 0.0
+    return of_numbers("sign", lambda a: 1.0 if a > 0 else -1.0 if a < 0 else 0.0, a)
 
 
 def heaviside(a: Operand, at_zero: float = 0.5) -> Any:
     """1 where ``a > 0``, 0 where ``a < 0``; a boundary at ``a = 0``. Of the number 0 it is ``at_zero``."""
     if _traced(a):
         return piecewise((1.0, a > 0), otherwise=0.0)
-    return 1.0 if a > 0 else float(at_zero) if a == 0 else 0.0
+    return of_numbers("heaviside", lambda a, at_zero: 1.0 if a > 0 else float(at_zero) if a == 0 else 0.0, a, at_zero)
 
 
 def clip(a: Operand, low: Operand, high: Operand) -> Any:
@@ -46,29 +46,29 @@ def clip(a: Operand, low: Operand, high: Operand) -> Any:
 
 def cosh(a: Operand) -> Any:
     """Hyperbolic cosine."""
-    return (exp(a) + exp(-a)) * 0.5 if _traced(a) else math.cosh(a)
+    return (exp(a) + exp(-a)) * 0.5 if _traced(a) else of_numbers("cosh", math.cosh, a)
 
 
 def sinh(a: Operand) -> Any:
     """Hyperbolic sine, to a few ulp of its value near zero too (the difference of two exponentials has no digits there)."""
-    return tanh(a) * cosh(a) if _traced(a) else math.sinh(a)
+    return tanh(a) * cosh(a) if _traced(a) else of_numbers("sinh", math.sinh, a)
 
 
 def asin(a: Operand) -> Any:
     """Inverse sine [rad], in [-pi/2, pi/2]. Its rate is infinite at -1 and 1; beyond them it isn't a number."""
     if not _traced(a):
-        return math.asin(a)
+        return of_numbers("asin", math.asin, a)
     return 2.0 * atan(a / (1.0 + sqrt((1.0 - a) * (1.0 + a))))
 
 
 def acos(a: Operand) -> Any:
     """Inverse cosine [rad], in [0, pi]. Its rate is infinite at -1 and 1; beyond them it isn't a number."""
-    return 2.0 * atan(sqrt((1.0 - a) / (1.0 + a))) if _traced(a) else math.acos(a)
+    return 2.0 * atan(sqrt((1.0 - a) / (1.0 + a))) if _traced(a) else of_numbers("acos", math.acos, a)
 
 
 def hypot(a: Operand, b: Operand) -> Any:
     """``sqrt(a**2 + b**2)``. A cone: it has no derivative where both are zero."""
-    return sqrt(a * a + b * b) if _traced(a, b) else math.hypot(a, b)
+    return sqrt(a * a + b * b) if _traced(a, b) else of_numbers("hypot", math.hypot, a, b)
 
 
 def atan2(y: Operand, x: Operand) -> Any:
@@ -78,7 +78,7 @@ def atan2(y: Operand, x: Operand) -> Any:
     inside, for which no two terms cancel.
     """
     if not _traced(y, x):
-        return math.atan2(y, x)
+        return of_numbers("atan2", math.atan2, y, x)
     if not _traced(x):
         return _at_distance(y, x)
     r = hypot(y, x)

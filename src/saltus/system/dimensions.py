@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from saltus.errors import UnitError
-from saltus.system.expression import ELEMENTARY, Expr
+from saltus.system.expression import ELEMENTARY, Expr, walk
 from saltus.system.text import PI_MULTIPLES
 from saltus.units import dimension, unit_text
 
@@ -76,6 +76,11 @@ class DimensionCheck:
                     f"d{name}/dt is a rate in {unit_text(wanted)}, but {_brief(term)} is {_in(found)}: "
                     f"{_missing(found, wanted)}. {_WAY_OUT}"
                 )
+
+    def unit(self, node: Expr) -> str:
+        """Coherent SI unit of a node, ``""`` if it isn't known, or may be that of an angle."""
+        found = self._dimension(node)
+        return "" if found is None or isinstance(found, _Number) or not found.keys() - {"s"} else unit_text(found)
 
     # -- one node ---------------------------------------------------------------------------------------------------------------
     def _dimension(self, node: Expr) -> Dimension | None:
@@ -166,6 +171,30 @@ def _is_plain(number: float) -> bool:
     """Whether a number is one of those that formulas are made of: a small multiple of 1, 1/2, 1/3 or 1/6, or one of pi."""
     size = abs(number)
     return size in PI_MULTIPLES or (size < 10 and abs(6 * size - round(6 * size)) < 1e-12)
+
+
+def units_of(states: Sequence[str], units: Mapping[str, str], rates: Sequence[Expr], formulas: Sequence[Expr]) -> list[str]:
+    """Coherent SI unit of each formula of a system's states and parameters, ``""`` where it isn't known.
+
+    None is known of a system whose own equations don't have one unit in a sum: it was traced with ``check_units=False``.
+    """
+    check = DimensionCheck(states, units)
+    try:
+        for node in walk(*rates):
+            check(node)
+        check.check_rates(rates)
+    except UnitError:
+        return [""] * len(formulas)
+    return [_unit(check, formula) for formula in formulas]
+
+
+def _unit(check: DimensionCheck, formula: Expr) -> str:
+    try:
+        for node in walk(formula):
+            check(node)
+    except UnitError:
+        return ""
+    return check.unit(formula)
 
 
 # -- words ---------------------------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, Protocol, Union, runtime_checkable
 
-from saltus.errors import TraceError
+from saltus.errors import TraceError, shown
 
 #: Elementary functions that a traced equation may call, in addition to arithmetic.
 ELEMENTARY = ("sqrt", "exp", "log", "sin", "cos", "tan", "atan", "tanh")
@@ -293,7 +293,7 @@ class Not(Condition):
 
 def _condition(value: object) -> Condition:
     if not isinstance(value, Condition):
-        raise TraceError(f"a condition must be a comparison such as x > gap, not {value!r}.")
+        raise TraceError(f"a condition must be a comparison such as x > gap, not {shown(value)}.")
     return value
 
 
@@ -326,16 +326,18 @@ def as_expr(value: Operand) -> Expr:
         return value
     if isinstance(value, Condition):
         raise TraceError("a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0).")
-    if isinstance(value, str):
+    if isinstance(value, str | bytes):
         raise TraceError(
-            f"an equation holds the text {value!r}. Text with units is for parameter values; inside an equation write SI numbers."
+            f"an equation holds the text {shown(value)}. Text with units is for parameter values; inside an equation write SI numbers."
         )
+    if getattr(getattr(value, "dtype", None), "kind", "f") in "mM":  # dates and spans of time of NumPy, which turn into numbers of ticks
+        raise TraceError(f"an equation holds the date or span {shown(value)}. Inside an equation write SI numbers.")
     if getattr(value, "shape", ()) != ():
         raise TraceError("an equation holds an array. A traced value is a single number: write out the components.")
     try:
         return constant(value)
     except (TypeError, ValueError, OverflowError):
-        raise TraceError(f"an equation holds {value!r}, which is neither a number nor a traced value.") from None
+        raise TraceError(f"an equation holds {shown(value)}, which is neither a number nor a traced value.") from None
 
 
 # -- operations: constants are folded, nothing else is rearranged --------------------------------------------------------------

@@ -7,18 +7,35 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from saltus.errors import TraceError
+from saltus.errors import TraceError, shown
 from saltus.system.expression import Condition, Expr, Operand, Relation, absolute, as_expr, elementary, select
 from saltus.system.expression import sub as _difference
 
 pi = math.pi
 
 
+def of_numbers(name: str, function: Callable[..., Any], *numbers: Any) -> Any:
+    """A function of plain numbers.
+
+    Raises
+    ------
+    TraceError
+        If one of them isn't a number, or the function has no value there.
+    """
+    for number in numbers:
+        as_expr(number)  # which refuses what isn't a number
+    try:
+        return function(*numbers)
+    except (TypeError, ValueError, ArithmeticError):
+        given = ", ".join(map(shown, numbers))
+        raise TraceError(f"sl.{name}({given}) has no finite real value. Keep to the numbers where it has one.") from None
+
+
 def _elementary(name: str, what: str) -> Callable[[Operand], Any]:
     on_numbers = getattr(math, name)
 
     def function(a: Operand) -> Any:
-        return elementary(name, a) if isinstance(a, Expr) else on_numbers(a)
+        return elementary(name, a) if isinstance(a, Expr) else of_numbers(name, on_numbers, a)
 
     function.__name__ = function.__qualname__ = name
     function.__doc__ = f"{what} of a traced value or a number."
@@ -37,24 +54,24 @@ tanh = _elementary("tanh", "Hyperbolic tangent")
 
 def abs(a: Operand) -> Any:
     """``|a|``; of a traced value a guard at ``a = 0``. The built-in ``abs`` does the same."""
-    return absolute(a) if isinstance(a, Expr) else builtins.abs(a)
+    return absolute(a) if isinstance(a, Expr) else of_numbers("abs", builtins.abs, a)
 
 
-def min(first: Operand, *others: Operand) -> Any:
+def min(first: Operand, /, *others: Operand) -> Any:
     """The smallest of the values; a guard wherever two of them are equal."""
-    return _extreme(first, others, builtins.min, lambda a, b: (b, a))
+    return _extreme("min", (first, *others), builtins.min, lambda a, b: (b, a))
 
 
-def max(first: Operand, *others: Operand) -> Any:
+def max(first: Operand, /, *others: Operand) -> Any:
     """The largest of the values; a guard wherever two of them are equal."""
-    return _extreme(first, others, builtins.max, lambda a, b: (a, b))
+    return _extreme("max", (first, *others), builtins.max, lambda a, b: (a, b))
 
 
-def _extreme(first: Operand, others: tuple[Operand, ...], on_numbers: Callable, larger_first: Callable) -> Any:
-    if not any(isinstance(value, Expr) for value in (first, *others)):
-        return on_numbers(first, *others) if others else first
-    result = as_expr(first)
-    for other in map(as_expr, others):
+def _extreme(name: str, values: tuple[Operand, ...], on_numbers: Callable, larger_first: Callable) -> Any:
+    if not any(isinstance(value, Expr) for value in values):
+        return of_numbers(name, lambda *numbers: on_numbers(numbers), *values)
+    result = as_expr(values[0])
+    for other in map(as_expr, values[1:]):
         if result.op == other.op == "const":
             result = as_expr(on_numbers(result.payload, other.payload))
         elif result is not other:
@@ -99,13 +116,13 @@ def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand | No
             result = select(condition, value, result)
         elif condition:
             result = value
-    return as_expr(result) if isinstance(result, Expr) else float(result)
+    return as_expr(result) if isinstance(result, Expr) else of_numbers("piecewise", float, result)
 
 
 def _pair(piece: Any) -> tuple[Operand, Condition | bool]:
     """A piece, checked."""
     if not (isinstance(piece, tuple | list) and len(piece) == 2):
-        raise TraceError(f"a piece of sl.piecewise is a pair (value, condition), not {piece!r}.")
+        raise TraceError(f"a piece of sl.piecewise is a pair (value, condition), not {shown(piece)}.")
     value, condition = piece
     if isinstance(value, Condition):
         raise TraceError("a piece of sl.piecewise begins with its value: write (value, condition), such as (k*(x - gap), x > gap).")
@@ -113,4 +130,4 @@ def _pair(piece: Any) -> tuple[Operand, Condition | bool]:
         return value, condition
     if isinstance(condition, bool) or str(getattr(condition, "dtype", "")) == "bool":
         return value, bool(condition)
-    raise TraceError(f"the condition of a piece of sl.piecewise must be a comparison such as x > gap, not {condition!r}.")
+    raise TraceError(f"the condition of a piece of sl.piecewise must be a comparison such as x > gap, not {shown(condition)}.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from saltus.errors import TraceError
-from saltus.system.expression import Expr, Operand
+from saltus.system.expression import Expr, Operand, as_expr
 from saltus.system.functions import piecewise
 
 
@@ -73,6 +73,8 @@ def freeplay(
         lower_gap = upper_gap = gap
     if lower_gap is None and upper_gap is None:
         raise TraceError("sl.freeplay needs gap=, or lower_gap= or upper_gap= or both.")
+    for operand in (x, stiffness, damping, preload, *(one for one in (lower_gap, upper_gap, velocity) if one is not None)):
+        as_expr(operand)  # which refuses what isn't a number
     damped = isinstance(damping, Expr) or damping != 0
     if damped and velocity is None:
         raise TraceError("sl.freeplay got damping= but no velocity=. Give the time derivative of x.")

@@ -7,6 +7,7 @@ sign: a preloaded stop has a negative one.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from saltus.errors import ParameterError
 from saltus.system.canonical import Canonical
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Bit, Condition, Expr, Not, add, neg, walk
-from saltus.system.guards import equation_of
+from saltus.system.guards import Guard, equation_of
 
 if TYPE_CHECKING:
     from saltus.system.system import System
@@ -37,7 +38,7 @@ def check_overlaps(system: System, values: Mapping[str, Any]) -> None:
     ParameterError
         With the boundaries and the values of their parameters.
     """
-    for first, second, width in _opposed(system):
+    for first, second, width in _opposed(system.field, system.guards):
         (overlap,) = evaluate([width], states=dict.fromkeys(system.states, 0.0), values=values)  # states cancel in it
         if not np.any(overlap > 0):
             continue
@@ -53,10 +54,15 @@ def check_overlaps(system: System, values: Mapping[str, Any]) -> None:
         )
 
 
-def _opposed(system: System) -> Iterator[tuple[int, int, Expr]]:
+@functools.lru_cache(maxsize=256)
+def _opposed(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> tuple[tuple[int, int, Expr], ...]:
     """Guards of a piece and of the next one, and how far they overlap: the sum of their gaps, where it depends on parameters only."""
+    return tuple(_pairs(field, guards))
+
+
+def _pairs(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> Iterator[tuple[int, int, Expr]]:
     canonical, seen = Canonical(), set()
-    for node in walk(*system.field, *(guard.gap for guard in system.guards)):
+    for node in walk(*field, *(guard.gap for guard in guards)):
         behind = node.args[1] if node.op == "select" else node
         if node.op != "select" or behind.op != "select":
             continue
@@ -64,7 +70,7 @@ def _opposed(system: System) -> Iterator[tuple[int, int, Expr]]:
         if first is None or second is None or (first, second) in seen:
             continue
         seen.add((first, second))
-        width = add(*(system.guards[number].gap if positive else neg(system.guards[number].gap) for number, positive in (first, second)))
+        width = add(*(guards[number].gap if positive else neg(guards[number].gap) for number, positive in (first, second)))
         if canonical.kinds(canonical.polynomial(width)) == {"param"}:
             yield first[0], second[0], width
 

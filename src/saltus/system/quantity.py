@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from saltus.errors import ParameterError, TraceError, nearest
+from saltus.errors import ParameterError, TraceError, nearest, shown
 from saltus.system.expression import TIME, Expr, as_expr, parameter, state, sub
 from saltus.system.guards import Guard, bits_in, join_guards, surface_guard
 from saltus.system.names import why_no_name
@@ -51,7 +51,7 @@ def quantity(system: System, function: Quantity, what: str = "a quantity") -> tu
     if not callable(function) or isinstance(function, System):
         names = ", ".join(("t", *_own_states(system)))
         raise TraceError(
-            f"{what} must be a function such as `lambda {names}: ...`, not {function!r}. Parameters are further arguments, by name."
+            f"{what} must be a function such as `lambda {names}: ...`, not {shown(function)}. Parameters are further arguments, by name."
         )
     title = f"{what} of {system.name}"
     positional, named = _arguments(system, function, title)
@@ -241,8 +241,10 @@ def with_integrals(system: System, integrands: Mapping[str, Quantity], units: Ma
     extended = system
     for name, function in integrands.items():
         if why_no_name(name) is not None or name in system.units:
-            raise ParameterError(f"an integral of {system.name} can't be called {name!r}: use letters, digits and _, and no name it has.")
-        rate, guards = quantity(extended, function, f"the integrand {name!r}")
+            raise ParameterError(
+                f"an integral of {system.name} can't be called {shown(name)}: use letters, digits and _, and no name it has."
+            )
+        rate, guards = quantity(extended, function, f"the integrand {shown(name)}")
         extended = replace(extended, guards=guards)
         rates.append(rate)
     return replace(

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import SaltusError, among
+from saltus.errors import SaltusError, among, shown
 from saltus.system.clocks import affine, switch
 from saltus.system.expression import ELEMENTARY, And, Bit, Condition, Expr, Not, Or, Relation, constant, varies, walk
 from saltus.system.guards import Guard, bits_in
@@ -99,7 +99,9 @@ def arguments(data: Mapping[str, Any]) -> dict[str, Any]:
     """
     if not isinstance(data, Mapping) or not among(data.get("format"), (FORMAT,)):
         found = data.get("format") if isinstance(data, Mapping) else type(data).__name__
-        raise SaltusError(f"this isn't a system written by this version of saltus (format {found!r}, expected {FORMAT!r}). Trace it again.")
+        raise SaltusError(
+            f"this isn't a system written by this version of saltus (format {shown(found)}, expected {FORMAT!r}). Trace it again."
+        )
     try:
         return _read(data)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
@@ -109,7 +111,7 @@ def arguments(data: Mapping[str, Any]) -> dict[str, Any]:
 def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     states, parameters = tuple(data["states"]), list(data["parameters"])
     for name in (*states, *parameters):
-        _require(why_no_name(name) is None, f"{name!r} is no name: {why_no_name(name)}")
+        _require(why_no_name(name) is None, f"{shown(name)} is no name: {why_no_name(name)}")
     _require(why_no_title(data["name"]) is None, f"{data['name']!r} is no name of a system: {why_no_title(data['name'])}")
     for name in ("description", "source"):
         _require(why_no_text(data[name]) is None, f"its {name} can't be used: {why_no_text(data[name])}")
@@ -125,7 +127,7 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     field = tuple(nodes[i] for i in data["field"])
     _require(len(field) == len(states), "the number of derivatives and of states differ")
     for guard in guards:
-        _require(why_no_text(guard.name) is None, f"{guard.name!r} is no name of a boundary: {why_no_text(guard.name)}")
+        _require(why_no_text(guard.name) is None, f"{shown(guard.name)} is no name of a boundary: {why_no_text(guard.name)}")
     _require(all(guard.state is None or guard.state in states for guard in guards), "a guard names an unknown state")
     for number, guard in enumerate(guards):
         _require(bits_in([guard.gap]) <= set(range(number)), "a gap depends on a later guard")
@@ -148,7 +150,7 @@ def _node(op: str, args: tuple[Expr, ...], payload: Any, names: Mapping[str, set
     if op == "const":
         return constant(payload)
     if op in names:
-        _require(payload in names[op], f"unknown {op} {payload!r}")
+        _require(payload in names[op], f"unknown {op} {shown(payload)}")
         return Expr(op, args, str(payload))
     if op == "select":
         return Expr(op, args, _condition(payload, nodes))
@@ -173,7 +175,7 @@ def _condition(data: Sequence[Any], nodes: Sequence[Expr]) -> Condition:
         return Not(inner[0])
     if kind in ("and", "or") and len(inner) == 2:
         return (And if kind == "and" else Or)(*inner)
-    raise ValueError(f"unknown condition {kind!r}")
+    raise ValueError(f"unknown condition {shown(kind)}")
 
 
 def _require(holds: bool, what: str) -> None:

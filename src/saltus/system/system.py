@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, nearest
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.system import checks, serial
 from saltus.system.derivatives import gradient
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
 from saltus.system.overlaps import check_overlaps
+from saltus.system.periodic import check_periodic
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +61,7 @@ class System:
         for name, value in self.values.items():
             checks.check_range(name, value, self.forced_at)
         check_overlaps(self, self.values)
-        checks.check_periodic(self)
+        check_periodic(self)
 
     # -- values -----------------------------------------------------------------------------------------------------------------
     def with_values(self, **values: Any) -> System:
@@ -79,7 +80,16 @@ class System:
             If a text value has the wrong unit.
         """
         new = {name: checks.resolve_one(self._known(name), value, self.units[name], self.forced_at) for name, value in values.items()}
-        return replace(self, values={**self.values, **new})
+        if not new:
+            return self
+        copy = replace(self, values={**self.values, **new})
+        object.__setattr__(copy, "_origin", self.origin)
+        return copy
+
+    @property
+    def origin(self) -> System:
+        """The system that this one is a copy of with other values, itself if it is none: what follows from the equations is kept there."""
+        return vars(self).get("_origin", self)
 
     def resolve(self, name: str, value: Any) -> Any:
         """A value for a parameter, in SI and checked; the system itself stays as it is.
@@ -104,8 +114,8 @@ class System:
 
     def _known(self, name: str) -> str:
         """The name of a parameter, checked."""
-        if name not in self.values:
-            raise ParameterError(f"{self.name} has no parameter {name!r}. {nearest(name, self.values)}")
+        if not among(name, self.values):
+            raise ParameterError(f"{self.name} has no parameter {shown(name)}. {nearest(name, self.values)}")
         return name
 
     def period(self, values: Mapping[str, Any] | None = None) -> Any:
@@ -118,6 +128,8 @@ class System:
         """
         if self.forced_at is None:
             return None
+        if values is not None and not isinstance(values, Mapping):
+            raise ParameterError(f"values must be a mapping, such as {{{self.forced_at!r}: 15.0}}, not {shown(values)}.")
         frequency = (values or {}).get(self.forced_at, self.values[self.forced_at])
         return (2 * math.pi if self.units[self.forced_at] == "rad/s" else 1.0) / frequency
 
@@ -153,23 +165,25 @@ class System:
         Raises
         ------
         ParameterError
-            If ``y`` has another number of states.
+            If ``t`` or ``y`` holds something else than numbers, their shapes don't fit, or ``y`` has another number of states.
         """
         from saltus.system.evaluate import field
 
-        if len(y) != len(self.states):
-            raise ParameterError(f"{self.name} has the states {', '.join(self.states)}, but y holds {len(y)} of them.")
-        return field(self, t, y)
+        return field(self, *checks.point(self, t, y))
 
     def equations(self) -> list[str]:
         """The equations as text, one line each; long parts that are used twice come first, named."""
+        return list(self.origin._lines)
+
+    @functools.cached_property
+    def _lines(self) -> list[str]:
         from saltus.system.display import equation_lines
 
         return equation_lines(self)
 
     def fingerprint(self) -> str:
         """Hash of the equations (64 hexadecimal digits): the same for other values, another name and in another process."""
-        return self._fingerprint
+        return self.origin._fingerprint
 
     @functools.cached_property
     def _fingerprint(self) -> str:
@@ -178,8 +192,8 @@ class System:
     # -- units and looks --------------------------------------------------------------------------------------------------------
     def state_unit(self, name: str) -> str:
         """Unit of a state; ``""`` if not declared. Raises ParameterError for an unknown state."""
-        if name not in self.states:
-            raise ParameterError(f"{self.name} has no state {name!r}. {nearest(name, self.states)}")
+        if not among(name, self.states):
+            raise ParameterError(f"{self.name} has no state {shown(name)}. {nearest(name, self.states)}")
         return self.units[name]
 
     def parameter_text(self, name: str) -> str:

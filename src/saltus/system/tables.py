@@ -150,9 +150,9 @@ def _make(points: Any, values: Any, kind: str, outside: str, name: str) -> Table
     """The curve, checked."""
     for what, word, known in (("kind", kind, KINDS), ("outside", outside, OUTSIDE)):
         if not among(word, known):
-            raise TraceError(f"sl.table: {what}={word!r}. {nearest(word, known)}")
+            raise TraceError(f"sl.table: {what}={shown(word)}. {nearest(word, known)}")
     if not (isinstance(name, str) and name.isidentifier()):
-        raise TraceError(f"sl.table: name={name!r} is no name. Use letters, digits and _.")
+        raise TraceError(f"sl.table: name={shown(name)} is no name. Use letters, digits and _.")
     try:
         x, y = (np.array(data, dtype=np.float64) for data in (points, values))
     except (TypeError, ValueError, OverflowError):

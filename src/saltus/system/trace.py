@@ -5,15 +5,16 @@ Whatever goes wrong inside the function becomes a TraceError that names its file
 
 from __future__ import annotations
 
+import functools
 import inspect
 import sysconfig
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
-from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest
+from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest, shown
 from saltus.system import checks
 from saltus.system.dimensions import DimensionCheck
 from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
@@ -24,11 +25,32 @@ from saltus.system.singular import check_finite, check_gaps, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
 _HERE = str(Path(__file__).parent.parent)
 _LIBRARIES = tuple({sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None})
 _HOW_TO = "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and functions that can be traced. " + OWN_FUNCTIONS
 
 
+def _known_words(function: Callable[P, R]) -> Callable[P, R]:
+    """Answer arguments that :func:`system` doesn't have by those that it has."""
+    known = inspect.signature(function).parameters
+    elsewhere = dict.fromkeys(("forcing", "forced", "drive", "frequency", "period"), "forced_at")
+
+    @functools.wraps(function)
+    def called(*args: P.args, **kwargs: P.kwargs) -> R:
+        for word in kwargs:
+            if word not in known:
+                there = elsewhere.get(word)
+                told = f'Write {there}=, the name of the parameter that holds the forcing frequency: {there}="frequency".' if there else ""
+                raise TraceError(f"sl.system has no argument {word!r}. {told or nearest(word, known)}")
+        return function(*args, **kwargs)
+
+    return called
+
+
+@_known_words
 def system(
     states: str | Sequence[str] = "",
     *,
@@ -108,7 +130,7 @@ def system(
         known_units = _units(names, defaults, forced_at, dict(units or {}), title)
         if forced_at is not None and known_units[forced_at] not in ("Hz", "rad/s"):
             raise UnitError(
-                f"{title}: forced_at={forced_at!r} is in {known_units[forced_at]!r}, but a forcing frequency is in 'Hz' or 'rad/s'."
+                f"{title}: forced_at={shown(forced_at)} is in {known_units[forced_at]!r}, but a forcing frequency is in 'Hz' or 'rad/s'."
             )
         values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
         dimensions = DimensionCheck(names, known_units) if check_units else None
@@ -183,10 +205,10 @@ def _units(
     for name in declared:
         if name not in states and name not in defaults:
             raise ParameterError(
-                f"{title}: units= names {name!r}, which is neither a state nor a parameter. {nearest(name, (*states, *defaults))}"
+                f"{title}: units= names {shown(name)}, which is neither a state nor a parameter. {nearest(name, (*states, *defaults))}"
             )
     if forced_at is not None and forced_at not in defaults:
-        raise ParameterError(f"{title}: forced_at={forced_at!r} is no parameter. {nearest(forced_at, defaults)}")
+        raise ParameterError(f"{title}: forced_at={shown(forced_at)} is no parameter. {nearest(forced_at, defaults)}")
     units = {}
     for name in (*states, *defaults):
         if name in declared:

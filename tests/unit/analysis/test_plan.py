@@ -79,6 +79,13 @@ def test_whole_periods_may_be_written_as_a_float():
     assert isinstance(plan(periods=np.int64(7)).periods, int)
 
 
+def test_a_list_that_looks_like_a_range_is_refused():
+    with pytest.raises(
+        ParameterError, match=r"x = \['-1 mm', '1 mm', 5\] is a list.*5 has no unit. A range is a tuple: x=\('-1 mm', '1 mm', 5\)"
+    ):
+        plan({"x": ["-1 mm", "1 mm", 5], "v": V})
+
+
 def test_a_list_holds_the_starts_and_a_tuple_is_a_range():
     rows = plan({"x": ["0 mm", "1 mm", "5 mm"], "v": (0, 1, 2.0)})
     assert rows.axes["x"].tolist() == [0.0, 1e-3, 5e-3]

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from saltus import analysis
+import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.flow import Interrupted
 from saltus.results import load, save
@@ -160,7 +160,7 @@ def test_progress_is_told_for_each(whole):
 @pytest.fixture
 def no_computing(monkeypatch):
     for name in ("simulate", "frequency_response", "bifurcation_diagram"):
-        monkeypatch.setattr(analysis, name, lambda *_, **__: pytest.fail("something is computed again"))
+        monkeypatch.setattr(f"{sl._HOMES[name]}.{name}", lambda *_, **__: pytest.fail("something is computed again"))
 
 
 def test_what_is_there_is_not_computed_again(whole, copied, no_computing):
@@ -214,7 +214,7 @@ def test_a_stop_keeps_what_is_computed(whole, copied, monkeypatch):
         raise stop
 
     with monkeypatch.context() as patch:
-        patch.setattr(analysis, "bifurcation_diagram", stopped)
+        patch.setattr("saltus.analysis.bifurcation_diagram.bifurcation_diagram", stopped)
         with pytest.raises(KeyboardInterrupt):
             Run(copied)
     assert (copied / "soft-partial.nc").exists()
@@ -227,7 +227,9 @@ def test_a_stop_keeps_what_is_computed(whole, copied, monkeypatch):
 
 def test_only_one_question(tmp_path, no_computing, monkeypatch):
     calls = []
-    monkeypatch.setattr(analysis, "bifurcation_diagram", lambda *_, **call: calls.append(call) or pytest.skip("reached"))
+    monkeypatch.setattr(
+        "saltus.analysis.bifurcation_diagram.bifurcation_diagram", lambda *_, **call: calls.append(call) or pytest.skip("reached")
+    )
     for name in ("soft", "A map", "a-map"):
         assert len(questions_of(parse(STUDY), None, Inputs(tmp_path), [name])) == 1
     assert len(questions_of(parse(STUDY), None, Inputs(tmp_path), ["bifurcation_diagram"])) == 2

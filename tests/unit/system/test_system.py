@@ -121,6 +121,19 @@ def test_derived_equations_are_computed_once():
     assert RIG.guard_gradients is RIG.guard_gradients
 
 
+def test_copies_share_what_follows_from_the_equations(monkeypatch):
+    from saltus.system import display
+
+    other = RIG.with_values(force="5 N").with_values(upper_gap="1 mm")
+    assert other.origin is RIG.origin
+    assert RIG.with_values() is RIG
+    assert other.equations() == RIG.equations()
+    monkeypatch.setattr(display, "equation_lines", lambda _: pytest.fail("written again"))
+    lines = other.equations()
+    lines.clear()  # a list of the caller's own
+    assert other.with_values(force=1.0).equations() == RIG.equations()
+
+
 def test_importing_the_layer_is_light():
     code = "import sys, saltus.system, saltus.models; print([m for m in ('sympy', 'pint', 'numba', 'scipy', 'xarray') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.strip() == "[]"

@@ -118,6 +118,12 @@ def test_names_of_states(states, teaches):
         make(lambda t, x, v: (v, x), states=states)
 
 
+@pytest.mark.parametrize(("word", "teaches"), [("forcing", 'Write forced_at=.*forced_at="frequency"'), ("unit", "Did you mean 'units'")])
+def test_an_option_that_is_not_there_is_answered_by_one_that_is(word, teaches):
+    with pytest.raises(TraceError, match=teaches):
+        system(states="x v", **{word: "f"})
+
+
 def test_the_decorator_needs_its_states():
     with pytest.raises(TraceError, match=r'@sl.system\(states="x v"\)'):
         system(states=lambda t, x, v: (v, x))

@@ -11,14 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus import analysis
 from saltus.analysis.answers import gap_unit, provenance
+from saltus.analysis.attractors import attractors
 from saltus.analysis.basins import label_all
 from saltus.analysis.capture import Neighbourhoods
 from saltus.analysis.found import Found
+from saltus.analysis.lyapunov import lyapunov
 from saltus.analysis.orbits import Orbit, polish, same
 from saltus.analysis.portrait import portraits
 from saltus.analysis.settling import Settling
+from saltus.analysis.simulate import simulate
+from saltus.analysis.stroboscope import stroboscope
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.replication.job import Show
@@ -67,7 +70,7 @@ def simulated(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # 
     table, system = study.simulate, _system(settings, study)
     assert table is not None
     t_end = None if table.t_end is None else quantities.number(table.t_end, "s", "simulate", "t_end")
-    return analysis.simulate(
+    return simulate(
         system, quantities.start(system, table.start), table.periods, t_end, method=method_in(settings), samples=table.samples,
         keep=table.keep, values=quantities.varied(system, table.values), time_errors="local", threads=1, progress=show,
     )  # fmt: skip
@@ -83,7 +86,7 @@ def beside(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noq
     first, second = system.states
     x = (start[first][:, None] + offsets).ravel()
     v = np.repeat(np.broadcast_to(start[second], start[first].shape), len(offsets))
-    return analysis.stroboscope(
+    return stroboscope(
         system, {first: x, second: v}, table.periods or 1, settings["keep"], method=method_in(settings), threads=1, progress=show
     )
 
@@ -94,7 +97,7 @@ def on_attractors(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:
     study = study_of(settings)
     system = _system(settings, study)
     start = {name: found[f"attractor_{name}"].values[:, 0] for name in system.states}
-    return analysis.simulate(
+    return simulate(
         system, start, settings["periods"], method=method_in(settings), keep=settings["keep"], time_errors="local", threads=1, progress=show
     )
 
@@ -104,7 +107,7 @@ def exponents_on_attractors(settings: Settings, inputs: Inputs, show: Show) -> x
     (found,) = inputs.values()
     system = _system(settings, study_of(settings))
     start = {name: found[f"attractor_{name}"].values[:, 0] for name in system.states}
-    return analysis.lyapunov(
+    return lyapunov(
         system, start, method=settings["by"], flow=method_in(settings), periods=settings["periods"], transient=settings["transient"],
         threads=1, progress=show,
     )  # fmt: skip
@@ -117,7 +120,7 @@ def settled_from(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset: 
     system = _system(settings, study)
     assert study.simulate is not None
     start = quantities.start(system, study.simulate.start)
-    return analysis.attractors(system, start, method=method_in(settings), threads=1, progress=show)
+    return attractors(system, start, method=method_in(settings), threads=1, progress=show)
 
 
 def settled_from_motion(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:
@@ -129,7 +132,7 @@ def settled_from_motion(settings: Settings, inputs: Inputs, show: Show) -> xr.Da
     dim = one[system.states[0]].dims[0]
     last = one.isel({dim: slice(-201, -1)})
     start = {name: last[name].values for name in system.states}
-    return analysis.attractors(system, start, method=method_in(settings), threads=1, progress=show)
+    return attractors(system, start, method=method_in(settings), threads=1, progress=show)
 
 
 def settled_from_rare(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:
@@ -145,7 +148,7 @@ def settled_from_rare(settings: Settings, inputs: Inputs, show: Show) -> xr.Data
     rows, columns = np.nonzero(near) if near.any() else (np.array([0]), np.array([0]))
     first, second = map_["basin"].dims
     start = {str(first): map_[first].values[rows], str(second): map_[second].values[columns]}
-    return analysis.attractors(system, start, method=method_in(settings), threads=1, progress=show)
+    return attractors(system, start, method=method_in(settings), threads=1, progress=show)
 
 
 def halved(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noqa: ARG001

@@ -5,14 +5,15 @@ Each job runs on one thread; several run at a time.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus import analysis
 from saltus.analysis.answers import provenance
-from saltus.analysis.compare_methods import method_label
+from saltus.analysis.bifurcation_diagram import bifurcation_diagram
+from saltus.analysis.compare_methods import compare_methods, method_label
+from saltus.analysis.frequency_response import frequency_response
 from saltus.analysis.method_errors import one_period_errors
 from saltus.flow import Taylor
 from saltus.replication.job import Show
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.system import System
+
+#: Verbs by the names of their tables.
+VERBS: dict[str, Callable[..., xr.Dataset]] = {"frequency_response": frequency_response, "bifurcation_diagram": bifurcation_diagram}
 
 
 def _system(settings: Settings) -> System:
@@ -52,16 +56,16 @@ def _range(given: Mapping[str, Any]) -> tuple[Any, ...]:
 
 def responses(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noqa: ARG001  (all jobs are called alike)
     """The [frequency_response] or [bifurcation_diagram] of the settings."""
-    ask = getattr(analysis, settings["question"])
-    ds: xr.Dataset = ask(_system(settings), method=method_in(settings), threads=1, progress=show, **_arguments(settings["table"]))
-    return ds
+    return VERBS[settings["question"]](
+        _system(settings), method=method_in(settings), threads=1, progress=show, **_arguments(settings["table"])
+    )
 
 
 def compared(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noqa: ARG001
     """Both of the paper's ways of integrating beside the exact one, from the three Datasets that exist already."""
     methods = [method_in({"method": table}) for table in settings["methods"]]
     labels = [method_label(method) for method in (Taylor(), *methods)]
-    return analysis.compare_methods(
+    return compare_methods(
         _system(settings), settings["question"], methods, computed=dict(zip(labels, inputs.values(), strict=True)), threads=1,
         progress=False, **_arguments(settings["table"]),
     )  # fmt: skip

@@ -141,7 +141,7 @@ def _write_map(job: MapJob, ds: xr.Dataset, folder: Path, outcome: Outcome, pict
 
 
 def _write_agreement(job: MapJob, ds: xr.Dataset, other: xr.Dataset, folder: Path, outcome: Outcome, pictures: bool) -> None:
-    from saltus.analysis import compare
+    from saltus.analysis.compare import compare
     from saltus.results import save
     from saltus.study.questions.basins_table import agreement_table
 
@@ -159,7 +159,7 @@ def _write_agreement(job: MapJob, ds: xr.Dataset, other: xr.Dataset, folder: Pat
 
 def _motions(job: MapJob, ds: xr.Dataset) -> xr.Dataset:
     """A motion on each attractor, long enough for its picture."""
-    from saltus.analysis import simulate
+    from saltus.analysis.simulate import simulate
 
     system = job.plan.system
     start = {name: ds[f"attractor_{name}"].values[:, 0] for name in system.states}

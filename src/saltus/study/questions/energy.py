@@ -53,7 +53,7 @@ class Balance(Looked):
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Draw the balance."""
-        from saltus import analysis
+        from saltus.analysis.energy import energy_balance
 
         call: dict[str, Any] = self.arguments | self.functions | how
-        return analysis.energy_balance(self.system, **call)
+        return energy_balance(self.system, **call)

@@ -49,6 +49,6 @@ class Statistics(Looked):
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Count contacts."""
-        from saltus import analysis
+        from saltus.analysis.impacts import impact_statistics
 
-        return analysis.impact_statistics(self.system, **self.arguments, **how)
+        return impact_statistics(self.system, **self.arguments, **how)

@@ -73,9 +73,9 @@ class Exponents(OneDataset):
 
     def compute(self, threads: int | None, progress: Callable[[float], None]) -> xr.Dataset:
         """Call the analysis."""
-        from saltus import analysis
+        from saltus.analysis.lyapunov import lyapunov
 
-        return analysis.lyapunov(self.system, flow=self.method, threads=threads, progress=progress, **self.arguments)
+        return lyapunov(self.system, flow=self.method, threads=threads, progress=progress, **self.arguments)
 
     def tables(self, ds: xr.Dataset) -> list[TextTable]:
         """A row for each motion."""

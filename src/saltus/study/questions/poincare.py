@@ -65,6 +65,6 @@ class Section(Looked):
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Crossings."""
-        from saltus import analysis
+        from saltus.analysis.poincare import poincare
 
-        return analysis.poincare(self.system, **self.arguments, **how)
+        return poincare(self.system, **self.arguments, **how)

@@ -162,12 +162,14 @@ class Responses(OneDataset):
 
     def compute(self, threads: int | None, progress: Callable[[float], None]) -> xr.Dataset:
         """Call the analysis."""
-        from saltus import analysis
+        from saltus.analysis.bifurcation_diagram import bifurcation_diagram
+        from saltus.analysis.frequency_response import frequency_response
 
         axes = _arrays({"frequency": self.arguments["frequency"]} if "frequency" in self.arguments else self.arguments["vary"])
         call = {name: value for name, value in self.arguments.items() if name not in ("frequency", "vary")}
         call |= axes if "frequency" in self.arguments else {"vary": axes}
-        return getattr(analysis, self.analysis)(self.system, method=self.method, threads=threads, progress=progress, **call)
+        verbs: dict[str, Callable[..., xr.Dataset]] = {FREQUENCY_RESPONSE: frequency_response, BIFURCATION_DIAGRAM: bifurcation_diagram}
+        return verbs[self.analysis](self.system, method=self.method, threads=threads, progress=progress, **call)
 
     def tables(self, ds: xr.Dataset) -> list[TextTable]:
         """Branches, and what happens to them; kinds of motion over two parameters."""

@@ -47,14 +47,15 @@ class Lines(Looked):
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Simulate, leave the transient out, take the spectrum."""
-        from saltus import analysis
+        from saltus.analysis.simulate import simulate
+        from saltus.analysis.spectrum import spectrum
 
         asked = self.arguments
         motion = {name: asked[name] for name in ("start", "t_start", "values", "samples")}
         if self.system.forced_at is not None:
             periods = asked["transient"] + asked["periods"]
-            run = analysis.simulate(self.system, periods=periods, keep=asked["periods"], **motion, **how)
+            run = simulate(self.system, periods=periods, keep=asked["periods"], **motion, **how)
         else:
-            run = analysis.simulate(self.system, t_end=asked["t_end"], **motion, **how)
+            run = simulate(self.system, t_end=asked["t_end"], **motion, **how)
             run = run.sel(time=slice(asked["t_start"] + asked["transient"], None))
-        return analysis.spectrum(run, asked["states"], window=asked["window"], last=asked["last"])
+        return spectrum(run, asked["states"], window=asked["window"], last=asked["last"])

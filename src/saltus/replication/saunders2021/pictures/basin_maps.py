@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from saltus import analysis
+from saltus.analysis.compare import compare
 from saltus.plot import maps
 from saltus.plot.basins import paint
 from saltus.plot.palette import hues
@@ -68,7 +68,7 @@ def _common(found: dict[str, xr.Dataset]) -> _Row:
     entries = [[_words(exact.isel(attractor=i)), [np.nan, np.nan, float(exact["attractor_fraction"][i])]] for i in range(count)]
     cells, agreement = {EXACT.label: exact["basin"].values.astype(int)}, {}
     for column, look in enumerate((ON, OFF)):
-        both = analysis.compare(exact, found[look.label])
+        both = compare(exact, found[look.label])
         values = both["basin_b"].values.astype(int)
         number = np.arange(both.sizes["pair"])
         for pair in range(count, both.sizes["pair"]):

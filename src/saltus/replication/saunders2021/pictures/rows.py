@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from saltus import analysis
+from saltus.analysis.compare import compare
 from saltus.plot import maps
 from saltus.plot.style import display_scale
 from saltus.replication.saunders2021.pictures.looks import EXACT, LOOKS, OFF, ON, Data, Look, lag, periods_of, strobe
@@ -40,7 +40,7 @@ def trios(data: Data, figure: str, setting: str) -> list[Trio]:
         for i in range(exact.sizes["attractor"])
     ]
     for look in (ON, OFF):
-        both = analysis.compare(exact, data[f"{figure}/{setting}, {look.end}"])
+        both = compare(exact, data[f"{figure}/{setting}, {look.end}"])
         for a, b, kind, n in zip(*(both[f"match_{name}"].values for name in ("a", "b", "type", "period")), strict=True):
             if a >= 0 and b >= 0:
                 rows[int(a)].number[look.end] = int(b)

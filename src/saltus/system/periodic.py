@@ -1,0 +1,157 @@
+"""Whether a forced system repeats after the period of its forcing: by formula where time enters as a phase or a clock, else by samples."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.errors import TraceError
+from saltus.system.clocks import cycles_of
+from saltus.system.derivatives import differentiate, time_derivative
+from saltus.system.evaluate import evaluate, sides
+from saltus.system.expression import TIME, Expr, depends_on, div, operands, relations_in, walk
+
+if TYPE_CHECKING:
+    from saltus.system.system import System
+
+#: Share of its cycles by which a clock may miss a whole number of them in a period, and cycles by which a phase may.
+CLOCK_MISS, PHASE_MISS = 1e-9, 1e-9
+#: Difference after a period, in units of the values at one state, that is no rounding.
+DIFFERENCE = 1e-7
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How time enters an expression. None of it depends on the values of the parameters.
+
+    Attributes
+    ----------
+    clocks : tuple of (Expr, bool)
+        Cycles per second of switches, remainders and tables, and whether they count cycles at all; a level and a table that ends don't.
+    phases : tuple of Expr
+        Cycles per second of sines and cosines of ``rate*t + ...``, the rest of it free of time.
+    complete : bool
+        Whether time enters in no other way. Then an expression all of whose clocks and phases repeat repeats itself.
+    """
+
+    clocks: tuple[tuple[Expr, bool], ...]
+    phases: tuple[Expr, ...]
+    complete: bool
+
+
+@functools.lru_cache(maxsize=1024)
+def timing_of(entry: Expr) -> Timing:
+    """How time enters an expression; worked out once for each."""
+    timed: set[Expr] = set()
+    for node in walk(entry):
+        if node.op == "time" or not timed.isdisjoint(operands(node)):
+            timed.add(node)
+    clocks: dict[Expr, tuple[Expr, bool]] = {}
+    phases: dict[Expr, Expr] = {}
+    complete, waiting, seen = True, [entry], set()
+    while waiting:
+        node = waiting.pop()
+        if node in seen or node not in timed:
+            continue
+        seen.add(node)
+        below = list(node.args)
+        if node.op == "time":
+            complete = False
+        elif node.op in ("mod", "table"):
+            clocks[node], below = cycles_of(node), []
+        elif node.op == "select":
+            clocks |= {relation.gap: cycles_of(relation.gap) for relation in relations_in(node.payload)}
+        elif node.op in ("sin", "cos") and (rate := _rate(node.args[0])) is not None:
+            phases[node], below = div(rate, 2 * math.pi), []
+        waiting += below
+    return Timing(tuple(clocks.values()), tuple(phases.values()), complete)
+
+
+def _rate(angle: Expr) -> Expr | None:
+    """The rate of ``rate*t + (anything without time)``, of parameters only; None for any other angle."""
+    if depends_on(angle, ("select", "mod", "table")):
+        return None
+    rate = differentiate(angle, TIME)
+    return None if depends_on(rate, ("time", "state")) else rate
+
+
+def check_periodic(system: System) -> None:
+    """Raise a TraceError if the equations of a forced system differ after one period of the forcing.
+
+    Finds the forgotten 2 pi in ``cos(frequency*t)``, ramps, and a second frequency that isn't a multiple of the first. What no formula
+    tells is evaluated at samples.
+    """
+    period = system.period()
+    if period is None:
+        return
+    unsure = []
+    for number, entry in enumerate(_entries(system)):
+        timing = timing_of(entry)
+        if not _clocks_repeat(timing, system, period):
+            raise TraceError(_not_periodic(system, number, period))
+        if not (timing.complete and _phases_repeat(timing, system, period)):
+            unsure.append(number)
+    if unsure:
+        _check_samples(system, period, unsure)
+
+
+def _entries(system: System) -> list[Expr]:
+    """The field, then the gaps of the guards."""
+    return [*system.field, *(guard.gap for guard in system.guards)]
+
+
+def _clocks_repeat(timing: Timing, system: System, period: float) -> bool:
+    """Whether every clock has a whole number of cycles in a period: by formula, since samples miss pulses."""
+    cycles = [abs(rate * period) for rate in evaluate([rate for rate, _ in timing.clocks], values=system.values)]
+    counts = [counts for _, counts in timing.clocks]
+    return all(
+        not number or (repeats and abs(number - np.round(number)) <= CLOCK_MISS * number)
+        for number, repeats in zip(cycles, counts, strict=True)
+    )
+
+
+def _phases_repeat(timing: Timing, system: System, period: float) -> bool:
+    """Whether every phase has a whole number of cycles in a period."""
+    cycles = [rate * period for rate in evaluate(timing.phases, values=system.values)]
+    return all(abs(number - np.round(number)) <= PHASE_MISS for number in cycles)
+
+
+def _check_samples(system: System, period: float, unsure: list[int]) -> None:
+    """Raise a TraceError if one of these entries, or its derivative with respect to t, differs after a period.
+
+    They are evaluated at a handful of states, times and modes and one period later. In the derivatives stiff terms can't hide a weak drive.
+    """
+    entries = [entry for number, entry in enumerate(_entries(system)) if number in unsure]
+    expressions = entries + [time_derivative(entry) for entry in entries]
+    random = np.random.default_rng(20210)
+    sizes = np.array([0.0, 0.0, 1e-4, 1e-2, 1.0, 1.0])[:, None]
+    states = {name: sizes * random.uniform(-1, 1, sizes.shape) for name in system.states}
+    bits = [random.random(sizes.shape) < 0.5 for _ in system.guards]
+    for bit, at_rest in zip(bits, sides(system, 0.0, np.zeros(len(system.states))), strict=True):
+        bit[0] = at_rest
+    t = period * random.uniform(0, 3, (1, 8))
+    now, later = (evaluate(expressions, t=when, states=states, values=system.values, bits=bits) for when in (t, t + period))
+    for place, (a, b) in enumerate(zip(now, later, strict=True)):
+        a, b = np.broadcast_to(a, (6, 8)), np.broadcast_to(b, (6, 8))
+        with np.errstate(invalid="ignore"):
+            scale = np.maximum(np.abs(a), np.abs(b)).max(axis=1, keepdims=True)
+            differs = np.abs(a - b) > DIFFERENCE * scale
+        if differs.any():
+            raise TraceError(_not_periodic(system, unsure[place % len(unsure)], period))
+
+
+def _not_periodic(system: System, entry: int, period: float) -> str:
+    """The message about the entry of the field or the guard that doesn't repeat."""
+    count = len(system.states)
+    what = f"d{system.states[entry]}/dt" if entry < count else f"the boundary {system.guards[entry - count].name!r}"
+    unit = system.units[system.forced_at or ""]
+    drive = "cos(2*pi*frequency*t)" if unit == "Hz" else "cos(omega*t)"
+    return (
+        f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by forced_at={system.forced_at!r} [{unit}]. "
+        f"Write the drive as {drive}, with the unit declared in units=; let every other forcing frequency be a multiple of it; or say "
+        f"forced_at=None for a system without a period."
+    )
