@@ -10,11 +10,11 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from types import ModuleType
 
 import numpy as np
 
 from saltus.codegen.clocks import table_data
+from saltus.codegen.module import Flow
 from saltus.errors import SaltusWarning
 from saltus.flow.counts import whole as whole_number
 from saltus.flow.methods import Method
@@ -173,7 +173,7 @@ def tables_of(system: System) -> np.ndarray:
 
 
 # -- arrays --------------------------------------------------------------------------------------------------------------------
-def allocate(request: Request, states: int, module: ModuleType) -> tuple[Outcome, dict[str, np.ndarray]]:
+def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict[str, np.ndarray]]:
     """The arrays that all chunks write to, at the start of a run, and the outcome that shows them."""
     n, m = len(request.start), len(request.schedule.count)
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
@@ -220,7 +220,7 @@ def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dic
     return _Chunk(first, arrays, request.record_from is not None)
 
 
-def _open_tables(chunk: _Chunk, module: ModuleType) -> None:
+def _open_tables(chunk: _Chunk, module: Flow) -> None:
     """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no memory."""
     size = RECORDS + module.STEP_RECORDS if chunk.keeps_contacts else 0
     chunk.arrays["rec_i"] = np.zeros((size, st.RECORD_INTEGERS), np.int64)
@@ -270,7 +270,7 @@ def slice_of(states: int) -> int:
     return max(SLICE * 4 // max(states, 2) ** 2, 1)
 
 
-def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: Stop, room: Contacts) -> None:
+def _advance(chunk: _Chunk, module: Flow, workspace: tuple, stop: Stop, room: Contacts) -> None:
     """Move a chunk to its end in slices; empties its table of contacts after each. Where there is room for no more, it ends there."""
     arrays = chunk.arrays
     steps = slice_of(arrays["state"].shape[1])
@@ -298,7 +298,7 @@ def _behind(arrays: dict[str, np.ndarray]) -> float:
 
 
 def _run_chunks(
-    chunks: list[_Chunk], module: ModuleType, stop: Stop, room: Contacts, progress: Callable[[float], None] | None, workers: int
+    chunks: list[_Chunk], module: Flow, stop: Stop, room: Contacts, progress: Callable[[float], None] | None, workers: int
 ) -> None:
     """All chunks; Ctrl-C never comes in the midst of one, which would cut a table of contacts in two."""
     local = threading.local()
