@@ -8,14 +8,14 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.arguments import checked
 from saltus.plot import axes as draw
 from saltus.plot import selection
+from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, display_scale
 from saltus.results.schema import ENERGY, IMPACTS, check
 
 
-@checked
+@picture
 def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Histogram of the speeds at contact, a colour for each guard.
 
@@ -66,7 +66,7 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
     return panel
 
 
-@checked
+@picture
 def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Energy supplied, dissipated and stored, interval by interval; the largest imbalance is in the title.
 
