@@ -99,8 +99,6 @@ def nearest(name: object, known: Iterable[str]) -> str:
         return f"Known: {', '.join(sorted(known))}."
     alike = unicodedata.normalize("NFKC", name)
     if alike != name and alike in known:
-        return (
-            f"Write {alike!r} ({ascii(alike)}), which is how Python reads {name!r} ({ascii(name)}) in the function: they only look alike."
-        )
+        return f"Write {alike!r} ({alike!a}), which is how Python reads {name!r} ({name!a}) in the function: they only look alike."
     close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     return f"Did you mean {close[0]!r}?" if close else f"Known: {', '.join(sorted(known))}."

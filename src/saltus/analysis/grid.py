@@ -76,9 +76,7 @@ class Grid:
 
     def family(self, method: Method, threads: int | None = None) -> Family:
         """A map for every point of the grid."""
-        family = Family(self.system, method, self.rows, self.every, threads)
-        family.begin_tangent()
-        return family
+        return Family(self.system, method, self.rows, self.every, threads)
 
 
 def grid_of(

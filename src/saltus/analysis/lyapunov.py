@@ -121,8 +121,6 @@ def lyapunov(
     if block is not None and not 0 < block < math.inf:
         raise ParameterError(f"every must be a positive time, not {shown(every)}.")
     family = Family(system, flow, rows, block, threads)
-    if method == "variational":
-        family.begin_tangent()
     show, close = reporter(progress)
     work = (Exponents if method == "variational" else NeighbourExponents)(family, group.start, periods, transient, block)
 

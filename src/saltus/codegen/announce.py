@@ -34,5 +34,5 @@ def silent() -> Iterator[None]:
 
 
 def announce(what: str, seconds: float) -> None:
-    """Say what is going to be compiled, and how long it takes on a quiet machine."""
-    _TELL.get()(f"compiling {what}: once for each new equation, about {seconds:.0f} s")
+    """Say what is going to be compiled and how often that happens, and how long it takes on a quiet machine."""
+    _TELL.get()(f"compiling {what}, about {seconds:.0f} s")

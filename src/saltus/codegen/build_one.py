@@ -1,6 +1,6 @@
-"""Compile one module: what a process does that another one started for it (machine.py).
+"""Compile one object: what a process does that another one started for it (building.py).
 
-Reads ``{"name": ..., "source": ...}`` as JSON from standard input; writes the bytes that stand for the module to standard output.
+Reads ``[template, texts, called symbols, target]`` as JSON from standard input; writes the object to standard output.
 """
 
 from __future__ import annotations
@@ -9,11 +9,12 @@ import json
 import os
 import sys
 
-from saltus.codegen.machine import compiled
+from saltus.codegen import building, machine
 
 if __name__ == "__main__":
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what anything prints is no part of the answer
-    _, data = compiled(**json.load(sys.stdin))
+    template, texts, called, target = json.load(sys.stdin)
+    code = building.bitcode(template) if template else None
     with answer:
-        answer.write(data or b"")
+        answer.write(machine.object_code(code, texts, frozenset(called), machine.Target(*target)))

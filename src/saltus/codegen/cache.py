@@ -7,37 +7,25 @@ disturb each other; its checksum is verified before anything of it is used, and 
 
 from __future__ import annotations
 
-import atexit
 import os
 import shutil
-import sys
-import threading
 import time
 import warnings
-from collections import defaultdict
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 
 import platformdirs
 
-from saltus.codegen import entry, machine
-from saltus.codegen.announce import announce
+from saltus.codegen import entry
 from saltus.errors import SaltusWarning
-from saltus.interrupt import check_stop
 
 #: Age from which an unfinished entry belongs to a process that was killed [s].
 _ABANDONED = 86_400.0
-#: One thread at a time sees to an entry: a module stands in sys.modules before it is complete.
-_LOCKS: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
-atexit.register(machine.end_all)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One cached module: its key, the system it was made for, its size [bytes] and its file."""
+    """One cached object: its key, what it was made for, its size [bytes] and its file."""
 
     name: str
     system: str
@@ -76,48 +64,39 @@ def _delete(path: Path) -> None:
         entry.remove(path)
 
 
-def load(key: str, source: str, title: str, what: str | None = None, seconds: float = 20.0) -> ModuleType:
-    """The module with this source, from the cache or compiled now.
+def read(key: str) -> bytes | None:
+    """The object of an entry, None if there is none that can be used; a warning says why not."""
+    final = folder() / (key + entry.SUFFIX)
+    try:
+        return entry.read(final) if _usable() else None
+    except FileNotFoundError:
+        return None
+    except (entry.NotOurs, entry.Damaged) as why:
+        _warn(f"saltus: the compiled kernel {final} {why}; building it again.")
+        return None
+
+
+def keep(key: str, title: str, data: bytes) -> None:
+    """Write an entry, where that can be done.
 
     Parameters
     ----------
     key : str
-        Name of the entry: a hash of everything that its machine code depends on, the source included.
-    source : str
-        Text of the module. Its one function for Python is decorated with ``kept(signature, **options of numba.njit)``.
+        Its name.
     title : str
         What `saltus cache` shows for it.
-    what : str, optional
-        What is said to be compiled, if it must be; default the title.
-    seconds : float
-        How long that takes on a quiet machine [s], for people who wait.
-
-    Raises
-    ------
-    CacheError
-        If the process that compiles is killed.
-    Interrupted
-        If the work that this thread does a part of was asked to stop.
+    data : bytes
+        Object code.
     """
-    name = f"saltus_kernels_{key}"
-    with _held(_LOCKS[key]):
-        if name in sys.modules:
-            return sys.modules[name]
-        usable = _usable()
-        final = folder() / (key + entry.SUFFIX)
-        found = _from_cache(name, final) if usable else None
-        return found or _build(name, final if usable else None, source, title, what or title, seconds)
-
-
-@contextmanager
-def _held(lock: threading.Lock) -> Iterator[None]:
-    """Hold a lock; who is asked to stop while it waits for one stops."""
-    while not lock.acquire(timeout=machine.LOOK):
-        check_stop()
+    final = folder() / (key + entry.SUFFIX)
+    if not _usable():
+        return
     try:
-        yield
-    finally:
-        lock.release()
+        _sweep(final.parent)
+        entry.write(final, title, data)
+    except OSError as error:
+        if not final.exists():  # no other process has done it
+            _cannot_write(final.parent, error)
 
 
 def _usable() -> bool:
@@ -136,36 +115,6 @@ def _usable() -> bool:
         _cannot_write(place, error)
         return False
     return True
-
-
-def _from_cache(name: str, final: Path) -> ModuleType | None:
-    """The module, if its entry can be used; a warning says why not."""
-    try:
-        return machine.rebuilt(name, entry.read(final))
-    except FileNotFoundError:
-        return None
-    except (entry.NotOurs, entry.Damaged) as why:
-        _warn(f"saltus: the compiled kernel {final} {why}; building it again.")
-    except Exception as error:  # whatever makes Numba raise: the entry is ours, so build it again
-        _warn(f"saltus: the compiled kernel {final} could not be loaded ({error!r}); building it again.")
-    return None
-
-
-def _build(name: str, final: Path | None, source: str, title: str, what: str, seconds: float) -> ModuleType:
-    """Compile, and publish where that can be done. If no other process can compile, this one does, and tells what is wrong."""
-    announce(what, seconds)
-    data = machine.compiled_elsewhere(name, source, title)
-    module = None if data is None else machine.rebuilt(name, data)
-    if module is None:
-        module, data = machine.compiled(name, source)
-    if data is not None and final is not None:
-        try:
-            _sweep(final.parent)
-            entry.write(final, title, data)
-        except OSError as error:
-            if not final.exists():  # no other process has done it
-                _cannot_write(final.parent, error)
-    return module
 
 
 def _sweep(place: Path) -> None:

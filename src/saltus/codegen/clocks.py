@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from saltus.codegen.head import Constant
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.kernels.clocks_layout import C0, CYCLE, HELD, LEVEL, NUMBERS, ON, PULSE, REF, TABLE, WAVE
 from saltus.system import expression as ex
@@ -82,19 +83,17 @@ class Clocks:
         return code
 
     # -- for the head -----------------------------------------------------------------------------------------------------------------
-    def head(self) -> list[str]:
-        """Lines of the head: number and kinds of clocks, and the function of their numbers."""
+    def constants(self) -> dict[str, Constant]:
+        """Number and kinds of clocks."""
+        return {"NCLOCKS": len(self), "CLOCK_KIND": tuple(self._kinds) or (0,), "CLOCK_TABLE": tuple(self._table_of) or (0,)}
+
+    def function(self) -> str:
+        """``numbers_of_clocks(p, n)``: their numbers, of parameters only."""
         code = ScalarCode(parameter_leaf(self._system))
         for j, numbers in enumerate(self._numbers):
             for i, value in enumerate(code.values(numbers)):
                 code.lines.append(f"n[{NUMBERS * j + i}] = {value}")
-        return [
-            f"NCLOCKS = {len(self)}",
-            f"CLOCK_KIND = {tuple(self._kinds) or (0,)!r}",
-            f"CLOCK_TABLE = {tuple(self._table_of) or (0,)!r}",
-            "",
-            f"@kernel\ndef numbers_of_clocks(p, n):\n{indented(code.lines)}\n",
-        ]
+        return f"@kernel\ndef numbers_of_clocks(p, n):\n{indented(code.lines)}\n"
 
 
 def _values(roots: Iterable[Expr]) -> Iterator[Expr]:

@@ -1,162 +1,116 @@
-"""Machine code of a generated module as bytes: compiled here or in another process, and made into a module again.
-
-A module is never imported from a path, and Numba's own files are never read: its text is compiled, and its one compiled function is
-rebuilt, from bytes that the caller holds and has checked.
-"""
+"""Machine code: LLVM modules made into objects for this processor, and objects loaded and called. The only place that drives LLVM."""
 
 from __future__ import annotations
 
-import contextlib
-import json
-import marshal
+import itertools
 import os
-import pickle
-import subprocess
-import sys
-import tempfile
-import weakref
-from collections.abc import Callable
-from functools import partial
-from pathlib import Path
-from types import ModuleType
-from typing import Any
+import threading
+from collections.abc import Collection, Sequence
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
 
-from saltus.errors import CacheError
-from saltus.interrupt import check_stop
+import llvmlite.binding as llvm
 
-#: Time between two looks whether the work is to stop [s].
-LOOK = 0.1
-_COMPILING: weakref.WeakSet[subprocess.Popen] = weakref.WeakSet()
+#: Rises when the same templates and equations would be made into other code: entries of the cache carry it in their names.
+PIPELINE = 1
+#: Only one thread at a time: LLVM keeps modules in one context.
+_LLVM = threading.Lock()
+_NUMBER = itertools.count()
 
 
-class _InHand:
-    """Stands in Numba for the cache of one function: what it holds is rebuilt, what is compiled is held. See numba.core.caching.Cache."""
+class Target(NamedTuple):
+    """What code is made for: platform, processor, and its features, such as ``+avx2,-avx512f``."""
 
-    cache_path = None
-
-    def __init__(self, data: bytes | None):
-        self.data = data
-
-    def load_overload(self, _signature: Any, target_context: Any) -> Any:
-        from numba.core.compiler import CompileResult
-
-        target_context.refresh()
-        return None if self.data is None else CompileResult._rebuild(target_context, *pickle.loads(self.data))
-
-    def save_overload(self, _signature: Any, result: Any) -> None:
-        from numba.core.serialize import dumps
-
-        if not result.library.has_dynamic_globals:  # addresses of this process: of no use to another
-            self.data = dumps(result._reduce())
-
-    def enable(self) -> None:
-        """Part of the interface."""
-
-    def disable(self) -> None:
-        """Part of the interface."""
-
-    def flush(self) -> None:
-        """Part of the interface."""
+    triple: str
+    processor: str
+    features: str
 
 
-def _kept(cache: _InHand, signature: str, **options: Any) -> Callable[[Callable], Any]:
-    """The decorator that generated modules know as ``kept``: compile a function for one signature, or take it from the cache."""
-    from numba import njit
-
-    def decorate(function: Callable) -> Any:
-        dispatcher = njit(**options)(function)
-        dispatcher._cache = cache
-        dispatcher.compile(signature)
-        dispatcher.disable_compile()
-        return dispatcher
-
-    return decorate
+@cache
+def target() -> Target:
+    """The machine at hand; ``$SALTUS_PROCESSOR``, such as ``x86-64-v3``, names an older processor of its family instead."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    triple = llvm.get_process_triple()
+    chosen = os.environ.get("SALTUS_PROCESSOR")
+    if chosen:
+        return Target(triple, chosen, "")
+    return Target(triple, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
 
 
-def compiled(name: str, source: str) -> tuple[ModuleType, bytes | None]:
-    """Compile a module in this process; what :func:`rebuilt` makes it from, None if that can't be kept."""
-    code = compile(source, f"<{name}>", "exec")
-    cache = _InHand(None)
-    module = _run(name, code, cache)
-    return module, None if cache.data is None else pickle.dumps((marshal.dumps(code), cache.data))
+def versions() -> tuple[str, ...]:
+    """Versions of what makes the code."""
+    import llvmlite
+
+    return (llvmlite.__version__, ".".join(map(str, llvm.llvm_version_info)), str(PIPELINE))
 
 
-def rebuilt(name: str, data: bytes) -> ModuleType:
-    """The module that these bytes of :func:`compiled` stand for. They are code: whoever wrote them may do anything."""
-    code, machine = pickle.loads(data)
-    return _run(name, marshal.loads(code), _InHand(machine))
+def object_code(template: bytes | None, texts: Sequence[str], called: Collection[str], chosen: Target | None = None) -> bytes:
+    """One object file, optimised as a whole.
 
-
-def _run(name: str, code: Any, cache: _InHand) -> ModuleType:
-    module = ModuleType(name)
-    module.__dict__["kept"] = partial(_kept, cache)
-    sys.modules[name] = module  # Numba looks a function's module up by name
-    try:
-        exec(code, module.__dict__)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
-
-
-def compiled_elsewhere(name: str, source: str, title: str) -> bytes | None:
-    """What :func:`compiled` gives, by a process of its own (build_one.py); None if there is none, or it doesn't succeed.
-
-    Numba holds the interpreter while it compiles, and can lose a Ctrl-C in it. Here this process only waits: others of its threads go on,
-    and Ctrl-C ends the wait at once.
-
-    Raises
-    ------
-    CacheError
-        If the process was killed.
-    Interrupted
-        If the work that this thread does a part of was asked to stop.
+    Parameters
+    ----------
+    template : bytes or None
+        Bitcode.
+    texts : sequence of str
+        LLVM IR: constants that the template leaves open, functions that it calls.
+    called : collection of str
+        What others refer to; the rest is this object's own.
+    chosen : Target, optional
+        Default: this machine.
     """
-    path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    command = [sys.executable, "-P", "-m", "saltus.codegen.build_one"]  # -P: not what lies in the working folder
-    try:
-        with tempfile.TemporaryFile() as order:  # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
-            order.write(json.dumps({"name": name, "source": source}).encode())
-            order.seek(0)
-            process = subprocess.Popen(
-                command, stdin=order, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path},
-                start_new_session=True,  # Ctrl-C is for this process
-            )  # fmt: skip
-    except OSError:  # no processes here
-        return None
-    _COMPILING.add(process)
-    try:
-        data = _wait(process)
-    finally:
-        _end(process)
-    if process.returncode < 0:
-        raise CacheError(
-            f"the process that compiled {title} was ended by signal {-process.returncode}, as when memory runs out. Try again."
-        )
-    return data if process.returncode == 0 and data else None
+    made_for = chosen or target()
+    with _LLVM:
+        machine = _target_machine(made_for)
+        modules = [llvm.parse_bitcode(template)] if template is not None else []
+        modules += [llvm.parse_assembly(text) for text in texts]
+        module = modules[0]
+        module.triple, module.data_layout = made_for.triple, str(machine.target_data)
+        for other in modules[1:]:
+            other.triple, other.data_layout = module.triple, module.data_layout
+            module.link_in(other)
+        for one in (*module.functions, *module.global_variables):
+            if not one.is_declaration:
+                one.linkage = "external" if one.name in called else "internal"
+        module.verify()
+        _optimise(module, machine)
+        return machine.emit_object(module)
 
 
-def _wait(process: subprocess.Popen) -> bytes:
-    while True:
-        try:
-            return process.communicate(timeout=LOOK)[0]
-        except subprocess.TimeoutExpired:
-            check_stop()
+@lru_cache(maxsize=4)
+def _target_machine(made_for: Target) -> llvm.TargetMachine:
+    if made_for.triple != llvm.get_process_triple():
+        llvm.initialize_all_targets()
+        llvm.initialize_all_asmprinters()
+    found = llvm.Target.from_triple(made_for.triple)
+    return found.create_target_machine(cpu=made_for.processor, features=made_for.features, opt=3, codemodel="jitdefault")
 
 
-def _end(process: subprocess.Popen) -> None:
-    """Whatever has happened, leave no process behind."""
-    if process.poll() is None:
-        process.kill()
-        process.wait()
-    if process.stdout is not None:
-        with contextlib.suppress(OSError):
-            process.stdout.close()
-    _COMPILING.discard(process)
+def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    """LLVM's passes at level 3. Lanes are vectors already: nothing is to be made into vectors, least of all sums of doubles."""
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization, options.slp_vectorization, options.loop_unrolling = False, False, True
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
 
 
-def end_all() -> None:
-    """End what still compiles when this process ends."""
-    for process in list(_COMPILING):
-        with contextlib.suppress(OSError):
-            process.kill()
+@cache
+def _jit() -> llvm.LLJIT:
+    return llvm.create_lljit_compiler(_target_machine(target()), use_jit_link=False)
+
+
+class Loaded(NamedTuple):
+    """A function in memory: its address, and what keeps it there."""
+
+    address: int
+    keeper: Any
+
+
+def loaded(objects: Sequence[bytes], symbol: str) -> Loaded:
+    """Objects that refer to one another and to the C library, in memory, and the address of one function."""
+    with _LLVM:
+        library = llvm.JITLibraryBuilder()
+        for one in objects:
+            library = library.add_object_img(one)
+        keeper = library.add_current_process().export_symbol(symbol).link(_jit(), f"saltus{next(_NUMBER)}")
+    return Loaded(keeper[symbol], keeper)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from saltus.codegen.clocks import Clocks
+from saltus.codegen.head import Constant, Head
 from saltus.codegen.saltation import jump_function
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.taylor_head import bits_of, evaluation_order
@@ -98,7 +99,7 @@ def _gap_rates(system: System, stages: _Stages) -> str:
     return indented(code.lines)
 
 
-def ode45_head(system: System) -> str:
+def ode45_head(system: System) -> Head:
     """Everything that kernels/ode45.py expects to stand above it."""
     stages = _Stages(system)
     gaps = [guard.gap for guard in system.guards]
@@ -113,24 +114,18 @@ def ode45_head(system: System) -> str:
     for node, i in stages.constants.nodes.items():
         value = prepare.value(node)
         prepare.lines.append(f"c[{i}] = {value}")
-    sizes = dict(
-        NSTATES=len(system.states),
-        NGUARDS=len(gaps),
-        NCONST=len(stages.constants.nodes),
-        NDRIVE=len(stages.drives.nodes),
-        TANGENT=system.tangent_of is not None,
-        GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
-    )
-    return "\n".join(
-        [
-            *(f"{name} = {value!r}" for name, value in sizes.items()),
-            "",
-            f"@kernel\ndef prepare(p, c):\n{indented(prepare.lines)}\n",
-            *stages.clocks.head(),
-            f"@kernel\ndef drive(t, c, h, q):\n{indented(drive.lines)}\n",
-            f"@kernel\ndef field(t, y, c, q, h, out):\n{field}\n",
-            f"@kernel\ndef gaps(t, y, c, q, h, out):\n{gap_values}\n",
-            jump_function(system, stages.clocks),
-            f"@kernel\ndef gap_rates(t, y, dy, c, q, h, out):\n{gap_rates}\n",
-        ]
-    )
+    sizes: dict[str, Constant] = dict(
+        NSTATES=len(system.states), NGUARDS=len(gaps), NCONST=len(stages.constants.nodes), NDRIVE=len(stages.drives.nodes),
+        TANGENT=system.tangent_of is not None, GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
+        **stages.clocks.constants(),
+    )  # fmt: skip
+    functions = [
+        f"@kernel\ndef prepare(p, c):\n{indented(prepare.lines)}\n",
+        stages.clocks.function(),
+        f"@kernel\ndef drive(t, c, h, q):\n{indented(drive.lines)}\n",
+        f"@kernel\ndef field(t, y, c, q, h, out):\n{field}\n",
+        f"@kernel\ndef gaps(t, y, c, q, h, out):\n{gap_values}\n",
+        jump_function(system, stages.clocks),
+        f"@kernel\ndef gap_rates(t, y, dy, c, q, h, out):\n{gap_rates}\n",
+    ]
+    return Head(sizes, "\n".join(functions))

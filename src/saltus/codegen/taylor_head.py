@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from saltus.codegen.clocks import Clocks
+from saltus.codegen.head import Constant, Head
 from saltus.codegen.jets import MOVING, Constants, JetCode
 from saltus.codegen.saltation import jump_function
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
@@ -78,7 +79,7 @@ def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
     return str(series.payload), sign, ex.neg(form.offset) if sign > 0 else form.offset
 
 
-def taylor_head(system: System, order: int, lanes: int) -> str:
+def taylor_head(system: System, order: int, lanes: int) -> Head:
     """Everything that kernels/taylor_*.py expect to stand above it."""
     clocks = Clocks(system)
     builder, constants = SeriesBuilder(clocks), Constants()
@@ -105,31 +106,33 @@ def taylor_head(system: System, order: int, lanes: int) -> str:
         constant_code.lines.append(f"c[{i}, lane] = {value}")
     series = sorted(set(guards.row))
     stepped = sorted({*series, *(i * (order + 1) for i in range(len(system.states)))})
-    sizes = dict(
+    constants_of_head: dict[str, Constant] = dict(
         LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order, NCONST=len(constants.rows),
         NTURNS=len(code.harmonics), CLOCK_ROW=FIRST_TURN + len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, CALM_ROW=calm_row,
         ROWS=calm_row + moved * len(aside.guards), NMOVED=moved, NSINGULAR=len(aside.guards),
         NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped), NSERIES=len(series),
         PROBED=builder.may_hide(), TANGENT=system.tangent_of is not None,
+        **_tables(
+            STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row, GUARD_SERIES=[series.index(row) for row in guards.row],
+            GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const, SINGULAR_GUARD=list(aside.guards),
+        ),
+        **clocks.constants(),
     )  # fmt: skip
-    tables: dict[str, list] = dict(
-        STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row, GUARD_SERIES=[series.index(row) for row in guards.row],
-        GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const, SINGULAR_GUARD=list(aside.guards),
-    )  # fmt: skip
-    return "\n".join(
-        [
-            *(f"{name} = {value!r}" for name, value in sizes.items()),
-            *(f"{name} = {tuple(rows) or (0,)!r}" for name, rows in tables.items()),  # Numba can't index an empty tuple
-            "",
-            f"@kernel\ndef constants(p, c, lane):\n{indented(constant_code.lines)}\n",
-            *clocks.head(),
-            gaps_function(system, clocks),
-            jump_function(system, clocks),
-            _turns_function(system, code),
-            f"@inner\ndef jets(y, side, c, clock, work):\n{indented(code.lines)}\n",
-            f"@inner\ndef rates(y, side, c, clock, work):\n{indented(probe.lines)}\n",
-        ]
-    )
+    functions = [
+        f"@kernel\ndef constants(p, c, lane):\n{indented(constant_code.lines)}\n",
+        clocks.function(),
+        gaps_function(system, clocks),
+        jump_function(system, clocks),
+        _turns_function(system, code),
+        f"@inner\ndef jets(y, side, c, clock, work):\n{indented(code.lines)}\n",
+        f"@inner\ndef rates(y, side, c, clock, work):\n{indented(probe.lines)}\n",
+    ]
+    return Head(constants_of_head, "\n".join(functions))
+
+
+def _tables(**tables: list) -> dict[str, Constant]:
+    """Tables as they stand in a head: never empty."""
+    return {name: tuple(rows) or (0,) for name, rows in tables.items()}
 
 
 def _write_guards(system: System, code: JetCode, forms: list[Linear], constants: Constants, order: int) -> tuple[_Guards, int]:

@@ -9,11 +9,11 @@ import threading
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from types import ModuleType
 
 import numpy as np
 
 from saltus.codegen.clocks import table_data
+from saltus.codegen.module import Flow
 from saltus.errors import SaltusWarning
 from saltus.flow.counts import whole as whole_number
 from saltus.flow.methods import Method
@@ -166,7 +166,7 @@ def run(
 
 
 # -- arrays --------------------------------------------------------------------------------------------------------------------
-def allocate(request: Request, states: int, module: ModuleType) -> tuple[Outcome, dict[str, np.ndarray]]:
+def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict[str, np.ndarray]]:
     """The arrays that all chunks write to, at the start of a run, and the outcome that shows them."""
     n, m = len(request.start), len(request.schedule.count)
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
@@ -213,7 +213,7 @@ def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dic
     return _Chunk(first, arrays, request.record_from is not None)
 
 
-def _open_tables(chunk: _Chunk, module: ModuleType) -> None:
+def _open_tables(chunk: _Chunk, module: Flow) -> None:
     """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no memory."""
     size = RECORDS + module.STEP_RECORDS if chunk.keeps_contacts else 0
     chunk.arrays["rec_i"] = np.zeros((size, st.RECORD_INTEGERS), np.int64)
@@ -238,9 +238,12 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if contacts := [part for chunk in chunks for part in chunk.contacts]:
         table, numbers = (np.concatenate(half) for half in zip(*contacts, strict=True))
-        order = np.lexsort((np.arange(len(table)), table[:, st.REC_TRAJECTORY]))
-        order = order[~_returns_where_sliding_begins(table[order], numbers[order], outcome.status)]
-        outcome.record_integers, outcome.record_floats = table[order], numbers[order]
+        order = np.argsort(table[:, st.REC_TRAJECTORY], kind="stable")
+        table, numbers = table[order], numbers[order]
+        if (outcome.status == st.SLIDING).any():
+            kept = ~_returns_where_sliding_begins(table, numbers, outcome.status)
+            table, numbers = table[kept], numbers[kept]
+        outcome.record_integers, outcome.record_floats = table, numbers
         times = outcome.record_floats[:, -1]
         np.minimum(times, outcome.time[outcome.record_integers[:, st.REC_TRAJECTORY]], out=times)
     return outcome
@@ -260,7 +263,7 @@ def slice_of(states: int) -> int:
     return max(SLICE * 4 // max(states, 2) ** 2, 1)
 
 
-def _advance(chunk: _Chunk, module: ModuleType, workspace: tuple, stop: Stop, room: Contacts) -> None:
+def _advance(chunk: _Chunk, module: Flow, workspace: tuple, stop: Stop, room: Contacts) -> None:
     """Move a chunk to its end in slices; empties its table of contacts after each. Where there is room for no more, it ends there."""
     arrays = chunk.arrays
     steps = slice_of(arrays["state"].shape[1])
@@ -288,7 +291,7 @@ def _behind(arrays: dict[str, np.ndarray]) -> float:
 
 
 def _run_chunks(
-    chunks: list[_Chunk], module: ModuleType, stop: Stop, room: Contacts, progress: Callable[[float], None] | None, workers: int
+    chunks: list[_Chunk], module: Flow, stop: Stop, room: Contacts, progress: Callable[[float], None] | None, workers: int
 ) -> None:
     """All chunks, on threads even if it is one: Python raises Ctrl-C in the main thread, which would cut a table of contacts in two."""
     local = threading.local()

@@ -74,10 +74,6 @@ class Family:
         """Mismatch of closed orbits, float64[m], in units of their ranges float64[m, D], that the method's own errors explain."""
         return np.minimum(MOTION * self.method.noise_of(scale), MOST_NOISE)
 
-    def begin_tangent(self) -> None:
-        """Start to compile what :meth:`tangent` needs."""
-        self.method.begin_kernels(tangent_system(self.system))
-
     def rows(self, which: np.ndarray) -> Family:
         """The family of some of the rows: int64[m], with repeats if wanted, or bool[k]."""
         return Family(self.system, self.method, self.parameters[which], self.period[which] if self._looks else None, self.threads)

@@ -103,7 +103,6 @@ class Stroboscope:
             raise ParameterError(f"every must be a positive time, not {shown(every)}.")
         self._parameters = np.array([list(system.values.values())])
         self._tangent = tangent_system(system)
-        method.begin_kernels(self._tangent)
         self.noise = method.noise
 
     def family(self, count: int) -> Family:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass, fields
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from saltus.codegen.module import in_background, lane_width, ode45_module, taylor_module
+from saltus.codegen.module import Flow, lane_width, ode45_module, taylor_module
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
 from saltus.system.system import System
@@ -55,13 +54,9 @@ class Method:
         """The options, for provenance."""
         return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
 
-    def kernels(self, system: System) -> ModuleType:
+    def kernels(self, system: System) -> Flow:
         """The compiled module of this method for a system."""
         raise NotImplementedError
-
-    def begin_kernels(self, system: System) -> None:
-        """Start to compile for a system, or to load what is compiled, while this thread goes on: for what will be needed soon."""
-        in_background(self.kernels, system)
 
     def numbers(self, periods: float) -> np.ndarray:
         """The options as the kernel reads them, for a run of so many periods."""
@@ -129,7 +124,7 @@ class Taylor(Method):
             whole(self.max_steps, "max_steps")
         whole(self.max_events, "max_events")
 
-    def kernels(self, system: System) -> ModuleType:
+    def kernels(self, system: System) -> Flow:
         """The compiled Taylor flow."""
         return taylor_module(system, self.order, self.lanes or lane_width())
 
@@ -189,7 +184,7 @@ class ODE45(Method):
             whole(self.max_steps, "max_steps")
         whole(self.max_events, "max_events")
 
-    def kernels(self, system: System) -> ModuleType:
+    def kernels(self, system: System) -> Flow:
         """The compiled ode45."""
         return ode45_module(system)
 

@@ -19,8 +19,6 @@ import math
 from saltus.kernels.clocks_layout import C0, C1, C2, C3, CYCLE, HELD, LEVEL, NUMBERS, ON, PIECE, REF, TABLE, WAVE
 from saltus.kernels.trigonometry import turned
 
-# Beyond these, for each clock: its place in a cycle at the base, in cycles.
-PLACE = NUMBERS * NCLOCKS
 #: Times within this many ulp are one break (as coincident contacts are one).
 SAME_BREAK = 10.0 * 2.220446049250313e-16
 
@@ -57,6 +55,12 @@ def place_of(j, n, data):
     if CLOCK_KIND[j] == TABLE:
         return (n[NUMBERS * j + 1] - knot(data, j, 0)) / (knot(data, j, knots(data, j) - 1) - knot(data, j, 0))
     return n[NUMBERS * j + 1]
+
+
+@inner
+def place_at_base(j, n):
+    """Place of clock j in its cycle at the base, in cycles."""
+    return n[NUMBERS * NCLOCKS + j]
 
 
 @inner
@@ -100,7 +104,8 @@ def begin_of(j, k, n, base, data):
     rate = rate_of(j, n, data)
     if rate == 0.0:
         return -math.inf if k < 1 else math.inf
-    speed, place = abs(rate), math.copysign(n[PLACE + j], n[PLACE + j] * rate) if n[PLACE + j] != 0.0 else 0.0
+    at_base = place_at_base(j, n)
+    speed, place = abs(rate), math.copysign(at_base, at_base * rate) if at_base != 0.0 else 0.0
     if kind == CYCLE:
         return (k - place) / speed
     if kind == TABLE:
@@ -136,7 +141,7 @@ def first_guess(j, tau, n, base, data):
                 high = middle - 1
         return low
     rate = rate_of(j, n, data)
-    turns = math.floor(abs(rate) * tau + (n[PLACE + j] if rate > 0.0 else -n[PLACE + j]))
+    turns = math.floor(abs(rate) * tau + (place_at_base(j, n) if rate > 0.0 else -place_at_base(j, n)))
     if CLOCK_KIND[j] == CYCLE:
         return int(turns)
     if CLOCK_KIND[j] != TABLE:
@@ -209,7 +214,7 @@ def hold_polynomial(j, k, n, base, data, h):
         return
     if repeats(data, j):
         length = knot(data, j, count) - knot(data, j, 0)
-        speed, place = abs(rate) / length, n[PLACE + j] if rate > 0.0 else -n[PLACE + j]
+        speed, place = abs(rate) / length, place_at_base(j, n) if rate > 0.0 else -place_at_base(j, n)
         share = (data[first] - knot(data, j, 0)) / length
         h[at + REF] = (cycle + (share if rate > 0.0 else 1.0 - share) - place) / speed
     else:
@@ -225,12 +230,12 @@ def place_clocks(p, origin, period, count, n, data):
     """Numbers of all clocks at the start of a period; time is origin + count * period + tau."""
     numbers_of_clocks(p, n)
     for j in range(NCLOCKS):
-        n[PLACE + j] = 0.0
+        n[NUMBERS * NCLOCKS + j] = 0.0
         if is_cyclic(j, data):
             turn = 2.0 * math.pi * rate_of(j, n, data)
             gained = turned(turn, period, count) + turned(turn, origin, 1)
             place = place_of(j, n, data)
-            n[PLACE + j] = place - math.floor(place) + gained / (2.0 * math.pi)
+            n[NUMBERS * NCLOCKS + j] = place - math.floor(place) + gained / (2.0 * math.pi)
 
 
 @kernel

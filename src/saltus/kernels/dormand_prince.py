@@ -13,24 +13,7 @@ Symbols
 t, t_new ends of a step; h its length; k_i stages, k_1 = k_7 of the step before; s place in the step, 0 to 1; theta = AbsTol/RelTol.
 """
 
-import numpy as np
-
 from saltus.kernels.parts import part
-
-# `work` is one array for everything, so that the compiler sees that its parts don't overlap and keeps them in registers (measured:
-# a few per cent). Where its parts start: vectors of states - the stages, the states at the ends of the step, a point
-# between them, the error estimate divided by h, zeros -
-VECTORS, GAPS, DRIVES = 12, 7, 6
-K1, K2, K3, K4, K5, K6, K7, NODE, NEXT, POINT, ERROR, REST = (NSTATES * row for row in range(VECTORS))
-# gaps - at the ends of the step, the three of the root finder, their rates at a contact and those of a state at rest -
-AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST = (VECTORS * NSTATES + NGUARDS * row for row in range(GAPS))
-# q at each stage time and at any other, and c.
-Q2, Q3, Q4, Q5, Q6, Q = (VECTORS * NSTATES + GAPS * NGUARDS + NDRIVE * row for row in range(DRIVES))
-C = VECTORS * NSTATES + GAPS * NGUARDS + DRIVES * NDRIVE
-# What the clocks hold, and their numbers.
-H = C + NCONST
-N = H + HELD * NCLOCKS
-WORK = N + (NUMBERS + 1) * NCLOCKS
 
 # The pair: times, stages, error estimate.
 A2, A3, A4, A5 = 1 / 5, 3 / 10, 4 / 5, 8 / 9
@@ -143,8 +126,3 @@ def dense(time, t, h, work):
     for i in range(NSTATES):
         slope = work[K1 + i] * w1 + work[K3 + i] * w3 + work[K4 + i] * w4 + work[K5 + i] * w5 + work[K6 + i] * w6 + work[K7 + i] * w7
         work[POINT + i] = work[NODE + i] + h * slope
-
-
-def workspace():
-    """The memory that one call of `propagate` works in; one for each thread."""
-    return (np.zeros(WORK),)

@@ -11,11 +11,9 @@ V = 0 and V = 1 are proofs. Else the extremum decides: above the noise no crossi
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from saltus.kernels.marks import kernel
 from saltus.kernels.trigonometry import two_product
-
-kernel = njit(nogil=True, error_model="numpy", _nrt=False)
 
 # Columns of the output of `first_crossing`: place of the crossing, the smallest minimum that was no crossing.
 AT, MARGIN = range(2)

@@ -42,12 +42,6 @@ from saltus.kernels.status import (
     VIOLATIONS,
 )
 
-# Columns of `carry`, what a paused trajectory needs besides its state: time, start of the leg, next step length,
-# and the error estimates of all steps so far, added up for each state.
-TIME, LEG, LENGTH, ERRORS = range(4)
-CARRY = ERRORS + NSTATES
-#: Records that one step may write at most.
-STEP_RECORDS = NGUARDS
 # Columns of `options`.
 RTOL, ATOL, LOCATE, MAX_STEPS, MAX_EVENTS = range(5)
 

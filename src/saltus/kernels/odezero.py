@@ -11,6 +11,8 @@ t_left, t_right the bracket; t_try the last place tried, after a move: the end t
 ode45.py): the gaps at these three. Only the signs and ratios of gaps matter, so halved values do no harm.
 """
 
+from saltus.kernels.lanes import spacing
+
 # Ends of the bracket that moved last.
 NEITHER, MOVED_LEFT, MOVED_RIGHT = range(3)
 SMALLEST_NORMAL = 2.2250738585072014e-308
@@ -19,7 +21,7 @@ SMALLEST_NORMAL = 2.2250738585072014e-308
 @inner
 def ulp(x):
     """Distance from |x| to the next larger double (MATLAB's eps(x))."""
-    return np.spacing(abs(x))
+    return spacing(abs(x))
 
 
 @inner

@@ -2,10 +2,7 @@
 
 import math
 
-import numpy as np
-
 from saltus.kernels.batch import Batch
-from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 from saltus.kernels.status import (
     BUDGET_EVENTS,
     BUDGET_STEPS,
@@ -262,30 +259,6 @@ def refill(lanes, lane, cursor, batch, slow):
 
 
 # -- the whole batch -----------------------------------------------------------------------------------------------------------
-def rows_of_lanes(count):
-    """Zeros float64[count, LANES] that begin at a cache line: a row that lies in two costs twice."""
-    room = np.zeros(count * LANES + 8)
-    first = -room.ctypes.data // 8 % 8
-    return room[first : first + count * LANES].reshape(count, LANES)
-
-
-def workspace():
-    """The memory that one call of `propagate` works in; one set for each thread."""
-    guards = max(NGUARDS, 1)
-    rows = dict(
-        y=NSTATES, side=guards + NSINGULAR, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
-        prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS, probe_y=NSTATES,
-        probe_clock=CLOCK_ROWS, probe_rate=(6 if NSINGULAR > 0 else 3) * NSTATES,
-    )  # fmt: skip
-    lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: rows_of_lanes(count) for name, count in rows.items()})
-    slow = Slow(
-        q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)), bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(2), gaps=np.zeros(guards), state=np.zeros(NSTATES), touches=np.zeros((MOST_TOUCHES, 2)),
-        held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
-    )  # fmt: skip
-    return (*lanes, *slow)
-
-
 @entry
 def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
               sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, data, budget,
@@ -296,23 +269,8 @@ def propagate(period, origin, param, stride, state, count, phase, mode, fresh, c
     batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
                   sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options,
                   data)  # fmt: skip
-    lanes = Lanes(
-        lane_y,
-        lane_side,
-        lane_fresh,
-        lane_clock,
-        lane_c,
-        lane_work,
-        lane_bounds,
-        lane_prior,
-        lane_poly,
-        lane_run,
-        lane_found,
-        lane_probe_y,
-        lane_probe_clock,
-        lane_probe_rate,
-        lane_memo,
-    )
+    lanes = Lanes(lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found,
+                  lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo)  # fmt: skip
     slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches, slow_held, slow_numbers)
     roomy = rec_i.shape[0] - STEP_RECORDS
     following = 0

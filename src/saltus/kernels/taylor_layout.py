@@ -19,7 +19,10 @@ work) and rates(y, side, c, clock, work), the right-hand side alone; PROBED says
 
 from collections import namedtuple
 
-from saltus.kernels.isolation import MOST_TOUCHES
+import numpy as np
+
+from saltus.kernels.clocks_layout import HELD, NUMBERS
+from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 
 # Rows of `clock`: phase, time at phase zero, then one phase offset for each harmonic of the forcing; then, from
 # CLOCK_ROW on, what the clocks hold.
@@ -89,3 +92,28 @@ MOST_TRIALS = 12
 
 Lanes = namedtuple("Lanes", "y side fresh clock c work bounds prior poly run found probe_y probe_clock probe_rate memo")
 Slow = namedtuple("Slow", "q b bounds rates out gaps state touches held numbers")
+
+
+# -- memory --------------------------------------------------------------------------------------------------------------------
+def rows_of_lanes(count):
+    """Zeros float64[count, LANES] that begin at a cache line: a row that lies in two costs twice."""
+    room = np.zeros(count * LANES + 8)
+    first = -room.ctypes.data // 8 % 8
+    return room[first : first + count * LANES].reshape(count, LANES)
+
+
+def workspace():
+    """The memory that one call of `propagate` works in; one set for each thread."""
+    guards = max(NGUARDS, 1)
+    rows = dict(
+        y=NSTATES, side=guards + NSINGULAR, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
+        prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS, probe_y=NSTATES,
+        probe_clock=CLOCK_ROWS, probe_rate=(6 if NSINGULAR > 0 else 3) * NSTATES,
+    )  # fmt: skip
+    lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: rows_of_lanes(count) for name, count in rows.items()})
+    slow = Slow(
+        q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)), bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
+        out=np.zeros(2), gaps=np.zeros(guards), state=np.zeros(NSTATES), touches=np.zeros((MOST_TOUCHES, 2)),
+        held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
+    )  # fmt: skip
+    return (*lanes, *slow)

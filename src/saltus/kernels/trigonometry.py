@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from saltus.kernels.lanes import any_lane, fma, libm_cos, libm_sin, magnitude, nearest_integer, select
+from saltus.kernels.marks import inner, kernel
 
 #: pi/2 as the sum of three doubles.
 HALF_PI_1, HALF_PI_2, HALF_PI_3 = 1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33
@@ -27,7 +26,7 @@ _S6, _S5, _S4, _S3, _S2, _S1 = _S
 _C6, _C5, _C4, _C3, _C2, _C1 = _C
 
 
-@njit(forceinline=True)
+@inner
 def sincos(angle):
     """Sine and cosine [-] of a lane of angles [rad]."""
     n = nearest_integer(angle * (2.0 / math.pi))
@@ -53,7 +52,7 @@ def sincos(angle):
     return s, c
 
 
-@njit(_nrt=False)
+@kernel
 def two_product(a, b):
     """``a*b`` as a sum of two doubles (Dekker 1971; no fused multiply-add needed)."""
     p = a * b
@@ -65,7 +64,7 @@ def two_product(a, b):
     return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
 
 
-@njit
+@kernel
 def turned(rate, period, count):
     """Phase [rad] in [-pi, pi] that a harmonic of angular frequency ``rate`` [rad/s] has gained after ``count`` periods [s].
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
+from itertools import pairwise
 from typing import Any, Literal
 
 import matplotlib.pyplot as plt
@@ -13,12 +14,15 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from saltus.errors import ParameterError
+from saltus.plot.picture import drawable
 from saltus.plot.regions import Regions
 from saltus.plot.style import QUIET, RASTERISE_ABOVE, Scale, style, styled
 
 Direction = Literal["x", "y"]
 #: A gap is drawn into the limits if the axis grows by no more than this: an orbit far inside its gap must stay visible.
 _WIDEN = 2.0
+#: Room that the name of a gap takes above a picture, in widths of the Axes.
+_NAME = 0.45
 
 
 @contextmanager
@@ -125,7 +129,12 @@ def _name_gaps(ax: Axes, direction: Direction, names: list[tuple[float, str, boo
     top.set_gid(tag)
     top.spines[:].set_visible(False)
     top.tick_params(length=0, pad=1, labelsize=7, labelcolor=QUIET)
-    top.set_xticks([place for place, _, _ in names], [text for _, text, _ in names], linespacing=1.1)
+    low, high = ax.get_xlim()
+    close = [a[2] == b[2] and b[0] - a[0] < _NAME * (high - low) for a, b in pairwise(names)]
+    texts = [
+        drawable(f"{text}\n\n" if raised else text) for (_, text, _), raised in zip(names, [*close, False], strict=True)
+    ]  # one above the other
+    top.set_xticks([place for place, _, _ in names], texts, linespacing=1.1)
     for tick, (_, _, left) in zip(top.xaxis.get_major_ticks(), names, strict=True):
         tick.label2.set_horizontalalignment("right" if left else "left")
 
@@ -140,10 +149,27 @@ def legend(ax: Axes, regions: Regions, **place: Any) -> None:
         ax.legend([first[label] for label in order], order, **place)
 
 
+def status_text(ds: xr.Dataset) -> str:
+    """How a trajectory ended, where it stopped early or rests on a graze that isn't decided; else empty."""
+    status = str(ds["status"].values)
+    if status == "ok":
+        return ""
+    stopped = status != "graze_unresolved" and "end_time" in ds
+    return f"status: {status}" + (f", stopped at {float(ds['end_time']):.6g} s" if stopped else "")
+
+
 def note_status(ax: Axes, ds: xr.Dataset) -> None:
     """Say in the picture when a trajectory stopped early, or rests on a graze that isn't decided."""
-    status = str(ds["status"].values)
-    if status != "ok":
-        stopped = status != "graze_unresolved" and "end_time" in ds
-        where = f", stopped at {float(ds['end_time']):.6g} s" if stopped else ""
-        ax.text(0.99, 0.02, f"status: {status}{where}", transform=ax.transAxes, ha="right", va="bottom", fontsize=7, color="#A00000")
+    text = status_text(ds)
+    if text:
+        ax.text(0.99, 0.02, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=7, color="#A00000")
+
+
+def say(ax: Axes, text: str, *datasets: xr.Dataset) -> None:
+    """A sentence in place of an empty frame, with how the trajectories ended."""
+    singles = [one for ds in datasets for one in ([ds.sel(trajectory=i) for i in ds["trajectory"]] if "trajectory" in ds.dims else [ds])]
+    ends = [status_text(one) for one in singles]
+    ax.set_axis_off()
+    ax.text(0.02, 0.95, text, transform=ax.transAxes, va="top", linespacing=1.6)
+    if any(ends):
+        ax.text(0.02, 0.05, "\n".join(dict.fromkeys(filter(None, ends))), transform=ax.transAxes, va="bottom", fontsize=7, color="#A00000")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,12 +22,15 @@ from saltus.plot import maps
 from saltus.plot.palette import shades
 from saltus.plot.picture import picture
 from saltus.plot.style import QUIET, Scale
+from saltus.units import from_si
 
 _CALLER = "plot.basins"
 #: Shades of a hue; the middle one is the hue itself.
 _LEVELS = 65
 #: Share of the settled starts that may be lighter or darker than the ends of the scale: a few late ones would make all others look alike.
 _BEYOND = 0.02
+#: Width of a digit, in font sizes.
+_DIGIT = 0.64
 #: A legend of more entries is set smaller, to stay beside its map.
 _LONG_LEGEND = 14
 
@@ -42,7 +46,8 @@ def basins(
 ) -> Axes:
     """Map of the basins: a hue for each attractor, darker where it takes longer to settle, near-black where a start doesn't.
 
-    Cells are centred on the starts. White-edged dots are the attractors at whole forcing periods.
+    Cells are centred on the starts. White-edged dots are the attractors at whole forcing periods. Of more than two states the title says
+    where the others start.
 
     Parameters
     ----------
@@ -81,7 +86,20 @@ def basins(
             _points(panel, ds, pair, scales, colors)
         if legend:
             _legend(panel, ds, pair, colors, settling, points)
+        panel.set_title(_section(ds, pair), loc="left", fontsize=8, color=QUIET)
     return panel
+
+
+def _section(ds: xr.Dataset, pair: tuple[str, str]) -> str:
+    """Where the other states start, in words; empty where there are none."""
+    try:
+        fixed = {name: float(value) for name, value in json.loads(ds.attrs.get("at", "{}")).items() if name not in pair}
+    except (ValueError, TypeError, AttributeError):  # of another program
+        return ""
+    units = [ds[f"attractor_{name}"].attrs.get("units", "") if f"attractor_{name}" in ds else "" for name in fixed]
+    return ", ".join(
+        f"{name.replace('_', ' ')} = {from_si(value, unit, 4)}" for (name, value), unit in zip(fixed.items(), units, strict=True)
+    )
 
 
 # -- cells ---------------------------------------------------------------------------------------------------------------------
@@ -205,13 +223,24 @@ class _DrawRuler(HandlerBase):
                        height: float, fontsize: float, trans: Any) -> list[Any]:  # fmt: skip
         top = height - ydescent + 0.35 * fontsize
         artists: list[Any] = [Line2D([-xdescent, width - xdescent], [top, top], color=QUIET, lw=0.6, transform=trans)]
-        for value, place in zip(orig_handle.values, orig_handle.places, strict=True):
+        for value, place in _apart(orig_handle.values, orig_handle.places, width / (0.8 * fontsize)):
             x = place * width - xdescent
             artists.append(Line2D([x, x], [top, top - 0.25 * fontsize], color=QUIET, lw=0.6, transform=trans))
             side = "left" if place == 0 else "right" if place == 1 else "center"
             text = Text(x, top - 0.4 * fontsize, f"{value}", ha=side, va="top", color=QUIET, fontsize=0.8 * fontsize, transform=trans)
             artists.append(text)
         return artists
+
+
+def _apart(values: Sequence[float], places: Sequence[float], width: float) -> list[tuple[float, float]]:
+    """The numbers of a ruler that don't touch: the middle one is left out where it would. ``width`` is that of the ruler, in font sizes."""
+    ticks = list(zip(values, places, strict=True))
+    if len(ticks) == 3:
+        first, middle, last = (_DIGIT * len(f"{value}") for value in values)
+        at = places[1] * width
+        if at - middle / 2 < first + _DIGIT or at + middle / 2 > width - last - _DIGIT:
+            del ticks[1]
+    return ticks
 
 
 def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int, np.ndarray], settling: Settling | None,
@@ -221,9 +250,10 @@ def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int
     shares = dict(zip(codes.tolist(), (counts / ds["basin"].size).tolist(), strict=True))
     if "attractor_fraction" in ds:
         shares |= dict(zip(ds["attractor"].values.tolist(), ds["attractor_fraction"].values.tolist(), strict=True))
-    texts = _texts(ds, pair, list(colors), shares)
-    handles: list[Any] = [_Ramp(shades(color[None], _LEVELS if settling else 1)[0][::2]) for color in colors.values()]
-    if settling and colors:
+    named = [key for key in colors if shares.get(key) or _inside(ds, pair, key)]
+    texts = _texts(ds, pair, named, shares)
+    handles: list[Any] = [_Ramp(shades(colors[key][None], _LEVELS if settling else 1)[0][::2]) for key in named]
+    if settling and named:
         ticks = settling.ticks()
         shares_of_ticks, every = settling.share(np.array(ticks)).tolist(), ds.attrs.get("every")
         handles.append(_Ruler(ticks if every is None else [float(f"{tick * every:.3g}") for tick in ticks], shares_of_ticks))
@@ -235,6 +265,9 @@ def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int
     if points and colors and any(len(_stroboscopic(ds, pair, key)) for key in colors):
         handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="#BBBBBB", mec="#222222", mew=0.7))
         texts.append("points of the attractors" if "attractor_cycle" in ds else "Poincaré points of the attractors")
+    if len(named) < len(colors):
+        handles.append(Line2D([], [], ls="none"))
+        texts.append(f"{len(colors) - len(named)} more that no start of the map leads to")
     if handles:
         small = len(handles) > _LONG_LEGEND
         drawing = {_Ramp: _DrawRamp(), _Ruler: _DrawRuler()}
@@ -252,13 +285,14 @@ def _texts(ds: xr.Dataset, pair: tuple[str, str], ids: Sequence[int], shares: Ma
         one = ds.sel(attractor=key)
         if names.count(name) > 1 and "attractor_peak" in one:
             name = f"{name}, {maps.peak_text(one)}"
-        texts.append(f"{name}, {maps.share_text(shares.get(key, 0.0))}{_outside(ds, pair, key)}")
+        share = maps.share_text(shares[key]) if shares.get(key) else "no start"
+        outside = ", outside the map" if len(_stroboscopic(ds, pair, key)) and not _inside(ds, pair, key) else ""
+        texts.append(f"{name}, {share}{outside}")
     return texts
 
 
-def _outside(ds: xr.Dataset, pair: tuple[str, str], key: int) -> str:
-    """A remark if no point of the attractor lies in the map, where a reader would look for it."""
+def _inside(ds: xr.Dataset, pair: tuple[str, str], key: int) -> bool:
+    """Whether a point of the attractor lies in the map, where a reader looks for it."""
     cloud = _stroboscopic(ds, pair, key)
     limits = [maps.edges(ds[name].values) for name in pair]
-    inside = np.logical_and.reduce([(cloud[:, i] >= edge.min()) & (cloud[:, i] <= edge.max()) for i, edge in enumerate(limits)])
-    return ", outside the map" if len(cloud) and not inside.any() else ""
+    return bool(np.logical_and.reduce([(cloud[:, i] >= edge.min()) & (cloud[:, i] <= edge.max()) for i, edge in enumerate(limits)]).any())

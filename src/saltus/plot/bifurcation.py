@@ -21,6 +21,8 @@ _CALLER = "plot.bifurcation_diagram"
 _SHOWN = {
     "turning_points": "{} at turning points", "contacts": "{} at the contacts", "stroboscope": "{} at the Poincaré points",
 }  # fmt: skip
+#: Diameter of the smallest dots [pt]: more than a pixel of a screen.
+_SMALLEST = 0.6
 #: Where the legend begins, in widths of the Axes, if the names of the gaps stand beside it.
 _BESIDE_GAPS = 1.16
 
@@ -101,7 +103,7 @@ def _kinds(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> di
         x, y = _flat(one, values, of == code, across)
         wandering = not kinds.repeats(code)
         size = _size(x.size) * (0.5 if wandering else 1.0)
-        look = {"marker": "o", "ms": max(size, 0.4), "mfc": kinds.color(code), "mec": "none", "gid": f"kind {code}"}
+        look = {"marker": "o", "ms": max(size, _SMALLEST), "mfc": kinds.color(code), "mec": "none", "gid": f"kind {code}"}
         draw.draw_points(ax, x, y, zorder=2 if wandering else 3, **look)
     return points.kind_handles(one, of)
 

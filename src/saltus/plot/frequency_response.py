@@ -140,7 +140,7 @@ def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[st
         if kinds.repeats(code):
             line = points.branch_lines(one, y, mine)
             ax.plot(line[0] * across.factor, line[1], color=color, lw=0.8, zorder=2, gid=f"branches {code}")
-        size = _size(mine.sum()) * (0.7 if code == kinds.CHAOTIC else 1.0)
+        size = _size(mine.sum()) * (1.2 if code == kinds.CHAOTIC else 1.0)  # of its marker half is seen
         look = {"marker": kinds.marker(code), "mfc": color, "mec": "none"}
         draw.draw_points(ax, one.values[mine] * across.factor, y[mine], ms=size, zorder=3, gid=f"kind {code}", **look)
     return points.kind_handles(one, of, markers=True)

@@ -96,6 +96,10 @@ def history(
 def _panel(ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], time: str, unit: str | None) -> None:
     """One trajectory in one Axes."""
     curve = selection.path(ds, (state,), *shown)
+    if shown[0] == shown[1]:
+        who = f"Trajectory {int(ds['trajectory'])}" if "trajectory" in ds.coords else "It"
+        draw.say(ax, f"{who} stopped where it began: there is no motion to draw.", ds)
+        return
     values = curve.values[:, 0]
     finite = np.abs(values[np.isfinite(values)])
     y = display_scale(ds[state].attrs.get("units", ""), float(finite.max(initial=0.0)), unit)

@@ -11,13 +11,17 @@ from matplotlib.axes import Axes
 from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
-from saltus.plot.style import CYCLE, OKABE_ITO, display_scale
+from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 from saltus.results.schema import ENERGY, IMPACTS, check
+
+#: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a motion that repeats, and how often each
+#: must be seen.
+_SAME, _MOST_SPEEDS, _REPEATED = 1e-7, 6, 3
 
 
 @picture
 def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
-    """Histogram of the speeds at contact, a colour for each guard.
+    """Histogram of the speeds at contact, a colour for each guard. Where they repeat, or there are none, it is said in words.
 
     Parameters
     ----------
@@ -42,14 +46,19 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
     caller = "plot.impacts"
     check(ds, caller=caller, kinds=[IMPACTS])
     counts = ds["speed_histogram"]
+    labels: np.ndarray | None = None
     if "trajectory" in counts.dims:
-        labels = selection.chosen(ds, trajectory, caller) if trajectory is not None else ds["trajectory"].values
+        labels = np.asarray(selection.chosen(ds, trajectory, caller)) if trajectory is not None else ds["trajectory"].values
         counts = counts.sel(trajectory=labels).sum("trajectory")
     low, high = ds["speed_low"].values, ds["speed_high"].values
     scale = display_scale(ds["speed_low"].attrs.get("units", ""), float(np.abs(high).max()))
     names = ds["guard"].values.tolist()
     width = (high - low) * scale.factor / len(names)
+    told = _in_words(ds, labels, counts, scale)
     with draw.panels(ax, 1, (5.2, 2.8), caller) as (panel,):
+        if told:
+            draw.say(panel, told, ds if labels is None else ds.sel(trajectory=labels))
+            return panel
         for i, name in enumerate(names):
             panel.bar(
                 low * scale.factor + i * width,
@@ -64,6 +73,24 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
         if legend:
             panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
     return panel
+
+
+def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, scale: Scale) -> str:
+    """What there is to say of contacts that make no histogram: there are none, or their speeds come again and again."""
+    if not counts.values.sum():
+        return "No contact in the time that was looked at."
+    mine = slice(None) if labels is None else np.isin(ds["contact_trajectory"].values, labels)
+    speeds, guards = ds["contact_speed"].values[mine], ds["contact_guard"].values[mine].astype(str)
+    lines = []
+    for name in ds["guard"].values.tolist():
+        own = np.sort(speeds[(guards == name) & np.isfinite(speeds)])
+        first = np.flatnonzero(np.diff(own, prepend=-np.inf) > _SAME * own.max(initial=0.0))  # of each group of equal ones
+        if len(own) and (len(first) > _MOST_SPEEDS or len(own) < _REPEATED * len(first)):
+            return ""
+        if len(own):
+            values = ", ".join(scale.text(float(f"{own[i]:.6g}")) for i in first)
+            lines.append(f"{name.replace('_', ' ')}: {len(own)} contacts, at {values}")
+    return "\n".join(["The speeds at contact repeat.", *lines])
 
 
 @picture
@@ -104,6 +131,9 @@ def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, leg
     }
     scale = display_scale("J", max(float(np.abs(ds[name].values).max(initial=0.0)) for name in curves))
     with draw.panels(ax, 1, (6.0, 2.8), caller) as (panel,):
+        if not np.isfinite(ds["residual"].values).any():
+            draw.say(panel, "There is no balance: the motion stopped before the first interval had passed.", ds)
+            return panel
         for name, (color, line) in curves.items():
             label = {"change": "change of the stored energy", "energy": "stored at the end"}.get(name, name)
             panel.plot(ds[dim].values, ds[name].values * scale.factor, color=color, ls=line, lw=1.0, label=label)

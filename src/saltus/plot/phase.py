@@ -79,6 +79,9 @@ def phase(
     curves = [_values(one, pair, shown) for one, shown in zip(singles, windows, strict=True)]
     scales = _scales(run, pair, np.concatenate(curves), selection.units_of_states(run, units, _CALLER))
     with draw.panels(ax, 1, (4.6, 3.1), _CALLER) as (panel,):
+        if kind_of(run) != STROBOSCOPE and all(begin == end for begin, end in windows):
+            draw.say(panel, "It stopped where it began: there is no motion to draw.", *singles)
+            return panel
         for i, (one, shown) in enumerate(zip(singles, windows, strict=True)):
             name = _name(one, run, labels[i]) if len(labels) > 1 else None
             color = CYCLE[i % len(CYCLE)] if name else None

@@ -31,19 +31,20 @@ def picture(function: Callable[P, R]) -> Callable[P, R]:
         result = ask(*args, **kwargs)
         for one in np.ravel(np.asarray(result, dtype=object)):
             for text in one.findobj(Text):
-                if is_math_text(text.get_text()) and not _is_formula(text.get_text()):
-                    text.set_text(re.sub(r"(?<!\\)\$", r"\\$", text.get_text()))
+                if drawable(text.get_text()) != text.get_text():
+                    text.set_text(drawable(text.get_text()))
         return result
 
     return drawn
 
 
 @functools.lru_cache(maxsize=256)
-def _is_formula(text: str) -> bool:
-    """Whether Matplotlib can read a text that holds formulas."""
+def drawable(text: str) -> str:
+    """The text itself if Matplotlib can read the formulas in it, else one that is drawn as it is written."""
     parser: Any = MathTextParser("path")
     try:
-        parser.parse(text)
+        if is_math_text(text):
+            parser.parse(text)
     except (ValueError, RecursionError):
-        return False
-    return True
+        return re.sub(r"(?<!\\)\$", r"\\$", text)
+    return text

@@ -145,27 +145,53 @@ def _contact_label(boundary: Boundary) -> str:
 
 
 def _by_mode(ds: xr.Dataset) -> Regions:
-    """A colour for every combination of sides that occurs, named after the guards that are positive in it."""
+    """A colour for every combination of sides that occurs, named after the sides."""
     names = ds["guard"].values.tolist()
     modes = np.concatenate([np.ravel(ds["mode"].values), ds["contact_mode_after"].values]) if "mode" in ds else np.zeros(1, dtype=np.int64)
     codes = np.unique(modes)
     regions = []
-    for code, color in zip(codes.tolist(), _mode_colors(codes.tolist()), strict=True):
-        positive = [name for bit, name in enumerate(names) if code >> bit & 1]
-        regions.append(Region(color, ", ".join(f"{name} > 0" for name in positive) or "no gap > 0", contact=False))
+    for color, label in zip(_mode_colors(codes.tolist()), _mode_labels(codes.tolist(), names), strict=True):
+        regions.append(Region(color, label, contact=False))
     if not names:
         regions = [Region(CYCLE[0], "", contact=False)]
         codes = np.zeros(1, dtype=np.int64)
     return Regions(tuple(regions), (), None, tuple(range(len(names))), codes)
 
 
-def _mode_colors(codes: Sequence[int]) -> list[str]:
-    """The colours of a freeplay where the modes look like one, so that green is free there too; else a colour each.
+def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:
+    """Where modes look like those of a freeplay: the places of the free one, and of those below and above it.
 
     Two gaps of a freeplay give the modes none, one, both positive if they point the same way, and none, one, the other if they don't.
     """
-    if len(codes) == 3 and codes[0] & codes[1] == codes[0] and codes[1] & codes[2] == codes[1]:
-        return [_BELOW[0], _FREE, _ABOVE[0]]
-    if len(codes) <= 3 and codes[0] == 0 and all(code.bit_count() == 1 for code in codes[1:]):
-        return [_FREE, _ABOVE[0], _BELOW[0]][: len(codes)]
+    if len(codes) != 3:
+        return None
+    if codes[0] & codes[1] == codes[0] and codes[1] & codes[2] == codes[1]:
+        return 1, 0, 2
+    return (0, 2, 1) if codes[0] == 0 and all(code.bit_count() == 1 for code in codes[1:]) else None
+
+
+def _mode_colors(codes: Sequence[int]) -> list[str]:
+    """The colours of a freeplay where the modes look like one, so that green is free there too; else a colour each."""
+    places = _freeplay(codes)
+    if places:
+        return [color for _, color in sorted(zip(places, (_FREE, _BELOW[0], _ABOVE[0]), strict=True))]
+    if len(codes) == 2 and codes[0] == 0 and codes[1].bit_count() == 1:
+        return [_FREE, _ABOVE[0]]
     return [CYCLE[i % len(CYCLE)] for i in range(len(codes))]
+
+
+def _mode_labels(codes: Sequence[int], names: Sequence[str]) -> list[str]:
+    """The sides in words: those of a freeplay by what is met, others by the guards in which they differ; a single one has no name."""
+    places = _freeplay(codes)
+    changing = [bit for bit in range(len(names)) if len({code >> bit & 1 for code in codes}) > 1]
+    if places and len(changing) == 2:
+        free = codes[places[0]]
+        met = [names[(code ^ free).bit_length() - 1] if code != free else None for code in codes]
+        return ["free" if name is None else f"beyond {name.replace('_', ' ')}" for name in met]
+    return [", ".join(_side(names[bit], code >> bit & 1) for bit in changing) for code in codes]
+
+
+def _side(name: str, positive: int) -> str:
+    """A side of a guard: ``gap`` is the name of a boundary, ``x - y = gap`` its equation."""
+    left, equal, right = name.replace("_", " ").partition(" = ")
+    return f"{left} {'>' if positive else '<'} {right}" if equal else f"{'above' if positive else 'below'} {left}"

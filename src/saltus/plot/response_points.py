@@ -31,8 +31,8 @@ _EVENTS = {
 _EVENTS_AT = 1.025
 #: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
 _EVEN = 1e-6
-#: More marks than these on an axis are drawn smaller.
-_MANY_EVENTS = 40
+#: More marks than these on an axis are drawn smaller; so many, or fewer, stand on a line through the picture, to where it happens.
+_MANY_EVENTS, _FEW_EVENTS = 40, 12
 #: A legend of more entries is set smaller, to stay beside its picture.
 _LONG_LEGEND = 14
 
@@ -193,6 +193,9 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
             if here.size:
                 size, width = (4.5, 0.8) if values.size <= _MANY_EVENTS else (3.0, 0.5)
                 above = np.full(here.size, _EVENTS_AT)
+                if values.size <= _FEW_EVENTS:
+                    stems = ax.vlines(here, 0, _EVENTS_AT, transform=ax.get_xaxis_transform(), color=QUIET, lw=0.5, ls=":", clip_on=False)
+                    stems.set(zorder=1, gid=f"line of event {word}")
                 ax.plot(
                     here, above, transform=ax.get_xaxis_transform(), ls="none", marker=marker, ms=size, mfc="white",
                     mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False, zorder=5, label=text, gid=f"event {word}",

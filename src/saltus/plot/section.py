@@ -71,6 +71,9 @@ def section(
     points = [_values(ds, name) for name in names]
     scales = [_scale(ds, name, values[rows], wanted.get(name)) for name, values in zip(names, points, strict=True)]
     with draw.panels(ax, 1, (4.6, 3.4), _CALLER) as (panel,):
+        if not rows.any():
+            draw.say(panel, f"Section {ds.attrs.get('surface', '')}: no crossing in the time that was looked at.", ds)
+            return panel
         for mask, color, name in _groups(ds, labels, rows):
             _draw(panel, ds, mask, points, scales, color, name)
         for direction, name, values, scale in zip(("x", "y"), names, points, scales, strict=True):

@@ -92,7 +92,10 @@ def window(ds: xr.Dataset, periods: Periods, caller: str, default_share: float =
     axis = sample_axis(ds)
     if not axis.size:
         raise ParameterError(f"{caller}: this run holds no samples.")
-    first, last = float(axis[0]), float(axis[-1])
+    there = np.isfinite(np.stack([ds[name].values for name in states_of(ds)])).all(axis=0)
+    first, last = float(axis[0]), float(axis[there][-1] if there.any() else axis[0])  # one that stopped early has no more
+    if there.sum() < 2:
+        return first, first
     if periods is None:
         length = default_share * (last - first)
         if "period" in ds and default_share < 1:

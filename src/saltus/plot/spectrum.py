@@ -79,6 +79,9 @@ def spectrum(
         ds[f"{state}_amplitude"].attrs.get("units", ""), largest, selection.units_of_states(ds, units, _CALLER).get(state)
     )
     with draw.panels(ax, 1, (6.0, 2.8), _CALLER) as (panel,):
+        if not any(np.isfinite(curve).any() for curve in curves):
+            draw.say(panel, "There is no spectrum: the motion stopped before its end.", *singles)
+            return panel
         floor = _SHOWN * largest * scale.factor / 3
         for i, (one, curve) in enumerate(zip(singles, curves, strict=True)):
             name = f"trajectory {labels[i]}" if len(labels) > 1 else None

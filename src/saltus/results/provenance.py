@@ -21,7 +21,7 @@ from saltus.results.summary import summary
 from saltus.units import from_si
 
 #: Packages whose versions can change the digits of a result or the layout of its file.
-_PACKAGES = ("numpy", "numba", "xarray", "saltus")
+_PACKAGES = ("numpy", "llvmlite", "xarray", "saltus")
 
 
 def attributes(

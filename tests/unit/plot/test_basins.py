@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgb
 
 from saltus.errors import ParameterError
 from saltus.plot import basins, maps, palette
+from saltus.plot.basins import _apart as apart_ticks
 
 from .maps_data import attractors, basins_map
 
@@ -199,6 +200,27 @@ def test_an_attractor_outside_the_map_is_said_to_be():
     ax = basins(basins_map(np.array([[0, 1], [1, 0]]), known=known))
     assert texts(ax)[1] == "2T, 1 contact, 50.0 %, outside the map"
     assert ax.get_xlim()[1] < 11  # the map keeps its limits
+
+
+def test_an_attractor_without_a_start_is_named_only_where_it_is_seen():
+    known = attractors([[0.0], [1e-3], [9e-3]], [[0.0]] * 3, period=[1, 2, 3], contacts=[0, 2, 4], fraction=[1.0, 0.0, 0.0])
+    named = texts(basins(basins_map(np.zeros((6, 6), int), known=known)))
+    assert named[:2] == ["T, 0 contacts, 100 %", "2T, 2 contacts, no start"]
+    assert named[-1] == "1 more that no start of the map leads to"
+
+
+def test_the_title_says_where_the_other_states_start():
+    ds = basins_map(np.zeros((6, 6), int))
+    assert basins(ds).get_title(loc="left") == ""
+    other = {"attractor_w": (("attractor", "phase"), ds["attractor_v"].values, {"units": "m/s"})}
+    section = ds.assign(other).assign_attrs(at='{"w": 0.02, "q": 0.0}')
+    assert basins(section).get_title(loc="left") == "w = 20 mm/s, q = 0"
+
+
+@pytest.mark.parametrize(("values", "shown"), [([1, 30, 900], [1, 30, 900]), ([1024, 1500, 1999], [1024, 1999]), ([3, 4], [3, 4])])
+def test_numbers_of_the_ruler_do_not_touch(values, shown):
+    places = np.linspace(0, 1, len(values)).tolist()
+    assert [value for value, _ in apart_ticks(values, places, 6.9)] == shown
 
 
 def test_axes_of_the_caller_are_used():

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from saltus.errors import ParameterError
-from saltus.plot import OKABE_ITO, history, style
+from saltus.plot import OKABE_ITO, history, phase, style
 
 from .conftest import GAPS, PERIOD, rig_run
 
@@ -68,6 +68,19 @@ def test_no_sample_is_lost(run):
 def test_colours_are_those_of_the_palette(run):
     ax = history(run)
     assert {label: to_hex(line(ax, label).get_color()) for label in COLORS} == {k: OKABE_ITO[v].lower() for k, v in COLORS.items()}
+
+
+def test_a_run_that_stopped_early_ends_there():
+    stopped = rig_run(periods=10, status="sliding")
+    late = stopped["time"].values > 2.5 * stopped["time"].values[-1] / 10
+    stopped = stopped.assign({name: stopped[name].where(~late) for name in ("x", "v")}).assign(end_time=0.2)
+    last = stopped["time"].values[~late][-1]
+    assert history(stopped).get_xlim()[1] == pytest.approx(last)
+    assert phase(stopped).texts[-1].get_text() == "status: sliding, stopped at 0.2 s"
+    assert history(stopped, periods=1).get_xlim() == pytest.approx((last - PERIOD, last))
+    at_once = stopped.assign({name: stopped[name].where(stopped["time"] == 0) for name in ("x", "v")})
+    for ax in (history(at_once), history(at_once, periods=5), phase(at_once)):
+        assert ax.texts[0].get_text() == "It stopped where it began: there is no motion to draw."
 
 
 def test_axes_have_units_and_gap_lines(run):

@@ -64,6 +64,43 @@ def test_impacts_are_counted_by_guard():
     assert axes.get_xlabel() == "speed at contact [m/s]"
 
 
+def with_speeds(speeds):
+    """Impacts at the lower gap with these speeds."""
+    ds = data.impacts()
+    rows = ds.isel(contact=np.zeros(len(speeds), dtype=int)).assign(contact_speed=("contact", np.asarray(speeds, dtype=float)))
+    return rows.assign(speed_histogram=rows["speed_histogram"] * (len(speeds) > 0))
+
+
+@pytest.mark.parametrize(
+    ("speeds", "says"),
+    [
+        ([], "No contact in the time that was looked at."),
+        ([0.2, 0.1 * (1 + 1e-12), 0.1] * 4, "The speeds at contact repeat.\nlower gap: 12 contacts, at 0.1 m/s, 0.2 m/s"),
+        (np.linspace(0.1, 0.2, 12), None),
+        ([0.1, 0.2], None),  # seen once each: nothing repeats
+    ],
+)
+def test_contacts_that_make_no_histogram_are_told_in_words(speeds, says):
+    axes = sl.plot.impacts(with_speeds(speeds))
+    assert [text.get_text() for text in axes.texts] == ([says] if says else [])
+    assert bool(axes.patches) == (says is None)
+
+
+def test_what_holds_nothing_says_so_in_place_of_an_empty_frame():
+    stopped = data.energy()
+    stopped = stopped.assign(residual=stopped["residual"] * np.nan, status="sliding", end_time=0.1)
+    empty = data.spectrum()
+    empty = empty.assign(x_amplitude=empty["x_amplitude"] * np.nan)
+    for axes, says in (
+        (sl.plot.energy(stopped), "There is no balance: the motion stopped before the first interval had passed."),
+        (sl.plot.spectrum(empty), "There is no spectrum: the motion stopped before its end."),
+        (sl.plot.section(data.section().isel(crossing=[])), "Section x = 0.3 mm: no crossing in the time that was looked at."),
+    ):
+        assert axes.texts[0].get_text() == says
+        assert not axes.axison
+    assert sl.plot.energy(stopped).texts[1].get_text() == "status: sliding, stopped at 0.1 s"
+
+
 def test_energies_by_period_or_by_time():
     assert sl.plot.energy(data.energy()).get_xlabel() == "forcing periods"
     axes = sl.plot.energy(data.energy(2), trajectory=1)

@@ -85,14 +85,14 @@ def test_many_points_become_pixels(points):
 
 
 def test_colours_of_guards_that_bound_no_state(run):
-    """A gap between two masses: the modes decide, named by the signs of the gaps."""
+    """A gap between two masses: the modes decide, named by what is met."""
     relative = run.copy(deep=True)
     relative["guard_state"] = ("guard", np.array(["", ""]))
     relative["guard_boundary"] = ("guard", np.full(2, np.nan))
     ax = phase(relative, periods=5)
-    both = line(ax, "lower_gap > 0, upper_gap > 0")
+    both = line(ax, "beyond upper gap")
     assert np.nanmin(both.get_xdata()) == 0.4
-    assert np.nanmax(line(ax, "no gap > 0").get_xdata()) == 0.0
+    assert np.nanmax(line(ax, "beyond lower gap").get_xdata()) == 0.0
     assert not [one for one in ax.lines if one.is_dashed()]
 
 

@@ -97,8 +97,25 @@ def test_opposite_gaps_keep_free_green():
         guard_state=("guard", np.array(["", ""])), mode=("time", [0, 1, 0, 2]), contact_mode_after=("contact", [1, 0])
     )
     found = regions.find(ds, ["y"])
-    assert [region.label for region in found.regions] == ["no gap > 0", "a > 0", "b > 0"]
+    assert [region.label for region in found.regions] == ["free", "beyond a", "beyond b"]
     assert found.regions[0].color == OKABE_ITO["green"]
+
+
+@pytest.mark.parametrize(
+    ("names", "modes", "labels"),
+    [
+        (["rub"], [0, 1], ["below rub", "above rub"]),
+        (["x - y = gap"], [0, 1], ["x - y < gap", "x - y > gap"]),
+        (["lower", "upper"], [0, 1, 3], ["beyond lower", "free", "beyond upper"]),
+        (["lower", "upper"], [1, 3], ["below upper", "above upper"]),  # which of them is free isn't known
+        (["lower", "upper"], [1], [""]),  # nothing is met
+    ],
+)
+def test_sides_of_guards_that_bound_no_state_have_names(names, modes, labels):
+    ds = dataset(names, [np.nan] * len(names)).assign(
+        guard_state=("guard", np.array([""] * len(names))), mode=("time", modes), contact_mode_after=("contact", modes[:1])
+    )
+    assert [region.label for region in regions.find(ds, ["y"]).regions] == labels
 
 
 def test_a_notebook_stays_interactive(tmp_path):

@@ -1,0 +1,108 @@
+"""Long straight-line functions in blocks: the time that LLVM takes grows faster than the length of a function.
+
+A value that a later block needs goes through memory; the operations and their order are the same, so not a digit changes.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+#: Lines of a function that stays whole, and of a block of one that doesn't.
+WHOLE, LENGTH = 1000, 250
+
+_VALUE = re.compile(r"%r\d+\b")
+
+
+class Line(NamedTuple):
+    """One line of IR; the value that it gives and its type, "" if it gives none."""
+
+    text: str
+    name: str
+    type: str
+
+
+def in_blocks(name: str, result: str, parameters: str, attributes: str, lines: list[Line], lanes: int) -> str:
+    """The text of a function ``result name(parameters)`` with these lines, the last of which returns."""
+    head = f"{result} @{name}({parameters}) {attributes} {{\n"
+    if len(lines) <= WHOLE or result != "void":
+        return f"define {head}" + "".join(f"  {line.text}\n" for line in lines) + "}\n"
+    blocks = [lines[i : i + LENGTH] for i in range(0, len(lines), LENGTH)]
+    slots = _slots(blocks)
+    texts, calls = [], []
+    plain = re.sub(r"\S+ (%\w+)", r"\1", parameters)
+    for i, block in enumerate(blocks):
+        body = _one_block(block, i, slots, lanes, last=i == len(blocks) - 1)
+        texts.append(f"define internal void @{name}.{i}({parameters}, ptr %kept) noinline {attributes} {{\n{body}}}\n")
+        given = ", ".join(f"{kind} {value}" for kind, value in zip(_kinds(parameters), plain.split(", "), strict=True))
+        calls.append(f"  call void @{name}.{i}({given}, ptr %kept)\n")
+    memory = f"  %kept = alloca [{max(len(slots), 1) * lanes} x double], align 64\n"
+    return "\n".join(texts) + f"define {head}" + memory + "".join(calls) + "  ret void\n}\n"
+
+
+def _kinds(parameters: str) -> list[str]:
+    return [one.split()[0] for one in parameters.split(", ")]
+
+
+class _Slot(NamedTuple):
+    """Where a value is kept: its place, its type, the block that gives it."""
+
+    place: int
+    type: str
+    block: int
+
+
+def _slots(blocks: list[list[Line]]) -> dict[str, _Slot]:
+    """Places for the values that another block than their own uses."""
+    home = {line.name: (i, line.type) for i, block in enumerate(blocks) for line in block if line.name}
+    slots: dict[str, _Slot] = {}
+    for i, block in enumerate(blocks):
+        for line in block:
+            for used in _VALUE.findall(line.text):
+                if home[used][0] != i and used not in slots:
+                    slots[used] = _Slot(len(slots), home[used][1], home[used][0])
+    return slots
+
+
+def _one_block(block: list[Line], i: int, slots: dict[str, _Slot], lanes: int, last: bool) -> str:
+    """The lines of a block: values of others are loaded where they are first used, its own are kept where others use them."""
+    out, here = [], set()
+    for line in block:
+        for used in _VALUE.findall(line.text):
+            if used in slots and slots[used].block != i and used not in here:
+                here.add(used)
+                out += _load(used, slots[used], lanes)
+        out.append(line.text)
+        if line.name in slots:
+            out += _keep(line.name, slots[line.name], lanes)
+    if not last:
+        out.append("ret void")
+    return "".join(f"  {line}\n" for line in out)
+
+
+def _is_mask(type_: str) -> bool:
+    return type_.endswith("x i1>")
+
+
+def _load(name: str, slot: _Slot, lanes: int) -> list[str]:
+    place = f"%at{name[2:]}"
+    out = [f"{place} = getelementptr i8, ptr %kept, i64 {8 * lanes * slot.place}"]
+    if _is_mask(slot.type):
+        whole, bits = f"%whole{name[2:]}", f"%bits{name[2:]}"
+        return [
+            *out, f"{whole} = load i32, ptr {place}, align 8", f"{bits} = trunc i32 {whole} to i{lanes}",
+            f"{name} = bitcast i{lanes} {bits} to {slot.type}",
+        ]  # fmt: skip
+    return [*out, f"{name} = load {slot.type}, ptr {place}, align 8"]
+
+
+def _keep(name: str, slot: _Slot, lanes: int) -> list[str]:
+    place = f"%to{name[2:]}"
+    out = [f"{place} = getelementptr i8, ptr %kept, i64 {8 * lanes * slot.place}"]
+    if _is_mask(slot.type):
+        whole, bits = f"%wide{name[2:]}", f"%mask{name[2:]}"
+        return [
+            *out, f"{bits} = bitcast {slot.type} {name} to i{lanes}", f"{whole} = zext i{lanes} {bits} to i32",
+            f"store i32 {whole}, ptr {place}, align 8",
+        ]  # fmt: skip
+    return [*out, f"store {slot.type} {name}, ptr {place}, align 8"]

@@ -1,0 +1,219 @@
+"""Objects from the cache, or made: here if that takes a moment, by another process if it takes long, so that Ctrl-C ends the wait."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import weakref
+from collections import OrderedDict, defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from saltus.codegen import cache, machine, templates
+from saltus.codegen.announce import announce
+from saltus.errors import CacheError
+from saltus.interrupt import check_stop
+
+#: Time between two looks whether the work is to stop [s].
+LOOK = 0.1
+#: Seconds of LLVM's work for a million characters of an equation, and for a template: for people who wait.
+SECONDS_PER_MEGABYTE, SECONDS_OF_TEMPLATE, SECONDS_OF_LOWERING = 1.0, 4.0, 20.0
+#: What takes longer is made by another process; what takes longer than this is announced [s].
+LONG, ANNOUNCED = 0.5, 1.0
+#: Objects that are held in memory.
+_HELD = 32
+
+_COMPILING: weakref.WeakSet[subprocess.Popen] = weakref.WeakSet()
+#: One thread at a time sees to an object.
+_LOCKS: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
+_OBJECTS: OrderedDict[str, bytes] = OrderedDict()
+
+
+@dataclass(frozen=True)
+class Order:
+    """An object that is wanted.
+
+    Attributes
+    ----------
+    template : str
+        Name of the bitcode in it, "" if there is none.
+    texts : tuple of str
+        LLVM IR in it.
+    called : tuple of str
+        Its symbols that others use.
+    title : str
+        What `saltus cache` shows for it.
+    said : str
+        What is said to be compiled, if it takes long; "" to say nothing.
+    """
+
+    template: str
+    texts: tuple[str, ...]
+    called: tuple[str, ...]
+    title: str
+    said: str
+
+    @cached_property
+    def key(self) -> str:
+        """Name of the entry: a hash of everything that the machine code depends on."""
+        made_of = templates.identity(self.template) if self.template else ""
+        parts = [made_of, *self.texts, *self.called, *machine.target(), *machine.versions()]
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+    @property
+    def seconds(self) -> float:
+        """About how long it takes to make on a quiet machine [s]."""
+        return sum(map(len, self.texts)) / 1e6 * SECONDS_PER_MEGABYTE + (SECONDS_OF_TEMPLATE if self.template in _SLOW else 0.0)
+
+
+_SLOW = frozenset(name for name in templates.BITCODE if name != "capture")
+
+
+def built(order: Order) -> bytes:
+    """The object of an order, from memory, from the cache, or made now.
+
+    Raises
+    ------
+    CacheError
+        If the process that compiles is killed.
+    Interrupted
+        If the work that this thread does a part of was asked to stop.
+    """
+    with _held(_LOCKS[order.key]):
+        found = _OBJECTS.get(order.key)
+        if found is None:
+            found = cache.read(order.key)
+        if found is None:
+            if order.said and order.seconds > ANNOUNCED:
+                announce(order.said, order.seconds)
+            found = (_made_elsewhere(order) if order.seconds > LONG else None) or made(order)
+            cache.keep(order.key, order.title, found)
+        _OBJECTS[order.key] = found
+        while len(_OBJECTS) > _HELD:
+            _OBJECTS.popitem(last=False)
+        return found
+
+
+def made(order: Order) -> bytes:
+    """Compile in this process."""
+    template = bitcode(order.template) if order.template else None
+    return machine.object_code(template, order.texts, frozenset(order.called))
+
+
+def bitcode(name: str) -> bytes:
+    """The templates' bitcode: what the package brings, or, if the templates were edited since, made of them now.
+
+    Raises
+    ------
+    CacheError
+        If it would have to be made, and can't.
+    """
+    if templates.is_current(name):
+        return templates.bitcode(name)
+    key = templates.source_hash(name)[:32]
+    found = cache.read(key)
+    if found is None:
+        announce(f"the templates, which were edited since {name}.bc.xz was made: once", SECONDS_OF_LOWERING)
+        command = [sys.executable, "-P", "-m", "saltus.codegen.lowering", "--print", name]
+        found = _answer_of(command, b"", f"{name} from the templates")
+        if found is None:
+            raise CacheError(
+                f"saltus/kernels was edited since its bitcode {name}.bc.xz was made. Making it needs Numba: pip install 'saltus[build]', "
+                "then python -m saltus.codegen.lowering."
+            )
+        cache.keep(key, f"{name}, bitcode", found)
+    return found
+
+
+@contextmanager
+def _held(lock: threading.Lock) -> Iterator[None]:
+    """Hold a lock; who is asked to stop while it waits for one stops."""
+    while not lock.acquire(timeout=LOOK):
+        check_stop()
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _made_elsewhere(order: Order) -> bytes | None:
+    """Compile in a process of its own (build_one.py); None if there is none, or it doesn't succeed.
+
+    LLVM can't be stopped while it works. Here this process only waits: Ctrl-C ends the wait at once.
+
+    Raises
+    ------
+    CacheError
+        If the process was killed.
+    Interrupted
+        If the work that this thread does a part of was asked to stop.
+    """
+    command = [sys.executable, "-P", "-m", "saltus.codegen.build_one"]  # -P: not what lies in the working folder
+    if order.template:
+        bitcode(order.template)  # made and kept first, if it must be
+    given = json.dumps([order.template, order.texts, order.called, machine.target()]).encode()
+    return _answer_of(command, given, order.title)
+
+
+def _answer_of(command: list[str], given: bytes, title: str) -> bytes | None:
+    """What a process writes that is given these bytes; None if there is none, or it doesn't succeed."""
+    path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    try:
+        with tempfile.TemporaryFile() as file:  # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
+            file.write(given)
+            file.seek(0)
+            process = subprocess.Popen(
+                command, stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path},
+                start_new_session=True,  # Ctrl-C is for this process
+            )  # fmt: skip
+    except OSError:  # no processes here
+        return None
+    _COMPILING.add(process)
+    try:
+        data = _wait(process)
+    finally:
+        _end(process)
+    if process.returncode < 0:
+        raise CacheError(
+            f"the process that compiled {title} was ended by signal {-process.returncode}, as when memory runs out. Try again."
+        )
+    return data if process.returncode == 0 and data else None
+
+
+def _wait(process: subprocess.Popen) -> bytes:
+    while True:
+        try:
+            return process.communicate(timeout=LOOK)[0]
+        except subprocess.TimeoutExpired:
+            check_stop()
+
+
+def _end(process: subprocess.Popen) -> None:
+    """Whatever has happened, leave no process behind."""
+    if process.poll() is None:
+        process.kill()
+        process.wait()
+    if process.stdout is not None:
+        with contextlib.suppress(OSError):
+            process.stdout.close()
+    _COMPILING.discard(process)
+
+
+def end_all() -> None:
+    """End what still compiles when this process ends."""
+    for process in list(_COMPILING):
+        with contextlib.suppress(OSError):
+            process.kill()
+
+
+atexit.register(end_all)

@@ -1,0 +1,132 @@
+"""What the generated head of an equation supplies to the templates: sizes, tables, and functions with their arguments.
+
+The templates are compiled once, for every equation to come: they read sizes and tables from symbols ``saltus_NAME``, and call functions of
+these names. A new equation brings them (codegen/lane_ir.py). With the JIT off, the head stands above the templates as plain Python.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+#: What an argument of a head's function is: an array of doubles, a whole number, a double.
+ARRAY, WHOLE, REAL = "ptr", "i64", "double"
+
+
+@dataclass(frozen=True, eq=False)  # each stands for itself
+class Interface:
+    """What the head of one method supplies.
+
+    Attributes
+    ----------
+    entry : str
+        The one function that is called from outside.
+    arguments : tuple of str
+        Numba types of its arguments.
+    layout : str
+        The template that says what the work arrays hold, by the sizes alone; "" if there are none.
+    templates : tuple of str
+        The kernels that stand below the head and the layout, in this order.
+    sizes, flags : tuple of str
+        Whole numbers and truth values that the head supplies.
+    tables : mapping
+        What the entries of each table are, by its name.
+    functions : mapping
+        What the arguments of each function are, by its name.
+    truths : tuple of str
+        Functions that return a truth value; the others return nothing.
+    """
+
+    entry: str
+    arguments: tuple[str, ...]
+    layout: str
+    templates: tuple[str, ...]
+    sizes: tuple[str, ...]
+    flags: tuple[str, ...]
+    tables: MappingProxyType[str, str]
+    functions: MappingProxyType[str, tuple[str, ...]]
+    truths: tuple[str, ...]
+
+
+_F1, _F2, _F3 = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
+_I1, _I2 = "int64[::1]", "int64[:, ::1]"
+#: Types of a batch, the first arguments of every `propagate`, in order (kernels/batch.py), and the budget.
+BATCH = (
+    _F1, _F1, _F2, "int64", _F2, _I1, _F1, _I1, _I1, _F2, _I1, _I1, _F1, _I2, _F2,
+    _I1, _F1, _I1, _F3, _I2, _I1, _I2, _F2, _I1, _F1, _F1, "int64",
+)  # fmt: skip
+
+_CLOCKS = {"numbers_of_clocks": (ARRAY, ARRAY)}
+_JUMP = {"jump": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE)}
+
+#: What the layouts' ``workspace()`` return.
+_TAYLOR_WORK = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2, _F1, _F1)
+
+TAYLOR = Interface(
+    entry="propagate",
+    arguments=BATCH + _TAYLOR_WORK,
+    layout="taylor_layout",
+    templates=("clocks", "taylor_singular", "taylor_step", "taylor_contacts", "taylor_lanes"),
+    sizes=(
+        "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW", "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
+        "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "NSTEPPED", "NSERIES", "NCLOCKS",
+    ),
+    flags=("PROBED", "TANGENT"),
+    tables=MappingProxyType(
+        dict.fromkeys(
+            (
+                "STEP_ROW", "SERIES_ROW", "GUARD_ROW", "GUARD_SERIES", "SNAP_STATE", "SNAP_CONST", "SINGULAR_GUARD", "CLOCK_KIND",
+                "CLOCK_TABLE",
+            ),
+            WHOLE,
+        )
+        | {"GUARD_SIGN": REAL}
+    ),
+    functions=MappingProxyType(
+        {
+            "constants": (ARRAY, ARRAY, WHOLE),
+            "gaps": (REAL, ARRAY, ARRAY, ARRAY, ARRAY),
+            "turns": (ARRAY, REAL, REAL, WHOLE, WHOLE, ARRAY),
+            "jets": (ARRAY,) * 5,
+            "rates": (ARRAY,) * 5,
+            **_CLOCKS,
+            **_JUMP,
+        }
+    ),
+    truths=("turns",),
+)  # fmt: skip
+
+ODE45 = Interface(
+    entry="propagate",
+    arguments=(*BATCH, _F1),
+    layout="ode45_layout",
+    templates=("clocks", "dormand_prince", "odezero", "ode45"),
+    sizes=("NSTATES", "NGUARDS", "NCONST", "NDRIVE", "NCLOCKS"),
+    flags=("TANGENT", "GAPS_IN_TIME"),
+    tables=MappingProxyType({"CLOCK_KIND": WHOLE, "CLOCK_TABLE": WHOLE}),
+    functions=MappingProxyType(
+        {
+            "prepare": (ARRAY, ARRAY),
+            "drive": (REAL, ARRAY, ARRAY, ARRAY),
+            "field": (REAL,) + (ARRAY,) * 5,
+            "gaps": (REAL,) + (ARRAY,) * 5,
+            "gap_rates": (REAL,) + (ARRAY,) * 6,
+            **_CLOCKS,
+            **_JUMP,
+        }
+    ),
+    truths=(),
+)
+
+#: The test of capture: nothing of it depends on an equation.
+CAPTURE = Interface(
+    entry="capture",
+    arguments=(_F3, _F2, _F3, _I1, _F1, _I1, _I1),
+    layout="",
+    templates=("capture",),
+    sizes=(),
+    flags=(),
+    tables=MappingProxyType({}),
+    functions=MappingProxyType({}),
+    truths=(),
+)

@@ -1,0 +1,174 @@
+"""The compiled flow of one equation, as the engine calls it: at once with sizes that are read as it runs, and made again once it has work.
+
+Three tiers give the same bits, for they are the same operations in the same order:
+
+generic   the templates' machine code serves all equations and is on disk; only the equation is compiled, in a fraction of a second
+shape     sizes and tables are known to the compiler; one for all equations of one shape
+full      the equation too: one piece of code
+
+A flow begins generic. Once it has worked for `STEADY_AFTER` seconds another process makes it again; it is kept on disk, and exchanged
+between two calls. The next process finds it there and begins with it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import threading
+import time
+from collections.abc import Callable
+from contextvars import copy_context
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from saltus.codegen import cache, machine, templates
+from saltus.codegen.building import Order, built
+from saltus.codegen.head import Constant, Head
+from saltus.codegen.interface import Interface
+from saltus.codegen.lane_ir import constants_ir, equation_ir
+
+GENERIC, SHAPE, FULL = TIERS = ("generic", "shape", "full")
+#: What a flow becomes.
+STEADY = FULL
+#: Seconds of work after which a flow is made again: making it costs some three seconds of another processor, and gains a tenth.
+STEADY_AFTER = 2.0
+#: Constants that the generic code knows too: loops over them are unrolled.
+_BAKED = ("ORDER", "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "HORNER", "FINER", "SHORTEST")
+_DTYPES = {"float64": np.dtype(np.float64), "int64": np.dtype(np.int64)}
+
+
+class Call:
+    """The arguments of a compiled function as one block of numbers: of each array where it lies, its shape and its strides."""
+
+    def __init__(self, arguments: tuple[str, ...]) -> None:
+        self._kinds = [(None if kind == "int64" else _DTYPES[kind.partition("[")[0]], kind.count(",") + 1) for kind in arguments]
+
+    def block(self, values: tuple) -> np.ndarray:
+        """The arguments as the function reads them. int64[m].
+
+        Raises
+        ------
+        TypeError
+            If an array isn't of its type, or isn't contiguous.
+        """
+        numbers: list[int] = []
+        for value, (dtype, dimensions) in zip(values, self._kinds, strict=True):
+            if dtype is None:
+                numbers.append(int(value))
+            elif value.dtype != dtype or value.ndim != dimensions or not value.flags.c_contiguous:
+                raise TypeError(f"a kernel takes a contiguous array of {dtype} with {dimensions} axes, not of {value.dtype} {value.shape}.")
+            else:
+                numbers += (0, 0, value.size, 8, value.ctypes.data, *value.shape, *value.strides)
+        return np.array(numbers, np.int64)
+
+
+class Kernels:
+    """The compiled flow of one equation.
+
+    Parameters
+    ----------
+    interface : Interface
+        What the templates leave open.
+    template : str
+        Name of their bitcode.
+    head : Head
+        What the equation supplies.
+    title : str
+        What `saltus cache` shows for it.
+    what : str
+        What is said to be compiled, if that takes long.
+
+    Raises
+    ------
+    CacheError
+        If it can't be compiled here.
+    """
+
+    def __init__(self, interface: Interface, template: str, head: Head, title: str, what: str) -> None:
+        self.interface, self.template, self.title, self.what = interface, template, title, what
+        self._layout = layout_of(interface, head.constants)
+        self._constants = _open_constants(interface, head.constants, self._layout)
+        self._functions = head.functions
+        self._lanes = int(head.constants.get("LANES", 1))  # type: ignore[arg-type]
+        self._call = Call(interface.arguments)
+        self._worked, self._asked = 0.0, threading.Lock()
+        self._kept: list[machine.Loaded] = []  # what has been called once may be running
+        self.tier = ""
+        order = self._order(STEADY)
+        found = cache.read(order.key)
+        self._begin(STEADY, [found]) if found is not None else self.exchange(GENERIC)
+
+    def __getattr__(self, name: str) -> Any:
+        """What the layout says: CARRY, STEP_RECORDS, workspace()."""
+        try:
+            return self.__dict__["_layout"][name]
+        except KeyError:
+            raise AttributeError(f"{type(self).__name__} has no {name!r}") from None
+
+    def propagate(self, *values: Any) -> int:
+        """Call the kernel; kernels/batch.py says what its arrays are. Other threads go on meanwhile."""
+        block = self._call.block(values)
+        begun = time.perf_counter()
+        answer = int(self._entry(block.ctypes.data))
+        self._worked += time.perf_counter() - begun
+        if self._worked > STEADY_AFTER and self.tier != STEADY and self._asked.acquire(blocking=False):
+            threading.Thread(target=copy_context().run, args=(self._settle,), name=f"kernels: {self.title}", daemon=True).start()
+        return answer
+
+    def exchange(self, tier: str) -> None:
+        """Go on with another tier, made here if it isn't on disk. The next call uses it; a call under way ends as it began."""
+        self._begin(tier, [built(order) for order in self._orders(tier)])
+
+    def _settle(self) -> None:
+        """What goes wrong here costs speed, no result."""
+        with contextlib.suppress(Exception):
+            self.exchange(STEADY)
+
+    def _begin(self, tier: str, objects: list[bytes]) -> None:
+        loaded = machine.loaded(objects, f"saltus_{self.interface.entry}")
+        self._kept.append(loaded)
+        self._entry: Callable[[int], int] = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(loaded.address)
+        self.tier = tier
+
+    def _orders(self, tier: str) -> list[Order]:
+        """The objects that a tier is made of."""
+        return [self._order(tier)] if tier == FULL else [self._order(tier), self._equation()]
+
+    def _order(self, tier: str) -> Order:
+        entry = f"saltus_{self.interface.entry}"
+        baked = {name: value for name, value in self._constants.items() if name in _BAKED}
+        texts = [constants_ir(baked if tier == GENERIC else self._constants, self.interface)]
+        if tier == FULL:
+            texts.append(self._equation_text)
+        title = f"{self.title if tier == FULL else self.template}, {tier}"
+        return Order(self.template, tuple(texts), (entry,), title, self._said(tier))
+
+    def _said(self, tier: str) -> str:
+        return "what all equations share, for this processor: once" if tier == GENERIC else ""
+
+    def _equation(self) -> Order:
+        """The equation alone, with the sizes and tables that generic code reads."""
+        rest = {name: value for name, value in self._constants.items() if name not in _BAKED}
+        called = tuple(f"saltus_{name}" for name in (*self.interface.functions, *rest))
+        texts = (constants_ir(rest, self.interface), self._equation_text)
+        return Order("", texts, called, self.title, f"{self.what}: once for each new equation")
+
+    @cached_property
+    def _equation_text(self) -> str:
+        return equation_ir(self._functions, self._constants, self.interface, self._lanes)
+
+
+def layout_of(interface: Interface, constants: dict[str, Constant]) -> dict[str, Any]:
+    """The names of a layout for the sizes of a head."""
+    space: dict[str, Any] = dict(constants)
+    if interface.layout:
+        exec(templates.layout_code(interface.layout), space)
+    return space
+
+
+def _open_constants(interface: Interface, constants: dict[str, Constant], layout: dict[str, Any]) -> dict[str, Constant]:
+    """Everything that the templates read: sizes, flags, tables, and what the layout works out from them."""
+    names = [*interface.sizes, *interface.flags, *interface.tables]
+    return {name: constants[name] for name in names} | {name: layout[name] for name in templates.open_names_of(interface)}

@@ -1,0 +1,86 @@
+"""One module of the templates as bitcode: made smaller by what doesn't depend on sizes or on the processor, with names for people."""
+
+from __future__ import annotations
+
+import re
+
+import llvmlite.binding as llvm
+
+#: Inner functions that are called at contacts and ends of periods only: inlining them would cost time of compiling, and gain none.
+RARE = {"attend", "overflowed", "record", "change_side", "land_all", "end_stretch"}
+_MANGLED = re.compile(r"_ZN8template(\d+)(\w+)")
+
+
+def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) -> bytes:
+    """The bitcode of a module with one function to be called, ``i64 symbol(ptr values)``.
+
+    Parameters
+    ----------
+    module : ModuleRef
+        From :func:`saltus.codegen.lowering.frontend.module_of`.
+    entry : str
+        Its function that is to be called.
+    symbol : str
+        Name that this function gets. Its arguments are read one after the other from the memory that it is given.
+    inlined : set of str
+        Functions that are to be inlined, by the names that they have in the templates.
+    """
+    names = _names(module, symbol)
+    text = str(module).replace("alwaysinline", "nounwind")  # Numba hands it down from callers to callees; kernels raise nothing
+    text = re.sub(r'@("[^"]+"|[\w.$]+)', lambda name: f"@{names.get(name[1].strip(chr(34)), name[1])}", text)
+    clean = llvm.parse_assembly(text + _caller(module.get_function(entry), symbol, names[entry]))
+    for function in clean.functions:
+        if not function.is_declaration:
+            function.linkage = "external" if function.name == symbol else "internal"
+            if _own_name(function.name) in inlined - RARE | {"numba"}:
+                function.add_function_attribute("alwaysinline")
+    clean.verify()
+    _shrink(clean)
+    clean.name = symbol
+    return clean.as_bitcode()
+
+
+def _own_name(name: str) -> str:
+    return name.split(".")[1] if "." in name else name
+
+
+def _names(module: llvm.ModuleRef, symbol: str) -> dict[str, str]:
+    """What the functions of a module are called from now on: their name in the templates, and a number."""
+    names = {}
+    for i, function in enumerate(module.functions):
+        if not function.is_declaration:
+            own = _MANGLED.match(function.name)
+            names[function.name] = f"{symbol}.{own[2][: int(own[1])]}.{i}" if own else f"{symbol}.numba.{i}"
+    return names
+
+
+def _caller(function: llvm.ValueRef, symbol: str, name: str) -> str:
+    """``i64 symbol(ptr values)``: calls a function of Numba's with arguments that stand one after the other in memory; -1 if it fails."""
+    kinds = [str(argument.type) for argument in function.arguments][2:]  # its result, an exception, and its arguments
+    lines = ["%result = alloca i64", "%raised = alloca ptr"]
+    for i, kind in enumerate(kinds):
+        lines += [f"%p{i} = getelementptr i64, ptr %values, i64 {i}", f"%a{i} = load {kind}, ptr %p{i}"]
+    given = "".join(f", {kind} %a{i}" for i, kind in enumerate(kinds))
+    lines += [
+        f"%code = call i32 @{name}(ptr %result, ptr %raised{given})",
+        "%value = load i64, ptr %result",
+        "%fine = icmp eq i32 %code, 0",
+        "%answer = select i1 %fine, i64 %value, i64 -1",
+        "ret i64 %answer",
+    ]
+    return f"\ndefine i64 @{symbol}(ptr %values) {{\n" + "\n".join(f"  {line}" for line in lines) + "\n}\n"
+
+
+def _shrink(module: llvm.ModuleRef) -> None:
+    """Drop what nobody calls, and simplify what is simple for every size and processor."""
+    llvm.initialize_native_target()
+    machine = llvm.Target.from_triple(module.triple).create_target_machine()
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))
+    passes = llvm.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.add_sroa_pass()
+    passes.add_simplify_cfg_pass()
+    passes.add_instruction_combine_pass()
+    passes.add_simplify_cfg_pass()
+    passes.add_strip_dead_prototype_pass()
+    passes.run(module, builder)

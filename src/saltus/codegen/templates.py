@@ -1,0 +1,118 @@
+"""The templates' bitcode that the package brings: codegen/lowering makes it, once for every equation and every processor."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+import lzma
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from saltus.codegen.interface import CAPTURE, ODE45, TAYLOR, Interface
+from saltus.errors import CacheError
+
+#: Widths of a step of the Taylor flow.
+WIDTHS = (2, 4, 8, 16)
+#: Every bitcode: what it is made of, and lanes.
+BITCODE: dict[str, tuple[Interface, int]] = {
+    **{f"taylor_{lanes}": (TAYLOR, lanes) for lanes in WIDTHS}, "ode45": (ODE45, 1), "capture": (CAPTURE, 1),
+}  # fmt: skip
+#: Kernels that the templates import.
+_SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")
+#: Rises when codegen/lowering makes other bitcode of the same templates.
+LOWERING = 1
+
+
+@cache
+def text(name: str) -> str:
+    """A template, or a kernel that templates import."""
+    source = resources.files("saltus.kernels").joinpath(f"{name}.py").read_text(encoding="utf-8")
+    return source.replace("from __future__ import annotations\n", "\n")
+
+
+def _texts(name: str) -> list[str]:
+    """The texts that a bitcode is made of."""
+    interface, _ = BITCODE[name]
+    return [text(one) for one in (*filter(None, [interface.layout]), *interface.templates, *_SHARED)]
+
+
+def _hash(name: str, texts: list[str]) -> str:
+    interface, lanes = BITCODE[name]
+    return hashlib.sha256("\0".join([*texts, repr(interface), str(lanes), str(LOWERING)]).encode()).hexdigest()
+
+
+@cache
+def source_hash(name: str) -> str:
+    """Hash of all that a bitcode is made of, comments and docstrings left out: what says whether it is still what the templates give."""
+    return _hash(name, [_code_of(one) for one in _texts(name)])
+
+
+@cache
+def text_hash(name: str) -> str:
+    """The same with every character: quick, and what isn't changed at all is current."""
+    return _hash(name, _texts(name))
+
+
+class _WithoutDocstrings(ast.NodeTransformer):
+    def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
+        return None if isinstance(node.value, ast.Constant) else node
+
+
+def _code_of(source: str) -> str:
+    """A Python text without comments, docstrings and its own layout."""
+    return ast.unparse(_WithoutDocstrings().visit(ast.parse(source)))
+
+
+@cache
+def manifest() -> dict[str, Any]:
+    """What is known of the bitcode: hashes of its sources and of itself, and what made it."""
+    return json.loads(resources.files("saltus.kernels").joinpath("bitcode/manifest.json").read_text(encoding="utf-8"))
+
+
+@cache
+def bitcode(name: str) -> bytes:
+    """The bitcode of this name.
+
+    Raises
+    ------
+    CacheError
+        If it is damaged.
+    """
+    data = resources.files("saltus.kernels").joinpath(f"bitcode/{name}.bc.xz").read_bytes()
+    if hashlib.sha256(data).hexdigest() != manifest()["bitcode"][name]["sha256"]:
+        raise CacheError(f"saltus/kernels/bitcode/{name}.bc.xz is damaged: install saltus again.")
+    return lzma.decompress(data)
+
+
+@cache
+def is_current(name: str) -> bool:
+    """Whether a bitcode is what the templates of this installation give."""
+    known = manifest()["bitcode"][name]
+    return known["texts"] == text_hash(name) or known["sources"] == source_hash(name)
+
+
+def identity(name: str) -> str:
+    """What a bitcode is called in the names of what is made of it."""
+    return str(manifest()["bitcode"][name]["sha256"]) if is_current(name) else source_hash(name)
+
+
+@cache
+def open_names_of(interface: Interface) -> tuple[str, ...]:
+    """The names of a layout whose values depend on what is open, in the order in which they are computed."""
+    if not interface.layout:
+        return ()
+    unknown, found = {*interface.sizes, *interface.flags, *interface.tables}, list[str]()
+    for node in ast.parse(text(interface.layout)).body:
+        if isinstance(node, ast.Assign) and unknown & {name.id for name in ast.walk(node.value) if isinstance(name, ast.Name)}:
+            names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+            found += names
+            unknown |= set(names)
+    return tuple(found)
+
+
+@cache
+def layout_code(name: str) -> Any:
+    """A layout, compiled as Python: it says what the work arrays hold for the sizes of a head."""
+    return compile(ast.parse(text(name)), f"<saltus.kernels.{name}>", "exec")
