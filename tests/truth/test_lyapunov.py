@@ -290,7 +290,7 @@ def test_other_motions_of_the_lorenz_system():
 
 
 def test_lorenz_at_rho_20_has_two_equilibria_and_nothing_else():
-    starts = np.array([(1.0, 1.0, 20.0), (-1.0, -1.0, 20.0)]) + 0.1 * drawn(2, 3)
+    starts = np.array([(1.0, 1.0, 20.0), (-1.0, -1.0, 20.0)])  # mirror images, and so are the places that they lead to
     ds = sl.attractors(butterfly.with_values(rho=20.0), starts, method=sl.Taylor(order=12, lanes=2), every=0.75)
     assert ds["attractor_type"].values.tolist() == ["equilibrium"] * 2
     across = math.sqrt(8 / 3 * 19)
