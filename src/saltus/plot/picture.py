@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.cbook import is_math_text
 from matplotlib.mathtext import MathTextParser
 from matplotlib.text import Text
@@ -30,12 +31,17 @@ def picture(function: Callable[P, R]) -> Callable[P, R]:
     def drawn(*args: P.args, **kwargs: P.kwargs) -> R:
         result = ask(*args, **kwargs)
         for one in np.ravel(np.asarray(result, dtype=object)):
-            for text in one.findobj(Text):
-                if drawable(text.get_text()) != text.get_text():
-                    text.set_text(drawable(text.get_text()))
+            keep_drawable(one)
         return result
 
     return drawn
+
+
+def keep_drawable(artist: Artist) -> None:
+    """Have every text of a Figure or Axes drawn as it is written if Matplotlib can't read the formulas in it."""
+    for text in artist.findobj(Text):
+        if isinstance(text, Text) and drawable(text.get_text()) != text.get_text():
+            text.set_text(drawable(text.get_text()))
 
 
 @functools.lru_cache(maxsize=256)

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from saltus.analysis.noisy import NARROW, NOISY, ROOM, Noisy, apart, blurred
 from saltus.analysis.orbits import polish
 from saltus.analysis.recurrence import find
 from saltus.analysis.serial import found_data, found_from
-from saltus.analysis.settling import OPEN, complete, settle
+from saltus.analysis.settling import OPEN, Settling, complete, settle
 from saltus.flow.maps import FunctionMap
 
 WIDE = np.array([1.0])
@@ -196,6 +197,16 @@ def test_orbits_beside_a_noisy_one_become_it(cycle):
     assert [found.index(one) for one in (far, cycle, found.wandering[0])] == [0, 1, 1]
     found.add_wandering(noisy_cycle(cycle))
     assert len(found.wandering) == 1
+
+
+def test_cells_that_have_a_label_keep_their_attractor_when_it_turns_out_to_be_noisy(cycle):
+    far = replace(cycle, points=cycle.points + 9.0)
+    before = Found(Neighbourhoods.none(2), [cycle, far])
+    result = Settling.empty(4, 2)
+    result.label[:], result.end[:] = [0, 1, OPEN, OPEN], [[0, 0], [0, 0], *starts(2, 2)]
+    after = complete(henon(1e-3), result, before, SCALE, 256, 1)
+    assert after.orbits == [far]
+    assert result.label.tolist() == [1, 0, 1, 1]
 
 
 def test_errors_that_carry_the_motion_too_far_leave_it_without_a_type():

@@ -2,10 +2,12 @@
 
 import io
 
+import matplotlib.pyplot as plt
 import pytest
 from matplotlib.text import Text
 
 from saltus import plot
+from saltus.study.kept import save_picture
 
 from .conftest import rig_run
 from .responses_data import resonance
@@ -32,3 +34,10 @@ def test_a_unit_can_not_spoil_a_picture():
     run["x"].attrs["units"] = "$m^$"
     texts(plot.history(run))
     texts(plot.phase(run))
+
+
+def test_a_title_of_a_study_is_drawn_as_it_is_written(tmp_path):
+    figure, axes = plt.subplots()
+    axes.set_title("from $^$ on")
+    save_picture(figure, tmp_path / "map.png")
+    assert axes.get_title() == r"from \$^\$ on"
