@@ -28,9 +28,10 @@ from statistics import median
 HERE = Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parent.parent))
 
-#: (title, states, what is compiled, heyoka too): names of functions below.
+#: Title and states of each row, by its name.
 ROWS = {
-    "rig": ("rig, two stops", 2), "gear_pair": ("gear pair", 2), "wing": ("wing with freeplay", 4), "chain": ("two masses, two clearances", 4),
+    "rig": ("rig, two stops", 2), "gear_pair": ("gear pair", 2), "wing": ("wing with freeplay", 4),
+    "chain": ("two masses, two clearances", 4),
     "masses_4": ("4 masses, 2 stops", 8), "masses_8": ("8 masses, 2 stops", 16), "masses_16": ("16 masses, 2 stops", 32),
     "rig_tangent": ("rig and its tangent", 6), "chain_tangent": ("two masses and their tangent", 20),
     "masses_4_tangent": ("4 masses and their tangent", 72), "masses_8_tangent": ("8 masses and their tangent", 272),
@@ -38,7 +39,7 @@ ROWS = {
 }  # fmt: skip
 
 
-def row_of_masses(masses: int, stops: int):  # noqa: ANN201  (a System; saltus isn't imported yet)
+def row_of_masses(masses: int, stops: int):
     """Masses in a row between springs, the first ones with a stop."""
     import saltus as sl
 
@@ -150,6 +151,7 @@ def measured_keeping(name: str, cache: Path) -> tuple[float, float]:
 def table(repeats: int, folder: Path | None) -> None:
     """Print both tables, and keep them in a folder if there is one."""
     from benchmarks.record import Column, Record, Table
+
     from saltus.study.doctor import processor
 
     columns = (

@@ -11,9 +11,9 @@ import math
 import struct
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib import resources
 from typing import NamedTuple
 
+from saltus.codegen import templates
 from saltus.codegen.blocks import Line, in_blocks
 from saltus.codegen.interface import ARRAY, REAL, WHOLE, Interface
 
@@ -376,7 +376,7 @@ def _function(tree: ast.FunctionDef, signature: _Signature, lanes: int, constant
 @cache
 def _trigonometry(lanes: int) -> tuple[str, frozenset[str]]:
     """sincos, turned and two_product of kernels/trigonometry.py, and what they declare."""
-    tree = ast.parse(resources.files("saltus.kernels").joinpath("trigonometry.py").read_text())
+    tree = templates.tree_of(templates.text("trigonometry"))
     numbers = _numbers_of(tree)
     vector, declared = f"<{lanes} x double>", set[str]()
     pair, doubles = f"{{ {vector}, {vector} }}", "{ double, double }"
@@ -423,7 +423,7 @@ def equation_ir(functions: str, constants: Mapping[str, int | float | bool | tup
     known = {name: Value(INTEGER, str(int(v))) for name, v in constants.items() if isinstance(v, int)}
     needed = set(declared)
     texts = []
-    for node in ast.parse(functions).body:
+    for node in templates.tree_of(functions).body:
         assert isinstance(node, ast.FunctionDef)
         result = "i64" if node.name in interface.truths else "void"
         attributes = "nounwind alignstack(64)" if node.name in ("jets", "rates") else "nounwind"
