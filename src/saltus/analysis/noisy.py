@@ -92,8 +92,8 @@ def apart(trails: np.ndarray, points: np.ndarray, size: np.ndarray) -> np.ndarra
 def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
     """What errors of a map make of an orbit of the exact one: scatter about it; None if the motion leaves it.
 
-    The map is started on each point of the orbit and watched for TRAIL iterates. So the scatter is a property of map and orbit: it doesn't
-    depend on the starts from which the orbit was found.
+    The map is started on each point of the orbit and watched for TRAIL iterates. So the scatter is a property of map and orbit: the
+    starts from which the orbit was found change it by what the orbit's last bits do, some per cent.
 
     Parameters
     ----------

@@ -128,8 +128,8 @@ def test_the_file_of_a_job_s_function_is_part_of_its_identity(tmp_path):
 
 
 # -- what a result depends on ----------------------------------------------------------------------------------------------------
-#: Packages that take no part in numbers: messages, the end of work, and pictures of what was computed.
-NO_NUMBERS = ("errors", "interrupt", "plot")
+#: Packages that take no part in numbers: messages, what kinds arguments may be of, the end of work, and pictures of what was computed.
+NO_NUMBERS = ("errors", "arguments", "interrupt", "plot")
 
 
 def sources(place):
