@@ -23,7 +23,7 @@ BITCODE: dict[str, tuple[Interface, int]] = {
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")
 #: Rises when codegen/lowering makes other bitcode of the same templates.
-LOWERING = 1
+LOWERING = 2
 
 
 @cache
