@@ -1,0 +1,130 @@
+"""A flow is the same to the bit however it was compiled: at once, with its sizes known, all in one piece, for an older processor."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from conformance.systems import lab, latch, pair, slider, walls
+from saltus.codegen.kernels import FULL, GENERIC, SHAPE, TIERS, Kernels
+from saltus.codegen.module import jit_disabled
+from saltus.flow import engine
+from saltus.kernels import status as st
+from saltus.system.tangent import tangent_system
+
+pytestmark = pytest.mark.skipif(jit_disabled(), reason="nothing is compiled with the JIT off")
+TAYLOR = sl.Taylor(lanes=2)
+#: (system, spread of the starts, method): contacts, grazes, jumps of a threshold, sliding, a saltating tangent.
+CASES = {
+    "stop": (lab.with_values(spring=1.0, damping=0.1, stiffness=50.0, force=2.0, frequency=0.3, boundary=0.3), 1.0, TAYLOR),
+    "walls": (walls.with_values(moving_stiffness=30.0, stiffness=5.0, ceiling_stiffness=3.0), 1.0, TAYLOR),
+    "latch": (latch.with_values(gain=0.4), 2.0, TAYLOR),
+    "slides": (slider.with_values(force=2.0), 2.0, TAYLOR),
+    "tangent": (tangent_system(pair.with_values(lift=0.5, spring=1.0, stiffness1=40.0, stiffness2=30.0, stiffness=20.0)), 1.0, TAYLOR),
+    "ode45": (walls.with_values(moving_stiffness=30.0, stiffness=5.0, ceiling_stiffness=3.0), 1.0, sl.ODE45(1e-5, 1e-8)),
+}
+
+
+def request(system, spread, periods=8, count=24):
+    rng = np.random.default_rng(7)
+    start = rng.uniform(-spread, spread, (count, len(system.states)))
+    start[:4, 0] = [0.0, 0.3, -0.0, 1.0]
+    schedule = engine.Schedule(np.repeat(np.arange(periods), 2), np.tile([0.0, 0.3], periods))
+    period = np.full(count, system.period() or 1.0)
+    values = np.array([list(system.values.values())])
+    return engine.Request(start, values, period, 0.0, np.full(count, periods), 0.3 * period, schedule, 0)
+
+
+def bits(outcome):
+    """Everything that came out, as text."""
+    names = ("state", "time", "status", "mode", "counters", "minima", "samples", "sample_mode", "record_integers", "record_floats")
+    return {name: hashlib.sha256(np.ascontiguousarray(getattr(outcome, name)).tobytes()).hexdigest() for name in names}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_all_tiers_give_the_same_bits(case):
+    system, spread, method = CASES[case]
+    flow = method.kernels(system)
+    found = {}
+    for tier in TIERS:
+        flow.exchange(tier)
+        assert flow.tier == tier
+        outcome = engine.run(system, method, request(system, spread), threads=1)
+        found[tier] = bits(outcome)
+    assert found[SHAPE] == found[GENERIC]
+    assert found[FULL] == found[GENERIC]
+    if case not in ("slides", "latch"):
+        assert len(outcome.record_integers) > 20
+    if case == "slides":
+        assert st.SLIDING in outcome.status
+
+
+def test_an_exchange_between_two_calls_changes_nothing(monkeypatch):
+    """The chunk is worked off in small slices, and another tier takes over after every one."""
+    system, spread, method = CASES["walls"]
+    flow = method.kernels(system)
+    flow.exchange(GENERIC)
+    whole = bits(engine.run(system, method, request(system, spread), threads=1))
+    called = []
+    plain = Kernels.propagate
+
+    def exchanging(self, *values):
+        called.append(self.tier)
+        answer = plain(self, *values)
+        self.exchange(TIERS[len(called) % 3])
+        return answer
+
+    monkeypatch.setattr(Kernels, "propagate", exchanging)
+    monkeypatch.setattr(engine, "slice_of", lambda states: 40)
+    assert bits(engine.run(system, method, request(system, spread), threads=1)) == whole
+    assert set(called) == set(TIERS)
+
+
+def test_a_flow_that_has_worked_becomes_steady_by_itself(monkeypatch):
+    from saltus.codegen import kernels
+
+    monkeypatch.setattr(kernels, "STEADY_AFTER", 0.0)
+    system, spread, method = CASES["stop"]
+    flow = method.kernels(system)
+    flow.exchange(GENERIC)
+    monkeypatch.setattr(flow, "_asked", threading.Lock())
+    before = bits(engine.run(system, method, request(system, spread), threads=1))
+    end = time.monotonic() + 300
+    while flow.tier != kernels.STEADY:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert bits(engine.run(system, method, request(system, spread), threads=1)) == before
+
+
+ELSEWHERE = """
+import json, sys
+sys.path[:0] = {path!r}
+from conformance import test_tiers as t
+system, spread, _ = t.CASES["walls"]
+print(json.dumps(t.bits(t.engine.run(system, t.sl.Taylor(lanes={lanes}), t.request(system, spread), threads=1))))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="these are processors of one family")
+@pytest.mark.parametrize(("processor", "lanes"), [("x86-64-v3", 8), ("x86-64-v3", 4), ("x86-64-v2", 2)])
+def test_an_older_processor_gives_the_same_bits(processor, lanes):
+    """With eight lanes in four registers, with four; without fused multiply-add, which the C library then does."""
+    import json
+
+    system, spread, _ = CASES["walls"]
+    here = bits(engine.run(system, TAYLOR, request(system, spread), threads=1))
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "SALTUS_PROCESSOR": processor}
+    tests = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    command = [sys.executable, "-c", ELSEWHERE.format(path=[tests], lanes=lanes)]
+    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    assert json.loads(said.splitlines()[-1]) == here
