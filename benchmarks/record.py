@@ -15,7 +15,7 @@ from saltus.codegen.module import lane_width
 from saltus.study.doctor import processor
 
 #: Packages whose versions matter to a measurement.
-PACKAGES = ("saltus", "numpy", "numba", "scipy", "heyoka", "pynamicalsys")
+PACKAGES = ("saltus", "numpy", "llvmlite", "numba", "scipy", "heyoka", "pynamicalsys")
 
 
 @dataclass(frozen=True)

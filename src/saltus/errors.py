@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import reprlib
+import unicodedata
 from collections.abc import Iterable
 from typing import Any
 
@@ -94,5 +95,10 @@ def among(value: object, words: Iterable[str]) -> bool:
 def nearest(name: object, known: Iterable[str]) -> str:
     """A sentence that offers the nearest known name, or lists all of them."""
     known = list(known)
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5) if isinstance(name, str) else []
+    if not isinstance(name, str):
+        return f"Known: {', '.join(sorted(known))}."
+    alike = unicodedata.normalize("NFKC", name)
+    if alike != name and alike in known:
+        return f"Write {alike!r} ({alike!a}), which is how Python reads {name!r} ({name!a}) in the function: they only look alike."
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     return f"Did you mean {close[0]!r}?" if close else f"Known: {', '.join(sorted(known))}."

@@ -31,6 +31,11 @@ class Stop:
         """Whether it was asked for."""
         return self._asked.is_set() or (self._outer is not None and self._outer.is_set())
 
+    @property
+    def inside(self) -> bool:
+        """Whether the work is part of other work, which Ctrl-C asks to stop and doesn't interrupt."""
+        return self._outer is not None
+
     def hold(self) -> None:
         """Let all that this thread's context calls from now on ask this request (see :func:`check_stop`)."""
         _CURRENT.set(self)

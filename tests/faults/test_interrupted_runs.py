@@ -13,6 +13,7 @@ import saltus as sl
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
+from saltus.interrupt import Stop, check_stop
 
 START = {"x": np.linspace(-4e-3, 4e-3, 24), "v": np.linspace(-0.5, 0.5, 24)}
 
@@ -35,8 +36,8 @@ def ctrl_c():
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.parametrize(("threads", "chunk"), [(1, 8), (2, 8), (2, 24)])
-def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, chunk, monkeypatch):
+@pytest.mark.parametrize(("threads", "chunk", "progress"), [(1, 8, None), (2, 8, None), (2, 24, None), (2, 24, False)])
+def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, chunk, progress, monkeypatch):
     """Pressed while a table of contacts is put away, and again and again while the run ends."""
     rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
     monkeypatch.setattr(engine, "CHUNK", chunk)
@@ -51,7 +52,7 @@ def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, chun
 
     monkeypatch.setattr(engine, "_cut", interrupting)
     with pytest.raises(sl.Interrupted) as stopped:
-        sl.simulate(rig, START, periods=60, threads=threads)
+        sl.simulate(rig, START, periods=60, threads=threads, progress=progress)
     part = stopped.value.partial
     assert 0 < part.sizes["contact"] < whole.sizes["contact"]
     for row in range(len(START["x"])):
@@ -108,3 +109,61 @@ def test_a_frequency_response_hands_out_what_it_has():
     with pytest.raises(sl.Interrupted, match="stopped by Ctrl-C"):
         sl.frequency_response(rig, ("2 Hz", "30 Hz", 4000), periods=2000, progress=lambda share: share > 0 and seen.set())
     presser.join()
+
+
+# -- a single piece is done by the thread that asks ---------------------------------------------------------------------------------
+def test_ctrl_c_waits_for_a_single_piece_and_asks_it_to_stop():
+    seen = []
+
+    def piece(_):
+        assert threading.current_thread() is threading.main_thread()
+        _thread.interrupt_main()
+        seen.extend(stop.is_set() for _ in range(100))
+        return "whole"
+
+    stop = Stop()
+    with pytest.raises(KeyboardInterrupt):
+        on_threads(piece, [1], lambda *_: pytest.fail("it was told to stop"), stop=stop)
+    assert seen[-1]
+    assert len(seen) == 100
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_handler_of_the_caller_s_own_is_left_alone():
+    pressed = []
+
+    def own(*_):
+        pressed.append(threading.current_thread())
+
+    signal.signal(signal.SIGINT, own)
+    done = []
+
+    def piece(_):
+        assert threading.current_thread() is not threading.main_thread()
+        _thread.interrupt_main()
+        time.sleep(0.3)
+        return "whole"
+
+    on_threads(piece, [1], lambda item, result: done.append(result))
+    assert done == ["whole"]
+    assert pressed == [threading.main_thread()]
+    assert signal.getsignal(signal.SIGINT) is own
+
+
+def test_a_piece_within_a_piece_is_stopped_with_it():
+    """Whether in the main thread or in another, and what a piece raises is raised."""
+
+    def inner(_):
+        _thread.interrupt_main()
+        time.sleep(0.05)
+        check_stop()
+        pytest.fail("it went on")
+
+    def outer(_):
+        on_threads(inner, [1], lambda *_: None)
+
+    for pieces in ([1], [1, 2]):
+        with pytest.raises(KeyboardInterrupt):
+            on_threads(outer, pieces, lambda *_: None, threads=2)
+    with pytest.raises(ZeroDivisionError):
+        on_threads(lambda _: 1 / 0, [1], lambda *_: None)

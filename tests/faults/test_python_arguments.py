@@ -41,7 +41,6 @@ def only_arguments(monkeypatch):
     def kernels(*_):
         raise StartedError
 
-    monkeypatch.setattr("saltus.flow.methods.Method.begin_kernels", lambda *_: None)
     monkeypatch.setattr(sl.Taylor, "kernels", kernels)
     monkeypatch.setattr(sl.ODE45, "kernels", kernels)
 

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from saltus.errors import ParameterError
+from saltus.fence import has_control
 from saltus.results import ResultFileError, ending, export, load, save
 from unit.results.conftest import sine_run
 
@@ -93,16 +94,38 @@ def test_reading_that_comes_to_no_end_is_stopped(saved, monkeypatch):
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes are POSIX")
 def test_what_is_no_file_is_told_apart(tmp_path):
     os.mkfifo(tmp_path / "pipe.nc")
-    known = {tmp_path: "it is a folder", tmp_path / "pipe.nc": "a pipe", "/dev/zero": "a device", "a\0.nc": "there is no file"}
+    known = {tmp_path: "it is a folder", tmp_path / "pipe.nc": "a pipe", "/dev/zero": "a device"}
     for path, told in known.items():
         with pytest.raises(ResultFileError, match=told):
             load(path)
-    for call in (lambda: load(5), lambda: save(sine_run(), None)):
+    for call in (lambda: load(5), lambda: load("a\0.nc"), lambda: save(sine_run(), None)):
         with pytest.raises(ParameterError, match="the path of a file"):
             call()
 
 
 def test_a_nul_in_a_text_is_told(tmp_path):
-    with pytest.raises(ParameterError, match="NUL"):
-        save(sine_run().assign_attrs(study="a\0b"), tmp_path / "run.nc")
+    for name in ("run.nc", "run.csv", "run.mat"):
+        with pytest.raises(ParameterError, match="the attribute 'study' holds control characters"):
+            save(sine_run().assign_attrs(study="a\0b"), tmp_path / name)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("where", ["attribute", "attribute of a variable", "text", "turn of the direction"])
+def test_a_file_that_would_write_to_the_terminal_is_refused(tmp_path, where, monkeypatch):
+    """Whole, with all its checksums: the sequence sets the title of a terminal; others rewrite what is seen."""
+    run = sine_run()
+    if where == "attribute":
+        run = run.assign_attrs(source="\x1b]0;owned\x07")
+    elif where == "attribute of a variable":
+        run["x"].attrs["long_name"] = "\x1b[2J"
+    elif where == "text":
+        run = run.assign_coords(guard=["gap\x9b31m"])
+    else:
+        run = run.assign_attrs(source="\u202egpj.exe")
+    with pytest.raises(ParameterError, match="holds control characters"):
+        save(run, tmp_path / "run.nc")
+    monkeypatch.setattr("saltus.results.export.place_of_control", lambda _: "")  # as another program would write it
+    save(run, tmp_path / "run.nc")
+    with pytest.raises(ResultFileError, match="holds control characters, which a terminal would obey") as refused:
+        load(tmp_path / "run.nc")
+    assert not has_control(str(refused.value))

@@ -160,7 +160,7 @@ def test_the_motions_run(name, periods, tmp_path):
 def test_the_responses_run(name, tmp_path):
     """The whole way with few values and short transients. Only that it runs, and that all is written."""
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
-    text = re.sub(r"count = \d+", "count = 4", re.sub(r"periods = \d+", "periods = 40", text))
+    text = re.sub(r"count = \d+", "count = 2", re.sub(r"periods = \d+", "periods = 30", text))
     text = re.sub(r'x = \[("[^"]*"), [^]]*\]', r"x = [\1]", text)
     spec = parse(text)
     outcome = run_study(spec, text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False)

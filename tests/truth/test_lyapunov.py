@@ -289,6 +289,15 @@ def test_other_motions_of_the_lorenz_system():
     assert ds["response_period"].values.tolist() == [0, 0]
 
 
+def test_lorenz_at_rho_20_has_two_equilibria_and_nothing_else():
+    starts = np.array([(1.0, 1.0, 20.0), (-1.0, -1.0, 20.0)])  # mirror images, and so are the places that they lead to
+    ds = sl.attractors(butterfly.with_values(rho=20.0), starts, method=sl.Taylor(order=12, lanes=2), every=0.75)
+    assert ds["attractor_type"].values.tolist() == ["equilibrium"] * 2
+    across = math.sqrt(8 / 3 * 19)
+    places = np.stack([ds[f"attractor_{name}"].values[:, 0] for name in "xyz"], axis=1)
+    assert np.abs(places[np.argsort(places[:, 0])] - [(-across, -across, 19), (across, across, 19)]).max() < 1e-10
+
+
 # -- where the force jumps -----------------------------------------------------------------------------------------------------
 def test_exponents_where_the_force_jumps_against_finite_differences_of_the_flow():
     """The multipliers of the orbit from differences of whole runs, which know no tangent and no saltation."""

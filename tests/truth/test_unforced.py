@@ -50,6 +50,42 @@ def test_a_limit_cycle_has_the_period_size_and_multipliers_of_the_closed_form(ho
     assert np.isnan(turns[:, 2:]).all(), "it turns twice in a cycle"
 
 
+@pytest.mark.parametrize("turns", [1, 2, 67, 108, 115])
+def test_a_cycle_that_was_looked_for_over_many_turns_has_its_smallest_period(turns):
+    family = Family(planar, FAST, np.array([[1.0, 2.0, 1.0]]), 1.0)
+    cycle = find_cycles(family, np.array([[1.0, 1e-3]]), np.array([turns * np.pi]), np.ones((1, 2)))
+    np.testing.assert_allclose(cycle.period, np.pi, rtol=1e-12)
+
+
+def test_the_limit_cycle_of_the_airfoil_closes_in_an_independent_solver():
+    wing, rest = sl.models.aeroelastic(airspeed="12 m/s"), dict.fromkeys(("plunge", "plunge_rate", "pitch_rate"), 0.0)
+    ds = sl.attractors(wing, rest | {"pitch": "2 deg"}, every="0.25 s", method=FAST)
+    assert ds.attractor_type.values.tolist() == ["limit_cycle"]
+    period, scale = ds.attractor_cycle.item(), np.array([np.ptp(ds[f"attractor_{name}"].values) for name in wing.states])
+    start = np.array([ds[f"attractor_{name}"].values[0, 0] for name in wing.states])
+    gaps = wing.values["pitch_gap"] * np.array([-1.0, 1.0])
+
+    def moved(rtol):
+        """The start after one period, from boundary to boundary: scipy's steps don't know of them."""
+        t, y, met = 0.0, start, 0
+        events = [lambda t, y, gap=gap: y[1] - gap for gap in gaps]
+        for event in events:
+            event.terminal = True
+        while True:
+            part = solve_ivp(wing.rhs, (t, period), y, "DOP853", rtol=rtol, atol=rtol * scale, events=events)
+            t, y = part.t[-1], part.y[:, -1]
+            if part.status == 0:
+                return y, met
+            met, step = met + 1, 1e-7 * period  # off the boundary: field and its first derivatives are bounded there
+            y, t = y + step * np.array(wing.rhs(t + step / 2, y + step / 2 * np.array(wing.rhs(t, y)))), t + step
+
+    (coarse, _), (fine, met) = moved(1e-9), moved(1e-12)
+    error = np.abs((coarse - fine) / scale).max()  # that of the coarse one; the fine one is better
+    assert 0 < error < 1e-6
+    assert np.abs((fine - start) / scale).max() < error
+    assert met == ds.attractor_contacts.item() == 4  # of the cycle, gone through once
+
+
 def test_an_equilibrium_has_the_eigenvalues_of_the_jacobian_and_begins_to_oscillate_where_they_say(hopf):
     ds = hopf[1.0]
     rests = ds.isel(response=ds.response_type.values == "equilibrium")

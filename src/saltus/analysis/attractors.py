@@ -12,6 +12,7 @@ import xarray as xr
 from saltus.analysis import uncertainty
 from saltus.analysis.answers import gap_unit, provenance
 from saltus.analysis.halton import halton
+from saltus.analysis.noisy import stray_attrs
 from saltus.analysis.plan import SCOUTS, memory
 from saltus.analysis.portrait import portraits
 from saltus.analysis.recurrence import find
@@ -50,7 +51,8 @@ def attractors(
     """The attractors that given starts lead to: period, contacts, size, multipliers, margin to the next graze.
 
     A trajectory is followed until it has settled, not for a fixed number of periods. Periodic responses are polished by Newton's method on
-    the stroboscopic map and verified by their Floquet multipliers; what never repeats is typed by its largest Lyapunov exponent.
+    the stroboscopic map and verified by their Floquet multipliers; what never repeats is typed by its largest Lyapunov exponent. Where
+    errors of the method keep a motion from closing (ode45 at a loose tolerance), exact integration says which orbit it scatters about.
 
     Parameters
     ----------
@@ -73,7 +75,8 @@ def attractors(
     -------
     Dataset
         Dim ``attractor``: ``attractor_type``, ``attractor_period`` (the n of nT), ``attractor_contacts``, ``attractor_itinerary``,
-        ``attractor_peak``, ``attractor_rms``, ``attractor_margin``, multipliers, exponent, and its states at whole periods. Dim
+        ``attractor_peak``, ``attractor_rms``, ``attractor_margin``, multipliers, exponent, and its states at whole periods. Of a noisy one
+        these are the exact orbit's, and ``attractor_scatter`` [unit of the first state] says how far from it the points lie. Dim
         ``trajectory``: ``basin``, the attractor of each start (-2: none was established), ``periods_to_settle``.
 
     Raises
@@ -92,7 +95,7 @@ def attractors(
     return attractors_dataset(
         states=system.states, units=system.units, attractors=portraits(map_, found), gap_unit=gap_unit(system),
         basin=np.where(label < 0, UNCONVERGED, label), periods_to_settle=settled,
-        attrs=provenance(system, map_.method, system.values) | {"periods": periods},
+        attrs=provenance(system, map_.method, system.values) | {"periods": periods} | stray_attrs(found.astray),
     )  # fmt: skip
 
 
@@ -156,7 +159,8 @@ def basin_fractions(
         states=system.states, units=system.units, attractors=table, gap_unit=gap_unit(system), basin=result.label,
         periods_to_settle=result.periods, attrs=provenance(system, map_.method, system.values) | {"periods": periods},
     )  # fmt: skip
-    return ds.assign_attrs(smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=samples, seed=seed)
+    strays = stray_attrs(found.astray if (result.label == UNCONVERGED).any() else [])
+    return ds.assign_attrs(**strays, smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=samples, seed=seed)
 
 
 def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, float]]:

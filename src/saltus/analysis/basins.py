@@ -7,8 +7,8 @@ from typing import Any
 
 import xarray as xr
 
+from saltus.analysis.found import Found
 from saltus.analysis.plan import BasinPlan, basin_plan
-from saltus.analysis.recurrence import Found
 from saltus.analysis.settling import Settling
 from saltus.analysis.verb import verb
 from saltus.flow.methods import Method, check_method

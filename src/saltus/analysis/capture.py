@@ -53,7 +53,7 @@ class Neighbourhoods:
         """For trajectories float64[k, n, D]: the attractor that captures each (-1: none), and the index of the point at which it does."""
         label, when = np.full(len(points), -1, np.int64), np.zeros(len(points), np.int64)
         if len(self.centres):
-            capture_module().capture(np.ascontiguousarray(points), self.centres, self.weights, self.owners, self._extents(), label, when)
+            capture_module().propagate(np.ascontiguousarray(points), self.centres, self.weights, self.owners, self._extents(), label, when)
         return label, when
 
     @classmethod
@@ -71,6 +71,11 @@ class Neighbourhoods:
     def renumbered(self, ids: np.ndarray) -> Neighbourhoods:
         """The same, owner i now being ids[i]."""
         return Neighbourhoods(self.centres, self.weights, ids[self.owners])
+
+    def of(self, kept: np.ndarray) -> Neighbourhoods:
+        """Those of the owners int64[m] that are kept, ascending; owner kept[i] now being i."""
+        rows = np.isin(self.owners, kept)
+        return Neighbourhoods(self.centres[rows], self.weights[rows], np.searchsorted(kept, self.owners[rows]))
 
     def _extents(self) -> np.ndarray:
         """Half the extent of each along the first coordinate, float64[m]: sqrt of the corner of (W'W)^-1."""

@@ -14,7 +14,7 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.results.basins import agreement_dataset
 from saltus.results.intervals import wilson
-from saltus.results.schema import BASINS, attractor_name, axes_of, check, states_of
+from saltus.results.schema import BASINS, NOISY, attractor_name, axes_of, check, states_of
 
 #: Largest distance of two orbits that count as one, in units of the axis ranges: far above what methods differ by on one attractor,
 #: below what tells neighbours on the rig apart.
@@ -33,12 +33,12 @@ _NEVER = 1e9
 def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANCE) -> xr.Dataset:
     """Compare two maps of basins on one grid, such as those of two methods.
 
-    Attractors are matched one to one. Only those of equal type and period can be the same, and only within ``tolerance``. Among periodic
-    ones the nearest go together: the distance of two orbits is the largest difference of their stroboscopic points, at the best shift of
-    the phase, in units of the axis ranges. Up to ten times ``tolerance`` apart they can still be the same if their peaks and rms are
-    within it: in a weakly damped response the errors of a method shift the phase. Motions that don't repeat have no points to compare;
-    they can be the same if peak and rms of the first state are within ``tolerance``, and those go together that share the most cells
-    (mirror twins have equal peaks).
+    Attractors are matched one to one. Only those of equal type and period can be the same, and only within ``tolerance``; a noisy one is
+    taken for the periodic orbit about which it scatters. Among periodic ones the nearest go together: the distance of two orbits is the
+    largest difference of their stroboscopic points, at the best shift of the phase, in units of the axis ranges. Up to ten times
+    ``tolerance`` apart they can still be the same if their peaks and rms are within it: in a weakly damped response the errors of a method
+    shift the phase. Motions that don't repeat have no points to compare; they can be the same if peak and rms of the first state are within
+    ``tolerance``, and those go together that share the most cells (mirror twins have equal peaks).
 
     Parameters
     ----------
@@ -146,7 +146,8 @@ def _distances(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
     names, scale, levels = states_of(a), _scales(a, b), _level_distances(a, b)
     result = np.full(levels.shape, np.inf)
     points = [np.stack([ds[attractor_name(name)].values for name in names], axis=-1) / scale for ds in (a, b)]
-    types, periods = ([ds[name].values for ds in (a, b)] for name in ("attractor_type", "attractor_period"))
+    types = [np.where(ds["attractor_type"].values == NOISY, "periodic", ds["attractor_type"].values) for ds in (a, b)]
+    periods = [ds["attractor_period"].values for ds in (a, b)]
     for i, j in np.ndindex(*levels.shape):
         n = int(periods[0][i])
         if types[0][i] != types[1][j] or n != periods[1][j]:

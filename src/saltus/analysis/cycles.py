@@ -31,8 +31,8 @@ SAMPLED = 1e-6
 LOCATED, MOST_STEPS, CONVERGED = 3, 15, 1e-12
 #: Farthest that a cycle found lies from where it was looked for, in units of the scale.
 FARTHEST = 1.0
-#: Largest part of a period that is tried for a shorter one.
-MOST_PARTS = 64
+#: Most turns of a cycle that may have been taken for one: a return is seen in SAMPLES samples, of which a turn has 20 where they follow it.
+MOST_PARTS = SAMPLES // 16
 #: Points in equal steps of time that a cycle is known by: as many as the longest orbit of a stroboscope has.
 POINTS = 64
 #: Range of the motion, in units of the scale, below which it is no cycle but rest.

@@ -6,6 +6,7 @@ Newton on P^n(x) - x = 0 with the derivative from the tangent flow; Parker & Chu
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +61,12 @@ class Orbit:
     def stable(self) -> bool:
         """Whether all multipliers lie inside the unit circle, by more than rounding."""
         return bool(np.abs(self.multipliers[0]) < 1.0 - MARGINAL)
+
+    @property
+    def exponent(self) -> float:
+        """Largest Lyapunov exponent [per iterate]."""
+        largest = abs(self.multipliers[0])
+        return math.log(largest) / self.period if largest > 0 else -math.inf
 
 
 def polish(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:

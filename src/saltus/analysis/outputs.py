@@ -10,6 +10,7 @@ from saltus.errors import ParameterError, UnitError, shown
 from saltus.system.dimensions import units_of
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
+from saltus.system.names import why_no_title
 from saltus.system.quantity import quantity
 from saltus.system.system import System
 from saltus.units import check_declared, dimension
@@ -62,8 +63,9 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
         )
     extended, formulas, units = system, [], [system.units[name] for name in system.states]
     for name, one in (given or {}).items():
-        if not isinstance(name, str) or not name or name in system.states:
-            raise ParameterError(f"an output can't be called {shown(name)}: give a text that isn't a state of {system.name}.")
+        if why_no_title(name) or name in system.states:
+            why = why_no_title(name) or f"{system.name} has a state of this name"
+            raise ParameterError(f"an output can't be called {shown(name)}: {why}.")
         function, unit = one if isinstance(one, tuple) and len(one) == 2 else (one, "")
         formula, guards = quantity(extended, function, f"the output {shown(name)}")
         extended = replace(extended, guards=guards)

@@ -16,9 +16,11 @@ import xarray as xr
 from saltus.analysis import uncertainty
 from saltus.analysis.along import along
 from saltus.analysis.answers import gap_unit, provenance
+from saltus.analysis.found import Found
 from saltus.analysis.halton import halton
+from saltus.analysis.noisy import stray_attrs
 from saltus.analysis.portrait import portraits
-from saltus.analysis.recurrence import Found, find
+from saltus.analysis.recurrence import find
 from saltus.analysis.settling import OPEN, UNCONVERGED, Settling, complete, settle
 from saltus.analysis.starts import check_system, fill, fixed_states
 from saltus.errors import ParameterError
@@ -142,7 +144,8 @@ class BasinPlan:
             grazes_unresolved=result.unresolved.reshape(self.shape), attractors=table,
             gap_unit=gap_unit(self.system), attrs=self.attrs(),
         )  # fmt: skip
-        return ds.assign_attrs(uncertainty.measure(ds), flip_rate=np.nan, flip_checked=0)
+        strays = found.astray if (labels == UNCONVERGED).any() else []
+        return ds.assign_attrs(uncertainty.measure(ds), **stray_attrs(strays), flip_rate=np.nan, flip_checked=0)
 
     def attrs(self) -> dict[str, Any]:
         """Provenance."""

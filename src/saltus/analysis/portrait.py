@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from saltus.analysis.equilibria import autonomous, find_equilibria
+from saltus.analysis.found import Found
 from saltus.analysis.limit_cycles import LIMIT_CYCLE, cycle_of
+from saltus.analysis.noisy import Noisy
 from saltus.analysis.orbit_measures import Measures, measure, unknown
-from saltus.analysis.orbits import Orbit
-from saltus.analysis.recurrence import Found
 from saltus.analysis.unforced import rest
+from saltus.analysis.wandering import Wandering
 from saltus.flow.maps import Map, Stroboscope
 from saltus.results import AttractorTable
 
@@ -34,11 +33,16 @@ def portraits(map_: Map, found: Found) -> AttractorTable:
     if isinstance(map_, Stroboscope) and autonomous(map_.system):
         return _unforced(map_, found)
     size, per_second = len(map_.states), 1.0 / map_.period
-    period = np.array([*(orbit.period for orbit in found.orbits), *(0 for _ in found.wandering)], np.int64)
-    start = np.array([*(orbit.points[0] for orbit in found.orbits), *(one.points[-1] for one in found.wandering)]).reshape(-1, size)
+    orbits = [*found.orbits, *(one.orbit if isinstance(one, Noisy) else None for one in found.wandering)]
+    period = np.array([0 if orbit is None else orbit.period for orbit in orbits], np.int64)
+    start = np.array([*(orbit.points[0] for orbit in found.orbits), *map(_first, found.wandering)]).reshape(-1, size)
     points = [*(orbit.points for orbit in found.orbits), *(one.points[:WANDERED] for one in found.wandering)]
-    numbers = _numbers(map_, start, period, points)
     nothing = np.full(size, np.nan + 0j)
+    numbers = _numbers(map_, start, period, points)
+    scatter = np.array([one.scatter[0] if isinstance(one, Noisy) else np.nan for one in (*found.orbits, *found.wandering)])
+    noisy = np.flatnonzero(np.isfinite(scatter))
+    if len(noisy) and map_.exact is not None:
+        numbers.put(noisy, _numbers(map_.exact, start[noisy], period[noisy], [points[i] for i in noisy]))
     return AttractorTable(
         kind=[*("periodic" for _ in found.orbits), *(one.kind for one in found.wandering)],
         period=period,
@@ -47,11 +51,17 @@ def portraits(map_: Map, found: Found) -> AttractorTable:
         peak=numbers.peak[:, 0],
         rms=numbers.rms[:, 0],
         margin=numbers.margin,
-        multipliers=np.array([*(orbit.multipliers for orbit in found.orbits), *(nothing for _ in found.wandering)]).reshape(-1, size),
-        exponent=per_second * np.array([*map(_orbit_exponent, found.orbits), *(one.exponent for one in found.wandering)]),
+        multipliers=np.array([nothing if orbit is None else orbit.multipliers for orbit in orbits]).reshape(-1, size),
+        exponent=per_second * np.array([*(orbit.exponent for orbit in found.orbits), *(one.exponent for one in found.wandering)]),
         exponent_error=per_second * np.array([*(0.0 for _ in found.orbits), *(one.exponent_error for one in found.wandering)]),
         points=points,
+        scatter=scatter if len(noisy) else None,
     )
+
+
+def _first(one: Wandering) -> np.ndarray:
+    """A point on an attractor that is known by where it goes: of one that never repeats its last, when it has settled the most."""
+    return np.asarray(one.points[0] if isinstance(one, Noisy) else one.points[-1])
 
 
 def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
@@ -88,12 +98,6 @@ def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
         cycle=cycle,
         eigenvalues=eigenvalues,
     )
-
-
-def _orbit_exponent(orbit: Orbit) -> float:
-    """Largest Lyapunov exponent per iterate."""
-    largest = abs(orbit.multipliers[0])
-    return math.log(largest) / orbit.period if largest > 0 else -math.inf
 
 
 def _numbers(map_: Map, start: np.ndarray, period: np.ndarray, points: list[np.ndarray]) -> Measures:

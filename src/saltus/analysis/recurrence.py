@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.capture import Neighbourhoods, neighbourhoods
+from saltus.analysis.capture import Neighbourhoods
 from saltus.analysis.equilibria import autonomous
+from saltus.analysis.found import INSIDE, Found, is_about
 from saltus.analysis.limit_cycles import LIMIT_CYCLE, limit_cycles
+from saltus.analysis.noisy import Noisy, Stray, blurred, keep_to, stray_of
 from saltus.analysis.orbits import Orbit, polish, same
 from saltus.analysis.wandering import REPEATS, TRAIL, Wandering, merge, mismatch, survey
 from saltus.flow.maps import Map, Stroboscope, Travel
+from saltus.results.schema import NOISY
 
 #: Longest period looked for [iterates].
 LONGEST = 64
@@ -28,51 +30,6 @@ TRIES = 12
 SURVEYED = 24
 #: Iterates that they are watched, and what their repeats come to, in units of the scale, when they are on an orbit after all.
 WATCHED, ARRIVED = 32 * 1024, 1e-5
-#: Share of a trajectory's points that must lie in an attractor's boxes to belong to it.
-INSIDE = 0.9
-
-
-@dataclass
-class Found:
-    """Attractors of a map, in the order of their ids.
-
-    Attributes
-    ----------
-    near : Neighbourhoods
-        Where the periodic ones capture.
-    orbits : list of Orbit
-        The periodic ones, stable.
-    wandering : list of Wandering
-        Those that never repeat: their ids follow.
-    unstable : list of Orbit
-        Periodic orbits met on the way that don't attract.
-    """
-
-    near: Neighbourhoods
-    orbits: list[Orbit] = field(default_factory=list)
-    wandering: list[Wandering] = field(default_factory=list)
-    unstable: list[Orbit] = field(default_factory=list)
-
-    def __len__(self) -> int:
-        return len(self.orbits) + len(self.wandering)
-
-    def add(self, map_: Map, orbit: Orbit, scale: np.ndarray) -> None:
-        """One more periodic attractor, and where it captures."""
-        self.near = self.near.joined(neighbourhoods(map_, orbit, len(self.orbits), scale))
-        self.orbits.append(orbit)
-
-    def ordered(self, scale: np.ndarray) -> Found:
-        """The same with ids that don't depend on the order of discovery: by period, then by size, then by place."""
-        order = sorted(range(len(self.orbits)), key=lambda i: (self.orbits[i].period, *_rounded(self.orbits[i], scale)))
-        wandering = sorted(self.wandering, key=lambda w: (w.kind, *w.first))
-        near = self.near.renumbered(np.argsort(np.array(order, np.int64)))
-        return Found(near, [self.orbits[i] for i in order], wandering, self.unstable)
-
-
-def _rounded(orbit: Orbit, scale: np.ndarray) -> tuple[float, ...]:
-    """Size and place of an orbit, coarse enough that rounding can't change their order."""
-    sizes = np.sqrt(np.mean((orbit.points / scale) ** 2, axis=0))
-    return tuple(np.round(np.concatenate([sizes, orbit.points[0] / scale]), 7).tolist())
 
 
 def find(
@@ -118,12 +75,17 @@ def find(
     while len(going) and travel.age < most:
         points = travel.advance(ROUND)
         here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
+        here = here[~_keeping(found, NOISY, points[here], going[here], travel.age, owner, settled)]
         while len(here):
-            orbit = _new_orbit(map_, points[here], scale, found)
-            if orbit is None:
+            fresh = _new_orbit(map_, points[here], scale, found, most)
+            if fresh is None:
                 break
-            found.add(map_, orbit, scale)
-            here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
+            if isinstance(fresh, Noisy):
+                found.add_wandering(fresh)
+                here = here[~_keeping(found, NOISY, points[here], going[here], travel.age, owner, settled)]
+            else:
+                found.add(map_, fresh, scale)
+                here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
         if turns and len(here):
             here = here[~_on_cycles(map_, found, points[here], going[here], travel, here, scale, owner, settled)]
         stay = np.zeros(len(going), bool)
@@ -133,17 +95,10 @@ def find(
         if progress:
             progress(max(1.0 - len(going) / len(start), travel.age / most))
     if len(going):
-        _survey(map_, travel, going, scale, found, owner, settled)
+        _survey(map_, travel, going, scale, found, owner, settled, most)
     result = found.ordered(scale)
-    label = np.array([-1 if one is None else _index(result, one) for one in owner], np.int64)
+    label = np.array([-1 if one is None else result.index(one) for one in owner], np.int64)
     return result, label, settled
-
-
-def _index(found: Found, attractor: Orbit | Wandering) -> int:
-    for i, one in enumerate([*found.orbits, *found.wandering]):
-        if one is attractor:
-            return i
-    raise AssertionError("an owner that isn't an attractor")
 
 
 def _captured(found: Found, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray) -> np.ndarray:
@@ -155,7 +110,16 @@ def _captured(found: Found, points: np.ndarray, who: np.ndarray, age: int, owner
     return caught
 
 
-def _new_orbit(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found) -> Orbit | None:
+def _keeping(found: Found, kind: str, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray) -> np.ndarray:
+    """Note which trajectories float64[k, m, D] keep to an attractor of a kind that is known by where it goes, bool[k]."""
+    ones = [one for one in found.wandering if one.kind == kind]
+    on = keep_to(ones, points, INSIDE)
+    for i in np.flatnonzero(on >= 0):
+        owner[who[i]], settled[who[i]] = ones[on[i]], age
+    return on >= 0
+
+
+def _new_orbit(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, most: int) -> Orbit | Noisy | None:
     """An attracting orbit not known yet that one of the trajectories float64[k, ROUND, D] follows, if there is one."""
     period, apart = recurrence(points, scale)
     near = max(NEAR, map_.noise)
@@ -171,13 +135,33 @@ def _new_orbit(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found) -
             break
         seen.append(place)
         orbit = polish(map_, place, int(period[i]), scale)
-        if orbit is None or not _lies_on(place, orbit, scale, 100 * near):
+        if orbit is None or not _lies_on(place, orbit, scale, 100 * near) or any(is_about(one, orbit) for one in found.wandering):
             continue
         if not orbit.stable:
             found.unstable.append(orbit)
         elif not any(same(orbit, one, scale, max(SAME, 4 * map_.noise)) for one in found.orbits):
-            return orbit
+            noisy = _behind(map_, orbit, scale, most)
+            return orbit if noisy is None else noisy
     return None
+
+
+def _behind(map_: Map, orbit: Orbit, scale: np.ndarray, most: int) -> Noisy | None:
+    """The exact orbit of another period about which an inexact map's orbit is scatter: its loops are made, or lost, by errors."""
+    exact = _exactly(map_, orbit.points[:1], scale, most)[0] if _blurs(map_) else None
+    noisy = None if exact is None or exact.period == orbit.period else blurred(map_, exact, scale)
+    return noisy if noisy is not None and is_about(noisy, orbit) else None
+
+
+def _blurs(map_: Map) -> bool:
+    """Whether errors of a map are more than rounding, and periods are there to be blurred."""
+    return map_.exact is not None and not (isinstance(map_, Stroboscope) and autonomous(map_.system))
+
+
+def _exactly(map_: Map, state: np.ndarray, scale: np.ndarray, most: int) -> list[Orbit | None]:
+    """The orbits to which the exact map settles from float64[k, D]."""
+    assert map_.exact is not None
+    exact, label, _ = find(map_.exact, state, scale, most)
+    return [exact.orbits[i] if 0 <= i < len(exact.orbits) else None for i in label]
 
 
 def recurrence(points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -205,31 +189,48 @@ def _on_cycles(
 ) -> np.ndarray:  # fmt: skip
     """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are looked for. Notes their owners."""
     cycles = [one for one in found.wandering if one.kind == LIMIT_CYCLE]
-    alone = np.flatnonzero(~_goes_round(cycles, points))
+    alone = np.flatnonzero(keep_to(cycles, points, INSIDE) < 0)
     some = alone[np.unique(np.linspace(0, len(alone) - 1, min(TRIES, len(alone))).astype(int))] if len(alone) else alone
     some = some[travel.going[rows[some]]]
     if len(some) and isinstance(map_, Stroboscope):
         fresh = limit_cycles(map_, points[some, -1], ROUND * map_.period, scale)
         found.wandering = merge([*found.wandering, *fresh])
-        cycles = [one for one in found.wandering if one.kind == LIMIT_CYCLE]
-    round_it = _goes_round(cycles, points)
-    for i in np.flatnonzero(round_it):
-        owner[who[i]] = max(cycles, key=lambda one: float(one.share(points[[i]])[0]))
-        settled[who[i]] = travel.age
-    return round_it
+    return _keeping(found, LIMIT_CYCLE, points, who, travel.age, owner, settled)
 
 
-def _goes_round(cycles: list[Wandering], points: np.ndarray) -> np.ndarray:
-    """Which trajectories float64[k, m, D] keep to one of some limit cycles, bool[k]."""
-    keeps = [one.share(points) >= INSIDE for one in cycles]
-    return np.any(keeps, axis=0) if keeps else np.zeros(len(points), bool)
-
-
-def _survey(map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: Found, owner: list, settled: np.ndarray) -> None:
+def _survey(
+    map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: Found, owner: list, settled: np.ndarray, most: int
+) -> None:  # fmt: skip
     """Find out what the trajectories do that never settled: watch them much longer, and call an attractor only what none of them leaves.
 
     A chaotic saddle holds trajectories for thousands of periods too; what is seen to leave it betrays it.
     """
+    survivors, points, leavers = _watch(travel, going, found, owner, settled)
+    if not len(survivors):
+        return
+    chosen = np.unique(np.linspace(0, len(survivors) - 1, min(SURVEYED, len(survivors))).astype(int))
+    noisy, strays = _blurred(map_, travel.state[chosen], points[chosen], scale, most)
+    keeps = keep_to(noisy, points[chosen], INSIDE) >= 0
+    rests = np.array([mismatch(points[i, -ROUND:], scale) < ARRIVED for i in chosen])  # stays on an orbit that doesn't attract
+    free = chosen[~keeps & ~rests]
+    seen = [*noisy, *survey(map_, travel.state[free], points[free], scale)]
+    if seen:
+        moves = chosen[keeps | ~rests]
+        leavers.append(points[moves][_leave(map_, travel.state[moves], found, noisy, scale), -ROUND:])
+    for one in seen:
+        if not any((one.share(trail) >= INSIDE).any() for trail in leavers if len(trail)):
+            found.add_wandering(one)
+    label = wanders_on(found, points[:, -ROUND:], scale) if found.wandering else np.full(len(survivors), -1)
+    for i, one in zip(going[survivors], label, strict=True):
+        if one >= 0:
+            owner[i] = found.wandering[one]
+    found.astray = [stray for stray, one in zip(strays, label[chosen], strict=True) if one < 0] if strays else []
+
+
+def _watch(
+    travel: Travel, going: np.ndarray, found: Found, owner: list, settled: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
+    """Those of some trajectories that settle to nothing for TRAIL iterates more, int64[k], where they were, and where those that did."""
     survivors = np.arange(len(going))
     trails: list[np.ndarray] = []
     leavers: list[np.ndarray] = []
@@ -241,32 +242,32 @@ def _survey(map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, fou
         travel.keep(stays)
         survivors, trails = survivors[stays], [*(trail[stays] for trail in trails), points[stays]]
         if not len(survivors):
-            return
-    chosen = np.unique(np.linspace(0, len(survivors) - 1, min(SURVEYED, len(survivors))).astype(int))
-    points = np.concatenate(trails, axis=1)
-    chosen = chosen[[mismatch(points[i, -ROUND:], scale) >= ARRIVED for i in chosen]]  # others stay on an orbit that doesn't attract
-    seen = survey(map_, travel.state[chosen], points[chosen], scale)
-    if seen:
-        leavers.append(points[chosen][_leave(map_, travel.state[chosen], found, scale), -ROUND:])
-    fresh = [one for one in seen if not any((one.share(trail) >= INSIDE).any() for trail in leavers if len(trail))]
-    found.wandering = merge([*found.wandering, *fresh])
-    if not found.wandering:
-        return
-    label = wanders_on(found, points[:, -ROUND:], scale)
-    for i, one in zip(going[survivors], label, strict=True):
-        if one >= 0:
-            owner[i] = found.wandering[one]
+            break
+    return survivors, np.concatenate(trails, axis=1), leavers
 
 
-def _leave(map_: Map, state: np.ndarray, found: Found, scale: np.ndarray) -> np.ndarray:
-    """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]."""
+def _blurred(map_: Map, state: np.ndarray, trails: np.ndarray, scale: np.ndarray, most: int) -> tuple[list[Noisy], list[Stray]]:
+    """The noisy orbits that trajectories float64[k, TRAIL, D] keep to, and how far each strays from an exact one; nothing of an exact map.
+
+    They stand at float64[k, D].
+    """
+    if not _blurs(map_):
+        return [], []
+    orbits = _exactly(map_, state, scale, most)
+    strays = [stray_of(map_, orbit, trail, scale) for orbit, trail in zip(orbits, trails, strict=True)]
+    about = [blurred(map_, orbit, scale) for orbit in {id(orbit): orbit for orbit in orbits if orbit is not None}.values()]
+    return [one for one in about if one is not None and (one.share(trails) >= INSIDE).any()], strays
+
+
+def _leave(map_: Map, state: np.ndarray, found: Found, noisy: list[Noisy], scale: np.ndarray) -> np.ndarray:
+    """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]; those beside a noisy one don't."""
     travel, going = map_.launch(state, WATCHED), np.arange(len(state))
     left = np.zeros(len(state), bool)
     while len(going) and travel.age < WATCHED:
         points = travel.advance(ROUND)
         arrives = found.near.capture(points)[0] >= 0
         if travel.age % (8 * ROUND) == 0:
-            arrives |= [mismatch(trail, scale) < ARRIVED for trail in points]
+            arrives |= [mismatch(trail, scale) < ARRIVED for trail in points] & (keep_to(noisy, points, INSIDE) < 0)
         left[going[arrives]] = True
         stays = ~arrives & travel.going
         travel.keep(stays)
@@ -279,5 +280,5 @@ def wanders_on(found: Found, trails: np.ndarray, scale: np.ndarray) -> np.ndarra
     shares = np.stack([one.share(trails) for one in found.wandering], axis=1)
     _, apart = recurrence(trails, scale)
     best = shares.argmax(axis=1)
-    turns = np.array([one.kind == LIMIT_CYCLE for one in found.wandering])  # looks at one may well repeat
+    turns = np.array([one.kind in (LIMIT_CYCLE, NOISY) for one in found.wandering])  # looks at one may well repeat
     return np.where((shares.max(axis=1) >= INSIDE) & ((apart > REPEATS) | turns[best]), best, -1)

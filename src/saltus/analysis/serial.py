@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.capture import Neighbourhoods
+from saltus.analysis.found import Found
+from saltus.analysis.noisy import Noisy
 from saltus.analysis.orbits import Orbit
-from saltus.analysis.recurrence import Found
 from saltus.analysis.settling import Settling
 from saltus.analysis.wandering import Wandering
 
@@ -22,10 +23,7 @@ def found_data(found: Found) -> dict[str, Any]:
     return {
         "orbits": [_orbit_data(orbit) for orbit in found.orbits],
         "unstable": [_orbit_data(orbit) for orbit in found.unstable],
-        "wandering": [
-            {"kind": w.kind, "exponent": w.exponent, "error": w.exponent_error, "points": w.points.tolist(), "scale": w.scale.tolist()}
-            for w in found.wandering
-        ],
+        "wandering": [_wandering_data(one) for one in found.wandering],
         "near": {"centres": found.near.centres.tolist(), "weights": found.near.weights.tolist(), "owners": found.near.owners.tolist()},
     }
 
@@ -36,10 +34,7 @@ def found_from(data: Mapping[str, Any], size: int) -> Found:
     return Found(
         Neighbourhoods(_array(near["centres"], size), _array(near["weights"], size, size), np.array(near["owners"], np.int64)),
         [_orbit_from(one, size) for one in data["orbits"]],
-        [
-            Wandering(str(one["kind"]), float(one["exponent"]), float(one["error"]), _array(one["points"], size), np.array(one["scale"]))
-            for one in data["wandering"]
-        ],
+        [_wandering_from(one, size) for one in data["wandering"]],
         [_orbit_from(one, size) for one in data["unstable"]],
     )
 
@@ -55,6 +50,22 @@ def _orbit_data(orbit: Orbit) -> dict[str, Any]:
 def _orbit_from(data: Mapping[str, Any], size: int) -> Orbit:
     values = np.array([complex(real, imaginary) for real, imaginary in data["multipliers"]])
     return Orbit(_array(data["points"], size), _array(data["monodromy"], size, size), values, float(data["mismatch"]))
+
+
+def _wandering_data(one: Wandering) -> dict[str, Any]:
+    data = {
+        "kind": one.kind, "exponent": one.exponent, "error": one.exponent_error, "points": one.points.tolist(), "scale": one.scale.tolist(),
+    }  # fmt: skip
+    if not isinstance(one, Noisy):
+        return data
+    return data | {"orbit": _orbit_data(one.orbit), "size": one.size.tolist(), "scatter": one.scatter.tolist(), "stray": one.stray}
+
+
+def _wandering_from(data: Mapping[str, Any], size: int) -> Wandering:
+    plain = str(data["kind"]), float(data["exponent"]), float(data["error"]), _array(data["points"], size), np.array(data["scale"])
+    if "orbit" not in data:
+        return Wandering(*plain)
+    return Noisy(*plain, _orbit_from(data["orbit"], size), np.array(data["size"]), np.array(data["scatter"]), float(data["stray"]))
 
 
 def _array(rows: Any, *tail: int) -> np.ndarray:

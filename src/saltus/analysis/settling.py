@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.recurrence import Found, find, wanders_on
+from saltus.analysis.found import Found
+from saltus.analysis.recurrence import find, wanders_on
 from saltus.flow.maps import Map, Travel
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
@@ -124,7 +125,6 @@ def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most:
 
 
 def _renumber(label: np.ndarray, before: Found, after: Found) -> None:
-    old, new = [*before.orbits, *before.wandering], [*after.orbits, *after.wandering]
-    ids = np.array([next(i for i, one in enumerate(new) if one is other) for other in old], np.int64)
+    ids = np.array([*map(after.index, before.orbits), *map(after.index, before.wandering)], np.int64)
     if len(ids):
         label[label >= 0] = ids[label[label >= 0]]

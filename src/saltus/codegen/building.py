@@ -124,8 +124,7 @@ def bitcode(name: str) -> bytes:
     found = cache.read(key)
     if found is None:
         announce(f"the templates, which were edited since {name}.bc.xz was made: once", SECONDS_OF_LOWERING)
-        command = [sys.executable, "-P", "-m", "saltus.codegen.lowering", "--print", name]
-        found = _answer_of(command, b"", f"{name} from the templates")
+        found = _answer_of("saltus.codegen.lowering", ("--print", name), b"", f"{name} from the templates")
         if found is None:
             raise CacheError(
                 f"saltus/kernels was edited since its bitcode {name}.bc.xz was made. Making it needs Numba: pip install 'saltus[build]', "
@@ -158,22 +157,22 @@ def _made_elsewhere(order: Order) -> bytes | None:
     Interrupted
         If the work that this thread does a part of was asked to stop.
     """
-    command = [sys.executable, "-P", "-m", "saltus.codegen.build_one"]  # -P: not what lies in the working folder
     if order.template:
         bitcode(order.template)  # made and kept first, if it must be
     given = json.dumps([order.template, order.texts, order.called, machine.target()]).encode()
-    return _answer_of(command, given, order.title)
+    return _answer_of("saltus.codegen.build_one", (), given, order.title)
 
 
-def _answer_of(command: list[str], given: bytes, title: str) -> bytes | None:
-    """What a process writes that is given these bytes; None if there is none, or it doesn't succeed."""
+def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) -> bytes | None:
+    """What a module writes when it is run by another process and given these bytes; None if there is none, or it doesn't succeed."""
     path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
     try:
         with tempfile.TemporaryFile() as file:  # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
             file.write(given)
             file.seek(0)
             process = subprocess.Popen(
-                command, stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path},
+                [sys.executable, "-P", "-m", module, *options],  # -P: not what lies in the working folder
+                stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path},
                 start_new_session=True,  # Ctrl-C is for this process
             )  # fmt: skip
     except OSError:  # no processes here

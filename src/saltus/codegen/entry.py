@@ -112,10 +112,11 @@ def _content(path: Path) -> bytes:
         raise
     except OSError as error:  # a link, above all
         raise NotOurs(f"can't be opened as a plain file ({error.strerror})") from None
+    seen = os.fstat(handle)
+    if not stat.S_ISREG(seen.st_mode):
+        os.close(handle)
+        raise NotOurs("is no plain file")
     with os.fdopen(handle, "rb") as file:
-        seen = os.fstat(file.fileno())
-        if not stat.S_ISREG(seen.st_mode):
-            raise NotOurs("is no plain file")
         check_ours(seen)
         return file.read()
 

@@ -17,7 +17,6 @@ import ctypes
 import threading
 import time
 from collections.abc import Callable
-from contextvars import copy_context
 from functools import cached_property
 from typing import Any
 
@@ -114,7 +113,7 @@ class Kernels:
         answer = int(self._entry(block.ctypes.data))
         self._worked += time.perf_counter() - begun
         if self._worked > STEADY_AFTER and self.tier != STEADY and self._asked.acquire(blocking=False):
-            threading.Thread(target=copy_context().run, args=(self._settle,), name=f"kernels: {self.title}", daemon=True).start()
+            threading.Thread(target=self._settle, name=f"kernels: {self.title}", daemon=True).start()
         return answer
 
     def exchange(self, tier: str) -> None:
@@ -122,7 +121,7 @@ class Kernels:
         self._begin(tier, [built(order) for order in self._orders(tier)])
 
     def _settle(self) -> None:
-        """What goes wrong here costs speed, no result."""
+        """In a thread that no Ctrl-C of the caller's work ends. What goes wrong here costs speed, no result."""
         with contextlib.suppress(Exception):
             self.exchange(STEADY)
 

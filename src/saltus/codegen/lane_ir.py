@@ -11,9 +11,9 @@ import math
 import struct
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib import resources
 from typing import NamedTuple
 
+from saltus.codegen import templates
 from saltus.codegen.blocks import Line, in_blocks
 from saltus.codegen.interface import ARRAY, REAL, WHOLE, Interface
 
@@ -161,8 +161,6 @@ class _Body:
         return "true" if kind == TRUTH else "splat (i1 true)"
 
     def _binop(self, node: ast.BinOp) -> Value:
-        if isinstance(node.left, ast.Constant) and isinstance(node.right, ast.Attribute):  # 2.0 / math.pi
-            return Value(NUMBER, literal(ast.literal_eval(node.left) / math.pi))
         a, b, op = self.value(node.left), self.value(node.right), type(node.op)
         if op is ast.Pow:
             return self._library("pow", NUMBER, [self.number(a), self.number(b)])
@@ -257,15 +255,21 @@ class _Body:
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         match target, value:
-            case ast.Name(id=name), _:
-                self.names[name] = self.value(value)
-            case ast.Tuple(elts=names), ast.Tuple(elts=values):
-                found = [self.value(one) for one in values]
-                self.names |= {ast.unparse(name): one for name, one in zip(names, found, strict=True)}
+            case ast.Tuple(elts=targets), ast.Tuple(elts=values):
+                for one, found in zip(targets, [self.value(one) for one in values], strict=True):
+                    self._give(one, found)
             case ast.Tuple(elts=names), ast.Call(func=ast.Name(id=function), args=arguments):
                 self._call_for_two([ast.unparse(name) for name in names], function, [self.value(a) for a in arguments])
-            case ast.Subscript(value=ast.Name(id=array), slice=index), _:
-                number = self.number(self.value(value))
+            case _:
+                self._give(target, self.value(value))
+
+    def _give(self, target: ast.expr, value: Value) -> None:
+        """A value to a name, or to an entry of an array."""
+        match target:
+            case ast.Name(id=name):
+                self.names[name] = value
+            case ast.Subscript(value=ast.Name(id=array), slice=index):
+                number = self.number(value)
                 self.do(f"store double {number.text}, ptr {self._place(array, index, 1)}, align 8")
             case _:
                 raise UntranslatableError(ast.unparse(target))
@@ -372,7 +376,7 @@ def _function(tree: ast.FunctionDef, signature: _Signature, lanes: int, constant
 @cache
 def _trigonometry(lanes: int) -> tuple[str, frozenset[str]]:
     """sincos, turned and two_product of kernels/trigonometry.py, and what they declare."""
-    tree = ast.parse(resources.files("saltus.kernels").joinpath("trigonometry.py").read_text())
+    tree = templates.tree_of(templates.text("trigonometry"))
     numbers = _numbers_of(tree)
     vector, declared = f"<{lanes} x double>", set[str]()
     pair, doubles = f"{{ {vector}, {vector} }}", "{ double, double }"
@@ -419,7 +423,7 @@ def equation_ir(functions: str, constants: Mapping[str, int | float | bool | tup
     known = {name: Value(INTEGER, str(int(v))) for name, v in constants.items() if isinstance(v, int)}
     needed = set(declared)
     texts = []
-    for node in ast.parse(functions).body:
+    for node in templates.tree_of(functions).body:
         assert isinstance(node, ast.FunctionDef)
         result = "i64" if node.name in interface.truths else "void"
         attributes = "nounwind alignstack(64)" if node.name in ("jets", "rates") else "nounwind"

@@ -91,4 +91,5 @@ def _interpreted(interface: Interface, head: Head) -> ModuleType:
     for name in filter(None, (interface.layout, *interface.templates)):
         path = str(resources.files("saltus.kernels").joinpath(f"{name}.py"))
         exec(compile(templates.text(name), path, "exec"), module.__dict__)
+    module.__dict__["propagate"] = module.__dict__[interface.entry]
     return module

@@ -6,6 +6,7 @@ import ast
 import hashlib
 import json
 import lzma
+import threading
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -60,9 +61,19 @@ class _WithoutDocstrings(ast.NodeTransformer):
         return None if isinstance(node.value, ast.Constant) else node
 
 
+#: CPython 3.11 can't parse to a tree in two threads at once ("AST constructor recursion depth mismatch").
+_PARSER = threading.Lock()
+
+
+def tree_of(source: str) -> ast.Module:
+    """A Python text as a tree, from any thread."""
+    with _PARSER:
+        return ast.parse(source)
+
+
 def _code_of(source: str) -> str:
     """A Python text without comments, docstrings and its own layout."""
-    return ast.unparse(_WithoutDocstrings().visit(ast.parse(source)))
+    return ast.unparse(_WithoutDocstrings().visit(tree_of(source)))
 
 
 @cache
@@ -104,7 +115,7 @@ def open_names_of(interface: Interface) -> tuple[str, ...]:
     if not interface.layout:
         return ()
     unknown, found = {*interface.sizes, *interface.flags, *interface.tables}, list[str]()
-    for node in ast.parse(text(interface.layout)).body:
+    for node in tree_of(text(interface.layout)).body:
         if isinstance(node, ast.Assign) and unknown & {name.id for name in ast.walk(node.value) if isinstance(name, ast.Name)}:
             names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
             found += names
@@ -115,4 +126,4 @@ def open_names_of(interface: Interface) -> tuple[str, ...]:
 @cache
 def layout_code(name: str) -> Any:
     """A layout, compiled as Python: it says what the work arrays hold for the sizes of a head."""
-    return compile(ast.parse(text(name)), f"<saltus.kernels.{name}>", "exec")
+    return compile(text(name), f"<saltus.kernels.{name}>", "exec")

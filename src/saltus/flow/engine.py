@@ -9,6 +9,7 @@ import threading
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -144,7 +145,7 @@ def run(
     module = method.kernels(system.origin)
     outcome, whole = allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
-    shared = {"options": method.numbers(periods), "data": table_data(system)}
+    shared = {"options": method.numbers(periods), "data": tables_of(system.origin)}
     chunks = [_cut(request, whole, first, shared) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
@@ -163,6 +164,12 @@ def run(
             stacklevel=4,
         )
     return _finish(outcome, whole, chunks, request.t_end)
+
+
+@lru_cache(maxsize=64)
+def tables_of(system: System) -> np.ndarray:
+    """The tables of a system as its kernels read them: the same for all values."""
+    return table_data(system)
 
 
 # -- arrays --------------------------------------------------------------------------------------------------------------------
@@ -293,7 +300,7 @@ def _behind(arrays: dict[str, np.ndarray]) -> float:
 def _run_chunks(
     chunks: list[_Chunk], module: Flow, stop: Stop, room: Contacts, progress: Callable[[float], None] | None, workers: int
 ) -> None:
-    """All chunks, on threads even if it is one: Python raises Ctrl-C in the main thread, which would cut a table of contacts in two."""
+    """All chunks; Ctrl-C never comes in the midst of one, which would cut a table of contacts in two."""
     local = threading.local()
 
     def work(chunk: _Chunk) -> None:

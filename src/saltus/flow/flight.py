@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.codegen.clocks import table_data
-from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate, slice_of
+from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate, slice_of, tables_of
 from saltus.flow.methods import Method
 from saltus.interrupt import check_stop
 from saltus.kernels import status as st
@@ -55,7 +54,7 @@ class Flight:
         request = Request(start, parameters, period, 0.0, np.zeros(count, np.int64), np.zeros(count), Schedule.none(), None)
         _, self._arrays = allocate(request, start.shape[1], self._module)
         self._arrays["param"] = np.ascontiguousarray(parameters, float)
-        self._options, self._data = method.numbers(longest), table_data(system)
+        self._options, self._data = method.numbers(longest), tables_of(system.origin)
         self.age = 0
 
     def __len__(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Protocol
@@ -63,11 +64,17 @@ class Map(Protocol):
         Time of one iterate [s]; 1 for a map without time.
     noise : float
         Mismatch of a closed orbit, relative to the range of the states, that the map's own errors explain.
+    exact : Map or None
+        Of a map that errors of its own blur: the map without them. None where errors are rounding.
     """
 
     states: tuple[str, ...]
     period: float
     noise: float
+
+    @property
+    def exact(self) -> Map | None:
+        """See above."""
 
     def launch(self, start: np.ndarray, longest: float) -> Travel:
         """Trajectories from float64[k, D]; they will be asked for ``longest`` iterates at most."""
@@ -104,6 +111,12 @@ class Stroboscope:
         self._parameters = np.array([list(system.values.values())])
         self._tangent = tangent_system(system)
         self.noise = method.noise
+        self._every = every
+
+    @functools.cached_property
+    def exact(self) -> Stroboscope | None:
+        """See :class:`Map`."""
+        return None if self.method.exact else Stroboscope(self.system, self.method.companion(), self._every, self._threads)
 
     def family(self, count: int) -> Family:
         """The same map for so many trajectories."""
@@ -162,10 +175,21 @@ class FunctionMap:
         Names of the states, such as ``"x y"``.
     derivative : callable
         ``derivative(states) -> float64[k, D, D]``.
+    noise : float
+        Size of the errors that the function makes, relative to the range of the states.
+    exact : Map, optional
+        The map without these errors, where they are more than rounding.
     """
 
-    def __init__(self, function: Callable[[np.ndarray], np.ndarray], states: str, derivative: Callable[[np.ndarray], np.ndarray]):
-        self.states, self.period, self.noise = tuple(states.split()), 1.0, 1e-12
+    def __init__(
+        self,
+        function: Callable[[np.ndarray], np.ndarray],
+        states: str,
+        derivative: Callable[[np.ndarray], np.ndarray],
+        noise: float = 1e-12,
+        exact: Map | None = None,
+    ):
+        self.states, self.period, self.noise, self.exact = tuple(states.split()), 1.0, noise, exact
         self._function, self._derivative = function, derivative
 
     def launch(self, start: np.ndarray, longest: float) -> _Iterates:  # noqa: ARG002

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from contextvars import copy_context
 from typing import Any, TypeVar
 
@@ -33,7 +35,8 @@ def on_threads(
 
     Raises whatever a piece raises. On that, and on Ctrl-C, ``stop`` is set, pieces under way are waited for and the rest is left. What a
     piece calls asks ``stop`` too, threads of its own included, so that pieces end at once; they raise Interrupted then. The caller's
-    context holds in the threads too, such as its settings of NumPy.
+    context holds in the threads too, such as its settings of NumPy. A single piece without progress is done by this very thread: Newton's
+    method asks for thousands of them, each shorter than it takes to make a thread.
     """
     stop = stop or Stop()
 
@@ -41,6 +44,13 @@ def on_threads(
         stop.hold()
         return None if stop.is_set() else (item, work(item))
 
+    if len(items) == 1 and progress is None and _may_wait(stop):
+        with _ctrl_c_asks(stop):
+            result = copy_context().run(one, items[0])
+        if result is not None:
+            done(*result)
+        check_stop()
+        return
     with _OneThread() if len(items) == 1 else ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool:
         waiting: set[Future] = set()
         try:
@@ -57,6 +67,37 @@ def on_threads(
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
             raise
+
+
+def _may_wait(stop: Stop) -> bool:
+    """Whether Ctrl-C can wait until a piece of work in this thread has ended: wherever nobody has a handler of his own for it."""
+    if stop.inside or threading.current_thread() is not threading.main_thread():
+        return True
+    handler = signal.getsignal(signal.SIGINT)
+    return handler is signal.default_int_handler or not callable(handler)
+
+
+@contextmanager
+def _ctrl_c_asks(stop: Stop) -> Iterator[None]:
+    """Ctrl-C asks to stop, and is raised where the block ends: in the midst of it, it would cut a table of contacts in two."""
+    main = threading.current_thread() is threading.main_thread()
+    if stop.inside or not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    pressed = False
+
+    def note(*_: object) -> None:
+        nonlocal pressed
+        pressed = True
+        stop.set()
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if pressed:
+        raise KeyboardInterrupt
 
 
 class _OneThread(Executor):

@@ -12,11 +12,11 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch
 from matplotlib.transforms import ScaledTranslation
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError
 from saltus.plot import maps
 from saltus.plot.basins import paint
 from saltus.plot.palette import hues
+from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, style
 from saltus.results.schema import kind_text
 
@@ -32,7 +32,7 @@ _WHERE = {(True, True): "in both", (True, False): "left only", (False, True): "r
 _NAMED = 8
 
 
-@checked
+@picture
 def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     """Two maps of basins side by side, and where they differ; with one Axes only where they differ.
 

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from saltus.errors import ParameterError
+from saltus.plot.picture import drawable
 from saltus.plot.regions import Regions
 from saltus.plot.style import QUIET, RASTERISE_ABOVE, Scale, style, styled
 
@@ -130,7 +131,9 @@ def _name_gaps(ax: Axes, direction: Direction, names: list[tuple[float, str, boo
     top.tick_params(length=0, pad=1, labelsize=7, labelcolor=QUIET)
     low, high = ax.get_xlim()
     close = [a[2] == b[2] and b[0] - a[0] < _NAME * (high - low) for a, b in pairwise(names)]
-    texts = [f"{text}\n\n" if raised else text for (_, text, _), raised in zip(names, [*close, False], strict=True)]  # one above the other
+    texts = [
+        drawable(f"{text}\n\n" if raised else text) for (_, text, _), raised in zip(names, [*close, False], strict=True)
+    ]  # one above the other
     top.set_xticks([place for place, _, _ in names], texts, linespacing=1.1)
     for tick, (_, _, left) in zip(top.xaxis.get_major_ticks(), names, strict=True):
         tick.label2.set_horizontalalignment("right" if left else "left")

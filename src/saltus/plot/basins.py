@@ -17,10 +17,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
-from saltus.arguments import checked
 from saltus.plot import axes as draw
 from saltus.plot import maps
 from saltus.plot.palette import shades
+from saltus.plot.picture import picture
 from saltus.plot.style import QUIET, Scale
 from saltus.units import from_si
 
@@ -35,7 +35,7 @@ _DIGIT = 0.64
 _LONG_LEGEND = 14
 
 
-@checked
+@picture
 def basins(
     ds: xr.Dataset,
     ax: Any = None,

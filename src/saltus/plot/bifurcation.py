@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import kinds, regions
 from saltus.plot import response_points as points
+from saltus.plot.picture import picture
 from saltus.plot.style import QUIET, Scale
 from saltus.results.schema import response_name, sample_name, states_of
 
@@ -27,7 +27,7 @@ _SMALLEST = 0.6
 _BESIDE_GAPS = 1.16
 
 
-@checked
+@picture
 def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: bool = True, legend: bool = True, ax: Any = None) -> Axes:
     """Sampled values of every response against a parameter: a colour for each period, chaos in small dark dots, gaps dashed.
 

@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.arguments import checked
 from saltus.plot import axes as draw
 from saltus.plot import selection
+from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.schema import EXPONENTS, check, kind_text
 
@@ -20,7 +20,7 @@ _CALLER = "plot.exponents"
 _EARLY = 0.1
 
 
-@checked
+@picture
 def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax: Any = None, *, legend: bool = True) -> Any:
     """Lyapunov exponents as they converge: mean so far and its 95 % interval, against the time since the transient.
 

@@ -11,11 +11,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError, UnitError, among, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import kinds
 from saltus.plot import response_points as points
+from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, Scale
 from saltus.results.measured import read_measured
 from saltus.results.schema import states_of
@@ -35,7 +35,7 @@ _SIZES = ("rms", "peak", "peak_to_peak", "rms_about_mean", "amplitude", "transmi
 Measured = str | os.PathLike[str] | xr.Dataset | None
 
 
-@checked
+@picture
 def frequency_response(
     ds: points.Source,
     *,

@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import ScaledTranslation
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError
 from saltus.plot import axes as draw
 from saltus.plot import maps, selection
 from saltus.plot.history import history
 from saltus.plot.phase import phase
+from saltus.plot.picture import picture
 from saltus.plot.style import display_scale, style
 from saltus.results import schema
 
@@ -33,7 +33,7 @@ _ELSEWHERE = "#D2D2D2"
 _NARROWEST = 0.25
 
 
-@checked
+@picture
 def gallery(ds: xr.Dataset, runs: xr.Dataset, attractors: Sequence[int] | None = None, *, order: Sequence[int] | None = None) -> Figure:
     """A row for each attractor: time history over its period, phase portrait, Poincare points in the hue that it has in the map.
 

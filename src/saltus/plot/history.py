@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError, among, shown
 from saltus.plot import axes as draw
 from saltus.plot import regions, selection
+from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
 from saltus.results.schema import TRAJECTORY, check, contact_name, equations_of, forcing_period, states_of
 
@@ -27,7 +27,7 @@ _MARKERS: dict[str, dict[str, Any]] = {
 }
 
 
-@checked
+@picture
 def history(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,

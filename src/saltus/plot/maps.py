@@ -97,9 +97,14 @@ def colors_of(ds: xr.Dataset, order: Sequence[int] | None, caller: str) -> dict[
 
 # -- words ---------------------------------------------------------------------------------------------------------------------
 def describe(one: xr.Dataset) -> str:
-    """An attractor in a few words: ``24T, 60 contacts``; ``chaotic, 2.4 contacts per T``; ``limit cycle, 0.3 s, 4 contacts``."""
+    """An attractor in a few words: ``24T, 60 contacts``; ``chaotic, 2.4 contacts per T``; ``limit cycle, 0.3 s, 4 contacts``.
+
+    Of a noisy one how far it scatters too: ``noisy 24T, scatter 4.3 µm, 60 contacts``.
+    """
     period, contacts = int(one["attractor_period"]), float(one["attractor_contacts"])
     name = kind_text(str(one["attractor_type"].item()), period)
+    if "attractor_scatter" in one and math.isfinite(float(one["attractor_scatter"])):
+        name += f", scatter {from_si(float(one['attractor_scatter']), one['attractor_scatter'].attrs.get('units', ''), 2)}"
     if not math.isfinite(contacts):
         return name
     if period > 0:

@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.arguments import checked
 from saltus.plot import axes as draw
 from saltus.plot import selection
+from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 from saltus.results.schema import ENERGY, IMPACTS, check
 
@@ -19,7 +19,7 @@ from saltus.results.schema import ENERGY, IMPACTS, check
 _SAME, _MOST_SPEEDS, _REPEATED = 1e-7, 6, 3
 
 
-@checked
+@picture
 def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Histogram of the speeds at contact, a colour for each guard. Where they repeat, or there are none, it is said in words.
 
@@ -75,7 +75,6 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
     return panel
 
 
-@checked
 def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, scale: Scale) -> str:
     """What there is to say of contacts that make no histogram: there are none, or their speeds come again and again."""
     if not counts.values.sum():
@@ -94,6 +93,7 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
     return "\n".join(["The speeds at contact repeat.", *lines])
 
 
+@picture
 def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Energy supplied, dissipated and stored, interval by interval; the largest imbalance is in the title.
 

@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError
 from saltus.plot import axes as draw
+from saltus.plot.picture import picture
 from saltus.plot.response_points import is_log, parameter_scale
 from saltus.plot.style import CYCLE
 from saltus.results.intervals import wilson
@@ -21,7 +21,7 @@ _CALLER = "plot.methods"
 PIECES = 30
 
 
-@checked
+@picture
 def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
     """What a method does to steady responses, against one parameter: three panels, the first method of ``ds`` being the reference.
 

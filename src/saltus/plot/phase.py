@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
 from saltus.plot import regions, selection
+from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 from saltus.results.schema import STROBOSCOPE, check, kind_of, states_of
 from saltus.units import from_si
@@ -24,7 +24,7 @@ _CALLER = "plot.phase"
 SETTLED_SHARE = 0.3
 
 
-@checked
+@picture
 def phase(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,

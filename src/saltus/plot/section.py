@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import regions, selection
+from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 from saltus.results.schema import SECTION, check, states_of
 
@@ -23,7 +23,7 @@ _OTHERS = {"phase": ("crossing_phase", "phase of the forcing, t/T mod 1"), "time
 _DIRECTIONS = {1: (OKABE_ITO["blue"], "upwards"), -1: (OKABE_ITO["vermillion"], "downwards")}
 
 
-@checked
+@picture
 def section(
     ds: xr.Dataset,
     x: str | None = None,

@@ -10,10 +10,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import selection
+from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.schema import SPECTRUM, check, states_of
 
@@ -25,7 +25,7 @@ _SHOWN = 1e-5
 _ORDERS = 5.0
 
 
-@checked
+@picture
 def spectrum(
     ds: xr.Dataset,
     state: str | None = None,

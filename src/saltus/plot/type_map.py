@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch
 
-from saltus.arguments import checked
 from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
 from saltus.plot import kinds, maps
 from saltus.plot import response_points as points
+from saltus.plot.picture import picture
 from saltus.plot.style import Scale
 from saltus.results.schema import parameters_of, start_name, states_of
 from saltus.units import from_si
@@ -24,7 +24,7 @@ _CALLER = "plot.type_map"
 _UNSETTLED = {-1: ("escaped", "#FFFFFF"), -2: ("not settled", "#D2D2D2"), -3: ("failed", "#B9A9A0"), -4: ("not computed", "#F3F3F3")}
 
 
-@checked
+@picture
 def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = None) -> Axes:
     """Kind of motion over two parameters: a hue for each period, grey for motion that never repeats, chaos dark.
 

@@ -26,7 +26,8 @@ class AttractorTable:
     Attributes
     ----------
     kind : sequence of str, length m
-        ``periodic``, ``quasi_periodic`` or ``chaotic``; of a system without forcing ``equilibrium`` or ``limit_cycle`` too.
+        ``periodic``, ``quasi_periodic`` or ``chaotic``; ``noisy_periodic`` where errors of the method keep an orbit from closing; of a
+        system without forcing ``equilibrium`` or ``limit_cycle`` too.
     period : array of int, shape (m,)
         Period [forcing periods], 0 where the motion doesn't repeat, or nothing forces it.
     contacts : array, shape (m,)
@@ -49,6 +50,8 @@ class AttractorTable:
         Of a system without forcing: period of each limit cycle [s], else NaN.
     eigenvalues : array of complex, shape (m, D), optional
         Of a system without forcing: eigenvalues of the Jacobian of each equilibrium [1/s], else NaN.
+    scatter : array, shape (m,), optional
+        Where one is noisy: root mean square distance of its points from the exact orbit, first state [its unit]; NaN of the others.
     """
 
     kind: Sequence[str]
@@ -65,6 +68,7 @@ class AttractorTable:
     fractions: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
     cycle: np.ndarray | None = None
     eigenvalues: np.ndarray | None = None
+    scatter: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -124,6 +128,8 @@ class _Builder(Builder):
         self.put("attractor", np.arange(len(table)), coord=True)
         for name, column in columns.items():
             self.put(name, column)
+        if table.scatter is not None:
+            self.put("attractor_scatter", table.scatter)
         if table.fractions is not None:
             for end, column in zip(("", "_low", "_high"), table.fractions, strict=True):
                 self.put(f"attractor_fraction{end}", column)

@@ -19,6 +19,7 @@ from saltus.results.ending import with_ending
 from saltus.results.files import path_of, replacing
 from saltus.results.provenance import describe, file_hash
 from saltus.results.schema import RESPONSES, STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
+from saltus.results.texts import place_of_control
 
 Target = str | os.PathLike[str]
 
@@ -63,20 +64,26 @@ def save(ds: xr.Dataset, path: Target) -> Path:
 
 def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
     """Write a result to a netCDF file; see :func:`save`. A checksum of the numbers goes with it, and one of the file, at its end."""
-    check(ds, caller="to_netcdf", kinds=list(TABLES))
+    _check(ds, "to_netcdf", list(TABLES))
     engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if _has("h5netcdf") and _has("h5py") else "scipy"
     marked = ds.assign_attrs(file_hash=file_hash(ds))
     try:
         content = marked.to_netcdf(engine=engine)  # to memory: the HDF5 library crashes the process when it meets a full disk
     except ValueError as error:
-        if "embedded null" in str(error) or "VLEN strings" in str(error):
-            raise ParameterError(f"{path}: a name, text or attribute of the result holds a NUL character, which no file keeps.") from error
         if "safely cast" not in str(error):
             raise
         raise ParameterError(f'{path}: a count is too large for netCDF-3. Install "saltus[io]", which writes netCDF-4.') from error
     with replacing(Path(path)) as (part,):
         part.write_bytes(with_ending(content))
     return Path(path)
+
+
+def _check(ds: xr.Dataset, caller: str, kinds: Sequence[str]) -> None:
+    """Raise ParameterError unless a Dataset is a result of such a kind, and of plain text."""
+    check(ds, caller=caller, kinds=kinds)
+    place = place_of_control(ds)
+    if place:
+        raise ParameterError(f"{caller}: {place} holds control characters, which a terminal would obey. Write plain text.")
 
 
 def _has(package: str) -> bool:
@@ -112,7 +119,7 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
     ResultFileError
         If a file can't be written. None is left half-written.
     """
-    check(ds, caller="to_csv", kinds=(TRAJECTORY, STROBOSCOPE, RESPONSES))
+    _check(ds, "to_csv", (TRAJECTORY, STROBOSCOPE, RESPONSES))
     path = path_of(path)
     if kind_of(ds) == RESPONSES:
         main, side = tables.responses(ds), {"events": tables.events(ds)}
@@ -165,7 +172,7 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
     from scipy.io import savemat  # 0.2 s that only this function needs
     from scipy.io.matlab import MatWriteError
 
-    check(ds, caller="to_mat", kinds=list(TABLES))
+    _check(ds, "to_mat", list(TABLES))
     path = path_of(path)
     with replacing(path) as (part,):
         try:

@@ -13,6 +13,7 @@ from saltus.results.ending import is_whole, try_elsewhere
 from saltus.results.files import ResultFileError, path_of
 from saltus.results.provenance import file_hash
 from saltus.results.schema import kind_of, restore
+from saltus.results.texts import place_of_control
 
 #: First bytes of a file and the xarray engine that reads it.
 _ENGINES = {b"CDF\x01": "scipy", b"CDF\x02": "scipy", b"\x89HDF": "h5netcdf"}
@@ -63,7 +64,11 @@ def _read(path: Path) -> xr.Dataset:
         ds = xr.load_dataset(path, engine=engine)
         if not kind_of(ds):
             raise ResultFileError(f"{path} is a netCDF file, but not a result of saltus. Read it with xarray.open_dataset({str(path)!r}).")
-        return restore(ds)
+        ds = restore(ds)
+        place = place_of_control(ds)
+        if place:
+            raise ResultFileError(f"{path}: {place} holds control characters, which a terminal would obey. saltus wrote no such file.")
+        return ds
     except ResultFileError:
         raise
     except RefusedError as refused:

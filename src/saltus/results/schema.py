@@ -55,6 +55,8 @@ WITH_STATES = (TRAJECTORY, STROBOSCOPE, SECTION)
 ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
 #: Meaning of these codes.
 NO_BASIN = {ESCAPED: "escaped", UNCONVERGED: "unconverged", FAILED: "failed", NOT_COMPUTED: "not_computed"}
+#: The kind of an orbit that errors of the method keep from closing.
+NOISY = "noisy_periodic"
 #: Meaning of the values of ``agreement``.
 AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
 
@@ -108,6 +110,9 @@ ATTRACTOR_VARIABLES = {
     "attractor_margin": Variable(("attractor",), "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"),
     "attractor_multiplier_real": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, real part"),
     "attractor_multiplier_imag": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, imaginary part"),
+    "attractor_scatter": Variable(
+        ("attractor",), "<first>", "root mean square distance of a noisy motion from its exact orbit, first state; NaN of others"
+    ),
     "attractor_cycle": Variable(("attractor",), "s", "period of a limit cycle"),
     "attractor_eigenvalue_real": Variable(("attractor", "multiplier"), "1/s", "eigenvalue of the Jacobian of an equilibrium, real part"),
     "attractor_eigenvalue_imag": Variable(
@@ -256,8 +261,10 @@ def period_text(n: int, none: str = "not periodic") -> str:
 
 
 def kind_text(kind: str, n: int) -> str:
-    """A motion in a word: ``T``, ``3T``, ``quasi-periodic``, ``chaotic``, ``equilibrium``, ``limit cycle``."""
-    return period_text(n) if n > 0 else kind.replace("_", " " if kind == "limit_cycle" else "-")
+    """A motion in a word: ``T``, ``3T``, ``noisy 24T``, ``quasi-periodic``, ``chaotic``, ``equilibrium``, ``limit cycle``."""
+    if n > 0:
+        return f"noisy {period_text(n)}" if kind == NOISY else period_text(n)
+    return kind.replace("_", " " if kind == "limit_cycle" else "-")
 
 
 def states_of(ds: xr.Dataset) -> tuple[str, ...]:

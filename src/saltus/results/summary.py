@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import AGREEMENT, BASINS, EXPONENTS, RESPONSES, axes_of, kind_of, kind_text, parameters_of
+from saltus.results.schema import AGREEMENT, BASINS, EXPONENTS, NOISY, RESPONSES, UNCONVERGED, axes_of, kind_of, kind_text, parameters_of
 from saltus.results.summary_motions import WRITERS
 
 #: Attractors that get a line of their own; the others are counted.
@@ -35,8 +36,25 @@ def summary(ds: xr.Dataset) -> list[str]:
     lines += _attractors(ds)
     if "basin" in ds:
         lines.append(f"settled  {_unsettled(ds['basin'])}")
+        words = own_errors(ds.attrs) if (ds["basin"].values == UNCONVERGED).any() else ""
+        lines += [f"noise    {words}"] if words else []
     trust = [f"{words} {ds.attrs[name]:.3g}" for name, words in _TRUST.items() if name in ds.attrs]
     return lines + ([f"trust    {', '.join(trust)}"] if trust else [])
+
+
+def own_errors(attrs: Mapping[Any, Any]) -> str:
+    """What errors of ode45 have to do with starts that never settled, in a sentence or two; "" for another method."""
+    if str(attrs.get("method", "")) != "ODE45":
+        return ""
+    if "unconverged_exactly" not in attrs:
+        return "Errors of ode45 itself can keep a motion from settling. A smaller rtol, or Taylor, tells."
+    if not attrs["unconverged_exactly"]:
+        return "By exact integration from where they stand they settle to no orbit either."
+    return (
+        "Errors of ode45 itself keep them from having a type: exact integration from where they stand settles to "
+        f"{attrs['unconverged_exactly']}, and ode45 strays from there by up to {float(attrs['unconverged_stray']):.0%} of the range of a "
+        "state. Take a smaller rtol, or Taylor."
+    )
 
 
 def _axes(ds: xr.Dataset) -> str:
@@ -64,11 +82,14 @@ def _attractors(ds: xr.Dataset) -> list[str]:
         one = ds.isel(attractor=i)
         period = int(one["attractor_period"])
         kind = str(one["attractor_type"].item())
-        name = f"{kind} {period}T".replace("_", "-") if period else kind_text(kind, 0)
+        name = f"{kind} {period}T" if kind == "periodic" else kind_text(kind, period)
         if kind == "limit_cycle" and "attractor_cycle" in one:
             name += f", period {float(one['attractor_cycle']):.4g} s"
         share = f", {float(one['attractor_fraction']):.2%} of the starts" if "attractor_fraction" in one else ""
-        lines.append(f"  {i}: {name}, peak {float(one['attractor_peak']):.4g} {unit}".rstrip() + share)
+        size = f"peak {float(one['attractor_peak']):.4g} {unit}".rstrip()
+        if kind == NOISY:
+            size += f", scatter {float(one['attractor_scatter']):.2g} {unit}".rstrip()
+        lines.append(f"  {i}: {name}, {size}{share}")
     return lines + ([f"  and {count - _LINES} more"] if count > _LINES else [])
 
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
+    from saltus.analysis.found import Found
     from saltus.analysis.plan import BasinPlan
-    from saltus.analysis.recurrence import Found
     from saltus.analysis.settling import Settling
 
 #: Chunks handed out at a time, for each worker: enough to keep it busy, few enough that a large map doesn't fill the scheduler.

@@ -99,6 +99,9 @@ def save_picture(figure: Any, file: Path) -> Path:
     """Write a figure, in full or not at all, and forget it."""
     import matplotlib.pyplot as plt
 
+    from saltus.plot.picture import keep_drawable
+
+    keep_drawable(figure)  # a title is the user's text
     with replacing(file) as (part,):
         figure.savefig(part, dpi=150, format=file.suffix[1:])
     plt.close(figure)

@@ -29,7 +29,7 @@ from saltus.study.spec import Study
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.analysis.recurrence import Found
+    from saltus.analysis.found import Found
     from saltus.system import System
 
 #: Chunks from which on a map is worth an estimate.

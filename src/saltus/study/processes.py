@@ -14,8 +14,8 @@ from saltus.errors import StudyError
 from saltus.flow.threads import usable_processors
 
 if TYPE_CHECKING:
+    from saltus.analysis.found import Found
     from saltus.analysis.plan import BasinPlan
-    from saltus.analysis.recurrence import Found
     from saltus.analysis.settling import Settling
 
 #: Chunks that a process has at a time: one that it computes, one that it begins while the first is committed.

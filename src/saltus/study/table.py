@@ -70,9 +70,16 @@ class Column:
 
 
 def quantity(heading: str, values: Any, unit: str, digits: int = 4, name: str | None = None) -> Column:
-    """Numbers with a unit, each shown as people write it: ``0.4 mm``. ``name`` is the heading in the file, if it is another."""
+    """Numbers with a unit, each shown as people write it: ``0.4 mm``; ``-`` where there is none.
+
+    ``name`` is the heading in the file, if it is another.
+    """
     numbers = _floats(values)
-    return Column(heading, lambda i: from_si(numbers[i], unit, digits), {titled(name or heading, unit): numbers})
+
+    def shown(i: int) -> str:
+        return "-" if math.isnan(numbers[i]) else from_si(numbers[i], unit, digits)
+
+    return Column(heading, shown, {titled(name or heading, unit): numbers})
 
 
 def interval(heading: str, low: Any, high: Any, text: Callable[[float], str], unit: str = "") -> Column:

@@ -6,6 +6,8 @@ import keyword
 import unicodedata
 from typing import Any
 
+from saltus.fence import has_control
+
 #: Letters that a system's name may have.
 LONGEST = 200
 #: Names that mean something else to whoever reads equations or what is generated from them.
@@ -40,5 +42,5 @@ def why_no_text(text: Any) -> str | None:
 
 
 def _controls(text: str) -> set[str]:
-    """Letters that a terminal or a parser may obey: control characters, line ends, halves of surrogate pairs."""
-    return {letter for letter in set(text) if unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")}
+    """Letters that a terminal or a parser may obey: control characters, line ends, halves of surrogate pairs, turns of the direction."""
+    return {letter for letter in set(text) if unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") or has_control(letter)}

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from saltus.analysis.capture import Neighbourhoods, _alike, neighbourhoods, sphere
+from saltus.analysis.found import Found
 from saltus.analysis.orbits import polish
-from saltus.analysis.recurrence import Found, find
+from saltus.analysis.recurrence import find
 from saltus.analysis.settling import settle
 from saltus.flow.maps import FunctionMap
 

@@ -112,6 +112,13 @@ def test_period_and_type_come_before_distance():
     assert ds["match_period"].values.tolist() == [1, 2, 0, 2, 0]
 
 
+def test_a_noisy_orbit_is_the_one_about_which_it_scatters():
+    noisy = ("noisy_periodic", *TWO[1:])
+    assert table(compare(basins(), basins((ONE, noisy, CHAOS)))) == [(0, 0), (1, 1), (2, 2)]
+    longer = ("noisy_periodic", [*TWO[1], *TWO[1]], TWO[2])
+    assert table(compare(basins(), basins((ONE, longer, CHAOS))))[1] == (1, -1)
+
+
 def test_the_nearest_go_together_whatever_cells_they_share():
     """Two orbits of period 1 within the tolerance of both; the labels of b are exchanged, and that must show."""
     other = moved(ONE, 0.004)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from saltus.analysis.capture import Neighbourhoods
+from saltus.analysis.found import Found
 from saltus.analysis.orbits import Orbit
-from saltus.analysis.recurrence import Found, find
+from saltus.analysis.recurrence import find
 from saltus.analysis.serial import cell_types, found_data, found_from, settling_arrays, settling_from
 from saltus.analysis.settling import Settling, settle
 from saltus.analysis.wandering import Wandering

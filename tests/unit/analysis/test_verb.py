@@ -101,7 +101,7 @@ def test_progress_false_silences_what_is_compiled_and_only_the_outermost_counts(
     inner(progress=False)
     assert capfd.readouterr().err == ""
     outer()
-    assert capfd.readouterr().err == "saltus: compiling an equation: once for each new equation, about 20 s\n"
+    assert capfd.readouterr().err == "saltus: compiling an equation, about 20 s\n"
 
 
 # -- what a System isn't -----------------------------------------------------------------------------------------------------------

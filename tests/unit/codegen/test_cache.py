@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -12,22 +12,27 @@ import time
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 
-import numba
 import pytest
 
-from saltus.codegen import cache, entry, machine
+from saltus.codegen import building, cache, entry, machine
 from saltus.codegen.announce import silent
+from saltus.codegen.building import Order
 from saltus.errors import CacheError, SaltusWarning
 from saltus.interrupt import Interrupted, Stop
 
-pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is cached with the JIT off")
-
-KEY = "0123456789abcdef0123456789abcdef"
 SOURCE = """
-@kept("int64(int64)")
-def propagate(n):
-    return n + 1
+define i64 @next(i64 %n) {
+  %m = add i64 %n, 1
+  ret i64 %m
+}
 """
+
+
+def order(source=SOURCE):
+    return Order("", (source,), ("next",), "one line", "one line: once for each new equation")
+
+
+KEY = order().key
 
 
 @pytest.fixture
@@ -40,19 +45,27 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def here(monkeypatch):
-    """Compile in this process: quicker, where the other process isn't what is tested."""
-    monkeypatch.setattr(machine, "compiled_elsewhere", lambda *_: None)
+def long(monkeypatch):
+    """Everything takes long: it is announced, and compiled by another process."""
+    monkeypatch.setattr(Order, "seconds", 20.0)
 
 
 def forget():
     """As a new process would begin."""
-    sys.modules.pop(f"saltus_kernels_{KEY}", None)
+    building._OBJECTS.clear()
+
+
+class Loaded:
+    """The function of an object."""
+
+    def __init__(self, data):
+        self.loaded = machine.loaded([data], "next")
+        self.propagate = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(self.loaded.address)
 
 
 def load(source=SOURCE):
     forget()
-    return cache.load(KEY, source, "one line")
+    return Loaded(building.built(order(source)))
 
 
 def kernel(folder):
@@ -69,7 +82,7 @@ def reopened(file):
     return file
 
 
-def test_an_entry_is_made_once_and_then_loaded(folder, capfd):
+def test_an_entry_is_made_once_and_then_loaded(folder, long, capfd):
     assert load().propagate(1) == 2
     assert capfd.readouterr().err == "saltus: compiling one line: once for each new equation, about 20 s\n"
     before = stamp(folder)
@@ -82,14 +95,21 @@ def test_an_entry_is_made_once_and_then_loaded(folder, capfd):
     assert [path.name for path in folder.iterdir()] == [kernel(folder).name]
 
 
-def test_nothing_is_said_where_it_is_not_wanted(folder, here, capfd):
+def test_nothing_is_said_where_it_is_not_wanted(folder, long, capfd):
     with silent():
         load()
     assert capfd.readouterr().err == ""
 
 
-def test_within_a_process_the_module_is_the_same(folder, here):
-    assert load() is cache.load(KEY, SOURCE, "one line")
+def test_what_takes_a_moment_is_not_announced(folder, capfd):
+    load()
+    assert capfd.readouterr().err == ""
+
+
+def test_within_a_process_the_object_is_held(folder):
+    first = building.built(order())
+    kernel(folder).unlink()
+    assert building.built(order()) is first
 
 
 def truncate(file):
@@ -116,7 +136,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_entry_is_built_again(folder, here, damage):
+def test_a_damaged_entry_is_built_again(folder, damage):
     load()
     DAMAGES[damage](reopened(kernel(folder)))
     cache.entries()  # shows what is there without failing
@@ -136,41 +156,19 @@ def test_a_damaged_entry_is_built_again(folder, here, damage):
     assert not list(folder.glob(".building-*"))
 
 
-def test_an_entry_that_numba_cannot_read_is_replaced_with_a_warning(folder, here):
-    load()
-    kernel(folder).unlink()
-    entry.write(kernel(folder), "one line", b"not machine code")
-    with pytest.warns(SaltusWarning, match="building it again"):
-        assert load().propagate(1) == 2
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert load().propagate(1) == 2
-
-
 # -- what others could have written ----------------------------------------------------------------------------------------------
-class Evil:
-    """Unpickled, it makes a file."""
-
-    def __init__(self, mark):
-        self.mark = mark
-
-    def __reduce__(self):
-        return open, (str(self.mark), "w")
+WRONG = SOURCE.replace(", 1", ", 40")
 
 
 @pytest.fixture
-def planted(folder, tmp_path):
-    """A whole entry, checksum and all, that runs a stranger's code; and the file by which it would be seen."""
+def planted(folder):
+    """A whole entry, checksum and all, that holds a stranger's code."""
     folder.mkdir(mode=0o700)
-    mark = tmp_path / "code ran"
-    entry.write(kernel(folder), "one line", pickle.dumps(Evil(mark)))
-    return mark
+    entry.write(kernel(folder), "one line", building.made(order(WRONG)))
 
 
-def test_the_planted_entry_would_run_if_it_were_believed(folder, here, planted):
-    with pytest.warns(SaltusWarning, match="could not be loaded"):
-        assert load().propagate(1) == 2
-    assert planted.exists()
+def test_the_planted_entry_would_run_if_it_were_believed(folder, planted):
+    assert load().propagate(1) == 41
 
 
 def given_to_somebody(path):
@@ -202,32 +200,29 @@ def other_group():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="owners and modes are POSIX")
 @pytest.mark.parametrize("opening", OPENINGS)
-def test_an_entry_that_others_could_have_written_is_not_read(folder, here, planted, opening):
+def test_an_entry_that_others_could_have_written_is_not_read(folder, planted, opening):
     OPENINGS[opening](kernel(folder))
     with pytest.warns(SaltusWarning, match="building it again"):
         assert load().propagate(1) == 2
-    assert not planted.exists()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert load().propagate(1) == 2  # its place is taken by one of ours
-    assert not planted.exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="owners and modes are POSIX")
 @pytest.mark.parametrize("opening", [name for name in OPENINGS if name != "a link"])
-def test_a_folder_that_others_could_have_written_to_is_not_used(folder, here, planted, opening):
+def test_a_folder_that_others_could_have_written_to_is_not_used(folder, planted, opening):
     OPENINGS[opening](folder)
     os.chmod(folder, folder.stat().st_mode | 0o500)
     before = kernel(folder).read_bytes()
     with pytest.warns(SaltusWarning, match="compiled for this process only"):
         assert load().propagate(1) == 2
-    assert not planted.exists()
     assert kernel(folder).read_bytes() == before
     assert [path.name for path in folder.iterdir()] == [kernel(folder).name]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="owners and modes are POSIX")
-def test_a_link_of_ours_to_a_folder_of_ours_is_used(folder, here, tmp_path):
+def test_a_link_of_ours_to_a_folder_of_ours_is_used(folder, tmp_path):
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     folder.symlink_to(tmp_path / "elsewhere")
     load()
@@ -235,7 +230,7 @@ def test_a_link_of_ours_to_a_folder_of_ours_is_used(folder, here, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="owners and modes are POSIX")
-def test_somebody_elses_link_to_a_folder_of_ours_is_not_used(folder, here, tmp_path):
+def test_somebody_elses_link_to_a_folder_of_ours_is_not_used(folder, tmp_path):
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     folder.symlink_to(tmp_path / "elsewhere")
     given_to_somebody(folder)
@@ -245,7 +240,7 @@ def test_somebody_elses_link_to_a_folder_of_ours_is_not_used(folder, here, tmp_p
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="modes are POSIX")
-def test_folder_and_entry_are_closed_whatever_the_umask(folder, here):
+def test_folder_and_entry_are_closed_whatever_the_umask(folder):
     before = os.umask(0)
     try:
         load()
@@ -255,31 +250,19 @@ def test_folder_and_entry_are_closed_whatever_the_umask(folder, here):
     assert kernel(folder).stat().st_mode & 0o777 == 0o400
 
 
-def test_files_that_python_and_numba_would_read_are_not(folder, here, planted, monkeypatch):
-    """A planted .pyc, source or index of Numba's lies there unread: nothing is imported by path."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder / "numba"))
-    kernel(folder).unlink()
-    load()
-    for name in (f"{KEY}.py", "kernels.py", "__init__.py", f"__pycache__/{KEY}.{sys.implementation.cache_tag}.pyc"):
-        (folder / name).parent.mkdir(exist_ok=True)
-        (folder / name).write_text(f"open({str(planted)!r}, 'w')")
-    assert load().propagate(1) == 2
-    assert not planted.exists()
-    assert not list(folder.rglob("*.nb?"))
-
-
 # -- several at once ---------------------------------------------------------------------------------------------------------------
 CHILD = """
-import sys
-from saltus.codegen import cache
-source = sys.stdin.read()
-print(cache.load({key!r}, source, "one line").propagate(1))
+import ctypes, sys
+from saltus.codegen import building, machine
+data = building.built(building.Order("", (sys.stdin.read(),), ("next",), "one line", "one line: once for each new equation"))
+loaded = machine.loaded([data], "next")
+print(ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(loaded.address)(1))
 """
 
 
 def test_four_processes_that_start_cold_at_once(folder):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-W", "error", "-c", CHILD.format(key=KEY)]
+    command = [sys.executable, "-W", "error", "-c", CHILD]
     pipe = subprocess.PIPE
     processes = [subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, env=environment) for _ in range(4)]
     for process in processes:  # each waits for its source: they all reach the empty folder together
@@ -297,65 +280,54 @@ def test_four_processes_that_start_cold_at_once(folder):
 
 
 def in_threads(*sources):
-    """What threads get that each load an entry of its own, or the exceptions."""
+    """What threads get that each load an entry of their own, or the exceptions."""
     forget()
-
-    def one(number):
-        name = f"{number:x}" * 32
-        try:
-            return cache.load(name, sources[number], "one line")
-        finally:
-            sys.modules.pop(f"saltus_kernels_{name}", None)
-
     with ThreadPoolExecutor(len(sources)) as pool:
-        futures = [pool.submit(one, number) for number in range(len(sources))]
+        futures = [pool.submit(lambda source=source: Loaded(building.built(order(source)))) for source in sources]
     return [future.exception() or future.result() for future in futures]
 
 
-def test_threads_compile_in_processes_of_their_own(folder, monkeypatch):
-    """So that they don't wait for each other: no thread of this process calls Numba's compiler."""
-    monkeypatch.setattr(machine, "compiled", lambda *_: pytest.fail("compiled here"))
-    first, second = in_threads(SOURCE, SOURCE.replace("n + 1", "n + 2"))
+def test_what_takes_long_is_compiled_by_another_process(folder, long, monkeypatch):
+    monkeypatch.setattr(building, "made", lambda *_: pytest.fail("compiled here"))
+    first, second = in_threads(SOURCE, SOURCE.replace(", 1", ", 2"))
     assert (first.propagate(1), second.propagate(1)) == (2, 3)
     assert len(cache.entries()) == len(list(folder.iterdir())) == 2
 
 
-def test_where_no_process_can_be_started_this_one_compiles(folder, monkeypatch):
-    monkeypatch.setattr(machine.sys, "executable", "/no/such/python")
-    (module,) = in_threads(SOURCE)
-    assert module.propagate(1) == 2
+def test_where_no_process_can_be_started_this_one_compiles(folder, long, monkeypatch):
+    monkeypatch.setattr(building.sys, "executable", "/no/such/python")
+    (one,) = in_threads(SOURCE)
+    assert one.propagate(1) == 2
 
 
-@pytest.mark.parametrize("in_a_thread", [False, True])
-def test_what_does_not_compile_says_so_and_leaves_nothing_behind(folder, in_a_thread):
-    source = SOURCE.replace("n + 1", "n + nothing")
-    if in_a_thread:
-        (error,) = in_threads(source)
-        assert isinstance(error, numba.errors.NumbaError)
-    else:
-        with pytest.raises(numba.errors.NumbaError):
-            load(source)
+@pytest.mark.parametrize("slowly", [False, True])
+def test_what_does_not_compile_says_so_and_leaves_nothing_behind(folder, slowly, monkeypatch):
+    monkeypatch.setattr(Order, "seconds", 20.0 if slowly else 0.0)
+    with pytest.raises(RuntimeError, match="parsing error"):
+        load(SOURCE.replace("%n, 1", "%nothing, 1"))
     assert list(folder.iterdir()) == []
-    assert f"saltus_kernels_{KEY}" not in sys.modules
 
 
-def test_a_process_that_is_killed_is_told(folder, monkeypatch):
-    monkeypatch.setattr(machine, "_wait", lambda process: process.kill() or process.wait())
+def test_a_process_that_is_killed_is_told(folder, long, monkeypatch):
+    monkeypatch.setattr(building, "_wait", lambda process: process.kill() or process.wait())
     with pytest.raises(CacheError, match="ended by signal 9"):
         load()
     assert list(folder.iterdir()) == []
 
 
 # -- Ctrl-C ------------------------------------------------------------------------------------------------------------------------
-SLOW = """
-import time
-time.sleep(60)
-"""
+@pytest.fixture
+def slow(long, monkeypatch, tmp_path):
+    """The process that compiles doesn't end."""
+    script = tmp_path / "slow"
+    script.write_text("#!/bin/sh\nexec sleep 60\n")
+    script.chmod(0o700)
+    monkeypatch.setattr(building.sys, "executable", str(script))
 
 
 def compiling():
     """Processes that compile now."""
-    return [process for process in list(machine._COMPILING) if process.poll() is None]
+    return [process for process in list(building._COMPILING) if process.poll() is None]
 
 
 def wait_for(condition):
@@ -366,7 +338,7 @@ def wait_for(condition):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
-def test_ctrl_c_while_it_compiles_ends_at_once_and_leaves_no_process(folder):
+def test_ctrl_c_while_it_compiles_ends_at_once_and_leaves_no_process(folder, slow):
     """The main thread waits for a process: Ctrl-C reaches it, and cannot be lost in the compiler."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     started = []
@@ -380,7 +352,7 @@ def test_ctrl_c_while_it_compiles_ends_at_once_and_leaves_no_process(folder):
     presser.start()
     try:
         with pytest.raises(KeyboardInterrupt):
-            load(SLOW + SOURCE)
+            load()
     finally:
         presser.join()
         signal.signal(signal.SIGINT, before)
@@ -388,13 +360,14 @@ def test_ctrl_c_while_it_compiles_ends_at_once_and_leaves_no_process(folder):
     assert list(folder.iterdir()) == []
 
 
-def test_threads_that_wait_for_a_kernel_stop_when_they_are_told(folder):
+@pytest.mark.skipif(sys.platform == "win32", reason="the slow process is a script")
+def test_threads_that_wait_for_a_kernel_stop_when_they_are_told(folder, slow):
     """Both the one that compiles and the one that waits for it: they are part of work that Ctrl-C has ended."""
     stop = Stop()
 
     def one():
         stop.hold()
-        return cache.load(KEY, SLOW + SOURCE, "one line")
+        return building.built(order())
 
     with ThreadPoolExecutor(2) as pool:
         futures = [pool.submit(one) for _ in range(2)]
@@ -405,18 +378,18 @@ def test_threads_that_wait_for_a_kernel_stop_when_they_are_told(folder):
 
 
 # -- a folder that can't be used ---------------------------------------------------------------------------------------------------
-def test_a_folder_that_cannot_be_written_costs_time_not_the_run(tmp_path, monkeypatch, here):
+def test_a_folder_that_cannot_be_written_costs_time_not_the_run(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("SALTUS_CACHE", str(tmp_path / "file" / "kernels"))
     with pytest.warns(SaltusWarning, match="Set SALTUS_CACHE"):
-        module = load()
-    assert module.propagate(1) == 2
+        one = load()
+    assert one.propagate(1) == 2
     forget()
     assert cache.entries() == []
     assert cache.clear() == 0
 
 
-def test_a_full_disk_costs_time_not_the_run(folder, here, monkeypatch):
+def test_a_full_disk_costs_time_not_the_run(folder, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
@@ -426,7 +399,7 @@ def test_a_full_disk_costs_time_not_the_run(folder, here, monkeypatch):
     assert list(folder.iterdir()) == []
 
 
-def test_what_processes_left_that_were_killed_is_swept_after_a_day(folder, here):
+def test_what_processes_left_that_were_killed_is_swept_after_a_day(folder):
     load()
     for name in (".building-of-old", ".building-of-now"):
         (folder / name).write_text("")
@@ -438,7 +411,7 @@ def test_what_processes_left_that_were_killed_is_swept_after_a_day(folder, here)
     assert {path.name for path in folder.iterdir()} == {kernel(folder).name, ".building-of-now"}
 
 
-def test_clear_takes_entries_and_leftovers_and_nothing_else(folder, here):
+def test_clear_takes_entries_and_leftovers_and_nothing_else(folder):
     load()
     (folder / ".building-left-behind").write_text("")
     (folder / "of an older version").mkdir()

@@ -41,16 +41,11 @@ class ExactFunctions:
         return next((value for value, holds in pieces if holds), otherwise)
 
 
-def python(function):
-    """The Python behind a compiled function, or the function itself where the JIT is off."""
-    return getattr(function, "py_func", function)
-
-
 def generated(system: System, order: int = ORDER) -> dict:
     """The head of a Taylor module, run as plain Python."""
     names = {name: getattr(lane_operations, name) for name in dir(lane_operations) if not name.startswith("_")}
-    names |= {"kernel": lambda f: f, "inner": lambda f: f, "sincos": python(trigonometry.sincos), "turned": python(trigonometry.turned)}
-    exec("import math\nimport numpy as np\n" + taylor_head(system, order, LANES), names)
+    names |= {"kernel": lambda f: f, "inner": lambda f: f, "sincos": trigonometry.sincos, "turned": trigonometry.turned}
+    exec("import math\nimport numpy as np\n" + taylor_head(system, order, LANES).text, names)
     return names
 
 

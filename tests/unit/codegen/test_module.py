@@ -1,40 +1,41 @@
-"""What a kernel's name depends on: the equations, every template it is made of, versions, processor. Not parameter values."""
+"""What the name of compiled code depends on: the equations, the templates, versions, processor. Not parameter values."""
 
 from __future__ import annotations
 
 import json
 import os
-import re
 import subprocess
 import sys
-import threading
-from importlib import resources
 
-import numba
-import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.codegen import cache, module
+from saltus.codegen import building, cache, kernels, machine, module, templates
+from saltus.codegen.kernels import FULL, GENERIC, SHAPE, TIERS
 
+needs_jit = pytest.mark.skipif(module.jit_disabled(), reason="nothing is compiled with the JIT off")
 METHODS = {
-    "taylor": lambda system: module.taylor_module(system, 20, 4),
-    "ode45": module.ode45_module,
+    "taylor": lambda system: module.taylor_module.__wrapped__(system, 20, 4),
+    "ode45": module.ode45_module.__wrapped__,
 }
 
 
 @pytest.fixture
-def key(monkeypatch):
-    """A function: system -> name of its kernel, by one of the methods. Nothing is compiled."""
-    monkeypatch.setattr(module, "load", lambda key, *_: key)
-    monkeypatch.setattr(module, "_interpreted", lambda key, head, templates: key)
-    module._environment.cache_clear()
-    yield lambda system, method="taylor": METHODS[method](system)
-    module._environment.cache_clear()
+def keys(monkeypatch):
+    """A function: system -> names of the objects of all tiers, by one of the methods. Nothing is compiled."""
+    monkeypatch.setattr(module, "jit_disabled", lambda: False)
+    monkeypatch.setattr(kernels.Kernels, "_begin", lambda *_: None)
+    monkeypatch.setattr(kernels, "built", lambda order: b"")
+
+    def of(system, method="taylor"):
+        flow = METHODS[method](system)
+        return {tier: tuple(order.key for order in flow._orders(tier)) for tier in TIERS}
+
+    return of
 
 
-def equation(power):
-    @sl.system(states="x v", name="same name")
+def equation(power, name="same name"):
+    @sl.system(states="x v", name=name)
     def free(t, x, v, *, stiffness=2.0):
         return v, -stiffness * x**power
 
@@ -42,160 +43,118 @@ def equation(power):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_values_do_not_matter_and_equations_do(key, method):
+def test_values_do_not_matter_and_equations_do(keys, method):
     rig = sl.models.delangre("b")
-    assert (
-        key(rig, method)
-        == key(rig.with_values(contact_stiffness="70 kN/m", frequency="7 Hz"), method)
-        == key(sl.models.delangre("c"), method)
-    )
-    assert key(equation(3), method) == key(equation(3), method)
-    assert key(equation(3), method) != key(equation(5), method)
+    others = (rig.with_values(contact_stiffness="70 kN/m", frequency="7 Hz"), sl.models.delangre("c"))
+    assert all(keys(other, method) == keys(rig, method) for other in others)
+    assert keys(equation(3), method) == keys(equation(3, "another name"), method)
+    before, after = keys(equation(3), method), keys(equation(5), method)
+    assert before[GENERIC][0] == after[GENERIC][0]  # the templates' code serves all equations
+    assert before[GENERIC][1] != after[GENERIC][1]
+    assert before[FULL] != after[FULL]
 
 
-def test_methods_orders_and_lanes_have_kernels_of_their_own(key):
+def test_equations_of_one_shape_share_its_code(keys):
+    plain, stiff = keys(equation(3)), keys(equation(5))
+    assert plain[SHAPE][0] != plain[GENERIC][0]
+    assert plain[SHAPE][0] == stiff[SHAPE][0] or plain[SHAPE][1] != stiff[SHAPE][1]
+
+
+def test_methods_orders_and_lanes_have_code_of_their_own(keys):
     rig = sl.models.delangre("b")
-    keys = {module.taylor_module(rig, order, lanes) for order in (19, 20) for lanes in (2, 4, 8)} | {key(rig, "ode45")}
-    assert len(keys) == 7
+    flows = [module.taylor_module.__wrapped__(rig, order, lanes) for order in (19, 20) for lanes in (2, 4, 8)]
+    found = {tuple(order.key for order in flow._orders(GENERIC)) for flow in (*flows, METHODS["ode45"](rig))}
+    assert len(found) == 7
 
 
-@pytest.fixture
-def jit(monkeypatch):
-    monkeypatch.setattr(numba.config, "DISABLE_JIT", 0)
+CHANGES = {
+    "version of llvmlite or LLVM": lambda patch: patch.setattr(machine, "versions", lambda: ("0.0",)),
+    "platform": lambda patch: patch.setattr(machine, "target", lambda: machine.Target("another", "processor", "")),
+    "processor": lambda patch: patch.setattr(machine, "target", lambda: machine.Target(machine.llvm.get_process_triple(), "another", "")),
+    "features": lambda patch: patch.setattr(machine, "target", lambda: machine.Target(*real_target()[:2], "+none")),
+    "templates": lambda patch: patch.setattr(templates, "identity", lambda name: f"another {name}"),
+}
+real_target = machine.target
 
 
-def test_what_is_made_in_the_background_is_made_once_in_another_thread(jit):
-    made, done = [], threading.Event()
-
-    def kernels(system):
-        made.append((system, threading.current_thread()))
-        done.set()
-
-    rig = sl.models.delangre("b")
-    module.in_background(kernels, rig)
-    assert done.wait(60)
-    module.in_background(kernels, rig)
-    ((system, thread),) = made
-    assert system is rig
-    assert thread is not threading.main_thread()
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_the_code_depends_on_is_in_its_name(keys, monkeypatch, change):
+    before = keys(equation(3))
+    CHANGES[change](monkeypatch)
+    assert all(keys(equation(3))[tier][0] != before[tier][0] for tier in TIERS)
 
 
-def test_what_goes_wrong_in_the_background_is_told_where_it_is_asked_for(jit, recwarn, capfd):
-    done = threading.Event()
-
-    def kernels(system):
-        done.set()
-        raise sl.SaltusError(system.name)
-
-    module.in_background(kernels, sl.models.delangre("b"))
-    assert done.wait(60)
-    for thread in threading.enumerate():
-        if thread.name.startswith("kernels of"):
-            thread.join(60)
-    assert not recwarn
-    assert capfd.readouterr() == ("", "")
+TARGET = "from saltus.codegen import machine, module; print(*machine.target()[1:], module.lane_width())"
 
 
-def test_analyses_that_need_the_tangent_begin_it_at_once(monkeypatch):
-    begun = []
-    monkeypatch.setattr(sl.Taylor, "begin_kernels", lambda self, system: begun.append(system.tangent_of))
-    rig = sl.models.delangre("b", force="4 N")
-    sl.frequency_response(rig, frequency=("6 Hz", "7 Hz", 2), start=[(0.0, 0.0)], periods=2, progress=False)
-    assert begun
-    assert set(begun) == {rig}
-
-
-def modules_behind(method):
-    """File names of every text whose code is in a method's kernels: its templates, and what they import from the kernels folder."""
-    folder = resources.files("saltus.kernels")
-    seen, waiting = set(), list(TEMPLATES[method]) + re.findall(r"from saltus\.kernels\.(\w+) import", module._PREAMBLE)
-    while waiting:
-        name = waiting.pop().removesuffix(".py")
-        if name not in seen:
-            seen.add(name)
-            waiting += re.findall(r"from saltus\.kernels\.(\w+) import", folder.joinpath(f"{name}.py").read_text())
-    return sorted(f"{name}.py" for name in seen)
-
-
-def templates_of(method):
-    """Names of the templates that a method puts together."""
-    names = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_module", lambda title, what, head, templates, arguments: names.extend(templates))
-        METHODS[method](equation(3))
-    return names
-
-
-TEMPLATES = {method: templates_of(method) for method in METHODS}
-
-
-@pytest.mark.parametrize(("method", "edited"), [(method, name) for method in METHODS for name in modules_behind(method)])
-def test_an_edit_of_any_text_behind_a_kernel_gives_it_another_name(key, monkeypatch, method, edited):
-    before = key(equation(3), method)
-    template = module._template
-    monkeypatch.setattr(module, "_template", lambda name: template(name) + ("# edited\n" if name == edited else ""))
-    module._environment.cache_clear()
-    assert key(equation(3), method) != before
-
-
-@pytest.mark.parametrize(("owner", "name"), [(numba, "__version__"), (np, "__version__"), (module.sys, "version")])
-def test_versions_are_in_the_name(key, monkeypatch, owner, name):
-    before = key(equation(3))
-    monkeypatch.setattr(owner, name, "0.0 of another day")
-    module._environment.cache_clear()
-    assert key(equation(3)) != before
-
-
-@pytest.mark.parametrize("part", range(3))
-def test_what_numba_compiles_for_is_in_the_name(key, monkeypatch, part):
-    """Platform, processor, features: as Numba sees them, so NUMBA_CPU_NAME and NUMBA_CPU_FEATURES count."""
-    before = key(equation(3))
-    target = list(module._target())
-    target[part] = "another"
-    monkeypatch.setattr(module, "_target", lambda: tuple(target))
-    module._environment.cache_clear()
-    assert key(equation(3)) != before
-
-
-@pytest.mark.parametrize(("name", "value"), [("OPT", 0), ("BOUNDSCHECK", 1), ("DEBUGINFO_DEFAULT", 1)])
-def test_settings_of_numba_that_change_the_code_are_in_the_name(key, monkeypatch, name, value):
-    before = key(equation(3))
-    monkeypatch.setattr(numba.config, name, value)
-    module._environment.cache_clear()
-    assert key(equation(3)) != before
-
-
-TARGET = "import numba; from saltus.codegen import module; print(*module._target()[1:], module.lane_width())"
-
-
-def test_overrides_of_the_processor_are_seen():
-    """In a process of its own: Numba reads them once."""
-    overrides = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": "+sse2"}
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **overrides}
+def test_an_older_processor_can_be_asked_for():
+    """In a process of its own: it is read once."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "SALTUS_PROCESSOR": "x86-64-v2"}
     said = subprocess.run([sys.executable, "-c", TARGET], env=environment, capture_output=True, text=True, check=True).stdout
-    assert said.split() == ["x86-64", "+sse2", "2"]
+    assert said.split()[0] == "x86-64-v2"
+
+
+# -- the bitcode that the package brings --------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", templates.BITCODE)
+def test_the_bitcode_is_current(name):
+    """Templates were edited? python -m saltus.codegen.lowering"""
+    assert templates.is_current(name)
+    assert templates.bitcode(name)[:2] == b"BC"
+
+
+def made_again(name):
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-m", "saltus.codegen.lowering", "--print", name]
+    return subprocess.run(command, env=environment, capture_output=True, check=True).stdout
 
 
 @pytest.mark.parametrize(
-    ("features", "lanes"),
-    [("+avx2,+avx512dq,+avx512f,+fma", 16), ("+avx2,-avx512f,+fma", 4), ("+avx2,-fma", 2), ("+avx512f,-avx512dq,-avx2", 2), ("", 2)],
+    "name", ["capture", pytest.param("ode45", marks=pytest.mark.slow), pytest.param("taylor_2", marks=pytest.mark.slow)]
 )
-def test_lane_width_is_the_processors(monkeypatch, features, lanes):
-    monkeypatch.setattr(module, "_target", lambda: ("platform", "processor", features))
-    assert module.lane_width() == lanes
+def test_the_bitcode_is_what_the_templates_give(name):
+    """To the byte, where the same versions make it that made it."""
+    import llvmlite
+    import numba
+
+    again = made_again(name)
+    if templates.manifest()["made_with"] == {"numba": numba.__version__, "llvmlite": llvmlite.__version__}:
+        assert again == templates.bitcode(name)
+    assert again[:2] == b"BC"
+
+
+@pytest.fixture
+def edited(monkeypatch, tmp_path):
+    """A template that was edited since, and an empty cache."""
+    monkeypatch.setenv("SALTUS_CACHE", str(tmp_path / "kernels"))
+    monkeypatch.setattr(templates, "is_current", lambda name: name != "capture")
+    monkeypatch.setattr(templates, "source_hash", lambda name: f"{'edited':*<64}")
+
+
+def test_edited_templates_are_made_into_bitcode_and_said(edited, capfd):
+    assert building.bitcode("capture")[:2] == b"BC"
+    assert "edited since" in capfd.readouterr().err
+    assert building.bitcode("capture")[:2] == b"BC"
+    assert capfd.readouterr().err == ""
+    assert [entry.system for entry in cache.entries()] == ["capture, bitcode"]
+
+
+def test_edited_templates_without_numba_are_refused_in_a_sentence(edited, monkeypatch, capfd):
+    monkeypatch.setattr(building, "_answer_of", lambda *_: None)
+    with pytest.raises(sl.SaltusError, match=r"Numba: pip install 'saltus\[build\]', then python -m saltus.codegen.lowering"):
+        building.bitcode("capture")
+
+
+def test_a_comment_more_is_the_same_template(monkeypatch):
+    text = templates.text.__wrapped__
+    before = templates._hash("capture", [templates._code_of(text("capture"))])
+    longer = text("capture").replace('"""', '"""More words. ', 1) + "\n# a comment\n"
+    assert templates._hash("capture", [templates._code_of(longer)]) == before
+    assert templates._hash("capture", [templates._code_of(longer.replace("found += 1", "found += 2"))]) != before
 
 
 # -- nothing of the user's own words is in the code ---------------------------------------------------------------------------------
-def source_of(monkeypatch, system, method):
-    told = []
-    monkeypatch.setattr(module, "load", lambda key, source, *_: told.append(source))
-    monkeypatch.setattr(module, "_interpreted", lambda key, head, templates: told.append(head))
-    METHODS[method](system)
-    return told[0]
-
-
 @pytest.mark.parametrize("method", METHODS)
-def test_no_word_of_a_system_is_in_its_code(monkeypatch, method):
+def test_no_word_of_a_system_is_in_its_code(keys, monkeypatch, method):
     """Another name, other names of states, parameters and guards, other texts: the same source."""
     rig = sl.models.delangre("b")
     names = {name: f"other_{i}" for i, name in enumerate((*rig.states, *rig.values))}
@@ -207,18 +166,17 @@ def test_no_word_of_a_system_is_in_its_code(monkeypatch, method):
     data["nodes"] = [[op, args, names[word] if op in ("state", "param") else word] for op, args, word in data["nodes"]]
     data["guards"] = [[f"guard {i}", gap, names.get(state), boundary] for i, (_, gap, state, boundary) in enumerate(data["guards"])]
     renamed = sl.System.from_dict(data)
-    source = source_of(monkeypatch, renamed, method)
-    assert source == source_of(monkeypatch, rig, method)
-    assert not [name for name in names.values() if name in source]
+    text = METHODS[method](renamed)._equation_text
+    assert text == METHODS[method](rig)._equation_text
+    assert not [name for name in names.values() if name in text]
 
 
-@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is cached with the JIT off")
+@needs_jit
 def test_new_values_never_recompile(monkeypatch):
     """Values of a call, of a system, of a case, of each trajectory: one kernel for all, and once loaded it isn't even looked for."""
     rig = sl.models.delangre("b")
     sl.simulate(rig, (1e-3, 0.0), 1, samples=1)
-    before = {entry.name for entry in cache.entries()}
-    monkeypatch.setattr(cache, "_build", None)
+    monkeypatch.setattr(kernels, "built", None)
     for other in (
         rig.with_values(contact_stiffness="70 kN/m"),
         rig.with_values(frequency="7 Hz", cubic=0.0),
@@ -226,4 +184,3 @@ def test_new_values_never_recompile(monkeypatch):
     ):
         sl.simulate(other, {"x": [0.0, 1e-3], "v": [0.1, 0.0]}, 1, samples=1)
     sl.stroboscope(rig, (1e-3, 0.0), 2, values={"frequency": [14.0, 15.0, 16.0]})
-    assert {entry.name for entry in cache.entries()} == before

@@ -2,12 +2,12 @@
 
 import math
 from fractions import Fraction
-from importlib import resources
 
 import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.codegen import templates
 from saltus.codegen.clocks import Clocks, table_data
 from saltus.kernels.clocks_layout import C0, HELD, NUMBERS, ON, REF
 from saltus.system.evaluate import evaluate
@@ -19,9 +19,8 @@ POINTS, VALUES = [-1.0, 0.0, 0.3, 1.1, 2.0], [0.5, 2.0, -1.0, 0.25, 0.5]
 def clocks_of(system):
     """The template's functions for a system, as plain Python; its numbers are in `n`, its tables in `data`."""
     clocks = Clocks(system)
-    scope = {"math": math, "kernel": lambda f: f, "inner": lambda f: f}
-    text = resources.files("saltus.kernels").joinpath("clocks.py").read_text()
-    exec("\n".join(clocks.head()) + text.replace("from __future__ import annotations\n", ""), scope)
+    scope = {"math": math, "kernel": lambda f: f, "inner": lambda f: f, **clocks.constants()}
+    exec(clocks.function() + templates.text("clocks"), scope)
     return clocks, scope
 
 

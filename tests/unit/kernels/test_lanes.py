@@ -6,11 +6,12 @@ import inspect
 import math
 from functools import cache
 
-import numba
 import numpy as np
 import pytest
 from numba import njit
 
+from saltus.codegen.lowering import lane_types  # noqa: F401  (how Numba compiles them)
+from saltus.codegen.module import jit_disabled
 from saltus.kernels import lanes
 from saltus.kernels.lanes import (
     any_lane,
@@ -34,11 +35,12 @@ from saltus.kernels.lanes import (
     root,
     select,
     smaller,
+    spacing,
     splat,
     store,
 )
 
-JIT = not numba.config.DISABLE_JIT
+JIT = not jit_disabled()
 WIDTHS = (2, 4, 8, 16)
 SPECIAL = [0.0, -0.0, 1.0, -1.5, math.inf, -math.inf, math.nan, 5e-324, -1e308, 2.5, 3.5, -0.5, 1e-300, 7.0, -2.0, 0.3]
 
@@ -210,6 +212,12 @@ def test_the_lowest_bit(number):
         lowest += 1
     assert lowest_bit(number) == lowest
     assert njit(lambda value: lowest_bit(value))(number) == lowest
+
+
+@pytest.mark.parametrize("number", [0.0, 5e-324, 1e-310, 2.0**-1022, 0.3, 1.0, 1.5, 2.0**52, 1e300, math.inf, math.nan])
+def test_the_distance_to_the_next_number(number):
+    expected = np.spacing(number)
+    assert np.array_equal([spacing(number), njit(lambda value: spacing(value))(number)], [expected, expected], equal_nan=True)
 
 
 def test_every_operation_is_tried_here():

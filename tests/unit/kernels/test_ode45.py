@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import csv
-import importlib.util
-from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from saltus.codegen import module as codegen
+from saltus.codegen.head import Head
+from saltus.codegen.interface import ODE45
+from saltus.codegen.kernels import Kernels
 from saltus.kernels import status as st
 
 REFERENCE = Path(__file__).parents[2] / "reference"
-PREAMBLE = codegen._PREAMBLE.format(title="a test", arguments=", ".join(codegen.BATCH + codegen.ODE45_WORKSPACE))
 # The rig of de Langre et al., p = m zeta f_n alpha K_c j_1 j_2 p f, summed in the order of the paper's equation (3):
 # v' = -2 zeta wn v - wn^2 x - alpha/m x^3 - K_c/m (x beyond the gap) + p_eff cos(w t)/m. Two of Table 2's digits depend on it.
+RIG_SIZES = dict(NSTATES=2, NGUARDS=2, NCONST=9, NDRIVE=1, GAPS_IN_TIME=False, TANGENT=False)
 RIG = """
-NSTATES, NGUARDS, NCONST, NDRIVE, GAPS_IN_TIME, TANGENT = 2, 2, 9, 1, False, False
-
 @kernel
 def prepare(p, c):
     w, wn = 2.0 * math.pi * p[8], 2.0 * math.pi * p[2]
@@ -52,13 +50,11 @@ def gap_rates(t, y, dy, c, q, h, out):
     out[0], out[1] = dy[0], dy[0]
 """
 # x' = a + b x^2 with boundaries at s_0 and at s_1 + r t; p = a b s_0 s_1 r.
+RAMP_SIZES = dict(NSTATES=1, NGUARDS=2, NCONST=5, NDRIVE=1, GAPS_IN_TIME=True, TANGENT=False)
 RAMP = """
-NSTATES, NGUARDS, NCONST, NDRIVE, GAPS_IN_TIME, TANGENT = 1, 2, 5, 1, True, False
-
 @kernel
 def prepare(p, c):
-    for i in range(5):
-        c[i] = p[i]
+    c[0], c[1], c[2], c[3], c[4] = p[0], p[1], p[2], p[3], p[4]
 
 @kernel
 def drive(t, c, h, q):
@@ -81,39 +77,27 @@ def gap_rates(t, y, dy, c, q, h, out):
     out[0], out[1] = dy[0], dy[0] - c[4]
 """
 # Neither has a clock: nothing is decided by time alone.
-NO_CLOCKS = """
-NCLOCKS, CLOCK_KIND, CLOCK_TABLE = 0, (0,), (0,)
-
+NO_CLOCKS = dict(NCLOCKS=0, CLOCK_KIND=(0,), CLOCK_TABLE=(0,))
+NUMBERS_OF_NO_CLOCKS = """
 @kernel
 def numbers_of_clocks(p, n):
     pass
-
-"""
-# Compiled for the test, not kept.
-KEPT = """
-from numba import njit as kept
 """
 B4 = {"mass": 3.0, "zeta": 0.03, "fn": 5.0, "alpha": 7e8, "kc": 1.4e4, "j1": 0.0, "j2": 0.4e-3, "force": 4.0, "f": 15.0}
 
 
-def build(head, folder):
-    templates = (resources.files("saltus.kernels") / f"{name}.py" for name in ("clocks", "dormand_prince", "odezero", "ode45"))
-    path = folder / "kernels.py"
-    path.write_text(KEPT + PREAMBLE + head + NO_CLOCKS + "".join(template.read_text() for template in templates))
-    spec = importlib.util.spec_from_file_location("ode45_draft", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def build(sizes, functions):
+    return Kernels(ODE45, "ode45", Head(sizes | NO_CLOCKS, functions + NUMBERS_OF_NO_CLOCKS), "a test", "a test")
 
 
 @pytest.fixture(scope="module")
-def rig(tmp_path_factory):
-    return build(RIG, tmp_path_factory.mktemp("rig"))
+def rig():
+    return build(RIG_SIZES, RIG)
 
 
 @pytest.fixture(scope="module")
-def ramp(tmp_path_factory):
-    return build(RAMP, tmp_path_factory.mktemp("ramp"))
+def ramp():
+    return build(RAMP_SIZES, RAMP)
 
 
 def values(**changes):

@@ -3,26 +3,43 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
-import numba
 import numpy as np
 import pytest
 from mpmath import mp, mpf
-from numba import njit
 
+from compiled import compiled
+from saltus.codegen.interface import ARRAY
+from saltus.codegen.module import jit_disabled
 from saltus.kernels.lanes import load, store
 from saltus.kernels.trigonometry import LARGEST_ANGLE, sincos, turned
 
 LANES = 4
-JIT = not numba.config.DISABLE_JIT
+JIT = not jit_disabled()
 
 
-@njit
+ONE_ROW = """
+def one_row(angles, sines, cosines):
+    s, c = sincos(load(angles, 0, LANES))
+    store(sines, 0, s)
+    store(cosines, 0, c)
+"""
+
+
+@cache
+def _one_row():
+    """Sine and cosine of one row of lanes: compiled as in an equation, or plain with the JIT off."""
+    if JIT:
+        return compiled(ONE_ROW, (ARRAY,) * 3, LANES)
+    names = dict(sincos=sincos, load=load, store=store, LANES=LANES)
+    exec(ONE_ROW, names)
+    return names["one_row"]
+
+
 def _sincos_rows(angles, sines, cosines):
     for row in range(angles.shape[0]):
-        s, c = sincos(load(angles, row, LANES))
-        store(sines, row, s)
-        store(cosines, row, c)
+        _one_row()(angles[row : row + 1], sines[row : row + 1], cosines[row : row + 1])
 
 
 def in_ulps(values, exact):

@@ -180,6 +180,13 @@ def test_legend_says_what_each_attractor_is():
     assert basins(basins_map(np.array([[0, 1], [1, 1]])), legend=False).get_legend() is None
 
 
+def test_legend_says_how_far_a_noisy_attractor_scatters():
+    known = attractors([[1e-3], [2e-3]], [[0.1], [0.1]], [24, 5], [60, 14], kind=["noisy_periodic", "periodic"], fraction=[0.25, 0.75],
+                       attractor_scatter=("attractor", np.array([4.31e-6, np.nan]), {"units": "m"}))  # fmt: skip
+    ax = basins(basins_map(np.array([[0, 1], [1, 1]]), known=known))
+    assert texts(ax)[:2] == ["noisy 24T, scatter 4.3 µm, 60 contacts, 25.0 %", "5T, 14 contacts, 75.0 %"]
+
+
 def test_scale_of_lightness_is_labelled_with_its_ends_and_middle():
     ax = basins(basins_map(np.zeros((2, 2), dtype=int), np.array([[0, 0], [3, 15]])))
     ax.figure.canvas.draw()

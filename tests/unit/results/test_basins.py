@@ -242,6 +242,28 @@ def test_describe_tells_what_a_map_holds():
     ]
 
 
+def test_scatter_stands_where_an_attractor_is_noisy(tmp_path):
+    noisy = dataclasses.replace(TABLE, kind=["periodic", "noisy_periodic", "chaotic"], scatter=np.array([np.nan, 4.31e-6, np.nan]))
+    for ds in (basins(attractors=noisy), attractors(attractors=noisy)):
+        np.testing.assert_array_equal(ds["attractor_scatter"], noisy.scatter)
+        assert ds["attractor_scatter"].attrs["units"] == UNITS["x"]
+        assert "  1: noisy 3T, peak 0.002 m, scatter 4.3e-06 m, 25.00% of the starts" in describe(ds).splitlines()
+        xr.testing.assert_identical(load(save(ds, tmp_path / "noisy.nc")), ds)
+    assert "attractor_scatter" not in basins()
+
+
+def test_describe_tells_what_errors_of_ode45_have_to_do_with_starts_that_never_settled():
+    def noise(**attrs):
+        return [line for line in describe(basins(attrs={**PROVENANCE, **attrs})).splitlines() if line.startswith("noise")]
+
+    assert noise(method="Taylor") == []
+    assert noise(method="ODE45") == ["noise    Errors of ode45 itself can keep a motion from settling. A smaller rtol, or Taylor, tells."]
+    (told,) = noise(method="ODE45", unconverged_exactly="3T, 24T", unconverged_stray=0.314)
+    assert "exact integration from where they stand settles to 3T, 24T, and ode45 strays from there by up to 31% of the range" in told
+    (told,) = noise(method="ODE45", unconverged_exactly="", unconverged_stray=np.nan)
+    assert told == "noise    By exact integration from where they stand they settle to no orbit either."
+
+
 def test_describe_tells_what_the_others_hold():
     assert "extent   3 starts\nfound    3 attractors" in describe(attractors())
     assert "settled  2 of 3 starts, 1 failed" in describe(attractors())

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from saltus.errors import ParameterError, TraceError, UnitError
+from saltus.errors import ParameterError, SaltusError, TraceError, UnitError
 from saltus.system import cos, freeplay, pi, piecewise, sin, system
 from saltus.system.text import to_text
 
@@ -337,3 +337,22 @@ def test_defaults_in_torques_and_half_powers_are_read():
 
     assert dict(geared.values) == {"torque": 2.82, "twist": 4e4, "hertz": 1e9}
     assert [geared.units[name] for name in geared.values] == ["N*m", "N*m/rad", "N/m^1.5"]
+
+
+def test_letters_that_only_look_alike_are_told():
+    """The micro sign of keyboards; Python reads it as the Greek letter in the names of arguments, not in texts."""
+
+    def block(t, x, v, *, µ=0.3):
+        return v, -x - µ * v
+
+    with pytest.raises(SaltusError, match=r"Write 'μ' \('\\u03bc'\), which is how Python reads 'µ' \('\\xb5'\) in the function"):
+        system(states="x v", units={"\u00b5": "1"})(block)
+    traced = system(states="x v", units={"\u03bc": "1"})(block)
+    with pytest.raises(SaltusError, match="they only look alike"):
+        traced.resolve("\u00b5", 0.5)
+    assert traced.resolve("\u03bc", 0.5) == 0.5
+
+
+def test_a_name_that_turns_the_direction_of_text_is_refused():
+    with pytest.raises(SaltusError, match="without control characters"):
+        system(states="x", name="\u202egir")(lambda t, x, *, k=1.0: -k * x)

@@ -34,6 +34,9 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
             function.linkage = "external" if function.name == symbol else "internal"
             if _own_name(function.name) in inlined - RARE | {"numba"}:
                 function.add_function_attribute("alwaysinline")
+    for variable in clean.global_variables:
+        if not variable.is_declaration:
+            variable.linkage = "internal"  # what Numba keeps for exceptions: nobody reads it
     clean.verify()
     _shrink(clean)
     clean.name = symbol
@@ -82,5 +85,6 @@ def _shrink(module: llvm.ModuleRef) -> None:
     passes.add_simplify_cfg_pass()
     passes.add_instruction_combine_pass()
     passes.add_simplify_cfg_pass()
+    passes.add_global_dead_code_eliminate_pass()
     passes.add_strip_dead_prototype_pass()
     passes.run(module, builder)

@@ -15,10 +15,10 @@ from saltus.analysis.answers import gap_unit, provenance
 from saltus.analysis.attractors import attractors
 from saltus.analysis.basins import label_all
 from saltus.analysis.capture import Neighbourhoods
+from saltus.analysis.found import Found
 from saltus.analysis.lyapunov import lyapunov
 from saltus.analysis.orbits import Orbit, polish, same
 from saltus.analysis.portrait import portraits
-from saltus.analysis.recurrence import Found
 from saltus.analysis.settling import Settling
 from saltus.analysis.simulate import simulate
 from saltus.analysis.stroboscope import stroboscope

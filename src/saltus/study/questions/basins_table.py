@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from saltus.results.schema import axes_of, kind_text
+from saltus.results.summary import own_errors
 from saltus.study.table import Column, TextTable, number, quantity, table, with_error, words
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ def attractor_table(title: str, ds: xr.Dataset) -> TextTable:
         number("contacts", found["contacts"].values.astype(float), "g"),
         quantity(f"peak |{first}|", found["peak"].values, units["peak"]),
         quantity(f"rms {first}", found["rms"].values, units["rms"]),
+        *([quantity(f"scatter {first}", found["scatter"].values, units["scatter"], 2)] if "scatter" in found else []),
         number("|multiplier|", np.where(np.isfinite(sizes), sizes, np.nan), ".4f"),
         with_error("exponent", found["exponent"].values, found["exponent_error"].values, unit="1/s"),
         quantity("to a graze", found["margin"].values, units["margin"], 3),
@@ -55,18 +56,14 @@ def _notes(ds: xr.Dataset) -> tuple[str, ...]:
     if attrs["unresolved_cells"]:
         notes.append(f"{attrs['unresolved_cells']} starts met a graze shallower than the local error: either outcome is possible.")
     if attrs["unsettled_cells"]:
-        notes.append(f"{attrs['unsettled_cells']} starts lead to no known attractor within the periods allowed.{_own_errors(attrs)}")
+        unsettled = f"{attrs['unsettled_cells']} starts lead to no known attractor within the periods allowed."
+        notes.append(f"{unsettled} {own_errors(attrs)}".rstrip())
+    if "attractor_scatter" in ds:
+        notes.append(
+            "Noisy: errors of the method keep the motion from closing. It stays beside an exact orbit, whose numbers stand in the row; "
+            "scatter is its root mean square distance from there."
+        )
     return tuple(notes)
-
-
-def _own_errors(attrs: Mapping[str, object]) -> str:
-    """What a method of low accuracy may have to do with starts that don't settle; "" for one of high accuracy."""
-    if str(attrs.get("method", "")) != "ODE45":
-        return ""
-    return (
-        " Errors of ode45 itself can keep a motion from repeating, so that it scatters about an orbit or goes from one to another: that is "
-        "noise, no attractor. Where a smaller rtol, or Taylor, settles these starts, it was so."
-    )
 
 
 def agreement_table(ds: xr.Dataset) -> TextTable:

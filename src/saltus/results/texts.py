@@ -1,0 +1,34 @@
+"""Texts of a result: none holds what a terminal would obey, neither when it is written nor when it is read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.fence import has_control
+
+
+def place_of_control(ds: xr.Dataset) -> str:
+    """Where the first control character stands among names, texts and attributes, such as ``the attribute 'source'``; "" if nowhere."""
+    for place, text in _texts(ds):
+        if has_control(text):
+            return place
+    return ""
+
+
+def _texts(ds: xr.Dataset) -> Iterator[tuple[str, str]]:
+    yield from _attributes(ds.attrs, "")
+    for name, variable in ds.variables.items():
+        yield f"the name of the variable {str(name)!a}", str(name)
+        yield from _attributes(variable.attrs, f" of {str(name)!a}")
+        if variable.dtype.kind in "OUST":
+            for text in np.unique(np.asarray(variable.values).astype(str)):
+                yield f"the variable {str(name)!a}", str(text)
+
+
+def _attributes(attrs: Any, owner: str) -> Iterator[tuple[str, str]]:
+    for key, value in attrs.items():
+        yield f"the attribute {str(key)!a}{owner}", f"{key}{value}"
