@@ -73,7 +73,7 @@ DEFECT = 1024.0
 MOST_HALVINGS = 40
 
 # -- steps that prove nothing are shortened (settle_sooner), shares of the longest step --
-#: Such a step ends so far behind the first crossing that is predicted: about the error of the prediction.
+#: Such a step goes so much further than the first crossing that is predicted: about the error of the prediction.
 BEHIND = 1.1
 #: A crossing later than this isn't aimed at: a step hardly shorter proves hardly more.
 WORTH_AIMING = 0.9

@@ -307,11 +307,11 @@ def locate_again(lanes, h):
 
 @inner
 def share_to_first_crossing(lanes, h):
-    """Share of the step that ends just behind the first crossing which the cubic parts of the gaps predict, and in front of the second.
+    """Share of the step that ends just behind the first crossing which the leading terms predict, and in front of the second.
 
     1 where a shorter step would prove nothing, or could tell less: a gap that turns about at zero before that (a graze is judged on the
-    longest step), two crossings that may be one event, a gap that doesn't begin on its side, terms that are set aside, a step so short that
-    time would hardly pass.
+    longest step), two crossings that may be one event, a gap that doesn't begin on its side or ends at zero, terms that are set aside, a step
+    so short that time would hardly pass.
     """
     first, second, turned = splat(math.inf, LANES), splat(math.inf, LANES), splat(math.inf, LANES)
     for g in range(NGUARDS):
