@@ -310,7 +310,7 @@ def share_to_first_crossing(lanes, h):
     """Share of the step that ends just behind the first crossing which the leading terms predict, and in front of the second.
 
     1 where a shorter step would prove nothing, or could tell less: a gap that turns about at zero before that (a graze is judged on the
-    longest step), two crossings that may be one event, a gap that doesn't begin on its side or ends at zero, terms that are set aside, a step
+    longest step), two crossings that may be one event, a gap that doesn't begin on its side or ends at zero, terms set aside, a step
     so short that time would hardly pass.
     """
     first, second, turned = splat(math.inf, LANES), splat(math.inf, LANES), splat(math.inf, LANES)
