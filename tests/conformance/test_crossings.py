@@ -159,6 +159,44 @@ def test_crossing_without_speed(root):
     assert all(abs(c.time - root) <= c.error for c in found if c.before != c.after)
 
 
+def _expected(level, x, v, t_end):
+    """Times and directions at which x cos t + v sin t meets a level below which it starts."""
+    size, top = math.hypot(x, v), math.atan2(v, x)
+    if size <= level:
+        return [], 1.0
+    half = math.acos(level / size)
+    found = [(top + side * half + 2 * math.pi * k, -side) for k in range(-1, 3) for side in (-1, 1)]
+    return sorted(one for one in found if 0 < one[0] <= t_end), math.sqrt(size**2 - level**2)
+
+
+@pytest.mark.parametrize("apart", [None, 0.3, 1e-2, 1e-3, 1e-4, 1e-7, 1e-12])
+def test_crossings_of_several_gaps_in_one_step(apart):
+    """Two oscillators at 1 rad/s, boundaries without effect for both and for their distance: every crossing of all, at its time.
+
+    A natural step holds several. `apart`: the second oscillator follows the first so much later, and crosses as much later.
+    """
+    rng = np.random.default_rng(12)
+    x1, x2 = rng.uniform(-2.5, 0.9, (2, 100))
+    v1, v2 = rng.uniform(-3, 3, (2, 100))
+    if apart is not None:
+        x2, v2 = x1 * math.cos(apart) - v1 * math.sin(apart), v1 * math.cos(apart) + x1 * math.sin(apart)
+    starts = {"x1": x1, "v1": v1, "x2": x2, "v2": v2}
+    run = sl.simulate(pair.with_values(spring=1.0), starts, t_end=6.0, samples=1)
+    compared = 0
+    for i in range(100):
+        found = contacts(run, i)
+        assert [c.time for c in found] == sorted(c.time for c in found)
+        for guard, x, v in (("stop1", x1[i], v1[i]), ("stop2", x2[i], v2[i]), ("gap", x1[i] - x2[i], v1[i] - v2[i])):
+            expected, rate = _expected(1.0, x, v, 6.0)
+            if x >= 0.999 or abs(math.hypot(x, v) - 1) < 1e-6:
+                continue
+            times = [(c.time, c.direction) for c in found if c.guard == guard]
+            assert [direction for _, direction in times] == [direction for _, direction in expected]
+            assert all(abs(time - exact) < 1e-14 * (1 + 1 / rate) for (time, _), (exact, _) in zip(times, expected, strict=True))
+            compared += len(times)
+    assert compared > 200
+
+
 def test_through_both_boundaries_in_one_step():
     """At 100 m/s the rig crosses both contact zones, 0.8 mm apart, within one step: lower boundary, then upper, 8 us later."""
     rig = sl.models.delangre("a", contact_stiffness=0.0, cubic=0.0, force=0.0, damping_ratio=0.0)

@@ -53,7 +53,7 @@ def bits(outcome):
 @pytest.mark.parametrize("case", CASES)
 def test_all_tiers_give_the_same_bits(case):
     system, spread, method = CASES[case]
-    flow = method.kernels(system)
+    flow = method.kernels(system.origin)  # as the engine asks for it
     found = {}
     for tier in TIERS:
         flow.exchange(tier)
@@ -71,7 +71,7 @@ def test_all_tiers_give_the_same_bits(case):
 def test_an_exchange_between_two_calls_changes_nothing(monkeypatch):
     """The chunk is worked off in small slices, and another tier takes over after every one."""
     system, spread, method = CASES["walls"]
-    flow = method.kernels(system)
+    flow = method.kernels(system.origin)
     flow.exchange(GENERIC)
     whole = bits(engine.run(system, method, request(system, spread), threads=1))
     called = []
@@ -94,7 +94,7 @@ def test_a_flow_that_has_worked_becomes_steady_by_itself(monkeypatch):
 
     monkeypatch.setattr(kernels, "STEADY_AFTER", 0.0)
     system, spread, method = CASES["stop"]
-    flow = method.kernels(system)
+    flow = method.kernels(system.origin)
     flow.exchange(GENERIC)
     monkeypatch.setattr(flow, "_asked", threading.Lock())
     before = bits(engine.run(system, method, request(system, spread), threads=1))

@@ -184,8 +184,8 @@ def test_ode45_has_the_numbers_of_its_own_motion(events):
 @pytest.mark.parametrize(
     ("given", "error", "words"),
     [
-        ([1.0], ParameterError, "functions by name"),
-        ({"x": lambda x: x}, ParameterError, "isn't a state"),
+        ([1.0], ParameterError, "must be a mapping such as"),
+        ({"x": lambda x: x}, ParameterError, "has a state of this name"),
         ({"stop": lambda y: y}, TraceError, "asks for 'y'"),
         ({"stop": 3.0}, TraceError, "must be a function"),
     ],

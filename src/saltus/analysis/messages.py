@@ -32,6 +32,8 @@ SECONDS_PER_STEP = 1e-6
 
 #: Times the fastest rate of the equations that the rest of a run is long, from which on they count as singular where it stands.
 SINGULAR = 1e9
+#: Times the usual step is long there: a stiff equation takes steps of about one from the start, beside a root they become ever shorter.
+SHARPENING = 100.0
 
 
 def messages(run: xr.Dataset, asked: Span | None = None, system: System | None = None) -> list[str]:
@@ -92,7 +94,8 @@ def _singular(run: xr.Dataset, asked: Span, index: int, system: System) -> str:
     entries = evaluate([entry for row in system.jacobian for entry in row], t=time, states=state, values=values, bits=bits)
     matrix = np.array(entries, dtype=float).reshape(len(state), len(state))
     rate = float(np.abs(np.linalg.eigvals(matrix)).max()) if np.isfinite(matrix).all() else np.inf
-    if not rate * rest > SINGULAR:
+    usual = (time - asked.t_start) / max(place["steps"].item(), 1)  # a step of what lies behind: stiff equations take such, too
+    if not (rate * rest > SINGULAR and rate * usual > SHARPENING):
         return ""
     return (
         f"The equations change at {rate:.1e} 1/s there: one of their laws has no derivative, as the root of a level h has none at h = 0, "

@@ -72,6 +72,18 @@ DEFECT = 1024.0
 #: Halvings of a step that its probes can ask for.
 MOST_HALVINGS = 40
 
+# -- steps that prove nothing are shortened (settle_sooner), shares of the longest step --
+#: Such a step goes so much further than the first crossing that is predicted: about the error of the prediction.
+BEHIND = 1.1
+#: A crossing later than this isn't aimed at: a step hardly shorter proves hardly more.
+WORTH_AIMING = 0.9
+#: The share that is tried then. A number of two bits, so that motions with round numbers stay exact.
+SHORTENED = 0.75
+#: Crossings predicted so near to each other may be one event.
+TOGETHER = 2.0**-10
+#: A step isn't made shorter than this share of the stretch.
+LEAST_SHARE = 2.0**-40
+
 # -- laws without a series on a boundary (taylor_singular.py) --
 #: Effect on a state, relative to it, below which the terms without a series are left out of a step's series.
 NEGLIGIBLE = 2.0**-50

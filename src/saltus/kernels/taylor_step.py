@@ -121,6 +121,22 @@ def bound_series(lanes, h):
 
 
 @inner
+def terms_of_gap(lanes, g):
+    """Terms 0 to 3 of a gap over the step that `bounds` belong to, positive on its side, and the gap at its end."""
+    j, side = BOUNDS * GUARD_SERIES[g], load(lanes.side, g, LANES)
+    s, a0 = side * GUARD_SIGN[g], side * load(lanes.work, GAP_ROW + g, LANES)
+    a1, a2, a3 = load(lanes.bounds, j + LINEAR, LANES), load(lanes.bounds, j + QUADRATIC, LANES), load(lanes.bounds, j + CUBIC, LANES)
+    end = select(load(lanes.fresh, g, LANES) > 0.5, 0.0, a0) + s * load(lanes.bounds, j + CHANGE, LANES)
+    return a0, s * a1, s * a2, s * a3, end
+
+
+@inner
+def without_known_root(on_boundary, a0, a1, a2, a3):
+    """The terms of P, divided by x where the root at 0 is known."""
+    return select(on_boundary, a1, a0), select(on_boundary, a2, a1), select(on_boundary, a3, a2), select(on_boundary, 0.0, a3)
+
+
+@inner
 def locate(lanes, h):
     """Find the lanes whose gaps may close within h. Fills WHICH, SIGN, DEPTH, ONBOARD (and `poly`, unless
     all gaps share one series) for those with one proven crossing; returns those undecided.
@@ -141,11 +157,8 @@ def locate(lanes, h):
         row = GUARD_ROW[g]
         s = load(side, g, LANES) * GUARD_SIGN[g]
         on_boundary = load(fresh, g, LANES) > 0.5
-        a0 = load(side, g, LANES) * load(lanes.work, GAP_ROW + g, LANES)
-        a1, a2, a3 = s * load(bounds, j + LINEAR, LANES), s * load(bounds, j + QUADRATIC, LANES), s * load(bounds, j + CUBIC, LANES)
-        end = select(on_boundary, 0.0, a0) + s * load(bounds, j + CHANGE, LANES)
-        p0, p1, p2 = select(on_boundary, a1, a0), select(on_boundary, a2, a1), select(on_boundary, a3, a2)
-        p3 = select(on_boundary, 0.0, a3)
+        a0, a1, a2, a3, end = terms_of_gap(lanes, g)
+        p0, p1, p2, p3 = without_known_root(on_boundary, a0, a1, a2, a3)
         rest = load(bounds, j + REST, LANES)
         size = load(lanes.work, SCALE_ROW + g, LANES) + magnitude(a1) + magnitude(a2) + magnitude(a3) + rest
         inherited = load(lanes.prior, PRIOR_ROWS * g + NEW, LANES)
@@ -267,6 +280,61 @@ def refine_crossings(lanes, h, undecided):
     return undecided
 
 
+@kernel
+def settle_sooner(lanes, undecided):
+    """Try one shorter step in lanes whose gaps are undecided; what that doesn't settle keeps its length. Refines, and returns what is open.
+
+    A step that meets several contacts ends at the first; what its series say of the rest is thrown away. docs/decisions/0023.
+    """
+    longest = load(lanes.run, STEP, LANES)
+    h = select(undecided, longest * share_to_first_crossing(lanes, longest), longest)
+    tried = h < longest
+    if any_lane(tried):
+        undecided = locate_again(lanes, h)
+        in_vain = tried & undecided
+        if any_lane(in_vain):
+            h = select(in_vain, longest, h)
+            undecided = locate_again(lanes, h)
+        store(lanes.run, STEP, h)
+    return bits(refine_crossings(lanes, h, undecided))
+
+
+@kernel
+def locate_again(lanes, h):
+    """:func:`locate`, not inlined."""
+    return locate(lanes, h)
+
+
+@inner
+def share_to_first_crossing(lanes, h):
+    """Share of the step that ends just behind the first crossing which the leading terms predict, and in front of the second.
+
+    1 where a shorter step would prove nothing, or could tell less: a gap that turns about at zero before that (a graze is judged on the
+    longest step), two crossings that may be one event, a gap that doesn't begin on its side or ends at zero, terms set aside, a step
+    so short that time would hardly pass.
+    """
+    first, second, turned = splat(math.inf, LANES), splat(math.inf, LANES), splat(math.inf, LANES)
+    for g in range(NGUARDS):
+        a0, a1, a2, a3, end = terms_of_gap(lanes, g)
+        p0, p1, p2, p3 = without_known_root(load(lanes.fresh, g, LANES) > 0.5, a0, a1, a2, a3)
+        inside, discriminant = p0 > 0.0, p1 * p1 - 4.0 * p0 * p2
+        x = 2.0 * p0 / (root(larger(discriminant, 0.0)) - p1)
+        x = select(inside & (discriminant >= 0.0) & (x > 0.0), x, math.inf)
+        second, first = smaller(second, larger(first, x)), smaller(first, x)
+        doubt = load(lanes.bounds, BOUNDS * GUARD_SERIES[g] + REST, LANES) + 6.0 * (magnitude(p3) + TOGETHER * p0)
+        touches = (p1 < 0.0) & (p2 > 0.0) & (6.0 * magnitude(discriminant) <= 4.0 * p2 * doubt)  # the vertex is -discriminant / (4 p2)
+        ends_on_boundary = magnitude(end) <= TOGETHER * TOGETHER * (magnitude(a0) + magnitude(a1) + magnitude(a2) + magnitude(a3))
+        turned = select(inside & (~ends_on_boundary), turned, 0.0)
+        if any_lane(touches):
+            turned = smaller(select(touches, -0.5 * p1 / p2, math.inf), turned)
+    share = smaller(BEHIND * first, 0.5 * (first + second))
+    share = select(share < WORTH_AIMING, share, SHORTENED)
+    useful = (turned >= share) & (~(second - first <= TOGETHER)) & (share * h > LEAST_SHARE * load(lanes.run, END, LANES))
+    for j in range(NSINGULAR):
+        useful = useful & (load(lanes.side, NGUARDS + j, LANES) < 0.0)
+    return select(useful, share, 1.0)
+
+
 @inner
 def size_of_terms(lanes, g, share):
     """Size of the terms of a gap over a share of the step: what its rounding error is measured by."""
@@ -377,8 +445,8 @@ def step_all(lanes, batch, slow):
     if PROBED:
         h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), batch.options[LOG2_TOLERANCE])
     store(lanes.run, STEP, h)
-    undecided = refine_crossings(lanes, h, locate(lanes, h))
-    open_lanes = bits(undecided)
+    undecided = locate(lanes, h)
+    open_lanes = settle_sooner(lanes, undecided) if any_lane(undecided) else bits(refine_crossings(lanes, h, undecided))
     waiting = open_lanes
     while waiting != 0:
         decide(lanes, lowest_bit(waiting), batch, slow)

@@ -60,9 +60,7 @@ def numbers(found):
         (told(o.points), told(o.monodromy), told(o.multipliers.astype(complex)), struct.pack("d", o.mismatch))
         for o in (*found.orbits, *found.unstable)
     ]
-    wandering = [
-        (w.kind, struct.pack("dd", w.exponent, w.exponent_error), told(w.points), told(w.scale), told(w.boxes)) for w in found.wandering
-    ]
+    wandering = [(w.kind, struct.pack("dd", w.exponent, w.exponent_error), told(w.points), told(w.scale)) for w in found.wandering]
     near = found.near
     return len(found.orbits), orbits, wandering, told(near.centres), told(near.weights), told(near.owners)
 

@@ -109,7 +109,7 @@ def made_again(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["capture", pytest.param("ode45", marks=pytest.mark.slow), pytest.param("taylor_2", marks=pytest.mark.slow)]
+    "name", ["capture", pytest.param("ode45", marks=pytest.mark.slow), pytest.param("taylor_2", marks=pytest.mark.nightly)]
 )
 def test_the_bitcode_is_what_the_templates_give(name):
     """To the byte, where the same versions make it that made it."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from saltus.errors import TraceError
-from saltus.system import cos, exp, freeplay, mod, pi, piecewise, sin, system
+from saltus.system import cos, exp, freeplay, mod, periodic, pi, piecewise, sin, system
 from saltus.system.periodic import check_periodic, timing_of
 
 
@@ -45,7 +45,7 @@ def test_the_formula_tells_all_where_time_enters_as_phases_and_clocks(law, monke
     def refuse(*_):
         raise TraceError("no formula says that it repeats")
 
-    monkeypatch.setattr("saltus.system.periodic._check_samples", refuse)
+    monkeypatch.setattr(periodic, "_check_samples", refuse)
     assert verdicts(forced(law, forced_at=None)) == list(OTHERS.values())
 
 
@@ -53,7 +53,7 @@ def test_the_formula_tells_all_where_time_enters_as_phases_and_clocks(law, monke
 def test_samples_find_the_same(law, monkeypatch):
     """Of smooth laws: short pulses lie between samples, which is why clocks have the formula only."""
     made = forced(law, forced_at=None)
-    monkeypatch.setattr("saltus.system.periodic.timing_of", lambda entry: replace(timing_of(entry), clocks=(), complete=False))
+    monkeypatch.setattr(periodic, "timing_of", lambda entry: replace(timing_of(entry), clocks=(), complete=False))
     assert verdicts(made) == list(OTHERS.values())
 
 
