@@ -96,9 +96,9 @@ def test_lines_of_a_response_lie_on_multiples_of_its_own_frequency(contacting):
 
 
 def test_only_whole_responses_are_taken_and_what_doesnt_repeat_gets_a_window():
-    run = sl.simulate(
-        lab, (0.0, 0.0), periods=500, keep=24, samples=64, time_errors="local", values=SUBHARMONIC | {"stiffness": [100.0, 40.0]}
-    )
+    """Beside a 5T response the undamped free motion of an oscillator without a stop: its frequency isn't commensurate with the force's."""
+    values = SUBHARMONIC | {"stiffness": [100.0, 0.0], "damping": [0.1, 0.0]}
+    run = sl.simulate(lab, (0.0, 0.0), periods=500, keep=24, samples=64, time_errors="local", values=values)
     found = sl.spectrum(run, "x", last=24)
     assert found.response_period.values.tolist() == [5, 0]
     assert found.window.values.tolist() == ["none", "hann"]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.codegen.module import Flow, lane_width, ode45_module, taylor_module
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
 from saltus.system.system import System
 
@@ -39,7 +39,7 @@ def _check_positive(name: str, value: Any) -> None:
         or not isinstance(value, int | float | np.integer | np.floating)
         or not 0 < value <= sys.float_info.max
     ):
-        raise ParameterError(f"{name} must be a positive number, not {value!r}.")
+        raise ParameterError(f"{name} must be a positive number, not {shown(value)}.")
 
 
 class Method:
@@ -119,7 +119,7 @@ class Taylor(Method):
         whole(self.order, "order", 6, 40)
         _check_positive("tolerance", self.tolerance)
         if self.lanes is not None and (not isinstance(self.lanes, int) or self.lanes not in (2, 4, 8, 16)):
-            raise ParameterError(f"lanes must be 2, 4, 8 or 16, not {self.lanes!r}.")
+            raise ParameterError(f"lanes must be 2, 4, 8 or 16, not {shown(self.lanes)}.")
         if self.max_steps is not None:
             whole(self.max_steps, "max_steps")
         whole(self.max_events, "max_events")
@@ -179,7 +179,7 @@ class ODE45(Method):
         if self.rtol < 100 * np.finfo(float).eps:
             raise ParameterError(f"rtol must be at least {100 * np.finfo(float).eps:.3g}, as in MATLAB, not {self.rtol}.")
         if not isinstance(self.events, str) or self.events not in ("locate", "ignore"):
-            raise ParameterError(f'events must be "locate" or "ignore", not {self.events!r}.')
+            raise ParameterError(f'events must be "locate" or "ignore", not {shown(self.events)}.')
         if self.max_steps is not None:
             whole(self.max_steps, "max_steps")
         whole(self.max_events, "max_events")
@@ -217,6 +217,6 @@ def check_method(method: Any) -> Method:
     if method is None:
         return Taylor()
     if not isinstance(method, Method):
-        what = method.__name__ + " itself" if isinstance(method, type) else repr(method)
+        what = method.__name__ + " itself" if isinstance(method, type) else shown(method)
         raise ParameterError(f"method must be such as sl.Taylor() or sl.ODE45(rtol=1e-4, atol=1e-7), not {what}.")
     return method
