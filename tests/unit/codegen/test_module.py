@@ -84,6 +84,20 @@ def test_what_the_code_depends_on_is_in_its_name(keys, monkeypatch, change):
     assert all(keys(equation(3))[tier][0] != before[tier][0] for tier in TIERS)
 
 
+@pytest.mark.parametrize(
+    ("triple", "processor", "features", "lanes"),
+    [
+        ("x86_64-linux", "znver5", "+avx2,+avx512dq,+avx512f,+fma", 16), ("x86_64-linux", "haswell", "+avx2,-avx512f,+fma", 8),
+        ("x86_64-linux", "odd", "+avx2,-fma", 2), ("x86_64-linux", "odd", "+avx512f,-avx512dq,-avx2", 2), ("x86_64-linux", "old", "", 2),
+        ("x86_64-linux", "x86-64-v3", "", 8), ("x86_64-linux", "x86-64-v4", "", 16), ("aarch64-linux", "generic", "+neon", 4),
+        ("arm64-apple-macosx", "apple-m1", "", 4),
+    ],
+)  # fmt: skip
+def test_lane_width_is_the_processors(monkeypatch, triple, processor, features, lanes):
+    monkeypatch.setattr(machine, "target", lambda: machine.Target(triple, processor, features))
+    assert module.lane_width() == lanes
+
+
 TARGET = "from saltus.codegen import machine, module; print(*machine.target()[1:], module.lane_width())"
 
 
