@@ -114,7 +114,8 @@ def one(program: str, name: str) -> None:
 def measured(program: str, name: str, cache: Path) -> tuple[float, float] | None:
     """(CPU, wall) of one fresh process; what it kept in the cache of its equation is taken away again."""
     shared = {path.name for path in cache.iterdir()} if cache.exists() else set()
-    environment = {**os.environ, "SALTUS_CACHE": str(cache)}
+    empty = tempfile.mkdtemp(dir=cache.parent)  # heyoka keeps what it compiled, too
+    environment = {**os.environ, "SALTUS_CACHE": str(cache), "HOME": empty, "XDG_CACHE_HOME": empty}
     command = [sys.executable, str(HERE), "--one", program, name]
     said = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=True).stdout
     for path in cache.iterdir() if cache.exists() else ():
