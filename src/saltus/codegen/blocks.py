@@ -80,29 +80,15 @@ def _one_block(block: list[Line], i: int, slots: dict[str, _Slot], lanes: int, l
     return "".join(f"  {line}\n" for line in out)
 
 
-def _is_mask(type_: str) -> bool:
-    return type_.endswith("x i1>")
-
-
 def _load(name: str, slot: _Slot, lanes: int) -> list[str]:
     place = f"%at{name[2:]}"
-    out = [f"{place} = getelementptr i8, ptr %kept, i64 {8 * lanes * slot.place}"]
-    if _is_mask(slot.type):
-        whole, bits = f"%whole{name[2:]}", f"%bits{name[2:]}"
-        return [
-            *out, f"{whole} = load i32, ptr {place}, align 8", f"{bits} = trunc i32 {whole} to i{lanes}",
-            f"{name} = bitcast i{lanes} {bits} to {slot.type}",
-        ]  # fmt: skip
-    return [*out, f"{name} = load {slot.type}, ptr {place}, align 8"]
+    return [_address(place, slot, lanes), f"{name} = load {slot.type}, ptr {place}, align 8"]
 
 
 def _keep(name: str, slot: _Slot, lanes: int) -> list[str]:
     place = f"%to{name[2:]}"
-    out = [f"{place} = getelementptr i8, ptr %kept, i64 {8 * lanes * slot.place}"]
-    if _is_mask(slot.type):
-        whole, bits = f"%wide{name[2:]}", f"%mask{name[2:]}"
-        return [
-            *out, f"{bits} = bitcast {slot.type} {name} to i{lanes}", f"{whole} = zext i{lanes} {bits} to i32",
-            f"store i32 {whole}, ptr {place}, align 8",
-        ]  # fmt: skip
-    return [*out, f"store {slot.type} {name}, ptr {place}, align 8"]
+    return [_address(place, slot, lanes), f"store {slot.type} {name}, ptr {place}, align 8"]
+
+
+def _address(place: str, slot: _Slot, lanes: int) -> str:
+    return f"{place} = getelementptr i8, ptr %kept, i64 {8 * lanes * slot.place}"

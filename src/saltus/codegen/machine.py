@@ -11,11 +11,13 @@ from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 
+from saltus.errors import ParameterError, nearest, shown
+
 #: Rises when the same templates and equations would be made into other code: entries of the cache carry it in their names.
 PIPELINE = 1
 #: Only one thread at a time: LLVM keeps modules in one context.
 _LLVM = threading.Lock()
-#: Characters of IR beyond which LLVM takes less trouble: a third of the time saved; the code is as fast within some per cent (0022).
+#: Characters of IR beyond which LLVM takes less trouble: a third of the time saved (0022).
 LONG = 1_500_000
 _NUMBER = itertools.count()
 
@@ -28,14 +30,32 @@ class Target(NamedTuple):
     features: str
 
 
+#: Levels of x86-64 that ``$SALTUS_PROCESSOR`` may name, and features of this machine without which their code would crash.
+LEVELS = {
+    "x86-64": (), "x86-64-v2": ("sse4.2", "popcnt"), "x86-64-v3": ("avx2", "fma", "bmi2"),
+    "x86-64-v4": ("avx512f", "avx512dq", "avx512bw", "avx512vl"),
+}  # fmt: skip
+
+
 @cache
 def target() -> Target:
-    """The machine at hand; ``$SALTUS_PROCESSOR``, such as ``x86-64-v3``, names an older processor of its family instead."""
-    triple = llvm.get_process_triple()
+    """The machine at hand; ``$SALTUS_PROCESSOR``, such as ``x86-64-v3``, names an older processor of its family instead.
+
+    Raises
+    ------
+    ParameterError
+        If it names none that is known, or one that can do more than this machine.
+    """
+    triple, features = llvm.get_process_triple(), llvm.get_host_cpu_features()
     chosen = os.environ.get("SALTUS_PROCESSOR")
-    if chosen:
-        return Target(triple, chosen, "")
-    return Target(triple, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
+    if not chosen:
+        return Target(triple, llvm.get_host_cpu_name(), features.flatten())
+    if chosen not in LEVELS or not triple.startswith("x86_64"):
+        known = LEVELS if triple.startswith("x86_64") else ()
+        raise ParameterError(f"SALTUS_PROCESSOR={shown(chosen)} names no processor for {triple}. {nearest(chosen, known) if known else ''}")
+    if lacking := [name for name in LEVELS[chosen] if not features.get(name)]:
+        raise ParameterError(f"SALTUS_PROCESSOR={chosen}: this processor lacks {', '.join(lacking)}. Name an older one, or none.")
+    return Target(triple, chosen, "")
 
 
 def versions() -> tuple[str, ...]:

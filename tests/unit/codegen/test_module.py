@@ -42,6 +42,14 @@ def equation(power, name="same name"):
     return free
 
 
+def with_number(number, more=0):
+    @sl.system(states=" ".join(f"x{i}" for i in range(2 + more)))
+    def free(t, *x, stiffness=2.0):
+        return x[1], -stiffness * x[0] ** 3 - number * x[0] * x[1], *(x[0] for _ in range(more))
+
+    return free
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_values_do_not_matter_and_equations_do(keys, method):
     rig = sl.models.delangre("b")
@@ -54,10 +62,13 @@ def test_values_do_not_matter_and_equations_do(keys, method):
     assert before[FULL] != after[FULL]
 
 
-def test_equations_of_one_shape_share_its_code(keys):
-    plain, stiff = keys(equation(3)), keys(equation(5))
-    assert plain[SHAPE][0] != plain[GENERIC][0]
-    assert plain[SHAPE][0] == stiff[SHAPE][0] or plain[SHAPE][1] != stiff[SHAPE][1]
+@pytest.mark.parametrize("method", METHODS)
+def test_equations_of_one_shape_share_its_code(keys, method):
+    """They differ in a number of the equation, in no size; one with another state differs in both."""
+    plain, stiffer, larger = (keys(one, method) for one in (with_number(2.0), with_number(3.0), with_number(2.0, 1)))
+    assert plain[SHAPE][0] == stiffer[SHAPE][0]
+    assert plain[SHAPE][1] != stiffer[SHAPE][1]
+    assert len({plain[SHAPE][0], larger[SHAPE][0], plain[GENERIC][0]}) == 3
 
 
 def test_methods_orders_and_lanes_have_code_of_their_own(keys):
@@ -134,6 +145,33 @@ def test_the_bitcode_is_what_the_templates_give(name):
     if templates.manifest()["made_with"] == {"numba": numba.__version__, "llvmlite": llvmlite.__version__}:
         assert again == templates.bitcode(name)
     assert again[:2] == b"BC"
+
+
+def test_damaged_bitcode_is_refused_in_a_sentence(monkeypatch):
+    whole = templates.manifest()
+    known = {**whole["bitcode"], "capture": {**whole["bitcode"]["capture"], "sha256": "0" * 64}}
+    monkeypatch.setattr(templates, "manifest", lambda: {**whole, "bitcode": known})
+    with pytest.raises(sl.SaltusError, match=r"capture\.bc\.xz is damaged: install saltus again"):
+        templates.bitcode.__wrapped__("capture")
+
+
+@pytest.mark.parametrize(
+    ("given", "here", "words"),
+    [
+        ("x86-64-v9", "x86_64-linux", "Did you mean 'x86-64"),
+        ("quick", "x86_64-linux", "Known: x86-64, "),
+        ("x86-64-v3", "aarch64-linux", "names no processor for aarch64"),
+        ("x86-64-v4", "x86_64-linux", "lacks avx512f"),
+    ],
+)
+def test_a_processor_that_is_unknown_or_can_do_more_is_refused(monkeypatch, given, here, words):
+    """Code for one that can do more would end the process without a word."""
+    monkeypatch.setenv("SALTUS_PROCESSOR", given)
+    monkeypatch.setattr(machine.llvm, "get_process_triple", lambda: here)
+    features = type(machine.llvm.get_host_cpu_features())({"avx2": True, "fma": True, "avx512f": False})
+    monkeypatch.setattr(machine.llvm, "get_host_cpu_features", lambda: features)
+    with pytest.raises(sl.SaltusError, match=words):
+        machine.target.__wrapped__()
 
 
 @pytest.fixture
