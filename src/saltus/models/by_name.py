@@ -1,0 +1,30 @@
+"""Values of models are given by name: what a call by position is answered."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any, ParamSpec
+
+from saltus.errors import ParameterError, shown
+from saltus.system import System
+
+P = ParamSpec("P")
+
+
+def by_name(model: Callable[P, System]) -> Callable[P, System]:
+    """A model that answers values without a name in a sentence. Its signature stays."""
+    cases = [one.name for one in inspect.signature(model).parameters.values() if one.kind is one.POSITIONAL_OR_KEYWORD]
+
+    @functools.wraps(model)
+    def called(*given: P.args, **values: P.kwargs) -> System:
+        if len(given) > len(cases):
+            names = list(model().values)
+            raise ParameterError(
+                f"{model.__name__} takes {' and '.join([*(f'a {case}' for case in cases), 'values by name'])}, and {shown(given[len(cases)])} "
+                f"has no name. Write {model.__name__}({names[0]}=...); its parameters are {', '.join(names)}."
+            )
+        return model(*given, **values)
+
+    return called
