@@ -241,7 +241,7 @@ def test_the_freeplay_cycle_of_the_wing_grows_towards_the_flutter_speed():
 
 
 def _first_harmonic(speed):
-    """Amplitude of pitch at which the section with the describing function of the freeplay in place of its spring neither grows nor decays."""
+    """Amplitude of pitch at which the section, with the describing function of the freeplay for its spring, neither grows nor decays."""
     load = 1.225 * speed**2 * 0.135 * 6.28 * np.array([-1.0, -0.1 * 0.135])
     inertia = np.array([[12.4, 12.4 * 0.25 * 0.135], [12.4 * 0.25 * 0.135, 0.065]])
     damping = np.diag([27.4, 0.036]) - np.outer(load, [1 / speed, 1.1 * 0.135 / speed])

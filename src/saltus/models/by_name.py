@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Any, ParamSpec
+from typing import ParamSpec
 
 from saltus.errors import ParameterError, shown
 from saltus.system import System
@@ -21,9 +21,9 @@ def by_name(model: Callable[P, System]) -> Callable[P, System]:
     def called(*given: P.args, **values: P.kwargs) -> System:
         if len(given) > len(cases):
             names = list(model().values)
+            takes = " and ".join([*(f"a {case}" for case in cases), "values by name"])
             raise ParameterError(
-                f"{model.__name__} takes {' and '.join([*(f'a {case}' for case in cases), 'values by name'])}, and {shown(given[len(cases)])} "
-                f"has no name. Write {model.__name__}({names[0]}=...); its parameters are {', '.join(names)}."
+                f"{model.__name__} takes {takes}, and {shown(given[len(cases)])} has no name. Write {model.__name__}({names[0]}=...); its parameters are {', '.join(names)}."
             )
         return model(*given, **values)
 

@@ -154,6 +154,6 @@ def _not_periodic(system: System, entry: int, period: float) -> str:
     other = "rad/s" if unit == "Hz" else "Hz"
     return (
         f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by forced_at={name!r} [{unit}]. "
-        f"Write the drive as {drives[unit]}, or as {drives[other]} with units={{{name!r}: {other!r}}}; let every other forcing frequency be a "
-        f"multiple of it; or say forced_at=None for a system without a period."
+        f"Write the drive as {drives[unit]}, or as {drives[other]} with units={{{name!r}: {other!r}}}; let every other forcing "
+        f"frequency be a multiple of it; or say forced_at=None for a system without a period."
     )
