@@ -23,7 +23,8 @@ def by_name(model: Callable[P, System]) -> Callable[P, System]:
             names = list(model().values)
             takes = " and ".join([*(f"a {case}" for case in cases), "values by name"])
             raise ParameterError(
-                f"{model.__name__} takes {takes}, and {shown(given[len(cases)])} has no name. Write {model.__name__}({names[0]}=...); its parameters are {', '.join(names)}."
+                f"{model.__name__} takes {takes}, and {shown(given[len(cases)])} has no name. "
+                f"Write {model.__name__}({names[0]}=...); its parameters are {', '.join(names)}."
             )
         return model(*given, **values)
 
