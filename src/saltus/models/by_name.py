@@ -10,15 +10,15 @@ from typing import ParamSpec
 from saltus.errors import ParameterError, shown
 from saltus.system import System
 
-P = ParamSpec("P")
+Model = TypeVar("Model", bound=Callable[..., System])
 
 
-def by_name(model: Callable[P, System]) -> Callable[P, System]:
+def by_name(model: Model) -> Model:
     """A model that answers values without a name in a sentence. Its signature stays."""
     cases = [one.name for one in inspect.signature(model).parameters.values() if one.kind is one.POSITIONAL_OR_KEYWORD]
 
     @functools.wraps(model)
-    def called(*given: P.args, **values: P.kwargs) -> System:
+    def called(*given: Any, **values: Any) -> System:
         if len(given) > len(cases):
             names = list(model().values)
             takes = " and ".join([*(f"a {case}" for case in cases), "values by name"])
@@ -28,4 +28,4 @@ def by_name(model: Callable[P, System]) -> Callable[P, System]:
             )
         return model(*given, **values)
 
-    return called
+    return cast("Model", called)
