@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
-from typing import ParamSpec
+from typing import Any, TypeVar, cast
 
 from saltus.errors import ParameterError, shown
 from saltus.system import System
