@@ -151,8 +151,8 @@ def _plan(system: System, group: Ensemble, length: Span, samples: int | None, ke
         f"{group.size} trajectories with {count} samples each",
         "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
     )
-    index = first * per + np.arange(count)
-    return _Plan(Schedule(index // per, (index % per) / per), first)
+    whole_periods, rest = np.divmod(first * per + np.arange(count), per)
+    return _Plan(Schedule(whole_periods, rest / per), first)
 
 
 def _per_span(trajectories: int) -> int:
