@@ -103,11 +103,11 @@ def simulate(
     outcome = None
     try:
         again = time_errors == "measured" and bool(system.guards) and method.records_contacts
-        request = plan.request(group, length)
-        outcome = engine.run(system, method, request, threads, _part(show, 0.0, 0.3 if again else 1.0))
+        request, fit = plan.request(group, length), method.suited_to(group.size * (measure.copies(method) if again else 1))
+        outcome = engine.run(system, fit, request, threads, _part(show, 0.0, 0.3 if again else 1.0))
         errors = measure.local(outcome)
         if again:
-            errors = measure.measured(system, method, request, outcome, threads, _part(show, 0.3, 0.7))
+            errors = measure.measured(system, fit, request, outcome, threads, _part(show, 0.3, 0.7))
     except Interrupted as stop:
         so_far = stop.partial if outcome is None else outcome
         if isinstance(so_far, Outcome):

@@ -32,6 +32,11 @@ def local(outcome: Outcome) -> np.ndarray:
     return outcome.record_floats[:, st.REC_TIME_ERROR]
 
 
+def copies(method: Method) -> int:
+    """How many more runs of a trajectory its errors are measured by."""
+    return COPIES if method.exact else 1
+
+
 def measured(
     system: System, method: Method, request: Request, outcome: Outcome, threads: int | None, show: Callable[[float], None] | None
 ) -> np.ndarray:
@@ -45,8 +50,9 @@ def measured(
         As for :func:`saltus.flow.engine.run`.
     """
     n, silent = len(request.start), replace(request, schedule=Schedule.none())
-    copies = _nudged(system, silent) if method.exact else [silent]
-    batches = [copies] if n <= FEW else [[one] for one in copies]
+    runs = _nudged(system, silent) if method.exact else [silent]
+    batches = [runs] if n <= FEW else [[one] for one in runs]
+    companion = method.companion().suited_to(n * len(batches[0]))
     distance = np.zeros(len(outcome.record_integers))
     for done, batch in enumerate(batches):
 
@@ -54,7 +60,7 @@ def measured(
             if show:
                 show((done + share) / len(batches))
 
-        check = engine.run(system, method.companion(), _together(batch), threads, part if show else None)
+        check = engine.run(system, companion, _together(batch), threads, part if show else None)
         for i in range(len(batch)):
             distance = np.maximum(distance, _distances(outcome, check, i * n))
     error = (SAFETY if method.exact else SAFETY_OF_EXACT_COMPANION) * distance
