@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import saltus as sl
+from compiled import compiled
 from saltus.codegen import machine, templates
-from saltus.codegen.interface import TAYLOR
+from saltus.codegen.blocks import WHOLE
+from saltus.codegen.interface import ARRAY, TAYLOR
 from saltus.codegen.lane_ir import constants_ir, equation_ir
 from saltus.codegen.machine import Target
 from saltus.codegen.taylor_head import taylor_head
@@ -49,3 +52,12 @@ def test_a_long_equation_is_cut_into_blocks_with_the_same_operations():
     whole = text.count(" call <4 x double> @llvm.fma")
     assert whole > 500
     assert machine.object_code(None, [text], ["saltus_jets", "saltus_rates"])
+
+
+@pytest.mark.parametrize("early", [0.0, 1.0])
+def test_a_long_function_that_may_return_early_returns_from_all_of_it(early):
+    """As the jump of a tangent does where no force jumps."""
+    lines = ["a = y[0] + 1.0", "if y[1] > 0.0:", "    return", *["a = a * 1.0 + 1.0"] * (2 * WHOLE), "y[0] = a"]
+    y = np.array([3.0, early])
+    compiled("def leave(y):\n" + "\n".join(f"    {line}" for line in lines) + "\n", (ARRAY,), 2)(y)
+    assert y[0] == (3.0 if early else 4.0 + 2 * WHOLE)
