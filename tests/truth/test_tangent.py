@@ -94,3 +94,33 @@ def test_two_masses_against_finite_differences():
     end = np.stack([Stroboscope(chain, sl.Taylor()).sequences(start + step * e, 1)[0] for e in np.eye(size)], axis=2)
     back = np.stack([Stroboscope(chain, sl.Taylor()).sequences(start - step * e, 1)[0] for e in np.eye(size)], axis=2)
     assert np.abs((end - back) / (2 * step) - matrix).max() < 1e-5 * np.abs(matrix).max()
+
+
+def row_of_masses(masses):
+    """Masses in a row between springs; the first beats against a spring, the second against one under load, whose force begins at once."""
+
+    @sl.system(states=" ".join(f"{name}{i}" for name in "xv" for i in range(masses)), forced_at="f")
+    def row(t, *y, k=50.0, c=0.1, stiffness=500.0, gap=0.1, load=2.0, f=1.0, force=6.0):
+        x, v = y[:masses], y[masses:]
+        stops = [stiffness * (x[0] - gap), load + stiffness * (x[1] - gap)]
+        rates = [force * sl.cos(2 * sl.pi * f * t)] + [0.0] * (masses - 1)
+        for i in range(masses):
+            left, right = (x[i - 1] if i else 0.0), (x[i + 1] if i + 1 < masses else 0.0)
+            rates[i] += k * (left - 2 * x[i] + right) - c * v[i]
+            rates[i] -= sl.piecewise((stops[i], x[i] > gap), otherwise=0) if i < 2 else 0.0
+        return (*v, *rates)
+
+    return row
+
+
+@pytest.mark.parametrize("method", [sl.Taylor(), sl.ODE45(1e-10, 1e-12)], ids=["Taylor", "ODE45"])
+def test_six_masses_against_finite_differences(method):
+    """Every entry of a tangent with twelve columns, across contacts where the force jumps and where it doesn't."""
+    row, start = row_of_masses(6), 0.3 * np.random.default_rng(3).standard_normal((1, 12))
+    _, matrix = Stroboscope(row, method).tangent(start, 1)
+    step = 1e-6 * np.concatenate([np.eye(12), -np.eye(12)])
+    ends, met = Stroboscope(row, sl.Taylor()).sequences(start + step, 1)
+    assert len(set(met[0].tolist())) == 4  # both stops, in and out
+    assert all(len(one) == len(met[0]) for one in met)
+    slopes = (ends[:12] - ends[12:]).T / 2e-6
+    assert np.abs(slopes - matrix[0]).max() < 1e-5 * np.abs(matrix).max()

@@ -226,3 +226,35 @@ def test_a_fold_is_where_an_independent_solver_finds_it(system, name, values, st
     last = ds.isel(response=responses[np.abs(ds[f"response_{name}"].values[responses] - place).argmin()])
     exact = independent_fold(system, name, (last.response_x.values[0], last.response_v.values[0]), last[f"response_{name}"].item(), place)
     assert abs(place - exact) < 2.0**-HALVINGS * step, "within the interval in which it was sought"
+
+
+def test_the_freeplay_cycle_of_the_wing_grows_towards_the_flutter_speed():
+    """As the describing function says, which leaves the third harmonics out: the less of a cycle the freeplay is, the better it is."""
+    speed = [13.0, 13.4]
+    start = {"plunge": 0, "pitch": "2 deg", "plunge_rate": 0, "pitch_rate": 0}
+    ds = sl.bifurcation_diagram(sl.models.aeroelastic(), {"airspeed": speed}, start, every="0.25 s")
+    assert ds.response_type.values.tolist() == ["limit_cycle"] * 2
+    seen = ds.output_maximum.sel(output="pitch").values
+    told = [_first_harmonic(u) for u in speed]
+    missed = seen / np.array(told) - 1
+    assert (np.abs(missed) < 0.05 * 0.01 / seen).all()
+
+
+def _first_harmonic(speed):
+    """Amplitude of pitch at which the section, with the describing function of the freeplay for its spring, neither grows nor decays."""
+    load = 1.225 * speed**2 * 0.135 * 6.28 * np.array([-1.0, -0.1 * 0.135])
+    inertia = np.array([[12.4, 12.4 * 0.25 * 0.135], [12.4 * 0.25 * 0.135, 0.065]])
+    damping = np.diag([27.4, 0.036]) - np.outer(load, [1 / speed, 1.1 * 0.135 / speed])
+
+    def growth(amplitude):
+        share = 0.01 / amplitude
+        spring = 40.0 * (1 - 2 / np.pi * (np.arcsin(share) + share * np.sqrt(1 - share**2)))
+        rows = -np.linalg.solve(inertia, np.hstack([np.diag([2840.0, spring]) - np.outer(load, [0.0, 1.0]), damping]))
+        return np.linalg.eigvals(np.vstack([np.eye(4)[2:], rows])).real.max()
+
+    low, high = 0.05, 5.0
+    assert growth(low) > 0 > growth(high)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if growth(middle) > 0 else (low, middle)
+    return low

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,13 @@ def guards_over(system: System, values: Mapping[str, Any], shape: tuple[int, ...
 
 def gap_units(system: System) -> list[str]:
     """Unit of the gap of each guard, ``""`` where it isn't known."""
+    return list(_gap_units(system.origin))
+
+
+@lru_cache(maxsize=64)  # the same for all values, and as long to find as a short run
+def _gap_units(system: System) -> tuple[str, ...]:
     found = units_of(system.states, system.units, system.field, [guard.gap for guard in system.guards])
-    return [unit if guard.state is None else system.units[guard.state] for guard, unit in zip(system.guards, found, strict=True)]
+    return tuple(unit if guard.state is None else system.units[guard.state] for guard, unit in zip(system.guards, found, strict=True))
 
 
 def common(system: System, method: Method, group: Ensemble, outcome: Outcome) -> dict[str, Any]:

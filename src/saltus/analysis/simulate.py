@@ -103,11 +103,11 @@ def simulate(
     outcome = None
     try:
         again = time_errors == "measured" and bool(system.guards) and method.records_contacts
-        request = plan.request(group, length)
-        outcome = engine.run(system, method, request, threads, _part(show, 0.0, 0.3 if again else 1.0))
+        request, fit = plan.request(group, length), method.suited_to(group.size * (measure.copies(method) if again else 1))
+        outcome = engine.run(system, fit, request, threads, _part(show, 0.0, 0.3 if again else 1.0))
         errors = measure.local(outcome)
         if again:
-            errors = measure.measured(system, method, request, outcome, threads, _part(show, 0.3, 0.7))
+            errors = measure.measured(system, fit, request, outcome, threads, _part(show, 0.3, 0.7))
     except Interrupted as stop:
         so_far = stop.partial if outcome is None else outcome
         if isinstance(so_far, Outcome):
@@ -151,8 +151,8 @@ def _plan(system: System, group: Ensemble, length: Span, samples: int | None, ke
         f"{group.size} trajectories with {count} samples each",
         "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
     )
-    index = first * per + np.arange(count)
-    return _Plan(Schedule(index // per, (index % per) / per), first)
+    whole_periods, rest = np.divmod(first * per + np.arange(count), per)
+    return _Plan(Schedule(whole_periods, rest / per), first)
 
 
 def _per_span(trajectories: int) -> int:

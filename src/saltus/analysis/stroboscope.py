@@ -86,7 +86,7 @@ def stroboscope(
 
     show, close = reporter(progress)
     try:
-        result = dataset(engine.run(system, method, request, threads, show))
+        result = dataset(engine.run(system, method.suited_to(group.size), request, threads, show))
     except Interrupted as stop:
         if isinstance(stop.partial, Outcome):
             stop.partial = dataset(stop.partial)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -31,6 +32,11 @@ def local(outcome: Outcome) -> np.ndarray:
     return outcome.record_floats[:, st.REC_TIME_ERROR]
 
 
+def copies(method: Method) -> int:
+    """How many more runs of a trajectory its errors are measured by."""
+    return COPIES if method.exact else 1
+
+
 def measured(
     system: System, method: Method, request: Request, outcome: Outcome, threads: int | None, show: Callable[[float], None] | None
 ) -> np.ndarray:
@@ -44,8 +50,9 @@ def measured(
         As for :func:`saltus.flow.engine.run`.
     """
     n, silent = len(request.start), replace(request, schedule=Schedule.none())
-    copies = _nudged(system, silent) if method.exact else [silent]
-    batches = [copies] if n <= FEW else [[one] for one in copies]
+    runs = _nudged(system, silent) if method.exact else [silent]
+    batches = [runs] if n <= FEW else [[one] for one in runs]
+    companion = method.companion().suited_to(n * len(batches[0]))
     distance = np.zeros(len(outcome.record_integers))
     for done, batch in enumerate(batches):
 
@@ -53,7 +60,7 @@ def measured(
             if show:
                 show((done + share) / len(batches))
 
-        check = engine.run(system, method.companion(), _together(batch), threads, part if show else None)
+        check = engine.run(system, companion, _together(batch), threads, part if show else None)
         for i in range(len(batch)):
             distance = np.maximum(distance, _distances(outcome, check, i * n))
     error = (SAFETY if method.exact else SAFETY_OF_EXACT_COMPANION) * distance
@@ -63,17 +70,28 @@ def measured(
 # -- nudges ----------------------------------------------------------------------------------------------------------------------
 def _nudged(system: System, request: Request) -> list[Request]:
     """The request with starts and values wrong by an ulp, differently in each copy. What moves a boundary, or time, stays."""
-    places = {leaf.payload for guard in system.guards for leaf in ex.walk(guard.gap) if leaf.op == "param"} | {system.forced_at}
-    fixed = np.array([name in places for name in system.values], bool)
+    fixed = _fixed(system.origin)
     resting = _on_a_boundary(system, request)[:, None]
     copies = []
     for copy in range(COPIES):
-        signs = np.random.default_rng([SEED, copy]).choice([-1.0, 1.0], len(system.states) + len(system.values))
-        nudge = 1.0 + signs * np.finfo(float).eps
+        nudge = 1.0 + _signs(copy, len(system.states) + len(system.values)) * np.finfo(float).eps
         by_state = np.where(resting, 1.0, nudge[: len(system.states)])
         by_value = np.where(fixed, 1.0, nudge[len(system.states) :])
         copies.append(replace(request, start=request.start * by_state, parameters=request.parameters * by_value))
     return copies
+
+
+@lru_cache(maxsize=64)
+def _fixed(system: System) -> np.ndarray:
+    """Parameters that move a boundary, or time: bool[P], the same for all values."""
+    places = {leaf.payload for guard in system.guards for leaf in ex.walk(guard.gap) if leaf.op == "param"} | {system.forced_at}
+    return np.array([name in places for name in system.values], bool)
+
+
+@lru_cache(maxsize=64)
+def _signs(copy: int, count: int) -> np.ndarray:
+    """Up or down, for each state and value of a copy."""
+    return np.random.default_rng([SEED, copy]).choice([-1.0, 1.0], count)
 
 
 def _on_a_boundary(system: System, request: Request) -> np.ndarray:

@@ -23,9 +23,12 @@ class Line(NamedTuple):
 
 
 def in_blocks(name: str, result: str, parameters: str, attributes: str, lines: list[Line], lanes: int) -> str:
-    """The text of a function ``result name(parameters)`` with these lines, the last of which returns."""
+    """The text of a function ``result name(parameters)`` with these lines, the last of which returns.
+
+    One that branches stays whole: a block could leave itself only, not the function.
+    """
     head = f"{result} @{name}({parameters}) {attributes} {{\n"
-    if len(lines) <= WHOLE or result != "void":
+    if len(lines) <= WHOLE or result != "void" or any(line.text.startswith("br ") for line in lines):
         return f"define {head}" + "".join(f"  {line.text}\n" for line in lines) + "}\n"
     blocks = [lines[i : i + LENGTH] for i in range(0, len(lines), LENGTH)]
     slots = _slots(blocks)

@@ -1,6 +1,7 @@
 """Compile one object: what a process does that another one started for it (building.py).
 
-Reads ``[template, texts, called symbols, target]`` as JSON from standard input; writes the object to standard output.
+Reads ``[template, texts, called symbols, target, whether sizes are open]`` as JSON from standard input; writes the object to standard
+output.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from saltus.codegen import building, machine
 if __name__ == "__main__":
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what anything prints is no part of the answer
-    template, texts, called, target = json.load(sys.stdin)
+    template, texts, called, target, open_sizes = json.load(sys.stdin)
     code = building.bitcode(template) if template else None
     with answer:
-        answer.write(machine.object_code(code, texts, frozenset(called), machine.Target(*target)))
+        answer.write(machine.object_code(code, texts, frozenset(called), machine.Target(*target), open_sizes=open_sizes))

@@ -27,7 +27,7 @@ from saltus.interrupt import check_stop
 #: Time between two looks whether the work is to stop [s].
 LOOK = 0.1
 #: Seconds of LLVM's work for a million characters of an equation, and for a template: for people who wait.
-SECONDS_PER_MEGABYTE, SECONDS_OF_TEMPLATE, SECONDS_OF_LOWERING = 1.0, 4.0, 20.0
+SECONDS_PER_MEGABYTE, SECONDS_OF_TEMPLATE, SECONDS_OF_LOWERING = 1.0, 2.5, 20.0
 #: What takes longer is made by another process; what takes longer than this is announced [s].
 LONG, ANNOUNCED = 0.5, 1.0
 #: Objects that are held in memory.
@@ -55,6 +55,8 @@ class Order:
         What `saltus cache` shows for it.
     said : str
         What is said to be compiled, if it takes long; "" to say nothing.
+    open_sizes : bool
+        See :func:`saltus.codegen.machine.object_code`.
     """
 
     template: str
@@ -62,12 +64,13 @@ class Order:
     called: tuple[str, ...]
     title: str
     said: str
+    open_sizes: bool = False
 
     @cached_property
     def key(self) -> str:
         """Name of the entry: a hash of everything that the machine code depends on."""
         made_of = templates.identity(self.template) if self.template else ""
-        parts = [made_of, *self.texts, *self.called, *machine.target(), *machine.versions()]
+        parts = [made_of, *self.texts, *self.called, str(self.open_sizes), *machine.target(), *machine.versions()]
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
     @property
@@ -107,7 +110,7 @@ def built(order: Order) -> bytes:
 def made(order: Order) -> bytes:
     """Compile in this process."""
     template = bitcode(order.template) if order.template else None
-    return machine.object_code(template, order.texts, frozenset(order.called))
+    return machine.object_code(template, order.texts, frozenset(order.called), open_sizes=order.open_sizes)
 
 
 def bitcode(name: str) -> bytes:
@@ -159,7 +162,7 @@ def _made_elsewhere(order: Order) -> bytes | None:
     """
     if order.template:
         bitcode(order.template)  # made and kept first, if it must be
-    given = json.dumps([order.template, order.texts, order.called, machine.target()]).encode()
+    given = json.dumps([order.template, order.texts, order.called, machine.target(), order.open_sizes]).encode()
     return _answer_of("saltus.codegen.build_one", (), given, order.title)
 
 

@@ -66,7 +66,7 @@ TAYLOR = Interface(
     entry="propagate",
     arguments=BATCH + _TAYLOR_WORK,
     layout="taylor_layout",
-    templates=("clocks", "taylor_singular", "taylor_step", "taylor_contacts", "taylor_lanes"),
+    templates=("clocks", "taylor_singular", "taylor_crossings", "taylor_step", "taylor_contacts", "taylor_lanes"),
     sizes=(
         "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW", "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
         "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "NSTEPPED", "NSERIES", "NCLOCKS",

@@ -142,7 +142,7 @@ class Kernels:
         if tier == FULL:
             texts.append(self._equation_text)
         title = f"{self.title if tier == FULL else self.template}, {tier}"
-        return Order(self.template, tuple(texts), (entry,), title, self._said(tier))
+        return Order(self.template, tuple(texts), (entry,), title, self._said(tier), tier == GENERIC)
 
     def _said(self, tier: str) -> str:
         return "what all equations share, for this processor: once" if tier == GENERIC else ""

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import CacheError, ParameterError, nearest, shown
 
 #: Rises when the same templates and equations would be made into other code: entries of the cache carry it in their names.
-PIPELINE = 1
+PIPELINE = 2
 #: Only one thread at a time: LLVM keeps modules in one context.
 _LLVM = threading.Lock()
 #: Characters of IR beyond which LLVM takes less trouble: a third of the time saved (0022).
@@ -65,7 +65,9 @@ def versions() -> tuple[str, ...]:
     return (llvmlite.__version__, ".".join(map(str, llvm.llvm_version_info)), str(PIPELINE))
 
 
-def object_code(template: bytes | None, texts: Sequence[str], called: Collection[str], chosen: Target | None = None) -> bytes:
+def object_code(
+    template: bytes | None, texts: Sequence[str], called: Collection[str], chosen: Target | None = None, *, open_sizes: bool = False
+) -> bytes:
     """One object file, optimised as a whole.
 
     Parameters
@@ -78,6 +80,9 @@ def object_code(template: bytes | None, texts: Sequence[str], called: Collection
         What others refer to; the rest is this object's own.
     chosen : Target, optional
         Default: this machine.
+    open_sizes : bool
+        The template reads its sizes as it runs: LLVM neither unrolls its loops nor inlines what doesn't ask for it. That takes a third of
+        the time, and gains nothing there (0028).
     """
     made_for = chosen or target()
     with _LLVM:
@@ -94,7 +99,7 @@ def object_code(template: bytes | None, texts: Sequence[str], called: Collection
                 one.linkage = "external" if one.name in called else "internal"
         module.verify()
         quickly = sum(map(len, texts)) > LONG
-        _optimise(module, machine, 1 if quickly else 3)
+        _optimise(module, machine, 1 if quickly or open_sizes else 3, open_sizes)
         return (_target_machine(made_for, 1) if quickly else machine).emit_object(module)
 
 
@@ -110,10 +115,12 @@ def _target_machine(made_for: Target, level: int = 3) -> llvm.TargetMachine:
     return found.create_target_machine(cpu=made_for.processor, features=made_for.features, opt=level, codemodel="jitdefault")
 
 
-def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine, level: int) -> None:
+def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine, level: int, open_sizes: bool) -> None:
     """LLVM's passes. Lanes are vectors already: nothing is to be made into vectors, least of all sums of doubles."""
     options = llvm.create_pipeline_tuning_options(speed_level=level)
-    options.loop_vectorization, options.slp_vectorization, options.loop_unrolling = False, False, True
+    options.loop_vectorization, options.slp_vectorization, options.loop_unrolling = False, False, not open_sizes
+    if open_sizes:
+        options.inlining_threshold = 0
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
 
@@ -131,10 +138,20 @@ class Loaded(NamedTuple):
 
 
 def loaded(objects: Sequence[bytes], symbol: str) -> Loaded:
-    """Objects that refer to one another and to the C library, in memory, and the address of one function."""
+    """Objects that refer to one another and to the C library, in memory, and the address of one function.
+
+    Raises
+    ------
+    CacheError
+        If they are no such objects: somebody else's files in the folder of kernels.
+    """
     with _LLVM:
         library = llvm.JITLibraryBuilder()
         for one in objects:
             library = library.add_object_img(one)
-        keeper = library.add_current_process().export_symbol(symbol).link(_jit(), f"saltus{next(_NUMBER)}")
+        try:
+            keeper = library.add_current_process().export_symbol(symbol).link(_jit(), f"saltus{next(_NUMBER)}")
+        except RuntimeError as error:
+            why = " ".join(str(error).split())
+            raise CacheError(f"a compiled kernel can't be loaded: {shown(why, 200)}. Delete what is kept: saltus cache clear.") from error
     return Loaded(keeper[symbol], keeper)

@@ -18,8 +18,9 @@ from saltus.codegen.module import Flow
 from saltus.errors import SaltusWarning
 from saltus.flow.counts import whole as whole_number
 from saltus.flow.methods import Method
+from saltus.flow.pace import marks, resume
 from saltus.flow.room import Contacts
-from saltus.flow.threads import on_threads, usable_processors
+from saltus.flow.threads import may_wait, on_threads, usable_processors
 from saltus.interrupt import Interrupted, Stop
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
@@ -115,6 +116,7 @@ class _Chunk:
     first: int
     arrays: dict[str, np.ndarray]
     keeps_contacts: bool
+    due: float | None
     contacts: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
 
 
@@ -146,7 +148,8 @@ def run(
     outcome, whole = allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     shared = {"options": method.numbers(periods), "data": tables_of(system.origin)}
-    chunks = [_cut(request, whole, first, shared) for first in range(0, len(request.start), CHUNK)]
+    due = method.due(periods)
+    chunks = [_cut(request, whole, first, shared, due) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
     try:
@@ -194,6 +197,7 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
         "cursor": np.zeros(n, np.int64),
         "samples": np.full((n, m, states), np.nan),
         "sample_mode": np.full((n, m), -1, np.int64),
+        **marks(n),
     }
     outcome = Outcome(
         whole["state"], whole["phase"], whole["status"], whole["mode"], whole["counters"], whole["minima"], whole["samples"],
@@ -206,7 +210,7 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
 ARGUMENTS = Batch._fields
 
 
-def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dict[str, np.ndarray]) -> _Chunk:
+def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dict[str, np.ndarray], due: float | None) -> _Chunk:
     """The arrays of one chunk: views of the whole, and tables of its own."""
     last = min(first + CHUNK, len(request.start))
     arrays = {name: array[first:last] for name, array in whole.items()}
@@ -217,14 +221,14 @@ def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dic
     arrays["rec_first"] = np.full(last - first, 0 if request.record_from is None else request.record_from, np.int64)
     arrays["rec_used"] = np.zeros(1, np.int64)
     arrays |= common
-    return _Chunk(first, arrays, request.record_from is not None)
+    return _Chunk(first, arrays, request.record_from is not None, due)
 
 
 def _open_tables(chunk: _Chunk, module: Flow) -> None:
     """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no memory."""
     size = RECORDS + module.STEP_RECORDS if chunk.keeps_contacts else 0
-    chunk.arrays["rec_i"] = np.zeros((size, st.RECORD_INTEGERS), np.int64)
-    chunk.arrays["rec_f"] = np.zeros((size, st.RECORD_FLOATS + chunk.arrays["state"].shape[1] + 1))
+    chunk.arrays["rec_i"] = np.empty((size, st.RECORD_INTEGERS), np.int64)  # what isn't used is never read
+    chunk.arrays["rec_f"] = np.empty((size, st.RECORD_FLOATS + chunk.arrays["state"].shape[1] + 1))
 
 
 def _empty_table(chunk: _Chunk, room: Contacts) -> None:
@@ -270,14 +274,18 @@ def slice_of(states: int) -> int:
     return max(SLICE * 4 // max(states, 2) ** 2, 1)
 
 
-def _advance(chunk: _Chunk, module: Flow, workspace: tuple, stop: Stop, room: Contacts) -> None:
+def _advance(
+    chunk: _Chunk, module: Flow, workspace: tuple, stop: Stop, room: Contacts, show: Callable[[float], None] | None = None
+) -> None:
     """Move a chunk to its end in slices; empties its table of contacts after each. Where there is room for no more, it ends there."""
     arrays = chunk.arrays
     steps = slice_of(arrays["state"].shape[1])
     while not stop.is_set():
         outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), steps, *workspace)
         _empty_table(chunk, room)
-        if outcome == st.FINISHED:
+        if show is not None:
+            show(_share_done([chunk]))
+        if outcome == st.FINISHED and not (chunk.due is not None and resume(arrays, chunk.due)):
             return
         if room.full:
             arrays["status"][arrays["status"] == st.RUNNING] = st.BUDGET_EVENTS
@@ -300,14 +308,18 @@ def _behind(arrays: dict[str, np.ndarray]) -> float:
 def _run_chunks(
     chunks: list[_Chunk], module: Flow, stop: Stop, room: Contacts, progress: Callable[[float], None] | None, workers: int
 ) -> None:
-    """All chunks; Ctrl-C never comes in the midst of one, which would cut a table of contacts in two."""
+    """All chunks; Ctrl-C never comes in the midst of one, which would cut a table of contacts in two.
+
+    A single chunk that is moved by this very thread reports its own progress: a thread only for that would take as long as a short run.
+    """
     local = threading.local()
+    here = len(chunks) == 1 and may_wait(stop)
 
     def work(chunk: _Chunk) -> None:
         if not hasattr(local, "workspace"):
             local.workspace = module.workspace()
         _open_tables(chunk, module)
-        _advance(chunk, module, local.workspace, stop, room)
+        _advance(chunk, module, local.workspace, stop, room, progress if here else None)
 
-    show = None if progress is None else lambda _: progress(_share_done(chunks))
+    show = None if progress is None or here else lambda _: progress(_share_done(chunks))
     on_threads(work, chunks, lambda *_: None, workers, show, stop)

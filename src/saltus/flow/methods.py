@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,25 +12,21 @@ import numpy as np
 from saltus.codegen.module import Flow, lane_width, ode45_module, taylor_module
 from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
+from saltus.flow.pace import LONG, LOOK
 from saltus.system.system import System
 
 #: Steps that a trajectory may take for each of its periods; a healthy one takes ten to a hundred.
 STEPS_PER_PERIOD = 10_000
 #: Steps that any trajectory may take.
 STEPS_AT_LEAST = 1_000_000
+#: Lanes of a few trajectories, such as one and the three copies that measure its errors: a step of 16 takes twice as long (0028).
+FEW = 4
 #: Share of its span that these steps must bring a trajectory further: one that needs a thousand million steps, minutes, is run to its end.
 SLOWEST_SHARE = 1e-3
 
 
 def _step_budget(given: int | None, periods: float) -> float:
     return float(given) if given is not None else STEPS_AT_LEAST + STEPS_PER_PERIOD * math.ceil(periods)
-
-
-def _pace(given: int | None, periods: float) -> tuple[float, float]:
-    """Steps after which a trajectory is looked at, and the periods that they must have brought it further."""
-    if given is not None:
-        return float(given), math.inf
-    return float(STEPS_AT_LEAST), min(SLOWEST_SHARE * periods, STEPS_AT_LEAST / STEPS_PER_PERIOD)
 
 
 def _check_positive(name: str, value: Any) -> None:
@@ -61,6 +57,14 @@ class Method:
     def numbers(self, periods: float) -> np.ndarray:
         """The options as the kernel reads them, for a run of so many periods."""
         raise NotImplementedError
+
+    def due(self, periods: float) -> float | None:  # noqa: ARG002
+        """Periods that so many steps as :data:`saltus.flow.pace.LONG` must bring a run of so many; None if it has a budget of steps."""
+        return None
+
+    def suited_to(self, count: int) -> Method:  # noqa: ARG002  (what most methods don't ask)
+        """The method with which so many trajectories are moved soonest; its results are the same to the bit."""
+        return self
 
     @property
     def records_contacts(self) -> bool:
@@ -99,7 +103,7 @@ class Taylor(Method):
         Size of the last two terms of a step relative to the leading ones [-]. The default, 2**-56, leaves rounding only, over any number
         of periods; 2**-46 leaves 3e-15 m of error on the rig after five periods and takes a quarter less time.
     lanes : int, optional
-        Trajectories moved at once: 2, 4, 8 or 16. Default: what suits the processor. Results don't depend on it.
+        Trajectories moved at once: 2, 4, 8 or 16. Default: what suits the processor, and a short run of few. Results don't depend on it.
     max_steps, max_events : int, optional
         Budgets of one trajectory; beyond them it stops with status ``budget_steps`` or ``budget_events``. Default: any number of steps as
         long as each million brings it a thousandth of the run further, or 100 periods; 10 million contacts.
@@ -128,10 +132,19 @@ class Taylor(Method):
         """The compiled Taylor flow."""
         return taylor_module(system, self.order, self.lanes or lane_width())
 
+    def suited_to(self, count: int) -> Taylor:
+        """With few lanes for few trajectories, unless the user has chosen."""
+        return replace(self, lanes=min(FEW, lane_width())) if self.lanes is None and count <= FEW else self
+
     def numbers(self, periods: float) -> np.ndarray:
         """log2 of the tolerance, steps between two looks at the pace, event budget, periods that they must bring."""
-        steps, pace = _pace(self.max_steps, periods)
-        return np.array([math.log2(self.tolerance), steps, float(self.max_events), pace])
+        due = self.due(periods)
+        steps, least = (LOOK, due * LOOK / LONG) if due is not None else (self.max_steps or 0, math.inf)
+        return np.array([math.log2(self.tolerance), float(steps), float(self.max_events), least])
+
+    def due(self, periods: float) -> float | None:
+        """See :class:`Method`."""
+        return min(SLOWEST_SHARE * periods, LONG / STEPS_PER_PERIOD) if self.max_steps is None else None
 
     @property
     def noise(self) -> float:

@@ -44,7 +44,7 @@ def on_threads(
         stop.hold()
         return None if stop.is_set() else (item, work(item))
 
-    if len(items) == 1 and progress is None and _may_wait(stop):
+    if len(items) == 1 and progress is None and may_wait(stop):
         with _ctrl_c_asks(stop):
             result = copy_context().run(one, items[0])
         if result is not None:
@@ -69,7 +69,7 @@ def on_threads(
             raise
 
 
-def _may_wait(stop: Stop) -> bool:
+def may_wait(stop: Stop) -> bool:
     """Whether Ctrl-C can wait until a piece of work in this thread has ended: wherever nobody has a handler of his own for it."""
     if stop.inside or threading.current_thread() is not threading.main_thread():
         return True

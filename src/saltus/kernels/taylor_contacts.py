@@ -1,4 +1,4 @@
-"""Template, 4 of 5 of the Taylor flow: contacts of one lane - settling what the quadratic bound could not, landing, recording."""
+"""Template, 5 of 6 of the Taylor flow: contacts of one lane - settling what the quadratic bound could not, landing, recording."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Template, 5 of 5 of the Taylor flow: the life of a lane - filled, attended to at contacts, samples and ends of periods, emptied."""
+"""Template, 6 of 6 of the Taylor flow: the life of a lane - filled, attended to at contacts, samples and ends of periods, emptied."""
 
 import math
 

@@ -1,7 +1,8 @@
-"""Template, 1 of 5 of the Taylor flow: what its work arrays hold. codegen puts a generated head before the five.
+"""Template, 1 of 6 of the Taylor flow: what its work arrays hold. codegen puts a generated head before the six.
 
-One step of all lanes reads: jets -> step length -> locate contacts -> advance and land (taylor_step.py), then attend to the lanes where
-more happened: a contact to be recorded or hard to settle (taylor_contacts.py), the end of a period, a sample, the end (taylor_lanes.py).
+One step of all lanes reads: jets -> step length (taylor_step.py) -> locate contacts (taylor_crossings.py) -> advance and land
+(taylor_step.py), then attend to the lanes where more happened: a contact to be recorded or hard to settle (taylor_contacts.py), the end of
+a period, a sample, the end (taylor_lanes.py).
 Steps are arithmetic on lanes without branches on their contents, or with branches that only skip work; so a trajectory's digits don't
 depend on its neighbours.
 
@@ -40,8 +41,8 @@ RUN_ROWS = 18
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
 # Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when;
-# of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1).
-DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, FOUND_ROWS = range(9)
+# of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1), the row of its series.
+DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, FOUND_ROWS = range(10)
 # Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that it found to cross (bits), guards on
 # which the state rests (bits), whether a harmonic of time has another phase in every period, whether this step isn't made of numbers.
 WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN = range(7)

@@ -1,4 +1,4 @@
-"""Template, 2 of 5 of the Taylor flow: forces without a Taylor series on a boundary, such as d**1.5 where a contact begins or ends.
+"""Template, 2 of 6 of the Taylor flow: forces without a Taylor series on a boundary, such as d**1.5 where a contact begins or ends.
 
 Off the boundary such a force is analytic; its series converges as far as the boundary is away. So steps grow, and shrink, in proportion
 to that way (`away_from_boundaries`). The first step off a boundary and the last step onto it can't be taken like that: there the terms

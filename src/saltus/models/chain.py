@@ -13,9 +13,11 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
+from saltus.models.by_name import by_name
 from saltus.system import System, cos, freeplay, pi, system
 
 
+@by_name
 def chain(**values: Any) -> System:
     """Chain of two masses with two clearances, shaken harmonically.
 

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from typing import Any
 
 from saltus.errors import ParameterError, among, nearest, shown
+from saltus.models.by_name import by_name
 from saltus.system import System, cos, pi, piecewise, system
 
 _SOURCE = (
@@ -28,6 +29,7 @@ _SOURCE = (
 CASES = {"a": (0.4e-3, 0.4e-3), "b": (0.0, 0.4e-3), "c": (0.0, 0.8e-3)}
 
 
+@by_name
 def delangre(case: str = "b", **values: Any) -> System:
     """Forced Duffing oscillator with freeplay: the rig of de Langre et al.
 

@@ -15,9 +15,11 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
+from saltus.models.by_name import by_name
 from saltus.system import System, cos, freeplay, pi, sin, sqrt, system
 
 
+@by_name
 def gear_pair(**values: Any) -> System:
     """Spur gear pair with backlash and varying mesh stiffness (after Kahraman and Singh).
 

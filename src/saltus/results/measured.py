@@ -16,7 +16,7 @@ from saltus.errors import UnitError, shown
 from saltus.fence import TABLE_BYTES, RefusedError, content
 from saltus.fence import text as text_of
 from saltus.results.files import ResultFileError, path_of
-from saltus.units import to_si
+from saltus.units import coherent_unit, to_si
 
 #: ``frequency [Hz]``
 _HEADER = re.compile(r"\s*(?P<name>.*?)\s*\[(?P<unit>[^]]*)\]\s*")
@@ -63,6 +63,40 @@ def measured_points(data: bytes, path: Path, axis: str, axis_unit: str, amplitud
     place = {name: _column(path, header[1], name, unit, units) for name, unit in units.items()}
     points = np.array([[_number(path, line, row, *place[name]) for name in units] for line, row in rows]).reshape(-1, 2)
     return xr.Dataset({name: ("point", points[:, i], {"units": unit}) for i, (name, unit) in enumerate(units.items())})
+
+
+def columns(data: bytes, path: Path) -> np.ndarray:
+    """The first two columns of a CSV file, float64[2, n], in SI by the units in their headings; ``path`` is for messages.
+
+    Raises
+    ------
+    ResultFileError
+        If it has fewer, or holds something that isn't a number, or a unit that can't be read.
+    """
+    rows = _rows(data, path)
+    header = next(rows, (0, []))[1]
+    if len(header) < 2:
+        raise ResultFileError(f"{path} has no two columns. Its first line names them, with their units: time [s], force [N].")
+    factors = []
+    for text in header[:2]:
+        match = _HEADER.fullmatch(text)
+        unit = match["unit"].strip() if match else ""
+        try:
+            factors.append(to_si(f"1 {unit}", coherent_unit(f"1 {unit}", "a heading"), "a heading") if unit not in ("", "1", "-") else 1.0)
+        except UnitError as error:
+            raise ResultFileError(f"{path}: {error}") from None
+    if _is_number(header[0]):
+        raise ResultFileError(f"{path} begins with numbers. Its first line names the columns, with their units: time [s], force [N].")
+    found = [[_number(path, line, row, i, str(i + 1), "", "") for i in (0, 1)] for line, row in rows]
+    return np.array(found, float).reshape(-1, 2).T * np.array(factors)[:, None]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _wanted(units: dict[str, str]) -> str:

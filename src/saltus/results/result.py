@@ -52,9 +52,11 @@ class Result(xr.Dataset):
             if variable.dims:
                 tables.setdefault(variable.dims, []).append(str(name))
         some, name = ", ".join(map(repr, next(iter(tables.values()), [])[:2])), "run" if "contact" in dims else "ds"
-        rows = math.prod(self.sizes.values())
+        empty = [str(name) for name, size in self.sizes.items() if size == 0]
+        product = f"multiply its tables ({' and '.join(map(_dims, tables))}) to {math.prod(self.sizes.values())} rows"
+        lost = f"lose its tables ({' and '.join(map(_dims, tables))}), because there is no {' and no '.join(empty)}"
         raise ParameterError(
-            f"{caller} of this result would multiply its tables ({' and '.join(map(_dims, tables))}) to {rows} rows. "
+            f"{caller} of this result would {lost if empty else product}. "
             f"Take one: {'sl.samples(run), sl.contacts(run) or ' if name == 'run' else ''}{name}[[{some}]].{caller}()."
         )
 

@@ -9,6 +9,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from saltus.results.provenance import to_json, version
+from saltus.system.formula import Formula
 
 if TYPE_CHECKING:
     from saltus.system import System
@@ -22,9 +23,18 @@ def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[
     """Texts that must be the same to go on with what was computed: equations, values, method, arguments, code."""
     return {
         "equations": system.fingerprint(), "values": to_json(dict(system.values)), "method": method.name,
-        "method options": to_json(method.options()), **{name: to_json(value) for name, value in arguments.items()},
+        "method options": to_json(method.options()), **{name: to_json(_plain(value)) for name, value in arguments.items()},
         "saltus": version("saltus"), "code": code_hash(),
     }  # fmt: skip
+
+
+def _plain(value: Any) -> Any:
+    """A value with data in place of formulas."""
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return value.data() if isinstance(value, Formula) else value
 
 
 @cache

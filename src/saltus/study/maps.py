@@ -23,7 +23,7 @@ from saltus.study.names import slug
 from saltus.study.processes import run_on_processes
 from saltus.study.questions.basins import Basins, Map
 from saltus.study.running import Report, Resources
-from saltus.study.setting import Setting, system_of
+from saltus.study.setting import Setting, setting_of
 from saltus.study.spec import Study
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def jobs_of(study: Study, own: System | None = None) -> list[MapJob]:
         If the study doesn't fit its system.
     """
     assert study.basins is not None
-    return jobs_of_setting(study.basins, Setting(study, system_of(study.system, own), Inputs(Path())))
+    return jobs_of_setting(study.basins, setting_of(study, own, Inputs(Path())))
 
 
 def jobs_of_setting(table: Basins, setting: Setting) -> list[MapJob]:

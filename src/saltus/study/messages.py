@@ -21,16 +21,18 @@ from saltus.study.questions.responses import BifurcationDiagram, FrequencyRespon
 from saltus.study.questions.simulate import Compare, Simulate
 from saltus.study.questions.spectrum import Spectrum
 from saltus.study.spec import Study
-from saltus.study.spec_parts import METHODS, Header, Range, SystemTable
+from saltus.study.spec_parts import METHODS, Curve, Header, Output, Range, SystemTable
 
 TABLES: dict[str, type[BaseModel]] = {
     "study": Header, "system": SystemTable, "simulate": Simulate, "compare": Compare, "basins": Basins, "map": Map, "axes": Axis,
     "lyapunov": Lyapunov, "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram, "frequency": Range,
     "vary": Range, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts, "energy": Energy,
+    "outputs": Output, "tables": Curve,
 }  # fmt: skip
 #: Parts of a place that name the branch of a union, not a key.
 _BRANCHES = re.compile(r"float|str|(list|dict)\[.*\]|function-.*")
 _BARE_QUANTITY = re.compile(r"\s*([\w.-]+)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[A-Za-zµ][^#\"']*?)\s*(?:#.*)?")
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _EXPECTED = {
     "int_type": "a whole number",
     "float_type": "a number",
@@ -53,7 +55,9 @@ def toml(value: Any) -> str:
     """A value as TOML would write it on one line."""
     match value:
         case dict():
-            return "{ " + ", ".join(f"{key} = {toml(item)}" for key, item in value.items()) + " }"
+            return (
+                "{ " + ", ".join(f"{key if _BARE_KEY.fullmatch(key) else toml(key)} = {toml(item)}" for key, item in value.items()) + " }"
+            )
         case list():
             return "[" + ", ".join(map(toml, value)) + "]"
         case bool() | str():
@@ -132,7 +136,7 @@ def _table(place: tuple) -> type[BaseModel] | None:
     """The class of the table at a place in a study."""
     table: type[BaseModel] | None = Study
     for part in place:
-        nested = part in ("method", "flow", "reference") or isinstance(part, int) or table in (Axis, Range)
+        nested = part in ("method", "flow", "reference") or isinstance(part, int) or table in (Axis, Range, Output, Curve)
         table = METHODS.get(part) or TABLES.get(part) or (table if nested else None)
     return table
 

@@ -86,6 +86,8 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self._process = context.Process(target=_work, args=(theirs, plan, found), daemon=True)
+        if hasattr(resource_tracker, "ensure_running"):  # started within, it would let Ctrl-C through again
+            resource_tracker.ensure_running()
         with _without_ctrl_c():
             self._process.start()
         theirs.close()

@@ -12,6 +12,7 @@ from saltus import fence
 from saltus.errors import StudyError
 from saltus.study.messages import content_faults, syntax_fault
 from saltus.study.spec import Study
+from saltus.system.formula import LONGEST
 
 
 def read(path: Path | str) -> tuple[Study, str]:
@@ -66,15 +67,17 @@ _FAULTS = 12
 #: Most characters of texts, by key: titles and paths may be longer than quantities and words, descriptions longer still.
 _LONGEST = {"name": 200, "printed": 400, "exact": 400, "measured": 400, "description": 20_000, "source": 20_000}
 _WORD = 100
+#: Tables whose texts are formulas.
+_FORMULAS = ("rates", "terms", "outputs", "energy", "force", "surface")
 
 
-def _short(data: Any, key: str = "") -> None:
-    """Refuse a text that is longer than any that could stand there."""
+def _short(data: Any, key: str = "", most: int = _WORD) -> None:
+    """Refuse a text that is longer than any that could stand there; ``most`` holds where the key says nothing of its own."""
     if isinstance(data, dict):
         for name, value in data.items():
-            _short(value, name)
+            _short(value, name, LONGEST if name in _FORMULAS else most)
     elif isinstance(data, list):
         for value in data:
-            _short(value, key)
-    elif isinstance(data, str) and len(data) > _LONGEST.get(key, _WORD):
-        raise fence.RefusedError(f"has a text of {len(data)} characters in {key!r}, where at most {_LONGEST.get(key, _WORD)} fit.")
+            _short(value, key, most)
+    elif isinstance(data, str) and len(data) > (longest := _LONGEST.get(key, most)):
+        raise fence.RefusedError(f"has a text of {len(data)} characters in {key!r}, where at most {longest} fit.")

@@ -16,7 +16,7 @@ from saltus.study.questions.impacts import Statistics
 from saltus.study.questions.poincare import Section
 from saltus.study.questions.spectrum import Lines
 from saltus.study.running import Outcome, Report, Resources, Running
-from saltus.study.setting import Setting, system_of
+from saltus.study.setting import Setting, setting_of
 from saltus.study.spec import Study
 
 if TYPE_CHECKING:
@@ -105,12 +105,15 @@ def questions_of(study: Study, own: System | None, inputs: Inputs, only: Sequenc
     StudyError, UnitError, ParameterError
         If one doesn't fit the system, two would write the same files, or ``only`` names none.
     """
-    setting = Setting(study, system_of(study.system, own), inputs)
+    setting = setting_of(study, own, inputs)
+    for_all = inputs.taken
     asked = [(name, question) for name, table in study.questions() for question in _PLANS[name](table, setting)]
     stems = [stem for _, question in asked for stem in question.stems]
     twice = sorted({stem for stem in stems if stems.count(stem) > 1})
     if twice:
         raise StudyError(f"names of this study give the same file names, such as {twice[0]}. Let them differ in letters or digits.")
+    for _, question in asked:
+        question.shared_inputs = for_all
     chosen = [question for name, question in asked if not only or _names(name, question) & set(only)]
     known = {name for one in asked for name in _names(*one)}
     for name in only:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import StudyError
+from saltus.errors import SaltusError, StudyError, nearest
 from saltus.study import quantities
+from saltus.system.formula import Equations, Formula, Formulas
 
 if TYPE_CHECKING:
     from saltus.study.inputs import Inputs
     from saltus.study.spec import Study
-    from saltus.study.spec_parts import SystemTable
+    from saltus.study.spec_parts import Header, Output, SystemTable
     from saltus.study.spec_parts import Table as SpecTable
     from saltus.system import System
 
@@ -28,45 +30,115 @@ class Setting:
         With the values of [system].
     inputs : Inputs
         The files that the study names.
+    formulas : Formulas
+        The terms and tables that its formulas share.
     """
 
     study: Study
     base: System
     inputs: Inputs
+    formulas: Formulas = field(default_factory=Formulas)
 
     def system(self, values: Any, place: str) -> System:
         """The system with the values of one question."""
         return self.base.with_values(**quantities.parameters(self.base, values, place)) if values else self.base
+
+    def formula(self, text: str, place: str) -> Formula:
+        """A formula of the study. Raises StudyError if it can't be read."""
+        try:
+            return self.formulas.formula(text)
+        except SaltusError as error:
+            raise StudyError(f"[{place}] {error}") from None
+
+    def outputs(self, system: System, given: Mapping[str, Output], place: str) -> dict[str, Any] | None:
+        """Outputs as the analyses take them, looked at now, so that a fault is told before anything is computed."""
+        from saltus.analysis.outputs import outputs_of
+
+        place = f"{place}.outputs"
+        outputs = {name: (self.formula(one.formula, place), one.unit) for name, one in given.items()}
+        try:
+            outputs_of(system, outputs)
+        except SaltusError as error:
+            raise StudyError(f"[{place}] {error}") from None
+        return outputs or None
 
     def method(self, own: SpecTable | None = None) -> Any:
         """The method of one question: its own, or the study's."""
         return method_of(own or self.study.method)
 
 
-def system_of(table: SystemTable, own: System | None = None) -> System:
-    """The system that [system] names, with its values.
+def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
+    """The setting of a study: its system, and what its formulas share, with the files that they take part in.
+
+    Raises
+    ------
+    StudyError, UnitError, ParameterError
+        If the system can't be made, or a file can't be read.
+    """
+    formulas = formulas_of(study.system, inputs)
+    return Setting(study, system_of(study.system, own, formulas, study.study), inputs, formulas)
+
+
+def formulas_of(table: SystemTable, inputs: Inputs) -> Formulas:
+    """The terms and tables of [system]. Raises StudyError if one can't be read."""
+    from saltus.study.curves import curve_of
+
+    tables = {name: curve_of(inputs.read(one.file, f"system.tables.{name}"), one, name) for name, one in table.tables.items()}
+    try:
+        return Formulas(table.terms, tables)
+    except SaltusError as error:
+        raise StudyError(f"[system] {error}") from None
+
+
+def system_of(table: SystemTable, own: System | None = None, formulas: Formulas | None = None, header: Header | None = None) -> System:
+    """The system that [system] names or writes out, with its values.
 
     Raises
     ------
     StudyError
-        If neither or both of the table and the command line give a system, or a value lacks its unit.
+        If there is none, or more than one, or a value lacks its unit.
     ParameterError, UnitError
         If the model, the case or a value is refused.
     """
     from saltus import models
 
+    kinds = {"a model": table.model or table.case, "rates": table.rates, "--system": own}
+    if len(given := [kind for kind, one in kinds.items() if one]) > 1:
+        raise StudyError(f"[system] {' and '.join(given)}: these are several systems. Keep one.")
+    if not table.rates and (table.units or table.forced_at):
+        raise StudyError("[system] units and forced_at are for equations of your own: give them with rates, or leave them out.")
     if own is not None:
-        if table.model is not None or table.case is not None:
-            raise StudyError("[system] names a model, and --system gives another system. Keep one of the two.")
         base = own
+    elif table.rates:
+        base = _written(table, formulas or Formulas(), header)
     elif table.model is None:
-        raise StudyError('[system] names no model. Write model = "delangre" (`saltus models` lists them), or give --system my_rig.py:rig.')
+        raise StudyError(
+            '[system] names no model. Write model = "delangre" (`saltus models` lists them), give rates, or --system my_rig.py:rig.'
+        )
     else:
         model = models.find(table.model)
         if table.case is not None and "case" not in signature(model).parameters:
             raise StudyError(f"[system] case: {table.model} has no cases.")
         base = model() if table.case is None else model(table.case)
     return base.with_values(**quantities.parameters(base, table.values))
+
+
+def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> System:
+    """The system whose equations stand in [system]."""
+    from saltus.system import system
+
+    try:
+        rates = {name: formulas.formula(text) for name, text in table.rates.items()}
+        used = {name for rate in rates.values() for name in rate.names} | ({table.forced_at} if table.forced_at else set())
+        if unused := [name for name in table.values if name not in used]:
+            raise StudyError(f"[system] {unused[0]!r} stands in no rate. {nearest(unused[0], sorted(used))}")
+        equations = Equations(rates, table.values, header.description if header else "")
+        title, source = (header.name, header.source) if header else ("system", "")
+        return system(states=list(rates), units=table.units, forced_at=table.forced_at, name=title, source=source)(equations)
+    except StudyError:
+        raise
+    except SaltusError as error:
+        raise StudyError(f"[system] {error}") from None
 
 
 def method_of(table: SpecTable) -> Any:

@@ -16,6 +16,8 @@ from saltus.study.names import slug
 #: A quantity as written: a bare number if it has no dimension, else text with its unit.
 Quantity = float | str
 Start = Quantity | list[Quantity]
+#: A formula as written: ``"k*(x - gap)"``.
+Formula = Annotated[str, Field(min_length=1)]
 #: Lower and upper end.
 Interval = Annotated[list[Quantity], Field(min_length=2, max_length=2)]
 
@@ -53,14 +55,51 @@ class Header(Table):
     source: str = Field("", description="Where the setting comes from.", examples=["Saunders et al. (2021), Table 2"])
 
 
+class Curve(Table):
+    """[system.tables.<name>]: measured points from a file, which formulas call by their name: ``stop(x)``, ``drive(t)``."""
+
+    file: str = Field(
+        description="CSV beside the study: two columns, units in the headings. Where the curve is known, ascending; its values there.",
+        examples=["stop.csv"],
+    )
+    kind: Literal["linear", "pchip", "spline"] = Field(
+        "linear", description="Straight between the points, cubics without overshoot, or a cubic spline.", examples=["pchip"]
+    )
+    outside: Literal["hold", "extend", "periodic"] = Field(
+        "hold",
+        description="Before and after the points: the values at the ends, the polynomials there, or the curve again.",
+        examples=["extend"],
+    )
+
+
 class SystemTable(Table):
-    """[system]: a model that comes with saltus and its values; only values if the system is given on the command line."""
+    """[system]: a model that comes with saltus, or equations of your own, and values of the parameters."""
 
     model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, Quantity] = Field(init=False)
 
     model: str | None = Field(None, description="A published system; `saltus models` lists them.", examples=["delangre"])
     case: str | None = Field(None, description="A named set of values of the model.", examples=["b"])
+
+    rates: dict[str, Formula] = Field(
+        default_factory=dict,
+        description="A system of your own: its states, and the formula of the time derivative of each. Every other key is a parameter.",
+        examples=[{"x": "v", "v": "(force*cos(2*pi*frequency*t) - k*x)/mass"}],
+    )
+    units: dict[str, str] = Field(
+        default_factory=dict, description="Units of states and parameters of a system of your own.", examples=[{"x": "m", "v": "m/s"}]
+    )
+    forced_at: str | None = Field(
+        None, description="The parameter of a system of your own that is the forcing frequency.", examples=["frequency"]
+    )
+    terms: dict[str, Formula] = Field(
+        default_factory=dict,
+        description="Formulas by name, for all other formulas of the study. One may use those before it.",
+        examples=[{"contact": "k*(x - gap) if x > gap else 0"}],
+    )
+    tables: dict[str, Curve] = Field(
+        default_factory=dict, description="Curves by name, for formulas to call.", examples=[{"stop": {"file": "stop.csv"}}]
+    )
 
     @property
     def values(self) -> dict[str, Quantity]:
@@ -143,6 +182,26 @@ Starts = Annotated[
     Annotated[dict[str, Start], Tag("dict[str]")] | Annotated[str, Tag("str")],
     Discriminator(lambda given: "dict[str]" if isinstance(given, dict) else "str"),
 ]
+
+
+class Output(Table):
+    """An output: a formula, and the unit that it is in."""
+
+    formula: Formula = Field(description="What is read off the motion.", examples=["k*(x - gap)"])
+    unit: str = Field("", description="Its unit; by default what the formula comes to.", examples=["N"])
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, given: Any) -> Any:
+        """A formula alone: ``"spring force" = "k*x"``."""
+        return {"formula": given} if isinstance(given, str) else given
+
+
+OUTPUTS: Any = Field(
+    default_factory=dict,
+    description="What to read off each response besides its states, by name: formulas.",
+    examples=[{"spring force": "k*x", "power": {"formula": "c*v**2", "unit": "W"}}],
+)
 VALUES: Any = Field(
     default_factory=dict,
     description="Values that differ from [system], for this question only.",

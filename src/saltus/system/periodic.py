@@ -148,10 +148,12 @@ def _not_periodic(system: System, entry: int, period: float) -> str:
     """The message about the entry of the field or the guard that doesn't repeat."""
     count = len(system.states)
     what = f"d{system.states[entry]}/dt" if entry < count else f"the boundary {system.guards[entry - count].name!r}"
-    unit = system.units[system.forced_at or ""]
-    drive = "cos(2*pi*frequency*t)" if unit == "Hz" else "cos(omega*t)"
+    name = system.forced_at or ""
+    unit = system.units[name]
+    drives = {"Hz": f"cos(2*pi*{name}*t)", "rad/s": f"cos({name}*t)"}
+    other = "rad/s" if unit == "Hz" else "Hz"
     return (
-        f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by forced_at={system.forced_at!r} [{unit}]. "
-        f"Write the drive as {drive}, with the unit declared in units=; let every other forcing frequency be a multiple of it; or say "
-        f"forced_at=None for a system without a period."
+        f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by forced_at={name!r} [{unit}]. "
+        f"Write the drive as {drives[unit]}, or as {drives[other]} with units={{{name!r}: {other!r}}}; let every other forcing "
+        f"frequency be a multiple of it; or say forced_at=None for a system without a period."
     )

@@ -233,6 +233,28 @@ class System:
             f"other values are {self.name}.with_values(...)."
         )
 
+    def __getitem__(self, name: Any) -> Any:
+        """Refuse: a System has no items. Raises ParameterError."""
+        raise ParameterError(f"a System has no items: {self._instead(name)}")
+
+    def __setitem__(self, name: Any, _: Any) -> None:
+        """Refuse: a System is never changed. Raises ParameterError."""
+        raise ParameterError(f"a System is never changed: {self._instead(name)}")
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse: parameters and states aren't attributes. Raises AttributeError."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise AttributeError(f"a System has no attribute {shown(name)}: {self._instead(name)}")
+
+    def _instead(self, name: Any) -> str:
+        """What to write for a parameter or a state by its name."""
+        if among(name, self.values):
+            return f"{self.name}.values[{name!r}] is the value of a parameter, {self.name}.with_values({name}=...) a copy with another one."
+        if among(name, self.states):
+            return f"{shown(name)} is a state. Its motion is sl.simulate({self.name}, ...)[{name!r}]."
+        return f"its parameters are in {self.name}.values, its states in {self.name}.states. {nearest(name, [*self.values, *self.states])}"
+
 
 def _refuse_change(self: System, name: str, _value: Any) -> None:
     change = f"system.with_values({name}=...)" if name in self.values else "system.with_values(...)"

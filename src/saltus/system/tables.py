@@ -134,7 +134,11 @@ def table(
     >>> table(1.5, [0.0, 1.0, 2.0], [0.0, 10.0, 40.0])
     25.0
     """
-    data = _make(points, values, kind, outside, name)
+    return look_up(x, curve(points, values, kind, outside, name))
+
+
+def look_up(x: Operand, data: Table) -> Any:
+    """The value of a table at ``x``, as :func:`table` gives it. Raises TraceError if it can't be looked up there."""
     if not isinstance(x, Expr):
         return float(data(x))
     if ex.depends_on(x, ("state",)):
@@ -146,8 +150,8 @@ def table(
     return Expr("table", (x,), data)
 
 
-def _make(points: Any, values: Any, kind: str, outside: str, name: str) -> Table:
-    """The curve, checked."""
+def curve(points: Any, values: Any, kind: str, outside: str, name: str) -> Table:
+    """The table of :func:`table`, checked. Raises TraceError as it does."""
     for what, word, known in (("kind", kind, KINDS), ("outside", outside, OUTSIDE)):
         if not among(word, known):
             raise TraceError(f"sl.table: {what}={shown(word)}. {nearest(word, known)}")

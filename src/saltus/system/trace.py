@@ -19,6 +19,7 @@ from saltus.system import checks
 from saltus.system.dimensions import DimensionCheck
 from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
 from saltus.system.foreign import OWN_FUNCTIONS
+from saltus.system.formula import Equations, Formula
 from saltus.system.guards import find_guards
 from saltus.system.names import why_no_name, why_no_text, why_no_title
 from saltus.system.singular import check_finite, check_gaps, lifted
@@ -278,6 +279,8 @@ def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
 
 def explained(error: Exception, function: Callable[..., Any], title: str) -> str:
     """The message for an error inside the user's function: where, what, and what to write instead."""
+    if isinstance(function, Formula | Equations) and isinstance(error, TraceError | UnitError):
+        return f"{title}: {error}"
     code = getattr(inspect.unwrap(function), "__code__", None)
     own_file = code.co_filename if code else ""
     frames = [
@@ -302,6 +305,8 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
 
 
 def place(function: Callable[..., Any]) -> str:
-    """File and line of a function."""
+    """File and line of a function, or the formula that it is."""
+    if isinstance(function, Formula | Equations):
+        return function.place
     code = getattr(inspect.unwrap(function), "__code__", None)
     return f"{code.co_filename}, line {code.co_firstlineno}" if code else "unknown place"

@@ -11,6 +11,7 @@ from saltus.system import functions
 from saltus.system.evaluate import evaluate, field, mode_number, sides
 
 solve_ivp = pytest.importorskip("scipy.integrate").solve_ivp
+brentq = pytest.importorskip("scipy.optimize").brentq
 
 
 def matrix(made, bits, **values):
@@ -158,6 +159,34 @@ def test_the_section_against_its_matrices():
         springs = np.array([2840 * q[0], 40 * (q[1] - np.clip(q[1], -0.01, 0.01))])
         exact = np.linalg.solve(inertia, loads - springs - np.array([27.4, 0.036]) * rate)
         assert field(made, 0.0, (*q, *rate)) == pytest.approx(np.concatenate([rate, exact]), rel=1e-11)
+
+
+def wing_matrix(speed, pitch_stiffness=40.0):
+    """First-order matrix of the section without freeplay, from its mass, damping and stiffness matrices."""
+    inertia = np.array([[12.4, 12.4 * 0.25 * 0.135], [12.4 * 0.25 * 0.135, 0.065]])
+    load = 1.225 * speed**2 * 0.135 * 6.28 * np.array([-1.0, (0.5 - 0.6) * 0.135])
+    damping = np.diag([27.4, 0.036]) - np.outer(load, [1 / speed, (0.5 + 0.6) * 0.135 / speed])
+    stiffness = np.diag([2840.0, pitch_stiffness]) - np.outer(load, [0.0, 1.0])
+    return np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(inertia, stiffness), -np.linalg.solve(inertia, damping)]])
+
+
+def test_the_section_without_freeplay_flutters_at_the_speed_in_its_docstring():
+    def growth(speed):
+        return np.linalg.eigvals(wing_matrix(speed)).real.max()
+
+    flutter = brentq(growth, 12.0, 15.0, xtol=1e-12)
+    assert f"{flutter:.4f} m/s" in aeroelastic.__doc__
+    for speed in (8.0, flutter, 15.0):
+        own = matrix(aeroelastic(airspeed=speed), [False, True])  # beyond the freeplay: pitch > -gap, pitch > gap
+        exact = np.linalg.eigvals(wing_matrix(speed))
+        own_values = np.linalg.eigvals(own)
+        assert np.abs(own_values[:, None] - exact).min(axis=1).max() < 1e-9
+
+
+@pytest.mark.parametrize("model", [chain, gear_pair, aeroelastic, lambda *given: delangre("b", *given)])
+def test_a_value_without_a_name_is_answered_by_the_names(model):
+    with pytest.raises(ParameterError, match=r"values by name, and 3 has no name\. Write \w+\(\w+=\.\.\.\); its parameters are "):
+        model(3)
 
 
 def test_the_section_oscillates_by_itself_and_rest_is_stable():

@@ -20,6 +20,12 @@ def test_the_product_of_samples_contacts_and_guards_is_refused(batch, call):
         getattr(batch, call)()
 
 
+def test_tables_of_a_run_without_contacts_are_not_lost_in_an_empty_frame(batch):
+    says = "lose its tables .*, because there is no contact. Take one: sl.samples"
+    with pytest.raises(ParameterError, match=says):
+        batch.isel(contact=slice(0, 0)).to_dataframe()
+
+
 def test_variables_of_one_table_become_a_frame_as_of_any_dataset(batch):
     frame = batch[["x", "v"]].to_dataframe()
     pd.testing.assert_frame_equal(frame, xr.Dataset(dict(batch[["x", "v"]].variables)).to_dataframe(), check_like=True)

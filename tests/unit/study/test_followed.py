@@ -181,7 +181,8 @@ def test_what_changed_is_computed_again(whole, tmp_path, monkeypatch, old, new, 
         (IMPACTS + "bins = 0\n", r"bins = 0 must be greater than or equal to 1"),
         (IMPACTS + 'values = { frequency = ["14 Hz"] }\n', r"\[impacts\] lists must have the same length"),
         (ENERGY + "intervals = 10\n", r"\[energy\] delangre is forced.*Leave intervals out"),
-        (ENERGY + 'energy = "m * v"\n', r"no key 'energy'"),
+        (ENERGY + 'energy = "mass*v"\n', r"\[energy\] lacks supplied\. .* or leave all three out: the model brings them along"),
+        (ENERGY + 'enrgy = "mass*v"\n', r"no key 'enrgy'\. Did you mean 'energy'\?"),
         ("[poincar]\n", r"no table 'poincar'\. Did you mean 'poincare'\?"),
     ],
 )  # fmt: skip
@@ -194,7 +195,7 @@ def test_faults_are_told_before_anything_is_computed(text, told, tmp_path, monke
 
 
 def test_systems_of_ones_own(tmp_path):
-    """Sections of them are planned; an energy balance would need functions, and a study holds no code."""
+    """Sections of them are planned; an energy balance needs its formulas."""
 
     @sl.system(states="x v", units={"x": "m", "v": "m/s"})
     def free(t, x, v, *, stiffness=4.0):
@@ -204,7 +205,7 @@ def test_systems_of_ones_own(tmp_path):
         return questions_of(parse('[study]\nname = "a"\n' + text), free, Inputs(tmp_path))
 
     assert asked('[poincare]\nsurface = "x turns"\nt_end = "2 s"\ntransient = "1 s"\n')[0].arguments["transient"] == 1.0
-    with pytest.raises(StudyError, match=r"\[energy\] is for published models.*sl\.energy_balance"):
+    with pytest.raises(StudyError, match=r'\[energy\] lacks energy\. Write energy = "\.\.\." as a formula, 0 if there is none\.$'):
         asked('[energy]\nt_end = "2 s"\n')
     with pytest.raises(StudyError, match=r"\[impacts\] free has no guard"):
         asked('[impacts]\nt_end = "2 s"\n')

@@ -130,7 +130,7 @@ def test_own_system_with_values(run_text, tmp_path):
     assert abs(float(outcome.run["end_x"]) - np.cos(6.0)) < 1e-14
     with pytest.raises(StudyError, match="has no forcing period"):
         run_text(text.replace('t_end = "2 s"', "periods = 3"), own_system(f"{tmp_path / 'my_rig.py'}:rig"))
-    with pytest.raises(StudyError, match="Keep one of the two"):
+    with pytest.raises(StudyError, match=r"these are several systems\. Keep one"):
         run_text(BATCH, own_system(f"{tmp_path / 'my_rig.py'}:rig"))
 
 

@@ -64,6 +64,25 @@ def test_errors_teach(values, error, teaches):
         RIG.with_values(**values)
 
 
+@pytest.mark.parametrize(
+    ("call", "teaches"),
+    [
+        (lambda: RIG["upper_gap"], r"no items: delangre\.values\['upper_gap'\] is .* delangre\.with_values\(upper_gap=\.\.\.\)"),
+        (lambda: RIG.upper_gap, r"no attribute 'upper_gap': delangre\.values\['upper_gap'\]"),
+        (lambda: RIG["x"], r"'x' is a state\. Its motion is sl\.simulate\(delangre, \.\.\.\)\['x'\]"),
+        (lambda: RIG["uper_gap"], "Did you mean 'upper_gap'"),
+        (lambda: RIG[0], r"parameters are in delangre\.values"),
+        (lambda: list(RIG), r"parameters are in delangre\.values"),
+        (lambda: "x" in RIG, r"parameters are in delangre\.values"),
+        (lambda: RIG.__setitem__("upper_gap", 1), r"never changed: .*delangre\.with_values\(upper_gap=\.\.\.\)"),
+    ],
+)
+def test_a_system_taken_for_a_table_says_what_to_write(call, teaches):
+    with pytest.raises((ParameterError, AttributeError), match=teaches):
+        call()
+    assert not hasattr(RIG, "upper_gap")
+
+
 def test_resolve_takes_one_or_many():
     assert RIG.resolve("frequency", "900 rpm") == 15.0
     assert type(RIG.resolve("frequency", 3)) is float

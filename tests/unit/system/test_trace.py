@@ -280,8 +280,16 @@ class TestPeriodicity:
     def test_the_forgotten_two_pi(self):
         with pytest.raises(TraceError, match=r"dv/dt doesn't repeat.*T = 0.0666667 s.*cos\(2\*pi\*frequency\*t\)"):
             self.forced(lambda t, x, a, f, g: a * cos(f * t))
-        with pytest.raises(TraceError, match=r"cos\(omega\*t\)"):
+        with pytest.raises(TraceError, match=r"as cos\(frequency\*t\), or as cos\(2\*pi\*frequency\*t\) with units={'frequency': 'Hz'}"):
             self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t), units={"frequency": "rad/s"})
+
+    def test_revolutions_per_minute_are_hertz_unless_said_otherwise(self):
+        def rotor(t, x, v, *, speed="1200 rpm"):
+            return v, cos(speed * t) - x
+
+        with pytest.raises(TraceError, match=r"as cos\(2\*pi\*speed\*t\), or as cos\(speed\*t\) with units={'speed': 'rad/s'}"):
+            make(rotor, forced_at="speed")
+        assert make(rotor, forced_at="speed", units={"speed": "rad/s"}).period() == pytest.approx(0.05, rel=1e-15)
 
     def test_a_ramp(self):
         with pytest.raises(TraceError, match="forced_at=None"):

@@ -114,47 +114,45 @@ class Maps(Question):
                 continue
             ds = finish(job, store, at.resources.threads).assign_attrs(study=at.text, title=job.name)
             maps[job.name] = ds
-            _write_map(job, ds, at.folder, outcome, at.pictures)
+            self._write_map(job, ds, at.folder, outcome, at.pictures)
         for job in self.jobs:
             if job.compare is not None and {job.name, job.compare} <= maps.keys():
-                _write_agreement(job, maps[job.name], maps[job.compare], at.folder, outcome, at.pictures)
+                self._write_agreement(job, maps[job.name], maps[job.compare], at.folder, outcome, at.pictures)
         return outcome
 
+    def _write_map(self, job: MapJob, ds: xr.Dataset, folder: Path, outcome: Outcome, pictures: bool) -> None:
+        from saltus.results import save
+        from saltus.study.questions.basins_table import attractor_table
 
-def _write_map(job: MapJob, ds: xr.Dataset, folder: Path, outcome: Outcome, pictures: bool) -> None:
-    from saltus.results import save
-    from saltus.study.questions.basins_table import attractor_table
+        table = attractor_table(job.name, ds)
+        outcome.tables.append(table)
+        outcome.files += [save(ds, folder / f"{job.slug}.nc"), self.write_table(table, folder / f"{job.slug}.csv")]
+        if pictures:
+            from saltus import plot
 
-    table = attractor_table(job.name, ds)
-    outcome.tables.append(table)
-    outcome.files += [save(ds, folder / f"{job.slug}.nc"), table.write_csv(folder / f"{job.slug}.csv")]
-    if pictures:
-        from saltus import plot
+            with plot.style():
+                axes = plot.basins(ds)
+                axes.set_title(job.name, loc="left")
+                outcome.files.append(save_picture(axes.figure, folder / f"{job.slug}.png"))
+                if ds.sizes["attractor"] > 0 and ds.attrs["method"] == "Taylor":
+                    figure = plot.gallery(ds, _motions(job, ds), attractors=list(range(min(ds.sizes["attractor"], GALLERY))))
+                    outcome.files.append(save_picture(figure, folder / f"{job.slug}{ATTRACTORS}.png"))
 
-        with plot.style():
-            axes = plot.basins(ds)
-            axes.set_title(job.name, loc="left")
-            outcome.files.append(save_picture(axes.figure, folder / f"{job.slug}.png"))
-            if ds.sizes["attractor"] > 0 and ds.attrs["method"] == "Taylor":
-                figure = plot.gallery(ds, _motions(job, ds), attractors=list(range(min(ds.sizes["attractor"], GALLERY))))
-                outcome.files.append(save_picture(figure, folder / f"{job.slug}{ATTRACTORS}.png"))
+    def _write_agreement(self, job: MapJob, ds: xr.Dataset, other: xr.Dataset, folder: Path, outcome: Outcome, pictures: bool) -> None:
+        from saltus.analysis.compare import compare
+        from saltus.results import save
+        from saltus.study.questions.basins_table import agreement_table
 
+        both = compare(other, ds).assign_attrs(name_a=str(job.compare), name_b=job.name)
+        table = agreement_table(both)
+        name = f"{job.slug}{AGREEMENT}"
+        outcome.tables.append(table)
+        outcome.files += [save(both, folder / f"{name}.nc"), self.write_table(table, folder / f"{name}.csv")]
+        if pictures:
+            from saltus import plot
 
-def _write_agreement(job: MapJob, ds: xr.Dataset, other: xr.Dataset, folder: Path, outcome: Outcome, pictures: bool) -> None:
-    from saltus.analysis.compare import compare
-    from saltus.results import save
-    from saltus.study.questions.basins_table import agreement_table
-
-    both = compare(other, ds).assign_attrs(name_a=str(job.compare), name_b=job.name)
-    table = agreement_table(both)
-    name = f"{job.slug}{AGREEMENT}"
-    outcome.tables.append(table)
-    outcome.files += [save(both, folder / f"{name}.nc"), table.write_csv(folder / f"{name}.csv")]
-    if pictures:
-        from saltus import plot
-
-        with plot.style():
-            outcome.files.append(save_picture(plot.agreement(both)[0].figure, folder / f"{name}.png"))
+            with plot.style():
+                outcome.files.append(save_picture(plot.agreement(both)[0].figure, folder / f"{name}.png"))
 
 
 def _motions(job: MapJob, ds: xr.Dataset) -> xr.Dataset:

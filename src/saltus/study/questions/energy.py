@@ -10,18 +10,27 @@ from saltus.errors import StudyError
 from saltus.fence import MOST_COUNT
 from saltus.study.identity import code_hash
 from saltus.study.questions.followed import Followed, Looked
+from saltus.study.spec_parts import Formula
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.study.setting import Setting
 
+#: What a balance is made of.
+_PARTS = ("energy", "supplied", "dissipated")
+
 
 class Energy(Followed):
-    """[energy]: energy stored, supplied and dissipated by a published model. Several: [[energy]], each with a name."""
+    """[energy]: energy stored, supplied and dissipated. Several: [[energy]], each with a name."""
 
     called = "Energy balance"
 
+    energy: Formula | None = Field(
+        None, description="Stored energy [J]; of a published model it is known.", examples=["(mass*v**2 + stiffness*x**2)/2"]
+    )
+    supplied: Formula | None = Field(None, description="Power that flows in [W].", examples=["force*cos(2*pi*frequency*t)*v"])
+    dissipated: Formula | None = Field(None, description="Power that is lost [W].", examples=["damping*v**2"])
     intervals: int | None = Field(
         None, ge=1, le=MOST_COUNT, description="Equal intervals of the run of a system without forcing; 100 by default.", examples=[100]
     )
@@ -33,27 +42,37 @@ class Balance(Looked):
     place, picture = "energy", "energy"
 
     def more_arguments(self, table: Energy, setting: Setting) -> dict[str, Any]:
-        """The intervals; the functions are those of the model, so they aren't among the arguments."""
-        from saltus import models
-
-        model = setting.study.system.model
-        if model is None:
-            raise StudyError(
-                f"[{self.place}] is for published models, which bring their energy along. For a system of your own write Python: "
-                "sl.energy_balance(rig, energy=..., supplied=..., dissipated=..., periods=...)."
-            )
+        """The intervals, and the functions unless they are those of the model."""
+        self.functions, self.coded = self._functions(table, setting)
         if table.intervals is not None and self.system.forced_at is not None:
             raise StudyError(f"[{self.place}] {self.system.name} is forced: its balance is drawn each forcing period. Leave intervals out.")
-        self.functions = models.energy(model)
-        return {"intervals": table.intervals}
+        return {"intervals": table.intervals, **({} if self.coded else {"functions": self.functions})}
+
+    def _functions(self, table: Energy, setting: Setting) -> tuple[dict[str, Any], bool]:
+        """Energy and powers, and whether they are those of a model, which stand in its code."""
+        from saltus import models
+        from saltus.system.quantity import quantity
+
+        written = {name: text for name in _PARTS if (text := getattr(table, name)) is not None}
+        model = setting.study.system.model
+        if not written and model is not None:
+            return models.energy(model), True
+        if lacking := [name for name in _PARTS if name not in written]:
+            bring = "" if model is None else ", or leave all three out: the model brings them along"
+            raise StudyError(f'[{self.place}] lacks {lacking[0]}. Write {lacking[0]} = "..." as a formula, 0 if there is none{bring}.')
+        functions = {name: setting.formula(text, self.place) for name, text in written.items()}
+        for name, function in functions.items():
+            quantity(self.system, function, f"{name} =")
+        return functions, False
 
     def identity(self) -> dict[str, str]:
-        """With the code of the models, which holds the functions."""
-        return super().identity() | {"models": code_hash("models")}
+        """With the code of the models, if that holds the functions."""
+        return super().identity() | ({"models": code_hash("models")} if self.coded else {})
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Draw the balance."""
         from saltus.analysis.energy import energy_balance
 
-        call: dict[str, Any] = self.arguments | self.functions | how
+        asked = {name: value for name, value in self.arguments.items() if name != "functions"}
+        call: dict[str, Any] = asked | self.functions | how
         return energy_balance(self.system, **call)

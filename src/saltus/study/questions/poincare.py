@@ -22,6 +22,8 @@ Surface = Annotated[
     Annotated[dict[str, Quantity], Tag("dict[str]")] | Annotated[str, Tag("str")],
     Discriminator(lambda given: "dict[str]" if isinstance(given, dict) else "str"),
 ]
+#: The key of a surface that is a formula.
+FORMULA = "formula"
 
 
 class Poincare(Followed):
@@ -30,8 +32,8 @@ class Poincare(Followed):
     called = "Poincare section"
 
     surface: Surface = Field(
-        description='A level of a state; its turning points, "x turns"; or a guard of the system by name.',
-        examples=[{"x": "0.3 mm"}, "x turns"],
+        description='A level of a state; its turning points, "x turns"; a guard of the system by name; or where a formula is zero.',
+        examples=[{"x": "0.3 mm"}, "x turns", {"formula": "x - 0.1*v"}],
     )
     direction: int = Field(0, ge=-1, le=1, description="1: only crossings upwards; -1: only downwards; 0: both.", examples=[1])
 
@@ -48,14 +50,16 @@ class Section(Looked):
 
     place, picture, several = "poincare", "section", True
 
-    def more_arguments(self, table: Poincare, setting: Setting) -> dict[str, Any]:  # noqa: ARG002
+    def more_arguments(self, table: Poincare, setting: Setting) -> dict[str, Any]:
         """The surface in SI, and the direction."""
         from saltus.analysis.poincare import crossed
 
         needs_contacts(self.method, self.place)
         surface: Any = table.surface
         known = [*(guard.name for guard in self.system.guards), *(f"{name} turns" for name in self.system.states)]
-        if isinstance(surface, dict):
+        if isinstance(surface, dict) and isinstance(text := surface.get(FORMULA), str) and FORMULA not in self.system.states:
+            surface = setting.formula(text, f"{self.place}.surface")
+        elif isinstance(surface, dict):
             (surface,) = quantities.states(self.system, surface, f"{self.place}.surface").items()
         elif surface not in known:
             level = f'surface = {{ {self.system.states[0]} = "0.3 mm" }}'

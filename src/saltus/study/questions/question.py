@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,11 +31,14 @@ class Question(ABC):
         Stems of the names of its files.
     shared : bool
         Whether several jobs (shards) may work on it; else it is left to the first of them.
+    shared_inputs : list of Input
+        Files that take part in all answers: those of the system.
     """
 
     title: str
     stems: tuple[str, ...]
     shared: bool = False
+    shared_inputs: Sequence[Input] = ()
 
     def inputs(self) -> list[Input]:
         """Files that take part in the answer."""
@@ -43,7 +46,7 @@ class Question(ABC):
 
     def write_table(self, table: TextTable, path: Path) -> Path:
         """Write a table as CSV, with the hashes of the files that took part in it."""
-        return replace(table, notes=(*table.notes, *(file.note for file in self.inputs()))).write_csv(path)
+        return replace(table, notes=(*table.notes, *(file.note for file in (*self.shared_inputs, *self.inputs())))).write_csv(path)
 
     def prepare(self, folder: Path) -> None:  # noqa: ARG002
         """Refuse an output folder with which the question can't go on; called for all questions before anything is computed."""

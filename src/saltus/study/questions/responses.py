@@ -15,6 +15,7 @@ from saltus.study.questions.question import OneDataset, Question
 from saltus.study.spec_parts import (
     BOX,
     METHOD,
+    OUTPUTS,
     PERIODS,
     SEED,
     START,
@@ -22,6 +23,7 @@ from saltus.study.spec_parts import (
     Interval,
     Method,
     Named,
+    Output,
     Quantity,
     Range,
     Starts,
@@ -50,6 +52,7 @@ class FrequencyResponse(Named):
     follow: bool = Field(False, description="Whether each start goes on, from value to value upwards, where it stood.", examples=[True])
     periods: int = PERIODS
     seed: int = SEED
+    outputs: dict[str, Output] = OUTPUTS
     method: Method | None = METHOD
     values: dict[str, Quantity] = VALUES
     measured: str | None = Field(
@@ -76,6 +79,7 @@ class BifurcationDiagram(Named):
     periods: int = PERIODS
     every: Quantity | None = Field(None, description="Time between two looks, for a system without forcing.", examples=["1 s"])
     seed: int = SEED
+    outputs: dict[str, Output] = OUTPUTS
     method: Method | None = METHOD
     values: dict[str, Quantity] = VALUES
 
@@ -94,7 +98,7 @@ def frequency_responses(table: FrequencyResponse, setting: Setting) -> list[Ques
     if system.forced_at is None:
         raise StudyError(f"[{place}] {system.name} has no forcing frequency. Ask for a [{BIFURCATION_DIAGRAM}] over another parameter.")
     grid = quantities.grid(system, system.forced_at, table.frequency, f"{place}.frequency")
-    arguments = {"frequency": grid, **_followed(system, table, place)}
+    arguments = {"frequency": grid, **_followed(system, table, setting, place)}
     _check(system, {system.forced_at: grid}, arguments, place)
     measured = None if table.measured is None else setting.inputs.read(table.measured, place)
     if measured is not None:
@@ -107,17 +111,17 @@ def bifurcation_diagrams(table: BifurcationDiagram, setting: Setting) -> list[Qu
     place = BIFURCATION_DIAGRAM
     system = setting.system(table.values, f"{place}.values")
     vary = {name: quantities.grid(system, name, given, f"{place}.vary") for name, given in table.vary.items()}
-    arguments = {"vary": vary, **_followed(system, table, place), "sample": table.sample}
+    arguments = {"vary": vary, **_followed(system, table, setting, place), "sample": table.sample}
     arguments["every"] = None if table.every is None else quantities.number(table.every, "s", place, "every")
     _check(system, vary, arguments, place)
     return [Responses(table.title, table.stem, system, setting.method(table.method), arguments, place)]
 
 
-def _followed(system: System, table: FrequencyResponse | BifurcationDiagram, place: str) -> dict[str, Any]:
+def _followed(system: System, table: FrequencyResponse | BifurcationDiagram, setting: Setting, place: str) -> dict[str, Any]:
     """The arguments that both analyses take."""
     return {
         "start": quantities.starts(system, table.start, place), "box": quantities.box(system, table.box, place), "follow": table.follow,
-        "periods": table.periods, "seed": table.seed,
+        "periods": table.periods, "seed": table.seed, "outputs": setting.outputs(system, table.outputs, place),
     }  # fmt: skip
 
 

@@ -1,0 +1,276 @@
+"""Template, 3 of 6 of the Taylor flow: where gaps close within a step, in all lanes at once.
+
+`locate` bounds the series, classifies each gap and chooses the first crossing. What is proven to cross is refined by Newton's method. What
+stays open is tried on a shorter step (`settle_sooner`), then left to the slow path (taylor_contacts.py). docs/decisions/0004, 0023.
+"""
+
+import math
+
+from saltus.kernels.isolation import ROUNDING
+from saltus.kernels.lanes import any_lane, bits, fma, larger, load, magnitude, root, select, smaller, splat, store
+
+
+@inner
+def bound_series(lanes, h):
+    """For every series that a gap reads: its first three terms at h, its change over h, its slope there, a bound of what follows its cubic.
+
+    Fills `bounds`: for x in [0, 1], gap(x h) = gap(0) + t1 x + t2 x^2 + t3 x^3 + rest(x), |rest| <= W/6, |rest'| <= W/2, |rest''| <= W
+    with W = sum of k(k-1)|t_k| for k >= 4 (k(k-1) >= 2k >= 6 there).
+    """
+    work, bounds = lanes.work, lanes.bounds
+    for j in range(NSERIES):
+        row = SERIES_ROW[j]
+        rest, change, turn = splat(0.0, LANES), splat(0.0, LANES), splat(0.0, LANES)
+        for k in range(ORDER, 3, -1):
+            term = load(work, row + k, LANES)
+            rest = fma(rest, h, magnitude(term) * (k * (k - 1.0)))
+            turn = fma(turn, h, change)
+            change = fma(change, h, term)
+        h2 = h * h
+        turn = fma(turn, h, 4.0 * change)  # of sum t_k h^(k-4), k >= 4: the derivative of h^4 times it, over h^3
+        t1, t2, t3 = load(work, row + 1, LANES) * h, load(work, row + 2, LANES) * h2, load(work, row + 3, LANES) * h2 * h
+        store(bounds, BOUNDS * j + LINEAR, t1)
+        store(bounds, BOUNDS * j + QUADRATIC, t2)
+        store(bounds, BOUNDS * j + CUBIC, t3)
+        store(bounds, BOUNDS * j + CHANGE, fma(change * h2, h2, t3) + t2 + t1)
+        store(bounds, BOUNDS * j + SLOPE_AT_END, fma(turn * h2, h2, 3.0 * t3) + 2.0 * t2 + t1)
+        store(bounds, BOUNDS * j + REST, rest * h2 * h2)
+
+
+@inner
+def terms_of_gap(lanes, g):
+    """Terms 0 to 3 of a gap over the step that `bounds` belong to, positive on its side, and the gap at its end."""
+    j, side = BOUNDS * GUARD_SERIES[g], load(lanes.side, g, LANES)
+    s, a0 = side * GUARD_SIGN[g], side * load(lanes.work, GAP_ROW + g, LANES)
+    a1, a2, a3 = load(lanes.bounds, j + LINEAR, LANES), load(lanes.bounds, j + QUADRATIC, LANES), load(lanes.bounds, j + CUBIC, LANES)
+    end = select(load(lanes.fresh, g, LANES) > 0.5, 0.0, a0) + s * load(lanes.bounds, j + CHANGE, LANES)
+    return a0, s * a1, s * a2, s * a3, end
+
+
+@inner
+def without_known_root(on_boundary, a0, a1, a2, a3):
+    """The terms of P, divided by x where the root at 0 is known."""
+    return select(on_boundary, a1, a0), select(on_boundary, a2, a1), select(on_boundary, a3, a2), select(on_boundary, 0.0, a3)
+
+
+@inner
+def locate(lanes, h):
+    """Find the lanes whose gaps may close within h. Fills NEAREST, TURNED, WHICH, SIGN, DEPTH, ONBOARD, SERIES for those with one proven
+    crossing; returns those undecided.
+    """
+    bound_series(lanes, h)
+    nothing, none = splat(0.0, LANES), splat(-1.0, LANES)
+    store(lanes.found, NEAREST, splat(math.inf, LANES))
+    store(lanes.found, TURNED, nothing)
+    store(lanes.found, WHICH, none)
+    store(lanes.found, SIGN, nothing)
+    store(lanes.found, DEPTH, nothing)
+    store(lanes.found, ONBOARD, nothing)
+    store(lanes.found, SERIES, none)
+    undecided = splat(0.0, LANES) > 1.0
+    for g in range(NGUARDS):
+        clear, crosses = classify(lanes, g, h)
+        undecided = undecided | (~(clear | crosses)) | choose(lanes, g, crosses)
+    undecided = undecided & (load(lanes.run, ACTIVE, LANES) > 0.5)
+    store(lanes.found, WHICH, select(undecided, -1.0, load(lanes.found, WHICH, LANES)))
+    return undecided
+
+
+@inner
+def classify(lanes, g, h):
+    """Where a gap is proven clear over the step, and where it is proven to cross; notes how near the clear ones come, where they turn.
+
+    A gap P (P/x where the root at 0 is known) is p0 + p1 x + p2 x^2 + p3 x^3 + rest on [0, 1]. If it is monotone or concave its end
+    decides; if it is convex it crosses once where it ends below zero, and twice where its vertex is proven to be; else its quadratic part
+    less the bounds of what follows decides, or the slow path does. What lies within the rounding error of the gap is never proven.
+    """
+    j, on_boundary = BOUNDS * GUARD_SERIES[g], load(lanes.fresh, g, LANES) > 0.5
+    a0, a1, a2, a3, end = terms_of_gap(lanes, g)
+    p0, p1, p2, p3 = without_known_root(on_boundary, a0, a1, a2, a3)
+    rest = load(lanes.bounds, j + REST, LANES)
+    size = load(lanes.work, SCALE_ROW + g, LANES) + magnitude(a1) + magnitude(a2) + magnitude(a3) + rest
+    inherited = load(lanes.prior, PRIOR_ROWS * g + NEW, LANES)
+    store(lanes.prior, PRIOR_ROWS * g + OLD, inherited)
+    noise = ROUNDING * (size + inherited)
+    bend = 2.0 * p2
+    turns = (p1 < 0.0) & (p1 + bend > 0.0)
+    flat_at = -p1 / bend  # where the quadratic part turns
+    vertex = p0 + 0.5 * p1 * flat_at
+    lowest = select(turns, vertex, smaller(p0, p0 + p1 + p2)) + smaller(p3, 0.0)
+    falls = p1 + larger(bend, 0.0) + larger(3.0 * p3, 0.0) + 0.5 * rest < 0.0
+    rises = p1 + smaller(bend, 0.0) + smaller(3.0 * p3, 0.0) - 0.5 * rest > 0.0
+    concave = larger(bend, bend + 6.0 * p3) + rest < 0.0
+    convex = smaller(bend, bend + 6.0 * p3) - rest > 0.0
+    dips = convex & turns & (6.0 * (vertex + larger(p3, 0.0) + noise) + rest < 0.0)
+    inside = p0 > 0.0
+    clear = inside & (((falls | rises | concave) & (end > noise)) | (6.0 * (lowest - noise) > rest))
+    crosses = inside & (((end < -noise) & (falls | concave | convex)) | dips)
+    slope_at_end = load(lanes.side, g, LANES) * GUARD_SIGN[g] * load(lanes.bounds, j + SLOPE_AT_END, LANES)
+    place = larger(smaller(flat_at, 1.0), 0.0)
+    depth, margin = fma(fma(fma(a3, place, a2), place, a1), place, a0), load(lanes.found, NEAREST, LANES)
+    nearer = clear & (~on_boundary) & (a1 < 0.0) & (slope_at_end > 0.0) & (depth < margin)
+    store(lanes.found, NEAREST, select(nearer, depth, margin))
+    store(lanes.found, TURNED, select(nearer, place * h, load(lanes.found, TURNED, LANES)))
+    return clear, crosses
+
+
+@inner
+def choose(lanes, g, crosses):
+    """Make guard g the one that a lane crosses, where it is the first; returns the lanes in which that isn't known.
+
+    Gaps of one state, on the same side of it, differ by a constant: the nearer closes first.
+    """
+    found, row = lanes.found, GUARD_ROW[g]
+    s = load(lanes.side, g, LANES) * GUARD_SIGN[g]
+    fresh, which, nearest = load(lanes.fresh, g, LANES), load(found, WHICH, LANES), load(found, DEPTH, LANES)
+    a0 = load(lanes.side, g, LANES) * load(lanes.work, GAP_ROW + g, LANES)
+    crosses, taken = crosses & (load(lanes.run, ACTIVE, LANES) > 0.5), which >= 0.0
+    same_series = magnitude(load(found, SERIES, LANES) - row) < 0.5
+    parallel = same_series & (s * load(found, SIGN, LANES) > 0.0) & (magnitude(a0 - nearest) > 0.0) & (~(fresh > 0.5))
+    unknown = crosses & taken & (~parallel)
+    crosses = crosses & ((~taken) | (a0 < nearest))
+    if any_lane(crosses):
+        store(found, WHICH, select(crosses, float(g), which))
+        store(found, DEPTH, select(crosses, a0, nearest))
+        store(found, SIGN, select(crosses, s, load(found, SIGN, LANES)))
+        store(found, SERIES, select(crosses, float(row), load(found, SERIES, LANES)))
+        store(found, ONBOARD, select(crosses, fresh, load(found, ONBOARD, LANES)))
+    return unknown
+
+
+@inner
+def gather_series(lanes):
+    """Write to `poly` the series whose gap each lane crosses; the first term isn't needed."""
+    series = load(lanes.found, SERIES, LANES)
+    for j in range(NSERIES):
+        wanted = magnitude(series - SERIES_ROW[j]) < 0.5
+        if any_lane(wanted):
+            for k in range(1, ORDER + 1):
+                store(lanes.poly, k, select(wanted, load(lanes.work, SERIES_ROW[j] + k, LANES), load(lanes.poly, k, LANES)))
+
+
+@inner
+def newton(terms, base, found, h, wanted):
+    """The root of P, or of P(d)/d where the root at 0 is known, in (0, h) in the lanes wanted; its derivative there; and where it is found.
+
+    P = P(0) + s (X(d) - X(0)) with the series X at `base`: guards of one series share its terms. Started from the root of the quadratic
+    part; the first two steps use only the leading terms. A step is the last if the square of its length times a bound of P''/2 on [0, h]
+    (its first four terms; the rest is smaller) says that what is left is below 1e-17 h. A lane that needs more than three steps gets them
+    without touching the others.
+    """
+    s, depth, fresh = load(found, SIGN, LANES), load(found, DEPTH, LANES), load(found, ONBOARD, LANES) > 0.5
+    x1, x2, x3 = load(terms, base + 1, LANES), load(terms, base + 2, LANES), load(terms, base + 3, LANES)
+    a, b, c = select(fresh, s * x1, depth), s * select(fresh, x2, x1), s * select(fresh, x3, x2)
+    x = 2.0 * a / (root(larger(b * b - 4.0 * a * c, 0.0)) - b)
+    x = larger(smaller(x, h), 0.0)
+    x, slope, change = newton_step(terms, base, x, s, depth, fresh, NEWTON_DEGREE_1)
+    x, slope, change = newton_step(terms, base, x, s, depth, fresh, NEWTON_DEGREE_2)
+    x, slope, change = newton_step(terms, base, x, s, depth, fresh, ORDER)
+    x4, x5, x6 = load(terms, base + 4, LANES), load(terms, base + 5, LANES), load(terms, base + 6, LANES)
+    third, fourth, fifth = magnitude(select(fresh, x4, x3)), magnitude(select(fresh, x5, x4)), magnitude(select(fresh, x6, x5))
+    bend = fma(fma(fma(10.0 * fifth, h, 6.0 * fourth), h, 3.0 * third), h, magnitude(c))
+    allowed = 1.0e-17 * h
+    converged = change * change * bend <= allowed * magnitude(slope)
+    more = 0
+    while more < 3 and any_lane(wanted & (~converged)):
+        closer, steeper, change = newton_step(terms, base, x, s, depth, fresh, ORDER)
+        x, slope = select(converged, x, closer), select(converged, slope, steeper)
+        converged = converged | (change * change * bend <= allowed * magnitude(slope))
+        more += 1
+    return x, slope, converged & (x > 0.0) & (x <= h) & (slope < 0.0)
+
+
+@inner
+def newton_step(terms, base, x, s, depth, fresh, degree):
+    """One Newton step with the terms of X up to `degree` (at least 5): even and odd terms apart, for half the latency of Horner's rule."""
+    u, top_even, top_odd = x * x, degree - degree % 2, degree - 1 + degree % 2
+    even, odd = load(terms, base + top_even, LANES), load(terms, base + top_odd, LANES)  # of Q = (X(d) - X(0))/d: odd/even + d * even/odd
+    even_rate, odd_rate = even, odd
+    even, odd = fma(even, u, load(terms, base + top_even - 2, LANES)), fma(odd, u, load(terms, base + top_odd - 2, LANES))
+    for k in range(top_even - 4, 0, -2):
+        even_rate = fma(even_rate, u, even)
+        even = fma(even, u, load(terms, base + k, LANES))
+    for k in range(top_odd - 4, 0, -2):
+        odd_rate = fma(odd_rate, u, odd)
+        odd = fma(odd, u, load(terms, base + k, LANES))
+    quotient = s * fma(even, x, odd)
+    quotient_rate = s * fma(2.0 * x, fma(x, even_rate, odd_rate), even)
+    slope = select(fresh, quotient_rate, fma(x, quotient_rate, quotient))
+    change = select(fresh, quotient, fma(x, quotient, depth)) / slope
+    return x - change, slope, change
+
+
+@inner
+def refine_crossings(lanes, h, undecided):
+    """Newton's method in the lanes with one proven crossing; what doesn't converge joins the undecided."""
+    which = load(lanes.found, WHICH, LANES)
+    crosses = which >= 0.0
+    store(lanes.found, DELTA, h)
+    if any_lane(crosses):
+        if NSERIES > 1:
+            gather_series(lanes)
+            x, slope, converged = newton(lanes.poly, 0, lanes.found, h, crosses)
+        else:
+            x, slope, converged = newton(lanes.work, SERIES_ROW[0], lanes.found, h, crosses)
+        undecided = undecided | (crosses & (~converged))
+        crosses = crosses & converged
+        on_boundary = load(lanes.found, ONBOARD, LANES) > 0.5
+        store(lanes.found, DELTA, select(crosses, x, h))
+        store(lanes.found, RATE, select(on_boundary, slope * x, slope))
+        store(lanes.found, WHICH, select(crosses, which, -1.0))
+    return undecided
+
+
+@kernel
+def settle_sooner(lanes, undecided):
+    """Try one shorter step in lanes whose gaps are undecided; what that doesn't settle keeps its length. Refines, and returns what is open.
+
+    A step that meets several contacts ends at the first; what its series say of the rest is thrown away. docs/decisions/0023.
+    """
+    longest = load(lanes.run, STEP, LANES)
+    h = select(undecided, longest * share_to_first_crossing(lanes, longest), longest)
+    tried = h < longest
+    if any_lane(tried):
+        undecided = locate_again(lanes, h)
+        in_vain = tried & undecided
+        if any_lane(in_vain):
+            h = select(in_vain, longest, h)
+            undecided = locate_again(lanes, h)
+        store(lanes.run, STEP, h)
+    return bits(refine_crossings(lanes, h, undecided))
+
+
+@kernel
+def locate_again(lanes, h):
+    """:func:`locate`, not inlined."""
+    return locate(lanes, h)
+
+
+@inner
+def share_to_first_crossing(lanes, h):
+    """Share of the step that ends just behind the first crossing which the leading terms predict, and in front of the second.
+
+    1 where a shorter step would prove nothing, or could tell less: a gap that turns about at zero before that (a graze is judged on the
+    longest step), two crossings that may be one event, a gap that doesn't begin on its side or ends at zero, terms set aside, a step
+    so short that time would hardly pass.
+    """
+    first, second, turned = splat(math.inf, LANES), splat(math.inf, LANES), splat(math.inf, LANES)
+    for g in range(NGUARDS):
+        a0, a1, a2, a3, end = terms_of_gap(lanes, g)
+        p0, p1, p2, p3 = without_known_root(load(lanes.fresh, g, LANES) > 0.5, a0, a1, a2, a3)
+        inside, discriminant = p0 > 0.0, p1 * p1 - 4.0 * p0 * p2
+        x = 2.0 * p0 / (root(larger(discriminant, 0.0)) - p1)
+        x = select(inside & (discriminant >= 0.0) & (x > 0.0), x, math.inf)
+        second, first = smaller(second, larger(first, x)), smaller(first, x)
+        doubt = load(lanes.bounds, BOUNDS * GUARD_SERIES[g] + REST, LANES) + 6.0 * (magnitude(p3) + TOGETHER * p0)
+        touches = (p1 < 0.0) & (p2 > 0.0) & (6.0 * magnitude(discriminant) <= 4.0 * p2 * doubt)  # the vertex is -discriminant / (4 p2)
+        ends_on_boundary = magnitude(end) <= TOGETHER * TOGETHER * (magnitude(a0) + magnitude(a1) + magnitude(a2) + magnitude(a3))
+        turned = select(inside & (~ends_on_boundary), turned, 0.0)
+        if any_lane(touches):
+            turned = smaller(select(touches, -0.5 * p1 / p2, math.inf), turned)
+    share = smaller(BEHIND * first, 0.5 * (first + second))
+    share = select(share < WORTH_AIMING, share, SHORTENED)
+    useful = (turned >= share) & (~(second - first <= TOGETHER)) & (share * h > LEAST_SHARE * load(lanes.run, END, LANES))
+    for j in range(NSINGULAR):
+        useful = useful & (load(lanes.side, NGUARDS + j, LANES) < 0.0)
+    return select(useful, share, 1.0)

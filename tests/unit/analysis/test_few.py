@@ -1,0 +1,81 @@
+"""A few trajectories in one call: the lanes that they get, no thread of their own, and nothing kept that belongs to another system."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.analysis import time_errors
+from saltus.analysis.answers import gap_units
+from saltus.codegen.module import lane_width
+from saltus.flow.methods import FEW
+
+RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+
+
+def falling(length: str) -> sl.System:
+    @sl.system(states="y vy", units={"y": length, "vy": f"{length}/s"})
+    def falling(t, y, vy, *, level=0.1, stiffness=1e3):
+        return vy, -sl.piecewise((stiffness * (y - level), 2 * y > 2 * level), otherwise=0)
+
+    return falling
+
+
+def test_few_trajectories_take_few_lanes_unless_the_user_chose():
+    assert sl.Taylor().suited_to(FEW) == sl.Taylor(lanes=min(FEW, lane_width()))
+    assert sl.Taylor().suited_to(FEW + 1) == sl.Taylor()
+    assert sl.Taylor(lanes=16).suited_to(1) == sl.Taylor(lanes=16)
+    assert sl.ODE45().suited_to(1) == sl.ODE45()
+
+
+@pytest.mark.parametrize("method", [sl.Taylor(), sl.ODE45()], ids=["Taylor", "ODE45"])
+def test_one_trajectory_is_the_first_of_many_with_every_estimate(method):
+    many = {"x": np.linspace(1e-3, 3e-3, 9), "v": 0.0}
+    alone, among = (sl.simulate(RIG, start, periods=12, method=method) for start in (("1 mm", 0.0), many))
+    mine = among.isel(trajectory=0, contact=among["contact_trajectory"].values == 0)
+    assert alone.sizes["contact"] > 20
+    for name in ("x", "v", "mode", "contact_time", "contact_time_error", "contact_velocity", "contact_steps", "end_x", "steps"):
+        np.testing.assert_array_equal(alone[name].values, mine[name].values, err_msg=name)
+    assert alone.attrs["method_options"] == among.attrs["method_options"]
+
+
+def test_the_copies_of_a_trajectory_are_one_call(monkeypatch):
+    calls, run = [], time_errors.engine.run
+
+    def counted(system, method, request, *rest):
+        calls.append((len(request.start), method.lanes))
+        return run(system, method, request, *rest)
+
+    monkeypatch.setattr(time_errors.engine, "run", counted)
+    sl.simulate(RIG, (0.0, 0.0), periods=3)
+    assert calls == [(1, min(FEW, lane_width())), (time_errors.COPIES, min(FEW, lane_width()))]
+
+
+def test_a_single_run_starts_no_thread_and_reports_its_progress(monkeypatch):
+    shares = []
+    sl.simulate(RIG, (0.0, 0.0), periods=3)  # compiles
+    monkeypatch.setattr(threading.Thread, "start", lambda _: pytest.fail("a thread was started"))
+    sl.simulate(RIG, (0.0, 0.0), periods=3, progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+def test_what_is_kept_of_a_system_is_its_own():
+    """Two systems of one name and one text, in different units, asked in turns; copies with other values share."""
+    metres, radians = (falling(unit) for unit in ("m", "rad"))
+    for _ in range(2):
+        assert gap_units(metres) == ["m"]
+        assert gap_units(radians) == ["rad"]
+        assert gap_units(metres.with_values(level=0.2)) == ["m"]
+    gap_units(metres).append("mine")
+    assert gap_units(metres) == ["m"]
+
+
+def test_nudges_leave_what_moves_a_boundary_or_time():
+    fixed = time_errors._fixed(RIG.origin)
+    assert {name for name, stays in zip(RIG.values, fixed, strict=True) if stays} == {"lower_gap", "upper_gap", "frequency"}
+    other = falling("m")
+    assert {name for name, stays in zip(other.values, time_errors._fixed(other), strict=True) if stays} == {"level"}
