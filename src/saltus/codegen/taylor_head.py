@@ -97,7 +97,7 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
     guards, rows = _write_guards(system, code, [builder.form(gap) for gap in aside.gaps], constants, order)
     gap_row, scale_row, calm_row = rows, rows + len(system.guards), rows + 2 * len(system.guards)
     for j in range(len(aside.guards)):
-        for i, entry in enumerate(aside.without(j)[:moved]):
+        for i, entry in enumerate(aside.without(j, moved)):
             code.write(calm_row + j * moved + i, code.linear(builder.form(entry), 0))
     handed_row = calm_row + moved * len(aside.guards)
     probed = builder.may_hide()
