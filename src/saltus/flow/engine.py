@@ -283,9 +283,10 @@ def _advance(
     while not stop.is_set():
         outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), steps, *workspace)
         _empty_table(chunk, room)
+        went_on = chunk.due is not None and resume(arrays, chunk.due)
         if show is not None:
             show(_share_done([chunk]))
-        if outcome == st.FINISHED and not (chunk.due is not None and resume(arrays, chunk.due)):
+        if outcome == st.FINISHED and not went_on:
             return
         if room.full:
             arrays["status"][arrays["status"] == st.RUNNING] = st.BUDGET_EVENTS

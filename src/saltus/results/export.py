@@ -14,8 +14,8 @@ import xarray as xr
 
 from saltus.errors import ParameterError, nearest, shown
 from saltus.fence import csv_cell
-from saltus.results import tables
-from saltus.results.ending import with_ending
+from saltus.results import known, tables
+from saltus.results.ending import checksum_in, with_ending
 from saltus.results.files import path_of, replacing
 from saltus.results.provenance import describe, file_hash
 from saltus.results.schema import RESPONSES, STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
@@ -73,8 +73,10 @@ def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
         if "safely cast" not in str(error):
             raise
         raise ParameterError(f'{path}: a count is too large for netCDF-3. Install "saltus[io]", which writes netCDF-4.') from error
+    data = with_ending(content)
     with replacing(Path(path)) as (part,):
-        part.write_bytes(with_ending(content))
+        part.write_bytes(data)
+    known.note(checksum_in(data))
     return Path(path)
 
 

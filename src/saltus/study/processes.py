@@ -8,6 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -85,6 +86,8 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self._process = context.Process(target=_work, args=(theirs, plan, found), daemon=True)
+        if hasattr(resource_tracker, "ensure_running"):  # started within, it would let Ctrl-C through again
+            resource_tracker.ensure_running()
         with _without_ctrl_c():
             self._process.start()
         theirs.close()
@@ -145,6 +148,7 @@ def _without_ctrl_c() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
+    resource_tracker.ensure_running()  # else it starts with the first process, and lets the signal through again
     noted: list[tuple[int, FrameType | None]] = []
     here = threading.current_thread() is threading.main_thread()
     handler = signal.signal(signal.SIGINT, lambda *what: noted.append(what)) if here else None
