@@ -106,7 +106,7 @@ class Taylor(Method):
         Trajectories moved at once: 2, 4, 8 or 16. Default: what suits the processor, and a short run of few. Results don't depend on it.
     max_steps, max_events : int, optional
         Budgets of one trajectory; beyond them it stops with status ``budget_steps`` or ``budget_events``. Default: any number of steps as
-        long as each million brings it a thousandth of the run further, or 100 periods; 10 million contacts.
+        long as each million brings it a thousandth of the run further, or 100 periods, and it doesn't stand still; 10 million contacts.
 
     References
     ----------

@@ -18,6 +18,7 @@ from saltus.results import known, tables
 from saltus.results.ending import checksum_in, with_ending
 from saltus.results.files import path_of, replacing
 from saltus.results.provenance import describe, file_hash
+from saltus.results.reader import reader
 from saltus.results.schema import RESPONSES, STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
 from saltus.results.texts import place_of_control
 
@@ -62,6 +63,7 @@ def save(ds: xr.Dataset, path: Target) -> Path:
     return writers[path.suffix](ds, path)
 
 
+@reader
 def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
     """Write a result to a netCDF file; see :func:`save`. A checksum of the numbers goes with it, and one of the file, at its end."""
     _check(ds, "to_netcdf", list(TABLES))
@@ -93,6 +95,7 @@ def _has(package: str) -> bool:
 
 
 # -- CSV -----------------------------------------------------------------------------------------------------------------------
+@reader
 def to_csv(ds: xr.Dataset, path: Target) -> Path:
     """Write a result as CSV, numbers with all their digits.
 
@@ -145,6 +148,7 @@ def _write_table(path: Path, table: tables.Table, ds: xr.Dataset) -> None:
 
 
 # -- MATLAB --------------------------------------------------------------------------------------------------------------------
+@reader
 def to_mat(ds: xr.Dataset, path: Target) -> Path:
     """Write a result as a MATLAB file: ``run = load("run.mat"); plot(run.time, run.x)``.
 
