@@ -15,6 +15,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import STROBOSCOPE, check, kind_of, states_of
 from saltus.units import from_si
 
@@ -25,6 +26,7 @@ SETTLED_SHARE = 0.3
 
 
 @picture
+@reader
 def phase(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,
