@@ -155,9 +155,22 @@ def test_samples_and_ends_beside_the_boundary_are_exact(late):
 @pytest.mark.parametrize("power", [1.5, 2.5, 1.2, 0.5])
 def test_the_tangent_flow_across_a_contact(power):
     """x = -v0 t - x0 + v0 T(v0) after it, with T ~ v0^((1-p)/(1+p)): the four derivatives."""
-    stiffness, x0, v0 = 1e4, -1e-2, 0.5
-    system = tangent_system(power_stop.with_values(stiffness=stiffness, power=power))
-    duration = duration_of(v0, stiffness, power)
+    assert_tangent_across_a_contact(power_stop.with_values(stiffness=1e4, power=power), power)
+
+
+@pytest.mark.parametrize("law", [lambda d: d * sl.sqrt(d), lambda d: d**2 / sl.sqrt(d)], ids=["root", "quotient"])
+def test_the_tangent_flow_of_a_law_written_with_a_root(law):
+    """Its derivative holds d/sqrt(d), which is 0/0 on the boundary."""
+
+    @sl.system(states="x v")
+    def stop(t, x, v, *, stiffness=1e4):
+        return v, -sl.piecewise((stiffness * law(x), x > 0), otherwise=0)
+
+    assert_tangent_across_a_contact(stop, 1.5)
+
+
+def assert_tangent_across_a_contact(stop, power, stiffness=1e4, x0=-1e-2, v0=0.5):
+    system, duration = tangent_system(stop), duration_of(v0, stiffness, power)
     end = -x0 / v0 + 2 * duration
     run = run_of(system, (x0, v0, 1, 0, 0, 1), end, method=sl.Taylor(order=12, lanes=2))
     tangent = [run[f"end_{name}"].item() for name in system.states[2:]]

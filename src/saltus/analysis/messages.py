@@ -26,6 +26,11 @@ _ADVICE = {
     st.NOT_COMPUTED: "The run was stopped; start it again.",
 }
 
+#: What may have ended a run of ODE45 long before the motion met anything.
+_BELOW_A_ROOT = (
+    " A trial step of ODE45 that goes below a root ends it too: end the law before it, as "
+    "sl.piecewise((-c*sl.sqrt(h), h > 1e-9), otherwise=0.0) does."
+)
 #: A step of one trajectory alone, for systems of two states on one core of a server [s]. Good to a factor of three.
 SECONDS_PER_STEP = 1e-6
 
@@ -57,6 +62,8 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
             if code == st.BUDGET_STEPS and asked is not None:
                 stuck = "" if system is None else _singular(run, asked, int(here[0]), system)
                 advice = stuck or f"{_outlook(run, asked, int(here[0]))} {advice}"
+            if code == st.NONFINITE and run.attrs.get("method") == "ODE45":
+                advice += _BELOW_A_ROOT
             texts.append(f"{len(here)} of {len(status)} trajectories: {name} - {meaning} (first: {_where(run, int(here[0]))}). {advice}")
     return texts
 

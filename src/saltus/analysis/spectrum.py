@@ -16,6 +16,7 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole as whole_number
 from saltus.results import schema, spectrum_dataset
+from saltus.results.reader import reader
 
 #: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the first).
 WINDOWS = {
@@ -29,6 +30,7 @@ UNEVEN = 1e-9
 
 
 @verb
+@reader
 def spectrum(
     run: xr.Dataset, state: str | Sequence[str] | None = None, *, window: str | None = None, last: int | None = None
 ) -> xr.Dataset:

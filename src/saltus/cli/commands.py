@@ -82,6 +82,8 @@ def demo(
     from saltus.study import demo as study
 
     usable_folder(out)
+    if plot:
+        study.prepare_drawing()
 
     with screen.working() as progress:
         result = study.demo(frequency, case.value, force, periods, progress)

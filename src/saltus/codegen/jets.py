@@ -16,6 +16,7 @@ import re
 from collections.abc import Callable
 from fractions import Fraction
 
+from saltus.codegen.columns import Lines
 from saltus.codegen.scalar import condition_code
 from saltus.codegen.series import Linear, Series, SeriesBuilder, is_constant
 from saltus.system import expression as ex
@@ -58,22 +59,25 @@ class JetCode:
 
     Parameters
     ----------
-    states : tuple of str
-        Names of the states.
+    rows : dict
+        Names of the states, and the row of ``y`` that holds each.
     fields : tuple of Linear
-        Right-hand sides in linear form.
+        Their right-hand sides in linear form.
     builder : SeriesBuilder
         What made them.
     constants : Constants
         Receives the parameter-only coefficients.
-    order : int
-        Highest Taylor coefficient of the states.
+    shared : int, optional
+        Number of states that all columns of a tangent share; the others are one column. Default: all.
     """
 
-    def __init__(self, states: tuple[str, ...], fields: tuple[Linear, ...], builder: SeriesBuilder, constants: Constants, order: int):
-        self.lines: list[str] = []
+    def __init__(
+        self, rows: dict[str, int], fields: tuple[Linear, ...], builder: SeriesBuilder, constants: Constants, shared: int | None = None
+    ) -> None:
+        self.lines = Lines()
         self.harmonics: dict[tuple[Expr, Expr], int] = {}  # (angular frequency, phase offset) of sines and cosines of time: row
-        self._states, self._fields, self._builder, self._order = states, fields, builder, order
+        self._fields, self._builder, self._shared = fields, builder, len(rows) if shared is None else shared
+        self._rows, self._index = list(rows.values()), {name: i for i, name in enumerate(rows)}
         self._constants = constants
         self._memo: dict[tuple, str | None] = {}
         self._coefficients: dict[Expr, str] = {}
@@ -82,10 +86,10 @@ class JetCode:
         self._count = 0
 
     # -- names ------------------------------------------------------------------------------------------------------------------
-    def _assign(self, code: str) -> str:
+    def _assign(self, code: str, of_column: bool = False) -> str:
         name = f"s{self._count}"
         self._count += 1
-        self.lines.append(f"{name} = {code}")
+        self.lines.assign(name, code, of_column)
         self._depth[name] = 1 + self._wait(code)
         return name
 
@@ -194,7 +198,7 @@ class JetCode:
         key = ("state", i, k)
         if key not in self._memo:
             if k == 0:
-                self._memo[key] = self._assign(f"load(y, {i}, LANES)")
+                self._memo[key] = self._assign(f"load(y, {self._rows[i]}, LANES)", of_column=i >= self._shared)
             else:
                 self._memo[key] = self._over(self.linear(self._fields[i], k - 1), k)
         return self._memo[key]
@@ -220,7 +224,7 @@ class JetCode:
         return self._sum([(a, b) for a, b in products if a is not None and b is not None])
 
     def _state(self, series: Series, k: int) -> str | None:
-        return self.state(self._states.index(str(series.payload)), k)
+        return self.state(self._index[str(series.payload)], k)
 
     def _time(self, _series: Series, k: int) -> str | None:
         if k == 0:
@@ -337,7 +341,7 @@ class JetCode:
                 angle = self._assign_angle(a, frequency)
                 names = f"s{self._count}", f"s{self._count + 1}"
                 self._count += 2
-                self.lines.append(f"{names[0]}, {names[1]} = sincos({angle})")
+                self.lines.assign(", ".join(names), f"sincos({angle})")
                 self._depth |= dict.fromkeys(names, self._wait(angle) + SINE)
                 self._memo[a, 0, "sine"], self._memo[a, 0, "cosine"] = names
             elif frequency is not None:
@@ -452,6 +456,6 @@ class JetCode:
             total = self._assign(f"{total} + magnitude({product})")
         return total
 
-    def write(self, row: int, value: str | None) -> None:
+    def write(self, row: int, value: str | None, of_column: bool = False) -> None:
         """Store a coefficient to a row of ``work``."""
-        self.lines.append(f"store(work, {row}, {self._zero(value)})")
+        self.lines.do(f"store(work, {row}, {self._zero(value)})", of_column)

@@ -20,6 +20,11 @@ from saltus.codegen.interface import ARRAY, REAL, WHOLE, Interface
 # Kinds of values: a lane, a mask of lanes, a double, a truth value, a whole number.
 LANE, MASK, NUMBER, TRUTH, INTEGER = "lane", "mask", "number", "truth", "integer"
 
+#: Functions of a head that its others call: what the arguments are that they were given, None as long as nobody has called them.
+Helpers = dict[str, tuple[str, ...] | None]
+#: Functions whose arrays hold a lane in each row; those of the others hold numbers.
+OF_LANES = ("jets", "rates")
+
 _ARITHMETIC = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
 _BITWISE = {ast.RShift: "ashr", ast.LShift: "shl", ast.BitAnd: "and", ast.BitOr: "or"}
 _COMPARE = {ast.Gt: "ogt", ast.Lt: "olt", ast.GtE: "oge", ast.LtE: "ole", ast.Eq: "oeq", ast.NotEq: "une"}
@@ -50,8 +55,10 @@ def literal(number: float) -> str:
 class _Body:
     """The lines of one function while it is translated."""
 
-    def __init__(self, lanes: int, pointers: Iterable[str], names: Mapping[str, Value], declared: set[str]) -> None:
-        self.lanes, self.declared = lanes, declared
+    def __init__(
+        self, lanes: int, row: int, pointers: Iterable[str], names: Mapping[str, Value], declared: set[str], helpers: Helpers
+    ) -> None:
+        self.lanes, self.row, self.declared, self.helpers = lanes, row, declared, helpers
         self.lines: list[Line] = []
         self.names = dict(names)
         self.types = {
@@ -246,6 +253,8 @@ class _Body:
                 case ast.Expr(value=ast.Call(func=ast.Name(id="store"), args=[ast.Name(id=array), row, value])):
                     found = self.lane(self.value(value))
                     self.do(f"store {self.types[LANE]} {found.text}, ptr {self._place(array, row, self.lanes)}, align 8")
+                case ast.Expr(value=ast.Call(func=ast.Name(id=function), args=arguments)) if function in self.helpers:
+                    self._helper(function, arguments)
                 case ast.If(test=test, body=body, orelse=[]):
                     self._if(test, body)
                 case ast.Return(value=value):
@@ -314,6 +323,21 @@ class _Body:
                     found = self.new(INTEGER, f"zext i1 {found.text} to i64")
                 self.do(f"ret {self.types[found.kind]} {found.text}")
 
+    def _helper(self, name: str, arguments: list[ast.expr]) -> None:
+        """Call another function of the head: with arrays, or what is left of them from some row on, and with values."""
+        given = []
+        for argument in arguments:
+            match argument:
+                case ast.Name(id=array) if array in self._pointers:
+                    given.append((ARRAY, f"%{array}"))
+                case ast.Subscript(value=ast.Name(id=array), slice=ast.Slice(lower=first, upper=None, step=None)) if first:
+                    given.append((ARRAY, self._place(array, first, self.row)))
+                case _:
+                    value = self.value(argument)
+                    given.append((self.types[value.kind], value.text))
+        self.helpers[name] = tuple(kind for kind, _ in given)
+        self.do(f"call void @saltus_{name}({', '.join(f'{kind} {text}' for kind, text in given)})")
+
     def _call_for_two(self, names: list[str], function: str, values: list[Value]) -> None:
         kind = LANE if function == "sincos" else NUMBER
         pair = f"{{ {self.types[kind]}, {self.types[kind]} }}"
@@ -353,19 +377,23 @@ def _whole(node: ast.expr, names: Mapping[str, Value]) -> int:
 
 
 class _Signature(NamedTuple):
-    """What the arguments of a function are, what it returns, and its attributes."""
+    """What the arguments of a function are, what it returns, its attributes, and how many numbers are a row of its arrays."""
 
     arguments: tuple[str, ...]
     result: str
     attributes: str
+    row: int = 1
 
 
-def _function(tree: ast.FunctionDef, signature: _Signature, lanes: int, constants: Mapping[str, Value], declared: set[str]) -> str:
+def _function(
+    tree: ast.FunctionDef, signature: _Signature, lanes: int, constants: Mapping[str, Value], declared: set[str], helpers: Helpers
+) -> str:
     """One function as IR text, in blocks if it is long."""
     kinds = {WHOLE: INTEGER, REAL: NUMBER}
     arguments = list(zip((argument.arg for argument in tree.args.args), signature.arguments, strict=True))
     given = {name: Value(kinds.get(type_, LANE), f"%{name}") for name, type_ in arguments if type_ != ARRAY}
-    body = _Body(lanes, [name for name, type_ in arguments if type_ == ARRAY], {**constants, **given}, declared)
+    arrays = [name for name, type_ in arguments if type_ == ARRAY]
+    body = _Body(lanes, signature.row, arrays, {**constants, **given}, declared, helpers)
     body.run(tree.body)
     if signature.result == "void":
         body.do("ret void")
@@ -382,7 +410,7 @@ def _trigonometry(lanes: int) -> tuple[str, frozenset[str]]:
     pair, doubles = f"{{ {vector}, {vector} }}", "{ double, double }"
     kinds = {"sincos": ((vector,), pair), "two_product": ((REAL, REAL), doubles), "turned": ((REAL, REAL, WHOLE), REAL)}
     texts = [
-        _function(node, _Signature(*kinds[node.name], "alwaysinline nounwind"), lanes, numbers, declared)
+        _function(node, _Signature(*kinds[node.name], "alwaysinline nounwind"), lanes, numbers, declared, {})
         for node in tree.body
         if isinstance(node, ast.FunctionDef) and node.name in kinds
     ]
@@ -422,12 +450,17 @@ def equation_ir(functions: str, constants: Mapping[str, int | float | bool | tup
     shared, declared = _trigonometry(lanes)
     known = {name: Value(INTEGER, str(int(v))) for name, v in constants.items() if isinstance(v, int)}
     needed = set(declared)
+    trees = {node.name: node for node in templates.tree_of(functions).body if isinstance(node, ast.FunctionDef)}
     texts = []
-    for node in templates.tree_of(functions).body:
-        assert isinstance(node, ast.FunctionDef)
-        result = "i64" if node.name in interface.truths else "void"
-        attributes = "nounwind alignstack(64)" if node.name in ("jets", "rates") else "nounwind"
-        texts.append(_function(node, _Signature(interface.functions[node.name], result, attributes), lanes, known, needed))
+    for name in interface.functions:
+        attributes, row = ("nounwind alignstack(64)", lanes) if name in OF_LANES else ("nounwind", 1)
+        signature = _Signature(interface.functions[name], "i64" if name in interface.truths else "void", attributes, row)
+        helpers: Helpers = {other: None for other in trees if other not in interface.functions}
+        texts.append(_function(trees[name], signature, lanes, known, needed, helpers))
+        for helper, arguments in helpers.items():
+            if arguments is not None:
+                signature = _Signature(arguments, "void", attributes, row)
+                texts.append(_function(trees[helper], signature, lanes, known, needed, {}))
     return "\n".join([shared, *texts, *sorted(needed)]) + "\n"
 
 

@@ -14,6 +14,7 @@ from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
 from saltus.system.singular import SetAside, set_aside
 from saltus.system.system import System
+from saltus.system.tangent import first_column
 
 
 def jump_function(system: System, clocks: Clocks) -> str:
@@ -43,11 +44,15 @@ def jump_function(system: System, clocks: Clocks) -> str:
             code.lines.append(f"n_{i} = {value}")
         lines += [f"if g == {g}:", *("    " + line for line in code.lines)]
     lines.append("closing = " + " + ".join([*(f"n_{i} * rate_before_{i}" for i in range(size)), f"n_{size}"]))
-    for j in range(size):
-        column = [f"y[{size + i * size + j}]" for i in range(size)]
-        lines.append(f"along_{j} = ({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing")
-        lines += [f"{entry} += leap_{i} * along_{j}" for i, entry in enumerate(column)]
-    return f"@kernel\ndef jump(t, y, p, h, before, after, g):\n{indented(lines)}\n"
+    given = ", ".join([*(f"leap_{i}, n_{i}" for i in range(size)), "closing"])
+    lines += [f"jump_of_column(y[{j}:], {given})" for j in range(size)]
+    column = [f"y[{i}]" for i in first_column(system)]
+    leap = [f"along = ({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"]
+    leap += [f"{entry} += leap_{i} * along" for i, entry in enumerate(column)]
+    return (
+        f"@kernel\ndef jump_of_column(y, {given}):\n{indented(leap)}\n\n"
+        f"@kernel\ndef jump(t, y, p, h, before, after, g):\n{indented(lines)}\n"
+    )
 
 
 def _bit_of(word: str, aside: SetAside) -> Callable[[int], str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from saltus.codegen.clocks import Clocks
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.jets import MOVING, Constants, JetCode
@@ -12,6 +14,7 @@ from saltus.system import expression as ex
 from saltus.system.expression import Expr
 from saltus.system.singular import set_aside
 from saltus.system.system import System
+from saltus.system.tangent import first_column
 
 #: Rows of the clock before the phases of harmonics (kernels/taylor_layout.py: TAU, BASE).
 FIRST_TURN = 2
@@ -84,34 +87,29 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
     clocks = Clocks(system)
     builder, constants = SeriesBuilder(clocks), Constants()
     aside = set_aside(system.field, system.guards)
-    fields = tuple(builder.form(f) for f in aside.field)
-    code = JetCode(system.states, fields, builder, constants, order)
-    for i in range(len(system.states)):
+    moved, column = len((system.tangent_of or system).states), first_column(system)
+    written = (*range(moved), *column)
+    fields = tuple(builder.form(aside.field[i]) for i in written)
+    code = JetCode({system.states[i]: i for i in written}, fields, builder, constants, shared=moved)
+    for i, row in enumerate(written):
         for k in range(order + 1):
-            code.write(i * (order + 1) + k, code.state(i, k))
+            code.write(row * (order + 1) + k, code.state(i, k), of_column=row in column)
     guards, rows = _write_guards(system, code, [builder.form(gap) for gap in aside.gaps], constants, order)
-    probe = JetCode(system.states, fields, builder, constants, 0)
-    probe.harmonics = code.harmonics
-    for i, form in enumerate(fields):
-        probe.write(i, probe.linear(form, 0))
-        probe.write(2 * len(fields) + i, probe.size(form))
     gap_row, scale_row, calm_row = rows, rows + len(system.guards), rows + 2 * len(system.guards)
-    moved = len((system.tangent_of or system).states)
     for j in range(len(aside.guards)):
-        for i, entry in enumerate(aside.without(j)[:moved]):
+        for i, entry in enumerate(aside.without(j, moved)):
             code.write(calm_row + j * moved + i, code.linear(builder.form(entry), 0))
-    constant_code = ScalarCode(parameter_leaf(system))
-    for node, i in constants.rows.items():
-        value = constant_code.value(node)
-        constant_code.lines.append(f"c[{i}, lane] = {value}")
+    handed_row = calm_row + moved * len(aside.guards)
+    probed = builder.may_hide()
+    rates = _rates(system, aside.field, builder, constants, code.harmonics) if probed or aside.guards else []
     series = sorted(set(guards.row))
     stepped = sorted({*series, *(i * (order + 1) for i in range(len(system.states)))})
     constants_of_head: dict[str, Constant] = dict(
         LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order, NCONST=len(constants.rows),
         NTURNS=len(code.harmonics), CLOCK_ROW=FIRST_TURN + len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, CALM_ROW=calm_row,
-        ROWS=calm_row + moved * len(aside.guards), NMOVED=moved, NSINGULAR=len(aside.guards),
+        ROWS=handed_row + len(code.lines.handed), NMOVED=moved, NSINGULAR=len(aside.guards),
         NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped), NSERIES=len(series),
-        PROBED=builder.may_hide(), TANGENT=system.tangent_of is not None,
+        PROBED=probed, TANGENT=system.tangent_of is not None,
         **_tables(
             STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row, GUARD_SERIES=[series.index(row) for row in guards.row],
             GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const, SINGULAR_GUARD=list(aside.guards),
@@ -119,15 +117,46 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         **clocks.constants(),
     )  # fmt: skip
     functions = [
-        f"@kernel\ndef constants(p, c, lane):\n{indented(constant_code.lines)}\n",
+        _constants_function(system, constants),
         clocks.function(),
         gaps_function(system, clocks),
         jump_function(system, clocks),
         _turns_function(system, code),
-        f"@inner\ndef jets(y, side, c, clock, work):\n{indented(code.lines)}\n",
-        f"@inner\ndef rates(y, side, c, clock, work):\n{indented(probe.lines)}\n",
+        _jets_functions(code, len(column), handed_row, order + 1),
+        f"@inner\ndef rates(y, side, c, clock, work):\n{indented(rates)}\n",
     ]
     return Head(constants_of_head, "\n".join(functions))
+
+
+def _rates(
+    system: System, field: Sequence[Expr], builder: SeriesBuilder, constants: Constants, harmonics: dict[tuple[Expr, Expr], int]
+) -> list[str]:
+    """Code for the right-hand side alone, and for the size of its terms."""
+    forms = tuple(builder.form(entry) for entry in field)
+    code = JetCode({name: i for i, name in enumerate(system.states)}, forms, builder, constants)
+    code.harmonics = harmonics
+    for i, form in enumerate(forms):
+        code.write(i, code.linear(form, 0))
+        code.write(2 * len(forms) + i, code.size(form))
+    return list(code.lines.shared())
+
+
+def _constants_function(system: System, constants: Constants) -> str:
+    """``constants(p, c, lane)``: what depends on parameters only."""
+    code = ScalarCode(parameter_leaf(system))
+    for node, i in constants.rows.items():
+        value = code.value(node)
+        code.lines.append(f"c[{i}, lane] = {value}")
+    return f"@kernel\ndef constants(p, c, lane):\n{indented(code.lines)}\n"
+
+
+def _jets_functions(code: JetCode, columns: int, handed_row: int, terms: int) -> str:
+    """``jets(y, side, c, clock, work)``; for a tangent it calls a function of one column for each of them."""
+    lines, texts = list(code.lines.shared(handed_row)), []
+    if columns:
+        texts.append(f"@inner\ndef jets_of_column(y, c, clock, shared, work):\n{indented(code.lines.column)}\n\n")
+        lines += [f"jets_of_column(y[{j}:], c, clock, work[{handed_row}:], work[{j * terms}:])" for j in range(columns)]
+    return "".join(texts) + f"@inner\ndef jets(y, side, c, clock, work):\n{indented(lines)}\n"
 
 
 def _tables(**tables: list) -> dict[str, Constant]:

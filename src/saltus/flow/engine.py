@@ -18,6 +18,7 @@ from saltus.codegen.module import Flow
 from saltus.errors import SaltusWarning
 from saltus.flow.counts import whole as whole_number
 from saltus.flow.methods import Method
+from saltus.flow.pace import marks, resume
 from saltus.flow.room import Contacts
 from saltus.flow.threads import may_wait, on_threads, usable_processors
 from saltus.interrupt import Interrupted, Stop
@@ -115,6 +116,7 @@ class _Chunk:
     first: int
     arrays: dict[str, np.ndarray]
     keeps_contacts: bool
+    due: float | None
     contacts: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
 
 
@@ -146,7 +148,8 @@ def run(
     outcome, whole = allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     shared = {"options": method.numbers(periods), "data": tables_of(system.origin)}
-    chunks = [_cut(request, whole, first, shared) for first in range(0, len(request.start), CHUNK)]
+    due = method.due(periods)
+    chunks = [_cut(request, whole, first, shared, due) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
     try:
@@ -194,6 +197,7 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
         "cursor": np.zeros(n, np.int64),
         "samples": np.full((n, m, states), np.nan),
         "sample_mode": np.full((n, m), -1, np.int64),
+        **marks(n),
     }
     outcome = Outcome(
         whole["state"], whole["phase"], whole["status"], whole["mode"], whole["counters"], whole["minima"], whole["samples"],
@@ -206,7 +210,7 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
 ARGUMENTS = Batch._fields
 
 
-def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dict[str, np.ndarray]) -> _Chunk:
+def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dict[str, np.ndarray], due: float | None) -> _Chunk:
     """The arrays of one chunk: views of the whole, and tables of its own."""
     last = min(first + CHUNK, len(request.start))
     arrays = {name: array[first:last] for name, array in whole.items()}
@@ -217,7 +221,7 @@ def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dic
     arrays["rec_first"] = np.full(last - first, 0 if request.record_from is None else request.record_from, np.int64)
     arrays["rec_used"] = np.zeros(1, np.int64)
     arrays |= common
-    return _Chunk(first, arrays, request.record_from is not None)
+    return _Chunk(first, arrays, request.record_from is not None, due)
 
 
 def _open_tables(chunk: _Chunk, module: Flow) -> None:
@@ -244,7 +248,7 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
     running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if contacts := [part for chunk in chunks for part in chunk.contacts]:
-        table, numbers = (np.concatenate(half) for half in zip(*contacts, strict=True))
+        table, numbers = (np.concatenate(half) if len(half) > 1 else half[0] for half in zip(*contacts, strict=True))
         order = np.argsort(table[:, st.REC_TRAJECTORY], kind="stable")
         table, numbers = table[order], numbers[order]
         if (outcome.status == st.SLIDING).any():
@@ -279,9 +283,10 @@ def _advance(
     while not stop.is_set():
         outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), steps, *workspace)
         _empty_table(chunk, room)
+        went_on = chunk.due is not None and resume(arrays, chunk.due)
         if show is not None:
             show(_share_done([chunk]))
-        if outcome == st.FINISHED:
+        if outcome == st.FINISHED and not went_on:
             return
         if room.full:
             arrays["status"][arrays["status"] == st.RUNNING] = st.BUDGET_EVENTS

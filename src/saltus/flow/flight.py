@@ -6,6 +6,7 @@ import numpy as np
 
 from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate, slice_of, tables_of
 from saltus.flow.methods import Method
+from saltus.flow.pace import marks, resume
 from saltus.interrupt import check_stop
 from saltus.kernels import status as st
 from saltus.system.system import System
@@ -25,6 +26,7 @@ _FOLLOW = (
     "end_phase",
     "counters",
     "minima",
+    *marks(0),
 )
 
 
@@ -54,7 +56,7 @@ class Flight:
         request = Request(start, parameters, period, 0.0, np.zeros(count, np.int64), np.zeros(count), Schedule.none(), None)
         _, self._arrays = allocate(request, start.shape[1], self._module)
         self._arrays["param"] = np.ascontiguousarray(parameters, float)
-        self._options, self._data = method.numbers(longest), tables_of(system.origin)
+        self._options, self._data, self._due = method.numbers(longest), tables_of(system.origin), method.due(longest)
         self.age = 0
 
     def __len__(self) -> int:
@@ -103,7 +105,10 @@ class Flight:
             data=self._data,
         )  # fmt: skip
         steps = slice_of(states)
-        while self._module.propagate(*(call[name] for name in ARGUMENTS), steps, *self._workspace) == st.PAUSED:
+        outcome, went_on = st.PAUSED, False
+        while outcome == st.PAUSED or went_on:
+            outcome = self._module.propagate(*(call[name] for name in ARGUMENTS), steps, *self._workspace)
+            went_on = self._due is not None and resume(arrays, self._due)
             check_stop()
         self.age += periods
         return samples

@@ -15,6 +15,7 @@ import numpy as np
 from saltus.codegen.module import Flow, lane_width, ode45_module, taylor_module
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
+from saltus.flow.pace import LONG, LOOK
 from saltus.system.system import System
 
 #: Steps that a trajectory may take for each of its periods; a healthy one takes ten to a hundred.
@@ -29,13 +30,6 @@ SLOWEST_SHARE = 1e-3
 
 def _step_budget(given: int | None, periods: float) -> float:
     return float(given) if given is not None else STEPS_AT_LEAST + STEPS_PER_PERIOD * math.ceil(periods)
-
-
-def _pace(given: int | None, periods: float) -> tuple[float, float]:
-    """Steps after which a trajectory is looked at, and the periods that they must have brought it further."""
-    if given is not None:
-        return float(given), math.inf
-    return float(STEPS_AT_LEAST), min(SLOWEST_SHARE * periods, STEPS_AT_LEAST / STEPS_PER_PERIOD)
 
 
 def _check_positive(name: str, value: Any) -> None:
@@ -93,6 +87,10 @@ class Method:
         """The options as the kernel reads them, for a run of so many periods."""
         raise NotImplementedError
 
+    def due(self, periods: float) -> float | None:  # noqa: ARG002
+        """Periods that so many steps as :data:`saltus.flow.pace.LONG` must bring a run of so many; None if it has a budget of steps."""
+        return None
+
     def suited_to(self, count: int) -> Method:  # noqa: ARG002  (what most methods don't ask)
         """The method with which so many trajectories are moved soonest; its results are the same to the bit."""
         return self
@@ -138,7 +136,7 @@ class Taylor(Method):
         Trajectories moved at once: 2, 4, 8 or 16. Default: what suits the processor, and a short run of few. Results don't depend on it.
     max_steps, max_events : int, optional
         Budgets of one trajectory; beyond them it stops with status ``budget_steps`` or ``budget_events``. Default: any number of steps as
-        long as each million brings it a thousandth of the run further, or 100 periods; 10 million contacts.
+        long as each million brings it a thousandth of the run further, or 100 periods, and it doesn't stand still; 10 million contacts.
 
     References
     ----------
@@ -170,8 +168,13 @@ class Taylor(Method):
 
     def numbers(self, periods: float) -> np.ndarray:
         """log2 of the tolerance, steps between two looks at the pace, event budget, periods that they must bring."""
-        steps, pace = _pace(self.max_steps, periods)
-        return np.array([math.log2(self.tolerance), steps, float(self.max_events), pace])
+        due = self.due(periods)
+        steps, least = (LOOK, due * LOOK / LONG) if due is not None else (self.max_steps or 0, math.inf)
+        return np.array([math.log2(self.tolerance), float(steps), float(self.max_events), least])
+
+    def due(self, periods: float) -> float | None:
+        """See :class:`Method`."""
+        return min(SLOWEST_SHARE * periods, LONG / STEPS_PER_PERIOD) if self.max_steps is None else None
 
     @property
     def noise(self) -> float:

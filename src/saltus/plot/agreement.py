@@ -18,6 +18,7 @@ from saltus.plot.basins import paint
 from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, style
+from saltus.results.reader import reader
 from saltus.results.schema import kind_text
 
 _CALLER = "plot.agreement"
@@ -33,6 +34,7 @@ _NAMED = 8
 
 
 @picture
+@reader
 def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     """Two maps of basins side by side, and where they differ; with one Axes only where they differ.
 

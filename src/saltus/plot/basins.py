@@ -22,6 +22,7 @@ from saltus.plot import maps
 from saltus.plot.palette import shades
 from saltus.plot.picture import picture
 from saltus.plot.style import QUIET, Scale
+from saltus.results.reader import reader
 from saltus.units import from_si
 
 _CALLER = "plot.basins"
@@ -36,6 +37,7 @@ _LONG_LEGEND = 14
 
 
 @picture
+@reader
 def basins(
     ds: xr.Dataset,
     ax: Any = None,

@@ -13,6 +13,7 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import EXPONENTS, check, kind_text
 
 _CALLER = "plot.exponents"
@@ -21,6 +22,7 @@ _EARLY = 0.1
 
 
 @picture
+@reader
 def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax: Any = None, *, legend: bool = True) -> Any:
     """Lyapunov exponents as they converge: mean so far and its 95 % interval, against the time since the transient.
 

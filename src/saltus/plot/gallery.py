@@ -22,6 +22,7 @@ from saltus.plot.phase import phase
 from saltus.plot.picture import picture
 from saltus.plot.style import display_scale, style
 from saltus.results import schema
+from saltus.results.reader import reader
 
 _CALLER = "plot.gallery"
 #: Forcing periods in the time history of a response that doesn't repeat, and the fewest of one that does: it takes two to see a repeat.
@@ -34,6 +35,7 @@ _NARROWEST = 0.25
 
 
 @picture
+@reader
 def gallery(ds: xr.Dataset, runs: xr.Dataset, attractors: Sequence[int] | None = None, *, order: Sequence[int] | None = None) -> Figure:
     """A row for each attractor: time history over its period, phase portrait, Poincare points in the hue that it has in the map.
 

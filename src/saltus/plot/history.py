@@ -16,6 +16,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import TRAJECTORY, check, contact_name, equations_of, forcing_period, states_of
 
 _CALLER = "plot.history"
@@ -28,6 +29,7 @@ _MARKERS: dict[str, dict[str, Any]] = {
 
 
 @picture
+@reader
 def history(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,

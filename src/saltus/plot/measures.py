@@ -13,6 +13,7 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import ENERGY, IMPACTS, check
 
 #: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a motion that repeats, and how often each
@@ -23,6 +24,7 @@ _LINE = 60
 
 
 @picture
+@reader
 def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Histogram of the speeds at contact, a colour for each guard. Where they repeat, or there are none, it is said in words.
 
@@ -97,6 +99,7 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
 
 
 @picture
+@reader
 def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Energy supplied, dissipated and stored, interval by interval; the largest imbalance is in the title.
 

@@ -14,6 +14,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import STROBOSCOPE, check, kind_of, states_of
 
 _CALLER = "plot.phase"
@@ -23,6 +24,7 @@ SETTLED_SHARE = 0.3
 
 
 @picture
+@reader
 def phase(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,

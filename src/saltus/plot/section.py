@@ -14,6 +14,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import SECTION, check, states_of
 
 _CALLER = "plot.section"
@@ -24,6 +25,7 @@ _DIRECTIONS = {1: (OKABE_ITO["blue"], "upwards"), -1: (OKABE_ITO["vermillion"], 
 
 
 @picture
+@reader
 def section(
     ds: xr.Dataset,
     x: str | None = None,

@@ -15,6 +15,7 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import SPECTRUM, check, states_of
 
 _CALLER = "plot.spectrum"
@@ -26,6 +27,7 @@ _ORDERS = 5.0
 
 
 @picture
+@reader
 def spectrum(
     ds: xr.Dataset,
     state: str | None = None,

@@ -48,9 +48,9 @@ class SetAside(NamedTuple):
     guards: tuple[int, ...]
     first: int
 
-    def without(self, j: int) -> tuple[Expr, ...]:
-        """The field without the terms of ``guards[j]``."""
-        return tuple(assuming(entry, self.first + j, True) for entry in self.field)
+    def without(self, j: int, count: int | None = None) -> tuple[Expr, ...]:
+        """The field, or its first entries, without the terms of ``guards[j]``."""
+        return tuple(assuming(entry, self.first + j, True) for entry in self.field[:count])
 
 
 def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
@@ -109,15 +109,20 @@ def lifted(field: Iterable[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
 
 
 def assuming(root: Expr, bit: int, value: bool) -> Expr:
-    """The expression with one bit known."""
+    """The expression with one bit known. What it rules out isn't looked at: it may divide by zero."""
     memo: dict[Expr, Expr] = {}
-    for node in ex.walk(root):
-        args = tuple(memo[child] for child in node.args)
-        if node.op == "select":
-            condition = _knowing(node.payload, bit, value)
-            memo[node] = args[not condition] if isinstance(condition, bool) else ex.rebuild(node, args, condition)
-        else:
-            memo[node] = ex.rebuild(node, args, node.payload)
+    stack = [root]
+    while stack:
+        node = stack[-1]
+        condition = _knowing(node.payload, bit, value) if node.op == "select" else None
+        decided = isinstance(condition, bool)
+        args = (node.args[not condition],) if decided else node.args
+        if missing := [child for child in args if child not in memo]:
+            stack += missing
+            continue
+        stack.pop()
+        new = tuple(memo[child] for child in args)
+        memo[node] = new[0] if decided else ex.rebuild(node, new, node.payload if condition is None else condition)
     return memo[root]
 
 

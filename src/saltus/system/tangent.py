@@ -14,6 +14,15 @@ from saltus.system.expression import Expr, add, constant, mul, state
 from saltus.system.system import System
 
 
+def first_column(system: System) -> range:
+    """Indices of the states that hold the first column of Y; those of column j are j further on. Empty for a system without a tangent.
+
+    All columns obey the same equations: they differ in which of its columns stands for Y, in nothing else.
+    """
+    size = len(system.tangent_of.states) if system.tangent_of else 0
+    return range(size, size + size * size, size) if size else range(0)
+
+
 def derivative_name(row: str, column: str) -> str:
     """Name of the state that holds d(row)/d(column at the start)."""
     return f"d{row}/d{column}(0)"

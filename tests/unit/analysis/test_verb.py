@@ -1,5 +1,6 @@
 """What every public verb says about its arguments, about compiling and about Ctrl-C."""
 
+import numpy as np
 import pytest
 
 import saltus as sl
@@ -189,6 +190,7 @@ def test_what_progress_may_be():
         lambda: sl.stroboscope(rig, (0, 0), 2, keep="x"),
         lambda: sl.simulate(rig, (0, 0), periods=2**64, samples=1),
         lambda: sl.simulate(rig, (0, 0), periods=1, threads="many"),
+        lambda: sl.simulate(rig, (0, 0), periods=1, values={"frequency": np.array([])}),
     ],
 )
 def test_wrong_types_and_sizes_are_refused_in_words(call):

@@ -15,6 +15,7 @@ from saltus.codegen.taylor_head import taylor_head
 from saltus.kernels import lanes as lane_operations
 from saltus.kernels import trigonometry
 from saltus.system import System
+from saltus.system.tangent import tangent_system
 
 pytestmark = pytest.mark.nojit
 LANES, ORDER = 4, 12
@@ -245,3 +246,23 @@ def test_lanes_do_not_mix():
     for lane in range(LANES):
         _, alone = lane_jets(system, STATES[:, [lane] * LANES], TIMES[[lane] * LANES], VALUES[[lane] * LANES])
         assert np.array_equal(alone[:, 0], together[:, lane])
+
+
+def test_the_columns_of_a_tangent():
+    """One text serves both columns of Y: its coefficients are those of dY/dt = J Y, with J differentiated by hand."""
+
+    @sl.system(states="x v")
+    def swing(t, x, v, *, a=0.7):
+        return v, sl.cos(2.0 * t) - a * x**3 - sl.tanh(v) + x * v
+
+    a, time, start = 0.7, 0.3, [0.4, -0.6, 1.1, 0.2, -0.3, 0.9]
+
+    def field(t, x, v, xx, xv, vx, vv):
+        by_x, by_v = -3 * mpf(a) * x**2 + v, x - 1 + mp.tanh(v) ** 2
+        return v, mp.cos(2 * t) - mpf(a) * x**3 - mp.tanh(v) + x * v, vx, vv, by_x * xx + by_v * vx, by_x * xv + by_v * vv
+
+    head, work = lane_jets(tangent_system(swing), np.tile(np.array(start)[:, None], LANES), np.full(LANES, time), [np.array([a])] * LANES)
+    assert "def jets_of_column(" in taylor_head(tangent_system(swing), ORDER, LANES).functions
+    for i, exact in enumerate(exact_jets(field, start, time)):
+        assert_same(work[i * (ORDER + 1) : (i + 1) * (ORDER + 1), LANES - 1], exact)
+    assert head["ROWS"] == len(work)

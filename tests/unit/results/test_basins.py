@@ -200,7 +200,7 @@ def test_save_and_load_return_the_same(case, engine, tmp_path):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_netcdf_of_xarray_keeps_everything(case, engine, tmp_path):
+def test_netcdf_of_xarray_keeps_everything(case, engine, tmp_path, untried):
     ds = CASES[case]()
     ds.to_netcdf(tmp_path / "map.nc", engine=engine)
     xr.testing.assert_identical(load(tmp_path / "map.nc"), ds)
