@@ -17,7 +17,6 @@ saltus and heyoka are also compared with themselves at another tolerance (the fl
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import itertools
 import os
@@ -37,7 +36,7 @@ from saltus.study.doctor import processor
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from benchmarks.record import Column, Record, Table
+from benchmarks.record import Column, Record, Table, options_of
 from benchmarks.rivals import rig
 
 #: Periods that rivals let a trajectory settle, and those they look at: all but some 5 of 2000 cells follow an orbit then.
@@ -277,13 +276,11 @@ def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: li
 
 def main(argv: Sequence[str] | None = None) -> None:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = options_of("basins", __doc__, 3, "runs of ours, of which the fastest counts")
     parser.add_argument("--cells", type=int, default=200, help="cells along each axis")
     parser.add_argument("--subset", type=int, default=2000, help="cells that heyoka labels")
     parser.add_argument("--few", type=int, default=400, help="cells that pynamicalsys labels")
-    parser.add_argument("--repeats", type=int, default=3, help="runs of ours, of which the fastest counts")
     parser.add_argument("--alone", action="store_true", help="saltus only")
-    parser.add_argument("--write", type=Path, metavar="FOLDER", help="keep the tables there as basins.json")
     chosen = parser.parse_args(argv)
     ours(6, 1)  # compiles
     heading(chosen.cells)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import datetime
 import importlib.metadata
 import json
@@ -16,6 +17,14 @@ from saltus.study.doctor import processor
 
 #: Packages whose versions matter to a measurement.
 PACKAGES = ("saltus", "numpy", "llvmlite", "numba", "scipy", "heyoka", "pynamicalsys")
+
+
+def options_of(name: str, description: str | None, repeats: int, what: str) -> argparse.ArgumentParser:
+    """The command line that benchmarks share: how often ``what`` is done, and where the tables are kept as ``<name>.json``."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=repeats, help=what)
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help=f"keep the tables there as {name}.json")
+    return parser
 
 
 @dataclass(frozen=True)

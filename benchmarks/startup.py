@@ -1,7 +1,8 @@
 """What it costs to begin: from the shell to the first trajectory, and one more in a process that has warmed up.
 
 Case b4 of the deLangre rig at 15 Hz from rest. Every row of the first table is a fresh process that does what its name says and ends; its
-machine code lies on disk, as after any earlier run, and so does the byte code of Python. The libraries alone stand first: what is above
+machine code lies on disk, as after any earlier run, and so does the byte code of Python. The last row alone finds neither machine code
+nor Matplotlib's list of fonts, as the first command on a machine. The libraries alone stand first: what is above
 them is saltus. The second table is one call among many in a process: a click. CPU time counts all threads, and is disturbed less than
 wall time by others on the machine. Medians.
 
@@ -12,11 +13,11 @@ wall time by others on the machine. Medians.
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from statistics import median
@@ -27,8 +28,11 @@ from saltus.study.doctor import processor
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from benchmarks.record import Column, Record, Table
+from benchmarks.record import Column, Record, Table, options_of
 
+#: The demo with its picture, written to the working folder.
+DEMO = 'import sys; sys.argv = ["saltus", "demo", "--out", "."]; from saltus.cli import main; main()'
+BARE = 'import os; os.environ |= dict.fromkeys(("SALTUS_CACHE", "MPLCONFIGDIR"), os.getcwd()); '
 MODEL = 'import saltus as sl; rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")'
 #: What each fresh process does.
 PROGRAMS = {
@@ -38,6 +42,8 @@ PROGRAMS = {
     "import saltus": "import saltus",
     "import saltus, a system": MODEL,
     "import saltus, a system, 20 periods of it": MODEL + "; sl.simulate(rig, start=(0.0, 0.0), periods=20, progress=False)",
+    "saltus demo, to its picture": DEMO,
+    "the same, first on a machine": BARE + DEMO,
 }
 PERIODS = (20, 100)
 CALLS = 40
@@ -49,11 +55,12 @@ CALL_COLUMNS = (
 
 
 def fresh(program: str) -> tuple[float, float]:
-    """CPU time and wall time of a process from its start to its end [s]."""
+    """CPU time and wall time of a process in an empty folder, from its start to its end, other processes that it starts included [s]."""
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    subprocess.run([sys.executable, "-c", program], env=environment, check=True)
-    wall, after = time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-c", program], env=environment, check=True, cwd=folder, stdout=subprocess.DEVNULL)
+        wall, after = time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, wall
 
 
@@ -115,8 +122,5 @@ def table(repeats: int, folder: Path | None = None) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--repeats", type=int, default=9, help="fresh processes of each kind")
-    parser.add_argument("--write", type=Path, metavar="FOLDER", help="keep the tables there as startup.json")
-    chosen = parser.parse_args()
+    chosen = options_of("startup", __doc__, 9, "fresh processes of each kind").parse_args()
     table(chosen.repeats, chosen.write)

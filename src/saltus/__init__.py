@@ -162,14 +162,18 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    from saltus.interrupt import ctrl_c_waits
+
     if name in _MODULES:
-        return importlib.import_module(f"saltus.{name}")
+        with ctrl_c_waits():
+            return importlib.import_module(f"saltus.{name}")
     if name not in _HOMES:
         from saltus.errors import nearest
         from saltus.system.foreign import ADVICE
 
         raise AttributeError(f"saltus has no {name!r}. {ADVICE.get(name) or nearest(name, __all__)}")
-    value = getattr(importlib.import_module(_HOMES[name]), name)
+    with ctrl_c_waits():
+        value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value
     return value
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
+from types import FrameType
 
 
 class Interrupted(KeyboardInterrupt):
@@ -15,6 +19,26 @@ class Interrupted(KeyboardInterrupt):
         if self.partial is None:
             return "stopped by Ctrl-C before anything was finished."
         return "stopped by Ctrl-C. What was finished stands in `partial` of this exception."
+
+
+@contextmanager
+def ctrl_c_waits() -> Iterator[None]:
+    """Ctrl-C within is raised where the block ends.
+
+    For what can't be stopped half done, or would swallow it: modules of other packages, while they are imported, lose one in a hundred.
+    """
+    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    if not callable(handler):  # in another thread it doesn't arrive; or nobody listens
+        yield
+        return
+    noted: list[tuple[int, FrameType | None]] = []
+    signal.signal(signal.SIGINT, lambda *what: noted.append(what))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if noted:
+        handler(*noted[0])
 
 
 class Stop:

@@ -3,6 +3,7 @@
 import _thread
 import os
 import signal
+import sys
 import threading
 import time
 
@@ -13,7 +14,7 @@ import saltus as sl
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
-from saltus.interrupt import Stop, check_stop
+from saltus.interrupt import Stop, check_stop, ctrl_c_waits
 
 START = {"x": np.linspace(-4e-3, 4e-3, 24), "v": np.linspace(-0.5, 0.5, 24)}
 
@@ -167,3 +168,37 @@ def test_a_piece_within_a_piece_is_stopped_with_it():
             on_threads(outer, pieces, lambda *_: None, threads=2)
     with pytest.raises(ZeroDivisionError):
         on_threads(lambda _: 1 / 0, [1], lambda *_: None)
+
+
+# -- while modules are imported ----------------------------------------------------------------------------------------------------
+_SWALLOWS = """
+import _thread, time
+try:
+    _thread.interrupt_main()
+    time.sleep(0.1)
+except KeyboardInterrupt:  # as C code of NumPy and pandas does that asks no further why something failed
+    pass
+function = 5
+"""
+
+
+@pytest.mark.parametrize("in_a_module", [True, False])
+def test_an_import_does_not_swallow_ctrl_c(tmp_path, monkeypatch, in_a_module):
+    (tmp_path / "swallowing.py").write_text(_SWALLOWS)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(sl._HOMES, "function", "swallowing")
+    monkeypatch.delitem(sys.modules, "swallowing", raising=False)
+    if in_a_module:
+        monkeypatch.setattr(sl, "_MODULES", ("swallowing",))
+        monkeypatch.setattr(sl.importlib, "import_module", lambda _: __import__("swallowing"))
+    with pytest.raises(KeyboardInterrupt):
+        _ = sl.swallowing if in_a_module else sl.function
+    assert sys.modules["swallowing"].function == 5
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_where_nobody_listens_for_ctrl_c_nobody_is_told():
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with ctrl_c_waits():
+        os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN

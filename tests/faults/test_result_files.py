@@ -10,7 +10,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.fence import has_control
-from saltus.results import ResultFileError, ending, export, load, save
+from saltus.results import ResultFileError, ending, export, known, load, save
 from unit.results.conftest import sine_run
 
 ENDING = 80
@@ -129,3 +129,49 @@ def test_a_file_that_would_write_to_the_terminal_is_refused(tmp_path, where, mon
     with pytest.raises(ResultFileError, match="holds control characters, which a terminal would obey") as refused:
         load(tmp_path / "run.nc")
     assert not has_control(str(refused.value))
+
+
+@pytest.fixture
+def stranger(tmp_path, monkeypatch):
+    """Somebody else's files: the folder of what this user's saltus wrote is empty."""
+    monkeypatch.setattr(known, "folder", lambda: tmp_path / "known")
+    monkeypatch.setattr(known, "_HERE", set())
+    return tmp_path
+
+
+def test_only_what_was_not_written_here_is_tried_elsewhere_and_once(stranger, monkeypatch):
+    """Anybody can write a right checksum over a file that HDF5 reads for ever."""
+    tried = []
+    monkeypatch.setattr(sys.modules["saltus.results.load"], "try_elsewhere", lambda path, _engine: tried.append(path.name))
+    mine = save(sine_run(samples=50), stranger / "mine.nc")
+    content = sine_run(samples=51).to_netcdf(engine="h5netcdf")
+    (stranger / "theirs.nc").write_bytes(ending.with_ending(content))
+    for _ in range(2):  # as this process knows them, and as another one does
+        load(mine)
+        load(stranger / "theirs.nc")
+        known._HERE.clear()
+    assert tried == ["theirs.nc"]
+    (stranger / "known").chmod(0o770)  # others could have written there
+    load(mine)
+    assert tried == ["theirs.nc", "mine.nc"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="memory is bounded on POSIX only")
+@pytest.mark.parametrize(
+    ("made", "told"), [("stored elsewhere", "leads to other files"), ("linked", "leads to other files"), ("huge", "allocate")]
+)
+def test_a_forged_file_reads_no_other_file_and_takes_no_memory(stranger, made, told):
+    """Its checksums are right. Data stored elsewhere would be those of any file, and a pipe there would be waited on for ever."""
+    h5py = pytest.importorskip("h5py")
+    (stranger / "secret").write_bytes(bytes(range(100)))
+    with h5py.File(stranger / "raw", "w") as file:
+        file.attrs["saltus_result"] = "trajectory"
+        if made == "stored elsewhere":
+            file.create_dataset("time", shape=(100,), dtype="i1", external=[(str(stranger / "secret"), 0, 100)]).make_scale("time")
+        elif made == "linked":
+            file["time"] = h5py.ExternalLink(str(stranger / "secret"), "/x")
+        else:
+            file.create_dataset("time", shape=(3 * 10**9,), dtype="f8", chunks=(1 << 20,)).make_scale("time")
+    (stranger / "run.nc").write_bytes(ending.with_ending((stranger / "raw").read_bytes()))
+    with pytest.raises(ResultFileError, match=told):
+        load(stranger / "run.nc")

@@ -69,7 +69,7 @@ def test_closed_form_and_40_digits_give_the_forced_linear_runs(row):
 def test_closed_form_knows_its_own_rounding():
     parameters, x, v, end = piecewise_linear.random_cases(12, seed=3)
     closed = piecewise_linear.contacts(parameters, x, v, end)
-    for i in np.flatnonzero(closed.count < 60):
+    for i in np.flatnonzero(closed.count < 60)[:3]:
         one = {key: float(values[i]) for key, values in parameters.items()}
         exact = high_precision.simulate({**one, "cubic": 0.0}, float(x[i]), float(v[i]), 10)
         mine = closed.of(i)
@@ -79,7 +79,9 @@ def test_closed_form_knows_its_own_rounding():
         assert abs(float(exact.margin) - closed.margin[i]) < 1e-3 * closed.margin[i]
 
 
+@pytest.mark.nightly
 def test_compiled_closed_form_is_the_plain_one():
+    """Only the nightly million of contacts uses it."""
     case = piecewise_linear.random_cases(20, seed=5)
     plain, compiled = (piecewise_linear.contacts(*case, compiled=compiled) for compiled in (False, True))
     assert plain.count.tolist() == compiled.count.tolist()

@@ -1,12 +1,13 @@
 """Figures of Saunders et al. (2021): the study files run, and the maps show the attractors that their comments promise.
 
-Grids are 8 x 8 here, sweeps of four values; the exact maps look for attractors from as many starts as ever, so that what they find is
-what the full study finds.
+Grids are 8 x 8 here at most, sweeps of two values; the exact maps look for attractors from as many starts as ever, so that what they
+find is what the full study finds.
 """
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,16 +43,26 @@ EXACT = {
 SETTINGS = {"fig6": ("b", None), "fig6b": ("b", 15.0), "fig8": ("c", 5.0), "fig11": ("c", 17.0), "fig13": ("c", 23.0)}
 
 
-def tiny(name):
+def tiny(name, count=8):
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
-    small = re.sub(r"count = \d+", "count = 8", text)
-    assert small.count("count = 8") == 2
+    small, axes = re.subn(r"count = \d+", f"count = {count}", text)
+    assert axes == 2
     return small
 
 
 @pytest.fixture(autouse=True)
 def few_checks(monkeypatch):
     monkeypatch.setattr(plan, "CHECKED", 16)
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Few scouts, and little time for motions that never repeat: what comes out means nothing, but all of it is made."""
+    monkeypatch.setattr(plan, "SCOUTS", 2)
+    monkeypatch.setattr("saltus.analysis.recurrence.WATCHED", 256)
+    monkeypatch.setattr("saltus.analysis.wandering.BLOCKS", 64)
+    for module in ("recurrence", "noisy", "steady"):
+        monkeypatch.setattr(f"saltus.analysis.{module}.TRAIL", 256)
 
 
 def test_all_figures_are_here():
@@ -111,17 +122,21 @@ def test_the_second_attractor_of_fig_11_is_the_large_one():
 
 
 def test_fig_8_has_a_third_attractor_after_the_grazing():
-    """At 23.2 kN/m, with a handful of starts of the grid as it stands; at 25.5 kN/m there are two."""
+    """At 23.2 kN/m, with a handful of starts of the grid as it stands; at 25.5 kN/m there are two.
+
+    Here four of its columns in which the third has starts, and the outer ones; truth/test_basins.py counts the whole grid.
+    """
     jobs = {job.name: job.plan for job in jobs_of(read(FOLDER / "fig8.toml")[0]) if job.plan.method.name == "Taylor"}
     counts = {}
-    for name, one in jobs.items():
+    for name, whole in jobs.items():
+        one = replace(whole, axes=whole.axes | {"x": whole.axes["x"][[0, 83, 84, 89, 90, 199]]})
         found, settled = one.scout(1), Settling.empty(one.cells, 2)
         label_all(one, found, range(one.chunks), lambda i, part, one=one, to=settled: to.put(one.cells_of(i), part), 1)
         counts[name] = one.finish(settled, found, 1).attractor_fraction.values * one.cells
     assert len(counts["25.5 kN per m, exact"]) == 2
     third = sorted(counts["23.2 kN per m, exact"])[0]
     assert len(counts["23.2 kN per m, exact"]) == 3
-    assert 5 <= round(third) <= 30
+    assert 2 <= round(third) <= 8
 
 
 def test_fig_6b_runs_as_a_study(tmp_path):
@@ -133,11 +148,9 @@ def test_fig_6b_runs_as_a_study(tmp_path):
 
 
 @pytest.mark.parametrize("name", [name for name in MAPS if name != "fig6b"])
-def test_the_maps_of_one_value_run(name, tmp_path, monkeypatch):
+def test_the_maps_of_one_value_run(name, tmp_path, brief):
     """Exact, located, not located: the whole way with few scouts and short transients. Only that it runs, and that all is written."""
-    monkeypatch.setattr(plan, "SCOUTS", 8)
-    monkeypatch.setattr("saltus.analysis.recurrence.TRAIL", 256)
-    text = "[[basins.map]]".join(tiny(name).replace("[basins]", "[basins]\nperiods = 16").split("[[basins.map]]")[:4])
+    text = "[[basins.map]]".join(tiny(name, 3).replace("[basins]", "[basins]\nperiods = 16").split("[[basins.map]]")[:4])
     jobs = jobs_of(parse(text))
     outcome = run_study(parse(text), text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False)
     assert outcome.waiting == []
@@ -156,11 +169,20 @@ def test_the_motions_run(name, periods, tmp_path):
     assert settled(load(file))["response_period"].values.tolist()[: len(periods)] == periods
 
 
-@pytest.mark.parametrize("name", RESPONSES)
-def test_the_responses_run(name, tmp_path):
-    """The whole way with few values and short transients. Only that it runs, and that all is written."""
-    text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
-    text = re.sub(r"count = \d+", "count = 2", re.sub(r"periods = \d+", "periods = 30", text))
+@pytest.mark.parametrize(
+    ("name", "panels"),
+    [
+        ("fig3", ["a1.5", "c4"]),
+        ("fig7", ["a", "c", "d", "f"]),
+        *(pytest.param(name, None, marks=pytest.mark.nightly, id=f"{name}, all of it") for name in RESPONSES),
+    ],
+)
+def test_the_responses_run(name, panels, tmp_path, brief):
+    """The whole way with few values and short transients, panels at both ends. Only that it runs, and that all is written."""
+    head, *questions = re.split(r"(?=^\[\[)", (FOLDER / f"{name}.toml").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    text = head + "".join(one for one in questions if panels is None or one.split('"')[1].split(",")[0] in panels)
+    assert text.count("[[") == (len(questions) if panels is None else len(questions) * len(panels) // 6)
+    text = re.sub(r"count = \d+", "count = 2", re.sub(r"periods = \d+", "periods = 256", text))
     text = re.sub(r'x = \[("[^"]*"), [^]]*\]', r"x = [\1]", text)
     spec = parse(text)
     outcome = run_study(spec, text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False)

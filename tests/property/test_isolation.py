@@ -23,7 +23,7 @@ def _start(roots, lead):
     return [float(c[4]), float(c[3]), float(2 * c[2]), float(6 * c[1])], float(24 * c[0])
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(roots=st.lists(SIXTEENTHS, min_size=1, max_size=4, unique=True), outside=st.sampled_from([(), (-1,), (3,), (-2, 5)]),
        lead=st.sampled_from([1, -1, 64, Fraction(-1, 1024)]), end=st.sampled_from([1.03, 1.55, 2.0, 2.125]))  # fmt: skip
 def test_simple_roots(roots, outside, lead, end):
@@ -39,7 +39,7 @@ def test_simple_roots(roots, outside, lead, end):
     assert str(run.status.values) == "ok"
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(
     double=SIXTEENTHS, others=st.lists(SIXTEENTHS, max_size=2, unique=True), lead=st.sampled_from([1, -1]), end=st.sampled_from([2.0, 1.7])
 )

@@ -230,7 +230,7 @@ def test_an_undamped_well_is_not_chaotic():
     assert "chaotic" not in ds.attractor_type.values
 
 
-def exponent_by_runge_kutta(damping, force, count=256, periods=150, steps=100, settle=50):
+def exponent_by_runge_kutta(damping, force, count=256, periods=150, steps=50, settle=50):
     """Largest exponent [1/s] of Ueda's oscillator: RK4 of the motion and of one direction, mean over many trajectories; and its error."""
     rng = np.random.default_rng(5)
     y = np.stack([rng.uniform(-2, 2, count), rng.uniform(-2, 2, count), np.ones(count), np.zeros(count)])

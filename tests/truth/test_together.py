@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import saltus as sl
+from saltus.analysis import plan
 
 METHOD = sl.Taylor(order=12, lanes=2)
 CUTS, POINTS, VALUES = [0.0, 0.2, 0.45, 0.5, 0.8, 1.0], [0.0, 0.2, 0.45, 0.8, 1.0], [1.0, 3.0, -1.0, 0.5, 1.0]
@@ -84,6 +85,7 @@ def test_a_contact_goes_on_over_the_end_of_a_period(start):
     np.testing.assert_allclose([run.end_x.item(), run.end_v.item()], one_period(start, both.values)[0], rtol=0, atol=1e-11)
 
 
-def test_every_start_of_a_map_settles():
-    basins = sl.basins(both, x=(-1, 1, 10), v=(-1, 1, 10), method=METHOD)
+def test_every_start_of_a_map_settles(monkeypatch):
+    monkeypatch.setattr(plan, "SCOUTS", 32)
+    basins = sl.basins(both, x=(-1, 1, 6), v=(-1, 1, 6), method=METHOD)
     assert (basins.basin.values == 0).all()

@@ -13,9 +13,11 @@ LORENZ, ROESSLER, HENON = 0.9056, 0.0900, 0.41922  # Sprott (2003), appendix A; 
 
 #: Series of an ensemble: one chaotic series scatters by some 5 %, and another processor makes another series of it.
 SERIES = 12
+#: So many of them for each other setting: the mean is good to 2 %, and five of six intervals hold it in 97 of 100 ensembles.
+SOME = 6
 
 
-def ensemble(field, start, interval, count, lead, parts=5):
+def ensemble(field, start, interval, count, lead, parts=2):
     """Float64[SERIES, count, 3]: motions from starts around one point, by Runge-Kutta steps of interval/parts, in NumPy alone."""
     states = np.array(start, float)[:, None] + np.random.default_rng(0).normal(size=(len(start), SERIES))
     step, skipped = interval / parts, round(lead / interval)
@@ -71,32 +73,40 @@ def test_lorenz_from_one_quantity_with_all_defaults(lorenz):
     """The bias, up to 10 %, isn't in the intervals: a new neighbour isn't quite in the old direction."""
     runs = [sl.wolf(series[:, 0], 0.02) for series in lorenz]
     assert_mean_is(runs, LORENZ, bias=0.1)
+    assert np.mean([ds["replacements"].item() for ds in runs]) > 400
     for ds in runs:
         assert ds["kind"].item() == "chaotic"
         assert ds.attrs["dimension"] == 3
         assert 0.1 <= ds.attrs["delay_samples"] * 0.02 <= 0.2  # published: 0.16 s or so
         assert ds.attrs["false_neighbours"] < 0.01
-        assert ds["replacements"].item() > 400
         assert ds["replaced_distance"].item() < 0.03
 
 
 @pytest.mark.parametrize("settings", [{}, {"evolve": "0.5 s"}, {"largest_distance": 0.05}], ids=str)
 def test_lorenz_from_all_states(lorenz, settings):
-    runs = [sl.wolf(series, "20 ms", **settings) for series in lorenz[:8]]
+    runs = [sl.wolf(series, "20 ms", **settings) for series in lorenz[:SOME]]
     assert_mean_is(runs, LORENZ, bias=0.1)
     assert "evolve" not in settings or {run.attrs["evolve_samples"] for run in runs} == {25}
 
 
 @pytest.mark.parametrize("delay", [5, "0.16 s"])
 def test_lorenz_in_four_delayed_coordinates(lorenz, delay):
-    runs = [sl.wolf(series[:, 0], 0.02, dimension=4, delay=delay) for series in lorenz[:8]]
+    runs = [sl.wolf(series[:, 0], 0.02, dimension=4, delay=delay) for series in lorenz[:SOME]]
     assert_mean_is(runs, LORENZ, bias=0.1)
     assert {run.attrs["delay_samples"] for run in runs} == {5 if delay == 5 else 8}
 
 
-@pytest.mark.parametrize("column", [0, 1])
-def test_roessler(roessler, column):
-    assert_mean_is([sl.wolf(series[:, column], 0.1) for series in roessler[:8]], ROESSLER, bias=0.05)
+@pytest.fixture(scope="module")
+def from_x(roessler):
+    return [sl.wolf(series[:, 0], 0.1) for series in roessler[:SOME]]
+
+
+def test_roessler_from_x(from_x):
+    assert_mean_is(from_x, ROESSLER, bias=0.05)
+
+
+def test_roessler_from_y(roessler):
+    assert_mean_is([sl.wolf(series[:, 1], 0.1) for series in roessler[:SOME]], ROESSLER, bias=0.05)
 
 
 @pytest.mark.parametrize("column", [0, slice(None)], ids=["embedded", "states"])
@@ -116,11 +126,11 @@ def test_units_and_sampling_scale_the_exponent_only(lorenz):
     assert value(sl.wolf(series, 5.0 + 0.02 * np.arange(6000)))[0] == pytest.approx(exponent, rel=1e-6)
 
 
-def test_short_series_scatter_more_and_say_so(roessler):
+def test_short_series_scatter_more_and_say_so(roessler, from_x):
     """A quarter of the series doubles the intervals, and they hold the exponent."""
     exponents, halves = np.array([value(sl.wolf(series[:4000, 0], 0.1)) for series in roessler]).T
     assert (np.abs(exponents - ROESSLER) < halves).mean() > 0.75
-    assert 1.5 < halves.mean() / np.mean([value(sl.wolf(series[:, 0], 0.1))[1] for series in roessler[:4]]) < 3.0
+    assert 1.5 < halves.mean() / np.mean([value(run)[1] for run in from_x]) < 3.0
 
 
 # -- what isn't chaos ----------------------------------------------------------------------------------------------------------
@@ -201,7 +211,7 @@ def test_on_the_motions_of_the_rig():
     rig = sl.models.delangre("c", frequency="5 Hz")
     start = {"x": [0.32e-3, *np.linspace(0.1e-3, 0.5e-3, 8)], "v": 0.0}
     stiffness = {"contact_stiffness": np.array([2.55e4, *8 * [2.89e7]])}
-    both = {method: sl.lyapunov(rig, start, values=stiffness, method=method, periods=1500) for method in ("wolf", "variational")}
+    both = {method: sl.lyapunov(rig, start, values=stiffness, method=method, periods=800) for method in ("wolf", "variational")}
     assert both["wolf"]["kind"].values.tolist() == ["regular", *8 * ["chaotic"]]
     periodic, *chaotic = both["wolf"]["lyapunov_exponent"].values[:, 0]
     assert abs(periodic) < 1e-6

@@ -14,6 +14,7 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.results.basins import agreement_dataset
 from saltus.results.intervals import wilson
+from saltus.results.reader import reader
 from saltus.results.schema import BASINS, NOISY, attractor_name, axes_of, check, states_of
 
 #: Largest distance of two orbits that count as one, in units of the axis ranges: far above what methods differ by on one attractor,
@@ -30,6 +31,7 @@ _NEVER = 1e9
 
 
 @verb
+@reader
 def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANCE) -> xr.Dataset:
     """Compare two maps of basins on one grid, such as those of two methods.
 

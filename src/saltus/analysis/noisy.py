@@ -22,7 +22,7 @@ from saltus.results.schema import NOISY, period_text
 NARROW = 0.05
 #: A stretch of the motion belongs to the orbit if it strays no farther than so many times what was seen when the orbit was found.
 ROOM = 2.0
-#: Iterates between two looks at the motion, as when attractors are searched for: ode45 starts afresh at each.
+#: Iterates between two looks at the motion, as when attractors are searched for: a step of ode45 ends at each.
 LOOK = 128
 #: Looks at the exact motion in each period, for its range.
 BETWEEN = 32

@@ -7,7 +7,7 @@ Three stages, each a pure function of the plan and of the stages before: *scout*
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -71,7 +71,7 @@ class BasinPlan:
     fixed: Mapping[str, float]
     periods: int
     every: float | None = None
-    scouts: int = SCOUTS
+    scouts: int = field(default_factory=lambda: SCOUTS)
 
     @property
     def shape(self) -> tuple[int, int]:

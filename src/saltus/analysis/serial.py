@@ -13,6 +13,7 @@ from saltus.analysis.noisy import Noisy
 from saltus.analysis.orbits import Orbit
 from saltus.analysis.settling import Settling
 from saltus.analysis.wandering import Wandering
+from saltus.errors import SaltusError
 
 #: What is kept of each cell, beside where it ended.
 CELL: dict[str, Any] = {"label": np.int16, "periods": np.int32, "status": np.int8, "unresolved": np.int16}
@@ -29,7 +30,36 @@ def found_data(found: Found) -> dict[str, Any]:
 
 
 def found_from(data: Mapping[str, Any], size: int) -> Found:
-    """Attractors from :func:`found_data`'s result, of a system with so many states."""
+    """Attractors from :func:`found_data`'s result, of a system with so many states.
+
+    Raises
+    ------
+    SaltusError
+        If the data are something else: machine code reads them, and doesn't ask.
+    """
+    try:
+        found = _found(data, size)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError):
+        found = None
+    if found is None or not _holds_together(found, size):
+        raise SaltusError("the attractors that were kept aren't such as saltus writes: somebody changed them. Take them from a copy.")
+    return found
+
+
+def _holds_together(found: Found, size: int) -> bool:
+    """Whether sizes fit one another, and numbers what they count."""
+    near, orbits = found.near, [*found.orbits, *found.unstable, *(one.orbit for one in found.wandering if isinstance(one, Noisy))]
+    return (
+        len(near.centres) == len(near.weights) == len(near.owners)
+        and bool(np.isfinite(near.centres).all() and np.isfinite(near.weights).all())
+        and bool(((near.owners >= 0) & (near.owners < len(found))).all())
+        and all(len(one.points) == len(one.monodromy) > 0 and one.multipliers.shape == (size,) for one in orbits)
+        and all(len(one.points) > 0 and one.scale.shape == (size,) for one in found.wandering)
+        and all(one.size.shape == one.scatter.shape == (size,) for one in found.wandering if isinstance(one, Noisy))
+    )
+
+
+def _found(data: Mapping[str, Any], size: int) -> Found:
     near = data["near"]
     return Found(
         Neighbourhoods(_array(near["centres"], size), _array(near["weights"], size, size), np.array(near["owners"], np.int64)),
@@ -62,10 +92,11 @@ def _wandering_data(one: Wandering) -> dict[str, Any]:
 
 
 def _wandering_from(data: Mapping[str, Any], size: int) -> Wandering:
-    plain = str(data["kind"]), float(data["exponent"]), float(data["error"]), _array(data["points"], size), np.array(data["scale"])
+    plain = str(data["kind"]), float(data["exponent"]), float(data["error"]), _array(data["points"], size), np.array(data["scale"], float)
     if "orbit" not in data:
         return Wandering(*plain)
-    return Noisy(*plain, _orbit_from(data["orbit"], size), np.array(data["size"]), np.array(data["scatter"]), float(data["stray"]))
+    widths = np.array(data["size"], float), np.array(data["scatter"], float)
+    return Noisy(*plain, _orbit_from(data["orbit"], size), *widths, float(data["stray"]))
 
 
 def _array(rows: Any, *tail: int) -> np.ndarray:

@@ -13,6 +13,7 @@ import xarray as xr
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole as whole_number
+from saltus.results.reader import reader
 from saltus.results.schema import TRAJECTORY, check, kind_of, states_of
 
 #: Largest mismatch that counts as a repeat: far above rounding, far below what tells 24T from its neighbour 12T on the rig (1e-2).
@@ -25,6 +26,7 @@ LAST = 96
 
 
 @verb
+@reader
 def settled(run: xr.Dataset, *, tolerance: float = TOLERANCE, last: int | None = None) -> xr.Dataset:
     """Period, contacts, peak and rms of a forced motion, from its last periods.
 

@@ -75,6 +75,9 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         raise ParameterError('values must be a mapping, such as values={"frequency": [5.0, 10.0]}.')
     columns = _columns(system, start)
     given = {name: _values(system, name, value) for name, value in (values or {}).items()}
+    empty = [name for name, value in given.items() if not np.size(value)]
+    if empty:
+        raise ParameterError(f"values of {empty[0]} are empty. Give at least one number.")
     deep = [name for name, value in given.items() if np.ndim(value) > 1]
     if deep:
         raise ParameterError(f"values of {deep[0]} must be one number or a one-dimensional array, one for each trajectory.")

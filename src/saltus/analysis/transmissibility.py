@@ -9,6 +9,7 @@ import xarray as xr
 
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
+from saltus.results.reader import reader
 from saltus.results.schema import RESPONSES, check
 
 #: What two outputs are compared by.
@@ -16,6 +17,7 @@ By = Literal["amplitude", "rms", "rms_about_mean"]
 
 
 @verb
+@reader
 def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude") -> xr.Dataset:
     """Ratio of two outputs of each response, such as the motion of a mass to that of its base.
 

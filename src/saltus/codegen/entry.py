@@ -18,6 +18,8 @@ from pathlib import Path
 FORMAT = "saltus-kernel/1"
 #: End of the names of entries; beginning of the names of those that aren't whole yet.
 SUFFIX, DRAFT = ".kernel", ".building-"
+#: Most bytes of an entry: some hundred times what the largest equations take.
+MOST = 1 << 28
 #: Bits of a mode with which others than the owner may write.
 _GROUP, _OTHERS = stat.S_IWGRP, stat.S_IWOTH
 
@@ -89,7 +91,7 @@ def read(path: Path) -> bytes:
     try:
         told = json.loads(header)
         whole = told["format"] == FORMAT and told["key"] + SUFFIX == path.name and told["sha256"] == hashlib.sha256(data).hexdigest()
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         whole = False
     if not whole:
         raise Damaged("is damaged")
@@ -100,7 +102,7 @@ def title_of(path: Path) -> str:
     """What an entry was made for, for a list of them."""
     try:
         return str(json.loads(_split(_content(path))[0])["title"])
-    except (OSError, NotOurs, Damaged, ValueError, KeyError, TypeError):
+    except (OSError, NotOurs, Damaged, ValueError, KeyError, TypeError, RecursionError):
         return "(damaged)"
 
 
@@ -118,7 +120,9 @@ def _content(path: Path) -> bytes:
         raise NotOurs("is no plain file")
     with os.fdopen(handle, "rb") as file:
         check_ours(seen)
-        return file.read()
+        if seen.st_size > MOST:
+            raise Damaged("is larger than any kernel")
+        return file.read(MOST)
 
 
 def _split(content: bytes) -> tuple[bytes, bytes]:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import CacheError, ParameterError, nearest, shown
 
 #: Rises when the same templates and equations would be made into other code: entries of the cache carry it in their names.
 PIPELINE = 3
@@ -138,10 +138,20 @@ class Loaded(NamedTuple):
 
 
 def loaded(objects: Sequence[bytes], symbol: str) -> Loaded:
-    """Objects that refer to one another and to the C library, in memory, and the address of one function."""
+    """Objects that refer to one another and to the C library, in memory, and the address of one function.
+
+    Raises
+    ------
+    CacheError
+        If they are no such objects: somebody else's files in the folder of kernels.
+    """
     with _LLVM:
         library = llvm.JITLibraryBuilder()
         for one in objects:
             library = library.add_object_img(one)
-        keeper = library.add_current_process().export_symbol(symbol).link(_jit(), f"saltus{next(_NUMBER)}")
+        try:
+            keeper = library.add_current_process().export_symbol(symbol).link(_jit(), f"saltus{next(_NUMBER)}")
+        except RuntimeError as error:
+            why = " ".join(str(error).split())
+            raise CacheError(f"a compiled kernel can't be loaded: {shown(why, 200)}. Delete what is kept: saltus cache clear.") from error
     return Loaded(keeper[symbol], keeper)

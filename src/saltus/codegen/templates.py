@@ -78,8 +78,28 @@ def _code_of(source: str) -> str:
 
 @cache
 def manifest() -> dict[str, Any]:
-    """What is known of the bitcode: hashes of its sources and of itself, and what made it."""
-    return json.loads(resources.files("saltus.kernels").joinpath("bitcode/manifest.json").read_text(encoding="utf-8"))
+    """What is known of the bitcode: hashes of its sources and of itself, and what made it.
+
+    Raises
+    ------
+    CacheError
+        If it isn't there, or damaged.
+    """
+    try:
+        known = json.loads(_brought("manifest.json"))
+        if all(isinstance(known["bitcode"][name][one], str) for name in BITCODE for one in ("texts", "sources", "sha256")):
+            return known
+    except (ValueError, KeyError, TypeError, RecursionError):
+        pass
+    raise CacheError("saltus/kernels/bitcode/manifest.json is damaged: install saltus again.")
+
+
+def _brought(file: str) -> bytes:
+    """A file of the bitcode as it was installed."""
+    try:
+        return resources.files("saltus.kernels").joinpath(f"bitcode/{file}").read_bytes()
+    except OSError as error:
+        raise CacheError(f"saltus/kernels/bitcode/{file} can't be read: {error.strerror or error}. Install saltus again.") from None
 
 
 @cache
@@ -91,7 +111,7 @@ def bitcode(name: str) -> bytes:
     CacheError
         If it is damaged.
     """
-    data = resources.files("saltus.kernels").joinpath(f"bitcode/{name}.bc.xz").read_bytes()
+    data = _brought(f"{name}.bc.xz")
     if hashlib.sha256(data).hexdigest() != manifest()["bitcode"][name]["sha256"]:
         raise CacheError(f"saltus/kernels/bitcode/{name}.bc.xz is damaged: install saltus again.")
     return lzma.decompress(data)

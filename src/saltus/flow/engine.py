@@ -248,7 +248,7 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
     running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if contacts := [part for chunk in chunks for part in chunk.contacts]:
-        table, numbers = (np.concatenate(half) for half in zip(*contacts, strict=True))
+        table, numbers = (np.concatenate(half) if len(half) > 1 else half[0] for half in zip(*contacts, strict=True))
         order = np.argsort(table[:, st.REC_TRAJECTORY], kind="stable")
         table, numbers = table[order], numbers[order]
         if (outcome.status == st.SLIDING).any():
@@ -283,9 +283,10 @@ def _advance(
     while not stop.is_set():
         outcome = module.propagate(*(arrays[name] for name in ARGUMENTS), steps, *workspace)
         _empty_table(chunk, room)
+        went_on = chunk.due is not None and resume(arrays, chunk.due)
         if show is not None:
             show(_share_done([chunk]))
-        if outcome == st.FINISHED and not (chunk.due is not None and resume(arrays, chunk.due)):
+        if outcome == st.FINISHED and not went_on:
             return
         if room.full:
             arrays["status"][arrays["status"] == st.RUNNING] = st.BUDGET_EVENTS

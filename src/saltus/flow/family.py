@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 
 import numpy as np
@@ -51,7 +52,7 @@ class Family:
         if (every is None) == (system.forced_at is None):
             raise ParameterError(f"{system.name} {NO_PERIOD if every is None else 'is forced: leave every= out.'}")
         self.system, self.method, self.threads = system, method, threads
-        self.parameters, self._looks = np.ascontiguousarray(parameters, float), every is not None
+        self.parameters = np.ascontiguousarray(parameters, float)
         self.states = system.states
         check_overlaps(system, self.values)
         period = system.period(self.values) if every is None else every
@@ -76,7 +77,9 @@ class Family:
 
     def rows(self, which: np.ndarray) -> Family:
         """The family of some of the rows: int64[m], with repeats if wanted, or bool[k]."""
-        return Family(self.system, self.method, self.parameters[which], self.period[which] if self._looks else None, self.threads)
+        some = copy.copy(self)  # nothing of what was checked changes
+        some.parameters, some.period = np.ascontiguousarray(self.parameters[which]), self.period[which].copy()
+        return some
 
     def every(self, time: np.ndarray) -> Family:
         """The same rows with other times between two looks [s], float64[k]: for systems without forcing."""

@@ -105,11 +105,11 @@ class Flight:
             data=self._data,
         )  # fmt: skip
         steps = slice_of(states)
-        paused = True
-        while paused:
-            paused = self._module.propagate(*(call[name] for name in ARGUMENTS), steps, *self._workspace) == st.PAUSED
+        outcome, went_on = st.PAUSED, False
+        while outcome == st.PAUSED or went_on:
+            outcome = self._module.propagate(*(call[name] for name in ARGUMENTS), steps, *self._workspace)
+            went_on = self._due is not None and resume(arrays, self._due)
             check_stop()
-            paused = paused or (self._due is not None and resume(arrays, self._due))
         self.age += periods
         return samples
 

@@ -22,6 +22,7 @@ from saltus.plot import maps
 from saltus.plot.palette import shades
 from saltus.plot.picture import picture
 from saltus.plot.style import QUIET, Scale
+from saltus.results.reader import reader
 from saltus.units import from_si
 
 _CALLER = "plot.basins"
@@ -36,6 +37,7 @@ _LONG_LEGEND = 14
 
 
 @picture
+@reader
 def basins(
     ds: xr.Dataset,
     ax: Any = None,
@@ -47,7 +49,7 @@ def basins(
     """Map of the basins: a hue for each attractor, darker where it takes longer to settle, near-black where a start doesn't.
 
     Cells are centred on the starts. White-edged dots are the attractors at whole forcing periods. Of more than two states the title says
-    where the others start.
+    where the others start, and the method if it isn't the exact one.
 
     Parameters
     ----------
@@ -86,7 +88,7 @@ def basins(
             _points(panel, ds, pair, scales, colors)
         if legend:
             _legend(panel, ds, pair, colors, settling, points)
-        panel.set_title(_section(ds, pair), loc="left", fontsize=8, color=QUIET)
+        panel.set_title(", ".join(filter(None, (_section(ds, pair), maps.method_text(ds)))), loc="left", fontsize=8, color=QUIET)
     return panel
 
 

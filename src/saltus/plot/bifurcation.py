@@ -14,6 +14,7 @@ from saltus.plot import kinds, regions
 from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import QUIET, Scale
+from saltus.results.reader import reader
 from saltus.results.schema import response_name, sample_name, states_of
 
 _CALLER = "plot.bifurcation_diagram"
@@ -28,6 +29,7 @@ _BESIDE_GAPS = 1.16
 
 
 @picture
+@reader
 def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: bool = True, legend: bool = True, ax: Any = None) -> Axes:
     """Sampled values of every response against a parameter: a colour for each period, chaos in small dark dots, gaps dashed.
 

@@ -13,6 +13,7 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import EXPONENTS, check, kind_text
 
 _CALLER = "plot.exponents"
@@ -21,6 +22,7 @@ _EARLY = 0.1
 
 
 @picture
+@reader
 def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax: Any = None, *, legend: bool = True) -> Any:
     """Lyapunov exponents as they converge: mean so far and its 95 % interval, against the time since the transient.
 
@@ -52,9 +54,10 @@ def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax:
     labels = selection.chosen(ds, trajectory, _CALLER)
     with draw.panels(ax, len(labels), (6.3, 2.5), _CALLER) as panels:
         for label, panel in zip(labels, panels, strict=True):
-            _panel(panel, ds.sel(trajectory=label), legend)
+            one = ds.sel(trajectory=label)
+            _panel(panel, one, legend)
             if len(labels) > 1:
-                panel.set_ylabel(f"trajectory {label}\n{panel.get_ylabel()}")
+                panel.set_ylabel(f"{selection.named(one, label)}\n{panel.get_ylabel()}")
     return panels[0] if len(panels) == 1 else np.array(panels, dtype=object)
 
 

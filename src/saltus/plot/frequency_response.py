@@ -18,6 +18,7 @@ from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, Scale
 from saltus.results.measured import read_measured
+from saltus.results.reader import reader
 from saltus.results.schema import states_of
 from saltus.units import to_si
 
@@ -36,6 +37,7 @@ Measured = str | os.PathLike[str] | xr.Dataset | None
 
 
 @picture
+@reader
 def frequency_response(
     ds: points.Source,
     *,

@@ -16,6 +16,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import TRAJECTORY, check, contact_name, equations_of, forcing_period, states_of
 
 _CALLER = "plot.history"
@@ -28,6 +29,7 @@ _MARKERS: dict[str, dict[str, Any]] = {
 
 
 @picture
+@reader
 def history(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,
@@ -85,7 +87,7 @@ def history(
         for i, (panel, one, part) in enumerate(zip(panels, singles, windows, strict=True)):
             _panel(panel, one, state, part, time, wanted)
             if len(labels) > 1:
-                panel.set_ylabel(f"trajectory {labels[i]}\n{panel.get_ylabel()}")
+                panel.set_ylabel(f"{selection.named(one, labels[i])}\n{panel.get_ylabel()}")
             if legend and i == 0:
                 ticks = 0.25 if time == "both" and "period" in one else 0.05  # inches
                 above = panel.transAxes + ScaledTranslation(0, ticks, panel.figure.dpi_scale_trans)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,18 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import ENERGY, IMPACTS, check
 
 #: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a motion that repeats, and how often each
 #: must be seen.
 _SAME, _MOST_SPEEDS, _REPEATED = 1e-7, 6, 3
+#: Characters that fit beside each other in a picture of words.
+_LINE = 60
 
 
 @picture
+@reader
 def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Histogram of the speeds at contact, a colour for each guard. Where they repeat, or there are none, it is said in words.
 
@@ -89,11 +94,12 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
             return ""
         if len(own):
             values = ", ".join(scale.text(float(f"{own[i]:.6g}")) for i in first)
-            lines.append(f"{name.replace('_', ' ')}: {len(own)} contacts, at {values}")
+            lines.append(textwrap.fill(f"{name.replace('_', ' ')}: {len(own)} contacts, at {values}", _LINE, subsequent_indent="    "))
     return "\n".join(["The speeds at contact repeat.", *lines])
 
 
 @picture
+@reader
 def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Energy supplied, dissipated and stored, interval by interval; the largest imbalance is in the title.
 

@@ -14,6 +14,7 @@ from saltus.plot.picture import picture
 from saltus.plot.response_points import is_log, parameter_scale
 from saltus.plot.style import CYCLE
 from saltus.results.intervals import wilson
+from saltus.results.reader import reader
 from saltus.results.schema import METHODS, check
 
 _CALLER = "plot.methods"
@@ -22,6 +23,7 @@ PIECES = 30
 
 
 @picture
+@reader
 def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
     """What a method does to steady responses, against one parameter: three panels, the first method of ``ds`` being the reference.
 

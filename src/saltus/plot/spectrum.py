@@ -15,6 +15,7 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
+from saltus.results.reader import reader
 from saltus.results.schema import SPECTRUM, check, states_of
 
 _CALLER = "plot.spectrum"
@@ -26,6 +27,7 @@ _ORDERS = 5.0
 
 
 @picture
+@reader
 def spectrum(
     ds: xr.Dataset,
     state: str | None = None,
@@ -84,7 +86,7 @@ def spectrum(
             return panel
         floor = _SHOWN * largest * scale.factor / 3
         for i, (one, curve) in enumerate(zip(singles, curves, strict=True)):
-            name = f"trajectory {labels[i]}" if len(labels) > 1 else None
+            name = selection.named(one, labels[i]) if len(labels) > 1 else None
             _curve(panel, one, curve * scale.factor, floor, CYCLE[i % len(CYCLE)], name)
         panel.set_yscale("log")
         panel.set_ylim(floor, 3 * largest * scale.factor)

@@ -16,6 +16,7 @@ from saltus.plot import kinds, maps
 from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import Scale
+from saltus.results.reader import reader
 from saltus.results.schema import parameters_of, start_name, states_of
 from saltus.units import from_si
 
@@ -25,6 +26,7 @@ _UNSETTLED = {-1: ("escaped", "#FFFFFF"), -2: ("not settled", "#D2D2D2"), -3: ("
 
 
 @picture
+@reader
 def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = None) -> Axes:
     """Kind of motion over two parameters: a hue for each period, grey for motion that never repeats, chaos dark.
 

@@ -1,8 +1,8 @@
 """The end of a result file: a checksum of all bytes before it, asked before any parser sees the file.
 
 netCDF-4 and netCDF-3 both say where their data end, and readers stop there: what follows is ours. A damaged HDF5 file can keep the HDF5
-library busy for ever, so a checksum inside comes too late. A file without this ending (written by xarray, or cut) is tried in a process of
-its own.
+library busy for ever, so a checksum inside comes too late. It says that a file is whole, not who wrote it: what this user's saltus didn't
+write here is tried in a process of its own first (see :mod:`saltus.results.known`).
 """
 
 from __future__ import annotations
@@ -29,6 +29,13 @@ with contextlib.suppress(ImportError, ValueError, OSError):
     import resource
     resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[3]), int(sys.argv[3])))
 import xarray
+if sys.argv[2] == "h5netcdf":
+    import h5py
+    with h5py.File(sys.argv[1]) as file:
+        for name in file:
+            one = file[name] if isinstance(file.get(name, getlink=True), h5py.HardLink) else None
+            if not isinstance(one, h5py.Dataset) or one.external or one.is_virtual:
+                raise ValueError("it holds folders, or leads to other files, which no result does")
 xarray.load_dataset(sys.argv[1], engine=sys.argv[2])
 """
 
@@ -38,8 +45,19 @@ def with_ending(content: bytes | memoryview) -> bytes:
     return bytes(content) + b"\nsaltus-sha256:" + hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
-def is_whole(path: Path) -> bool | None:
-    """Whether a file is, bit by bit, what was written; None if it has no ending that could tell."""
+def checksum_in(ended: bytes) -> str:
+    """The checksum that stands in what :func:`with_ending` returned."""
+    return ended[-65:-1].decode()
+
+
+def checksum(path: Path) -> str | None:
+    """The checksum at the end of a file, which is that of its bytes; None if there is none.
+
+    Raises
+    ------
+    ResultFileError
+        If it is that of other bytes.
+    """
     with path.open("rb") as file:
         left = max(os.fstat(file.fileno()).st_size - _LENGTH, 0)
         file.seek(left)
@@ -51,19 +69,21 @@ def is_whole(path: Path) -> bool | None:
         while left:
             part = file.read(min(left, 1 << 20))
             if not part:
-                return False
+                break
             digest.update(part)
             left -= len(part)
-    return digest.hexdigest().encode() == ending[1]
+    if digest.hexdigest().encode() != ending[1]:
+        raise ResultFileError(f"{path} is damaged: the checksum at its end doesn't match. Restore it from a copy or compute it again.")
+    return ending[1].decode()
 
 
 def try_elsewhere(path: Path, engine: str) -> None:
-    """Read a file without an ending in a process that can be stopped.
+    """Read a file of unknown origin in a process that can be stopped, and that has not more memory than a result takes.
 
     Raises
     ------
     ResultFileError
-        If that fails, or comes to no end.
+        If that fails, comes to no end, or the file leads to others.
     """
     size = path.stat().st_size
     patience = PATIENCE + size / SLOWEST

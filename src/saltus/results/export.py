@@ -14,10 +14,11 @@ import xarray as xr
 
 from saltus.errors import ParameterError, nearest, shown
 from saltus.fence import csv_cell
-from saltus.results import tables
-from saltus.results.ending import with_ending
+from saltus.results import known, tables
+from saltus.results.ending import checksum_in, with_ending
 from saltus.results.files import path_of, replacing
 from saltus.results.provenance import describe, file_hash
+from saltus.results.reader import reader
 from saltus.results.schema import RESPONSES, STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
 from saltus.results.texts import place_of_control
 
@@ -62,6 +63,7 @@ def save(ds: xr.Dataset, path: Target) -> Path:
     return writers[path.suffix](ds, path)
 
 
+@reader
 def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
     """Write a result to a netCDF file; see :func:`save`. A checksum of the numbers goes with it, and one of the file, at its end."""
     _check(ds, "to_netcdf", list(TABLES))
@@ -73,8 +75,10 @@ def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
         if "safely cast" not in str(error):
             raise
         raise ParameterError(f'{path}: a count is too large for netCDF-3. Install "saltus[io]", which writes netCDF-4.') from error
+    data = with_ending(content)
     with replacing(Path(path)) as (part,):
-        part.write_bytes(with_ending(content))
+        part.write_bytes(data)
+    known.note(checksum_in(data))
     return Path(path)
 
 
@@ -91,6 +95,7 @@ def _has(package: str) -> bool:
 
 
 # -- CSV -----------------------------------------------------------------------------------------------------------------------
+@reader
 def to_csv(ds: xr.Dataset, path: Target) -> Path:
     """Write a result as CSV, numbers with all their digits.
 
@@ -119,7 +124,15 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
     ResultFileError
         If a file can't be written. None is left half-written.
     """
-    _check(ds, "to_csv", (TRAJECTORY, STROBOSCOPE, RESPONSES))
+    try:
+        _check(ds, "to_csv", (TRAJECTORY, STROBOSCOPE, RESPONSES))
+    except ParameterError as error:
+        if not isinstance(ds, xr.Dataset) or "saltus_result" not in ds.attrs:
+            raise
+        raise ParameterError(
+            f"{error} Write .nc or .mat; or one table of it, ds[['...']].to_dataframe().to_csv({str(path)!r}). "
+            "A study writes its tables as CSV."
+        ) from None
     path = path_of(path)
     if kind_of(ds) == RESPONSES:
         main, side = tables.responses(ds), {"events": tables.events(ds)}
@@ -143,6 +156,7 @@ def _write_table(path: Path, table: tables.Table, ds: xr.Dataset) -> None:
 
 
 # -- MATLAB --------------------------------------------------------------------------------------------------------------------
+@reader
 def to_mat(ds: xr.Dataset, path: Target) -> Path:
     """Write a result as a MATLAB file: ``run = load("run.mat"); plot(run.time, run.x)``.
 

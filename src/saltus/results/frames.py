@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from saltus.results import tables
+from saltus.results.reader import reader
 from saltus.results.schema import STROBOSCOPE, TRAJECTORY, check
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
 
 
+@reader
 def contacts(run: xr.Dataset) -> pd.DataFrame:
     """The contacts of a run, one row each.
 
@@ -46,6 +48,7 @@ def contacts(run: xr.Dataset) -> pd.DataFrame:
     return _frame(run, tables.contact_columns(run))
 
 
+@reader
 def samples(run: xr.Dataset) -> pd.DataFrame:
     """The samples of a run, one row each.
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import xarray as xr
 
 from saltus.fence import RefusedError, regular
-from saltus.results.ending import is_whole, try_elsewhere
+from saltus.results import known
+from saltus.results.ending import checksum, try_elsewhere
 from saltus.results.files import ResultFileError, path_of
 from saltus.results.provenance import file_hash
 from saltus.results.schema import kind_of, restore
@@ -25,8 +26,8 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     Parameters
     ----------
     path : str or path
-        A ``.nc`` file. One that was not written by saltus (but by ``to_netcdf`` of xarray) has no checksum at its end: it is tried in
-        another process first, since a damaged file can keep its reader busy for ever.
+        A ``.nc`` file. One that wasn't written by this user's saltus on this machine, or by ``to_netcdf`` of xarray, is tried in another
+        process first, which takes a second: a damaged or malicious file can keep its reader busy for ever.
 
     Returns
     -------
@@ -56,11 +57,11 @@ def _read(path: Path) -> xr.Dataset:
     try:
         regular(path)
         engine = _engine(path)
-        whole = is_whole(path)
-        if whole is False:
-            raise ResultFileError(f"{path} is damaged: the checksum at its end doesn't match. Restore it from a copy or compute it again.")
-        if whole is None:  # not written by saltus.save, or cut
+        digest = checksum(path)
+        if digest is None or not known.is_known(digest):  # not written by saltus.save here: anybody can write a checksum
             try_elsewhere(path, engine)
+            if digest is not None:
+                known.note(digest)
         ds = xr.load_dataset(path, engine=engine)
         if not kind_of(ds):
             raise ResultFileError(f"{path} is a netCDF file, but not a result of saltus. Read it with xarray.open_dataset({str(path)!r}).")

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.results.reader import reader
 from saltus.results.schema import STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
 from saltus.results.summary import summary
 from saltus.units import from_si
@@ -130,6 +131,7 @@ def _canonical(values: np.ndarray) -> bytes | memoryview:
 
 
 # -- for people ----------------------------------------------------------------------------------------------------------------
+@reader
 def describe(ds: xr.Dataset) -> str:
     """A few lines on what a result holds and where it comes from.
 

@@ -354,11 +354,14 @@ class Store:
         record = unseal(read(self._record(index)) or b"")
         if record is None or record.get("index") != index or record.get("store") != self._made_under:
             return None
+        told = record.get("files")
+        if not isinstance(told, dict) or not all(isinstance(told.get(name), dict) for name in self.chunks.arrays):
+            return None
         if not checksums:
             sizes = {name: size(self._file(index, name)) for name in self.chunks.arrays}
-            return {} if sizes == {name: file["bytes"] for name, file in record["files"].items()} else None
+            return {} if sizes == {name: told[name].get("bytes") for name in sizes} else None
         files = {name: read(self._file(index, name)) for name in self.chunks.arrays}
-        found = {name: data for name, data in files.items() if data is not None and sha256(data) == record["files"][name]["sha256"]}
+        found = {name: data for name, data in files.items() if data is not None and sha256(data) == told[name].get("sha256")}
         return found if len(found) == len(files) else None
 
     def _record(self, index: int) -> Path:

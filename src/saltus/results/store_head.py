@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,16 @@ from saltus.results.store_chunks import Chunks
 FORMAT = 2
 #: Name of the file.
 HEAD = "store.json"
+#: Most cells of a map that a head may speak of: of more, not even the list of chunks is to be made.
+MOST_CELLS = 10**9
+_TYPES = {
+    "bool",
+    "float32",
+    "float64",
+    "complex64",
+    "complex128",
+    *(f"{kind}{bits}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)),
+}
 
 
 def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks) -> dict[str, Any]:
@@ -41,7 +52,7 @@ def read_head(path: Path) -> dict[str, Any]:
     if data is None:
         what = "there is no store" if not path.exists() else "this is not a store of saltus, and it was left alone"
         raise StoreError(f"{path}: {what}. Choose another path.")
-    head = unseal(data)
+    head = _opened(data)
     if head is None:
         raise StoreError(f"{path / HEAD} is damaged. Go on with the study that made it: the file is written again, and all chunks stay.")
     if head["format"] != FORMAT:
@@ -49,6 +60,27 @@ def read_head(path: Path) -> dict[str, Any]:
         layout = f"layout {head['format']}, known: {FORMAT}"
         raise StoreError(f"{path} was made by {age} saltus ({layout}). Use that one, or choose another path.")
     return head
+
+
+def _opened(data: bytes) -> dict[str, Any] | None:
+    """What a head says; None if it is damaged, or holds what no head does. Another layout may say anything."""
+    head = unseal(data)
+    if head is None or not isinstance(head.get("format"), int):
+        return None
+    return head if head["format"] != FORMAT or _says_what_a_head_says(head) else None
+
+
+def _says_what_a_head_says(head: Mapping[str, Any]) -> bool:
+    shape, chunk, arrays = head.get("shape"), head.get("chunk"), head.get("arrays")
+    if not (_texts(head.get("identity")) and isinstance(head.get("note"), dict) and isinstance(shape, list)):
+        return False
+    if not (shape and all(isinstance(one, int) and 0 < one <= MOST_CELLS for one in (*shape, chunk))):
+        return False
+    return math.prod(shape) <= MOST_CELLS and isinstance(arrays, dict) and _texts(arrays) and set(arrays.values()) <= _TYPES
+
+
+def _texts(values: Any) -> bool:
+    return isinstance(values, dict) and all(isinstance(value, str) for value in values.values())
 
 
 def mend_head(path: Path, head: Mapping[str, Any]) -> None:
@@ -59,7 +91,7 @@ def mend_head(path: Path, head: Mapping[str, Any]) -> None:
     StoreError
         If it is damaged and the chunks were made from something else.
     """
-    there = unseal(read(path / HEAD) or b"")
+    there = _opened(read(path / HEAD) or b"")
     if there is not None and (there.get("format") != FORMAT or fingerprint(there) == fingerprint(head)):
         return
     makers = _makers(path)

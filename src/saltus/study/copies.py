@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from saltus import fence
 from saltus.errors import StudyError
@@ -73,8 +74,22 @@ def inputs_of(folder: Path, text: str) -> Inputs:
         told = unseal(fence.content(folder / SEAL, fence.STUDY_BYTES))
     except fence.RefusedError as refused:
         raise StudyError(f"{folder / SEAL} {refused}") from None
-    if told is None:
+    if told is None or not _is_seal(told):
         raise StudyError(f"{folder / SEAL} {_CHANGED.format(folder)}")
     if told["study"] != sha256(text.encode()):
         raise StudyError(f"{folder / COPY} {_CHANGED.format(folder)}")
     return KeptInputs(folder / INPUTS, {name: (one["copy"], one["sha256"]) for name, one in told["inputs"].items()})
+
+
+def _is_seal(told: dict[str, Any]) -> bool:
+    """Whether a seal says what one says: hashes and names, of copies beside one another."""
+    inputs = told.get("inputs")
+    return (
+        isinstance(told.get("study"), str)
+        and isinstance(inputs, dict)
+        and all(isinstance(one, dict) and isinstance(one.get("sha256"), str) and _is_name(one.get("copy")) for one in inputs.values())
+    )
+
+
+def _is_name(copy: object) -> bool:
+    return isinstance(copy, str) and bool(re.fullmatch(r"[\w.-]{1,200}", copy)) and copy.strip(".") != ""

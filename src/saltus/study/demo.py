@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,13 +91,30 @@ def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods:
     return Demo(run, found, neighbours, _table(run, found, neighbours, title))
 
 
-def draw(result: Demo, file: Path) -> Path:
-    """A row for each start, the time history and the phase portrait of what it settles to; returns the file."""
+def prepare_drawing() -> None:
+    """Begin to import what :func:`draw` needs, in a thread: the first demo on a machine waits for another process to compile meanwhile."""
+
+    def imported() -> None:
+        with contextlib.suppress(Exception):  # `draw` meets it again, and says it
+            _pyplot()
+
+    threading.Thread(target=imported, name="imports for the picture", daemon=True).start()
+
+
+def _pyplot() -> Any:
     import matplotlib
 
     matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    import matplotlib.pyplot
 
+    import saltus.plot  # noqa: F401
+
+    return matplotlib.pyplot
+
+
+def draw(result: Demo, file: Path) -> Path:
+    """A row for each start, the time history and the phase portrait of what it settles to; returns the file."""
+    plt = _pyplot()
     from saltus import plot
 
     with plot.style():

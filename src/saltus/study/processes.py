@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
-from types import FrameType
 from typing import TYPE_CHECKING
 
 from saltus.errors import StudyError
 from saltus.flow.threads import usable_processors
+from saltus.interrupt import ctrl_c_waits
 
 if TYPE_CHECKING:
     from saltus.analysis.found import Found
@@ -140,23 +140,18 @@ def _without_ctrl_c() -> Iterator[None]:
     """Processes that are started within never see Ctrl-C: it is for this one, which ends them. Here it waits until they are started.
 
     The mask is what they inherit. It holds for one thread; another may take the signal, and Python would raise it here, in the middle of
-    what a process is told at its start. So the signal is noted, and raised afterwards.
+    what a process is told at its start.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    noted: list[tuple[int, FrameType | None]] = []
-    here = threading.current_thread() is threading.main_thread()
-    handler = signal.signal(signal.SIGINT, lambda *what: noted.append(what)) if here else None
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        if here:
-            signal.signal(signal.SIGINT, handler)
-    if noted and callable(handler):
-        handler(*noted[0])
+    resource_tracker.ensure_running()  # else it starts with the first process, and lets the signal through again
+    with ctrl_c_waits():
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def _work(pipe: Connection, plan: BasinPlan, found: Found) -> None:

@@ -17,7 +17,7 @@ from saltus.study.names import slug
 Quantity = float | str
 Start = Quantity | list[Quantity]
 #: A formula as written: ``"k*(x - gap)"``.
-Formula = Annotated[str, Field(min_length=1)]
+Formula = str
 #: Lower and upper end.
 Interval = Annotated[list[Quantity], Field(min_length=2, max_length=2)]
 
@@ -190,13 +190,15 @@ class Output(Table):
     formula: Formula = Field(description="What is read off the motion.", examples=["k*(x - gap)"])
     unit: str = Field("", description="Its unit; by default what the formula comes to.", examples=["N"])
 
-    @model_validator(mode="before")
-    @classmethod
-    def _bare(cls, given: Any) -> Any:
-        """A formula alone: ``"spring force" = "k*x"``."""
-        return {"formula": given} if isinstance(given, str) else given
+
+def _alone(given: Any) -> Any:
+    """A formula alone: ``"spring force" = "k*x"``."""
+    if not isinstance(given, str | dict | Output):
+        raise ValueError('must be a formula, such as "k*x", or a table of a formula and its unit')
+    return {"formula": given} if isinstance(given, str) else given
 
 
+Outputs = dict[str, Annotated[Output, BeforeValidator(_alone, json_schema_input_type=str | Output)]]
 OUTPUTS: Any = Field(
     default_factory=dict,
     description="What to read off each response besides its states, by name: formulas.",

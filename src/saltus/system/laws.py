@@ -73,8 +73,8 @@ def freeplay(
         lower_gap = upper_gap = gap
     if lower_gap is None and upper_gap is None:
         raise TraceError("sl.freeplay needs gap=, or lower_gap= or upper_gap= or both.")
-    for operand in (x, stiffness, damping, preload, *(one for one in (lower_gap, upper_gap, velocity) if one is not None)):
-        as_expr(operand)  # which refuses what isn't a number
+    x, stiffness, damping, preload = map(_number, (x, stiffness, damping, preload))
+    lower_gap, upper_gap, velocity = (None if one is None else _number(one) for one in (lower_gap, upper_gap, velocity))
     damped = isinstance(damping, Expr) or damping != 0
     if damped and velocity is None:
         raise TraceError("sl.freeplay got damping= but no velocity=. Give the time derivative of x.")
@@ -90,3 +90,9 @@ def freeplay(
         pieces.append((spring(x - upper_gap), x > upper_gap))
     force = piecewise(*pieces, otherwise=0.0)
     return force + preload if isinstance(preload, Expr) or preload != 0 else force
+
+
+def _number(operand: Operand) -> Operand:
+    """An expression as it is, any other number as a plain one. Raises TraceError for anything else."""
+    found = as_expr(operand)
+    return operand if isinstance(operand, Expr) else float(found.payload)

@@ -121,6 +121,8 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     for op, args, payload in data["nodes"]:
         _require(len(args) == _OPERANDS[op] and all(0 <= i < len(nodes) for i in args), f"wrong operands of {op!r}")
         nodes.append(_node(op, tuple(nodes[i] for i in args), payload, names, nodes))
+    places = [*data["field"], *(gap for _, gap, _, _ in data["guards"]), *(level for *_, level in data["guards"] if level is not None)]
+    _require(all(0 <= place < len(nodes) for place in places), "a derivative or a boundary stands in no node")
     guards = tuple(
         Guard(name, nodes[gap], state, None if boundary is None else nodes[boundary]) for name, gap, state, boundary in data["guards"]
     )

@@ -11,6 +11,7 @@ import saltus as sl
 from saltus.analysis import time_errors
 from saltus.analysis.answers import gap_units
 from saltus.codegen.module import lane_width
+from saltus.flow.family import Family
 from saltus.flow.methods import FEW
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
@@ -79,3 +80,19 @@ def test_nudges_leave_what_moves_a_boundary_or_time():
     assert {name for name, stays in zip(RIG.values, fixed, strict=True) if stays} == {"lower_gap", "upper_gap", "frequency"}
     other = falling("m")
     assert {name for name, stays in zip(other.values, time_errors._fixed(other), strict=True) if stays} == {"level"}
+
+
+def test_rows_of_a_family_are_a_family_of_these_rows():
+    """For a forced system and for one that is looked at; by numbers with repeats, and by a mask; nothing is shared."""
+    values = np.array([list(RIG.values.values())] * 3)
+    values[:, list(RIG.values).index("frequency")] = [10.0, 15.0, 20.0]
+    other = falling("m")
+    looked = Family(other, sl.Taylor(), np.array([[0.1, 1e3], [0.2, 1e3], [0.3, 2e3]]), np.array([0.1, 0.2, 0.3]))
+    for family, every in ((Family(RIG, sl.Taylor(), values), None), (looked, looked.period)):
+        for which in (np.array([2, 0, 2]), np.array([True, False, True])):
+            rows = family.rows(which)
+            truth = Family(family.system, sl.Taylor(), family.parameters[which], every if every is None else every[which])
+            np.testing.assert_array_equal(rows.parameters, truth.parameters)
+            np.testing.assert_array_equal(rows.period, truth.period)
+            assert len(rows) == len(truth)
+            assert not np.shares_memory(rows.period, family.period)

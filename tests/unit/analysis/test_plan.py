@@ -243,3 +243,9 @@ def test_boxes_that_are_refused(box, message):
 def test_at_is_checked_by_basin_fractions():
     with pytest.raises(ParameterError, match="no state 'y'"):
         sl.basin_fractions(RIG, samples=4, at={"y": 0.0}, x=SPAN_X)
+
+
+def test_the_number_of_scouts_is_read_when_a_plan_is_made(monkeypatch):
+    """Tests set it: a default that was read with the class made all of them run with 1024."""
+    monkeypatch.setattr(plans, "SCOUTS", 7)
+    assert plan().scouts == 7

@@ -66,6 +66,17 @@ def finished(small, tmp_path_factory):
 
 
 @pytest.fixture
+def empty_pictures(finished, monkeypatch):
+    """Frames instead of pictures, where nobody looks at them: drawing takes longer than the rest of such a study."""
+    import matplotlib.pyplot as plt
+
+    from saltus import plot
+
+    monkeypatch.setattr(plot, "basins", lambda *_, **__: plt.figure(figsize=(2, 2)).add_subplot())
+    monkeypatch.setattr(plot, "gallery", lambda *_, **__: plt.figure(figsize=(2, 2)))
+
+
+@pytest.fixture
 def study(tmp_path):
     """A function that writes a study file."""
 
@@ -108,6 +119,7 @@ def test_run_prints_a_table_and_writes_files_that_open(finished):
     assert (folder / "study.toml").read_text() == STUDY
 
 
+@pytest.mark.usefixtures("empty_pictures")
 def test_progress_in_json(study, tmp_path):
     """Every line of standard error is JSON, the last one says that all is done; nothing but tables on standard output."""
     result = saltus("run", study(), "--out", tmp_path / "out", "--progress", "json", "--threads", 1)
@@ -121,17 +133,20 @@ def test_progress_in_json(study, tmp_path):
     assert not result.stdout.startswith("{")
 
 
+@pytest.mark.usefixtures("empty_pictures")
 def test_progress_in_json_of_a_finished_map(finished):
     result = saltus("resume", finished[0], "--progress", "json", "--threads", 1)
     assert json.loads(result.stderr.splitlines()[-1])["done"] == 8
 
 
+@pytest.mark.usefixtures("empty_pictures")
 def test_progress_none_is_quiet(study, tmp_path):
     result = saltus("run", study(), "--out", tmp_path / "out", "--progress", "none", "--threads", 1)
     assert result.stderr == ""
     assert "share of starts" in result.stdout
 
 
+@pytest.mark.usefixtures("empty_pictures")
 def test_shards(study, tmp_path, finished):
     file, out = study(), tmp_path / "out"
     first = saltus("run", file, "--out", out, "--shard", "1/2", "--progress", "none", "--threads", 1)
@@ -182,6 +197,7 @@ def test_status_of_a_damaged_head(stopped):
 
 
 # -- resume ----------------------------------------------------------------------------------------------------------------------
+@pytest.mark.usefixtures("empty_pictures")
 def test_resume_of_a_stopped_study(stopped, finished):
     result = saltus("resume", stopped, "--progress", "json", "--threads", 1)
     assert result.exit_code == 0
@@ -191,6 +207,7 @@ def test_resume_of_a_stopped_study(stopped, finished):
     assert "8 of 8" in saltus("status", stopped).stdout
 
 
+@pytest.mark.usefixtures("empty_pictures")
 def test_resume_of_a_finished_study(finished, tmp_path):
     folder = tmp_path / "again"
     shutil.copytree(finished[0], folder)

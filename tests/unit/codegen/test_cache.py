@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from saltus.codegen import building, cache, entry, machine
+from saltus.codegen import building, cache, entry, machine, templates
 from saltus.codegen.announce import silent
 from saltus.codegen.building import Order
 from saltus.errors import CacheError, SaltusWarning
@@ -428,3 +428,43 @@ def test_the_folder_is_the_users_cache_by_default(monkeypatch):
     monkeypatch.delenv("SALTUS_CACHE", raising=False)
     assert cache.folder().name == "saltus"
     assert cache.folder().is_absolute()
+
+
+# -- what somebody else put there, with right checksums ----------------------------------------------------------------------------
+@pytest.mark.parametrize("data", [b"", b"no object" * 100])
+def test_an_entry_that_is_no_object_is_told(folder, data):
+    load()
+    kernel(folder).unlink()
+    entry.write(kernel(folder), "somebody's", data)
+    with pytest.raises(CacheError, match=r"can't be loaded: .* saltus cache clear"):
+        load()
+
+
+@pytest.mark.parametrize("head", [b"[" * 100_000 + b"\n", b"5\n", b"[]\n", b'{"format": []}\n'])
+def test_an_entry_with_a_strange_head_is_built_again(folder, head):
+    load()
+    kernel(folder).chmod(0o600)
+    kernel(folder).write_bytes(head)
+    assert entry.title_of(kernel(folder)) == "(damaged)"
+    with pytest.warns(SaltusWarning, match="is damaged; building it again"):
+        assert load().propagate(1) == 2
+
+
+def test_an_entry_of_many_gigabytes_is_not_read(folder):
+    load()
+    kernel(folder).chmod(0o600)
+    with kernel(folder).open("r+b") as file:
+        file.truncate(200 * 10**9)
+    with pytest.warns(SaltusWarning, match="is larger than any kernel; building it again"):
+        assert load().propagate(1) == 2
+
+
+@pytest.mark.parametrize("damage", [None, b"", b"[]", b'{"bitcode": 5}', b'{"bitcode": {"taylor_16": {"sha256": 5}}}', b"[" * 100_000])
+def test_damaged_bitcode_is_told(monkeypatch, tmp_path, damage):
+    (tmp_path / "bitcode").mkdir()
+    if damage is not None:
+        (tmp_path / "bitcode" / "manifest.json").write_bytes(damage)
+    monkeypatch.setattr(templates.resources, "files", lambda _: tmp_path)
+    for read in (templates.manifest.__wrapped__, lambda: templates._brought("ode45.bc.xz")):
+        with pytest.raises(CacheError, match=r"bitcode/\S+ (is damaged|can't be read: .*): install saltus again|nstall saltus again"):
+            read()

@@ -28,7 +28,7 @@ def everything():
 
 STARTS = np.array([[0.5, 0.0], [-1.0, 0.6], [1.4, -1.2]])
 PARAMETERS = np.array([0.3, 0.1, 0.7])
-END = 1.0
+END = 0.5
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,7 @@ def test_an_equation_compiles_for_every_processor(name, lanes):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["arm64, Linux", "arm64, macOS"])
+@pytest.mark.parametrize("name", [pytest.param("arm64, Linux", marks=pytest.mark.nightly), "arm64, macOS"])
 def test_the_templates_compile_for_arm(name):
     baked = constants_ir({"ORDER": 20}, TAYLOR)
     code = machine.object_code(templates.bitcode("taylor_4"), [baked], ["saltus_propagate"], TARGETS[name])

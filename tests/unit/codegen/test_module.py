@@ -134,10 +134,12 @@ def made_again(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["capture", pytest.param("ode45", marks=pytest.mark.slow), pytest.param("taylor_2", marks=pytest.mark.nightly)]
+    "name", ["capture", pytest.param("ode45", marks=pytest.mark.nightly), pytest.param("taylor_2", marks=pytest.mark.nightly)]
 )
 def test_the_bitcode_is_what_the_templates_give(name):
-    """To the byte, where the same versions make it that made it."""
+    """To the byte, where the same versions make it that made it. The smallest every time: whether the others are made of the templates as
+    they stand, the test before says.
+    """
     import llvmlite
     import numba
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -57,6 +58,12 @@ def sine_points(**changes):
         "guards": Guards(("gap",), ("x",), np.array([GAP])), "forcing_period": 1.0, "attrs": PROVENANCE,
     }  # fmt: skip
     return stroboscope_dataset(**{**arguments, **changes})
+
+
+@pytest.fixture
+def untried(monkeypatch):
+    """A file without a checksum is read at once. That it is tried in a process of its own first is seen in faults/test_result_files.py."""
+    monkeypatch.setattr(sys.modules["saltus.results.load"], "try_elsewhere", lambda *_: None)
 
 
 @pytest.fixture

@@ -200,7 +200,7 @@ def test_save_and_load_return_the_same(case, engine, tmp_path):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_netcdf_of_xarray_keeps_everything(case, engine, tmp_path):
+def test_netcdf_of_xarray_keeps_everything(case, engine, tmp_path, untried):
     ds = CASES[case]()
     ds.to_netcdf(tmp_path / "map.nc", engine=engine)
     xr.testing.assert_identical(load(tmp_path / "map.nc"), ds)
@@ -214,7 +214,7 @@ def test_a_single_code_comes_back_as_a_list(engine, tmp_path):
 
 
 def test_csv_says_that_it_is_for_trajectories(tmp_path):
-    with pytest.raises(ParameterError, match="this Dataset is from basins"):
+    with pytest.raises(ParameterError, match=r"this Dataset is from basins\. Write \.nc or \.mat; or one table of it"):
         to_csv(basins(), tmp_path / "map.csv")
 
 

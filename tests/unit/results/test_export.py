@@ -32,7 +32,7 @@ def engine(request, monkeypatch):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_netcdf_of_xarray_keeps_everything(case, engine, tmp_path):
+def test_netcdf_of_xarray_keeps_everything(case, engine, tmp_path, untried):
     run = CASES[case]()
     run.to_netcdf(tmp_path / "run.nc", engine=engine)
     back = load(tmp_path / "run.nc")

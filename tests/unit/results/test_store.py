@@ -469,3 +469,28 @@ def test_a_store_that_was_deleted_says_so(store):
     store.path.rename(store.path.with_name("elsewhere"))
     with pytest.raises(StoreError, match="moved or deleted"):
         store.done()
+
+
+# -- what somebody else wrote, with right checksums --------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("format", "2"), ("identity", []), ("note", None), ("shape", [None, 7]), ("shape", []), ("shape", [10**9, 10**9]), ("chunk", 0),
+     ("chunk", None), ("arrays", {"basin": [-1]}), ("arrays", {"basin": "object"})],
+)  # fmt: skip
+def test_a_head_that_says_what_none_does_counts_as_damaged(store, name, value):
+    head = unseal((store.path / "store.json").read_bytes())
+    head = {key: one for key, one in head.items() if key != "checksum"}
+    (store.path / "store.json").write_bytes(seal(head | {name: value}))
+    with pytest.raises(StoreError, match=r"store\.json is damaged"):
+        Store.open(store.path)
+    fill(store, [0])
+    assert Store.create_or_resume(store.path, IDENTITY, **MAKE).done()[0], "it is written again, and the chunks stay"
+
+
+@pytest.mark.parametrize("files", [None, [], {}, {"basin": True, "peak": 5}, {"basin": {}, "peak": {}}])
+def test_a_record_that_says_what_none_does_counts_as_damaged(store, files):
+    fill(store)
+    path = store.path / "done" / "3.json"
+    record = {key: one for key, one in unseal(path.read_bytes()).items() if key != "checksum"}
+    path.write_bytes(seal(record | {"files": files}))
+    assert store.damaged() == store.damaged(checksums=False) == [3]

@@ -14,6 +14,7 @@ from saltus.study.inputs import Inputs
 from saltus.study.read import parse, read
 from saltus.study.run import questions_of, run_study
 from saltus.study.running import Resources
+from saltus.study.spec import Study
 
 RIG = """
 [study]
@@ -170,6 +171,9 @@ def test_a_formula_takes_part_in_the_identity(whole):
         (RIG + SIMULATE.replace("[simulate]", "[simulate]\nperiod = 3"), "has no key 'period'"),
         (RIG + RESPONSE.replace('"contact"', '"contact + q"'), "[frequency_response.outputs] the output 'stop force' of written out"),
         (RIG + RESPONSE.replace('unit = "W"', 'unit = "N"'), "[frequency_response.outputs] the output 'power' is said to be in N"),
+        (RIG + RESPONSE.replace('"contact"', "3"), '[frequency_response.outputs.stop force] must be a formula, such as "k*x"'),
+        (RIG + RESPONSE.replace("formula = ", "formla = "), "no key 'formla'. Did you mean 'formula'?"),
+        (RIG.replace('x = "v"', 'x = ""') + SIMULATE, "a formula is text of 1 to 1000 characters"),
         (RIG + ENERGY.replace('supplied = "pull*v"\n', ""), '[energy] lacks supplied. Write supplied = "..."'),
         (RIG + ENERGY.replace("pull*v", "pull*"), "[energy] the formula 'pull*' can't be read"),
         (RIG + ENERGY.replace("pull*v", "pull*w"), "asks for 'w'"),
@@ -187,6 +191,11 @@ def test_faults_are_told_before_anything_is_computed(text, told, tmp_path):
         questions_of(parse(text), None, Inputs(folder))
     assert told in str(caught.value)
     assert "secret" not in str(caught.value)
+
+
+def test_the_schema_takes_outputs_as_text_and_as_tables():
+    outputs = Study.model_json_schema()["$defs"]["FrequencyResponse"]["properties"]["outputs"]["additionalProperties"]
+    assert outputs == {"anyOf": [{"type": "string"}, {"$ref": "#/$defs/Output"}]}
 
 
 def test_formulas_of_a_model_may_use_terms_and_tables(tmp_path):

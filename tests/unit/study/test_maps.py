@@ -9,6 +9,7 @@ import pytest
 
 from saltus.errors import SaltusError, StudyError, UnitError
 from saltus.study import identity
+from saltus.study.inputs import Inputs
 from saltus.study.maps import MapJob, jobs_of
 from saltus.study.read import parse
 from saltus.study.run import questions_of
@@ -68,7 +69,7 @@ def test_a_name_becomes_a_file_name(name, slug):
 def test_names_whose_files_would_overwrite_each_other_are_refused(second, tmp_path):
     text = BASE + f'[[basins.map]]\nname = "b"\n[[basins.map]]\nname = "a"\ncompare = "b"\n[[basins.map]]\nname = "{second}"\n'
     with pytest.raises(StudyError, match="same file"):
-        questions_of(parse(text), None, tmp_path)
+        questions_of(parse(text), None, Inputs(tmp_path))
 
 
 def test_at_for_an_axis_is_refused():
@@ -108,7 +109,7 @@ def test_at_for_an_axis_is_refused():
 )  # fmt: skip
 def test_faults_say_where_and_what_to_write(text, told, tmp_path):
     with pytest.raises(SaltusError, match=told) as caught:
-        questions_of(parse(text), None, tmp_path)
+        questions_of(parse(text), None, Inputs(tmp_path))
     assert "pydantic" not in str(caught.value)
 
 

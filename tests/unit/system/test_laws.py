@@ -1,5 +1,8 @@
 """The freeplay law against its definition."""
 
+from decimal import Decimal
+
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -59,3 +62,7 @@ def test_one_side_and_damping():
 def test_errors_teach(arguments, teaches):
     with pytest.raises(TraceError, match=teaches):
         freeplay(X, stiffness=K, **arguments)
+
+
+def test_numbers_of_any_kind_go_together():
+    assert freeplay(Decimal("0.5"), stiffness=np.longdouble(2), upper_gap=np.float32(0.25), preload=Decimal(1)) == 1.5

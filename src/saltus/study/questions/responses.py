@@ -23,7 +23,7 @@ from saltus.study.spec_parts import (
     Interval,
     Method,
     Named,
-    Output,
+    Outputs,
     Quantity,
     Range,
     Starts,
@@ -52,7 +52,7 @@ class FrequencyResponse(Named):
     follow: bool = Field(False, description="Whether each start goes on, from value to value upwards, where it stood.", examples=[True])
     periods: int = PERIODS
     seed: int = SEED
-    outputs: dict[str, Output] = OUTPUTS
+    outputs: Outputs = OUTPUTS
     method: Method | None = METHOD
     values: dict[str, Quantity] = VALUES
     measured: str | None = Field(
@@ -79,7 +79,7 @@ class BifurcationDiagram(Named):
     periods: int = PERIODS
     every: Quantity | None = Field(None, description="Time between two looks, for a system without forcing.", examples=["1 s"])
     seed: int = SEED
-    outputs: dict[str, Output] = OUTPUTS
+    outputs: Outputs = OUTPUTS
     method: Method | None = METHOD
     values: dict[str, Quantity] = VALUES
 

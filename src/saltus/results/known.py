@@ -1,0 +1,61 @@
+"""Result files that need no trial: those that this user's saltus wrote here, or has tried before; by the checksums at their ends.
+
+Each is an empty file of that name in a folder of the user's alone. The folder is safe to lose: what it held is tried again.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+import platformdirs
+
+#: Names that are kept: where there are more when a process writes its first, all of them are forgotten.
+MOST = 20_000
+_HERE: set[str] = set()
+
+
+def folder() -> Path:
+    """Where they are kept: in ``$SALTUS_CACHE``, else in the user's cache folder."""
+    chosen = os.environ.get("SALTUS_CACHE")
+    return (Path(chosen) if chosen else Path(platformdirs.user_cache_dir("saltus", appauthor=False))) / "known-results"
+
+
+def is_known(digest: str) -> bool:
+    """Whether the file with this checksum was written by this user's saltus, or has been tried."""
+    place = folder()
+    if digest in _HERE:
+        return True
+    try:
+        return _ours(place) and stat.S_ISREG(os.lstat(place / digest).st_mode)
+    except OSError:
+        return False
+
+
+def note(digest: str) -> None:
+    """Remember a checksum: in this process, and for others where the folder can be used."""
+    _HERE.add(digest)
+    place = folder()
+    with suppress(OSError):
+        place.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if _ours(place):
+            _sweep(place)
+            os.close(os.open(place / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600))
+
+
+def _ours(place: Path) -> bool:
+    """Whether a folder is this user's, and nobody else may write to it."""
+    seen = os.lstat(place)
+    mine = not hasattr(os, "geteuid") or (seen.st_uid == os.geteuid() and not seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
+    return stat.S_ISDIR(seen.st_mode) and mine
+
+
+@cache
+def _sweep(place: Path) -> None:
+    names = os.listdir(place)
+    for name in names if len(names) > MOST else ():
+        with suppress(OSError):
+            (place / name).unlink()

@@ -1,0 +1,51 @@
+"""What holds for all tests: files that take long begin first, and no flow is compiled a second time because it has worked for long."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+#: Files in which tests take longest, longest first: no process is to begin one of them when all others have ended.
+LONGEST = (
+    "faults/test_study_faults.py",
+    "truth/test_basins.py",
+    "paper/test_figures.py",
+    "conformance/test_tiers.py",
+    "truth/test_wolf.py",
+    "truth/test_attractors.py",
+    "unit/study/test_questions.py",
+    "unit/study/test_maps_run.py",
+    "truth/test_order.py",
+    "truth/test_lyapunov.py",
+    "test_docs.py",
+    "truth/test_responses.py",
+    "conformance/test_lanes.py",
+    "unit/cli/test_cli_maps.py",
+    "faults/test_result_files.py",
+    "oracles/test_oracles.py",
+    "unit/codegen/test_machine.py",
+    "conformance/test_time.py",
+    "truth/test_unforced.py",
+    "test_examples.py",
+    "faults/test_interrupted_runs.py",
+    "unit/codegen/test_compiled.py",
+)
+
+
+def pytest_collection_modifyitems(config, items):
+    """Whole files, in the order of LONGEST; all others stay as they are. --no-loadscope-reorder keeps the order (pyproject.toml)."""
+    here = Path(__file__).parent
+    order = {here / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(item.path, len(order)))
+
+
+@pytest.fixture(autouse=True, scope="session")
+def never_steady():
+    """A flow would be compiled again, in a process beside it, after two seconds of work: no test works long enough to gain by it."""
+    from saltus.codegen import kernels
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kernels, "STEADY_AFTER", math.inf)
+        yield
