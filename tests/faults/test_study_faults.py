@@ -45,19 +45,24 @@ CHUNKS = 24
 #: `serve` it loads everything once and forks a child for each line, which starts within milliseconds.
 COMMAND = """
 import json, os, signal, sys, time
-import saltus.analysis.plan, saltus.plot, saltus.study.maps, saltus.study.read, saltus.study.run
-from saltus.cli import main
-from saltus.results.store import Store
+import saltus.analysis.plan
 
-saltus.analysis.plan.CHUNK = saltus.study.maps.CHUNK = 24
-saltus.analysis.plan.SCOUTS, saltus.analysis.plan.CHECKED = 256, 64
-commit = Store.commit
+saltus.analysis.plan.CHUNK = 24
+saltus.analysis.plan.SCOUTS, saltus.analysis.plan.CHECKED = 64, 64
 
-def slow_commit(self, index, values):
-    time.sleep(float(os.environ.get("PAUSE", "0")))
-    commit(self, index, values)
+if __name__ == "__main__":  # a process of --workers computes chunks only
+    import saltus.plot, saltus.study.maps, saltus.study.read, saltus.study.run
+    from saltus.cli import main
+    from saltus.results.store import Store
 
-Store.commit = slow_commit
+    saltus.study.maps.CHUNK = 24
+    commit = Store.commit
+
+    def slow_commit(self, index, values):
+        time.sleep(float(os.environ.get("PAUSE", "0")))
+        commit(self, index, values)
+
+    Store.commit = slow_commit
 
 def empty_pictures():
     import matplotlib.pyplot as plt

@@ -289,6 +289,21 @@ def test_other_motions_of_the_lorenz_system():
     assert ds["response_period"].values.tolist() == [0, 0]
 
 
+def test_a_freeplay_wing_at_rest_has_the_eigenvalues_of_its_jacobian():
+    """Two pairs of complex eigenvalues: growth swings about their real parts, and its means are no exponents yet."""
+
+    @sl.system(states="x y vx vy")
+    def wing(t, x, y, vx, vy, *, gap=0.1, stiffness=40.0):
+        return vx, vy, 3 * y - 100 * x - vx, 2 * x - 8 - sl.freeplay(y, stiffness=stiffness, gap=gap) - 0.7 * vy
+
+    ds = sl.lyapunov(wing, (0.0, -1.0, 0.0, 0.0), every=0.2, periods=300, transient=200, values={"stiffness": [40.0, 900.0]})
+    for one, stiffness in zip(ds["lyapunov_exponent"].values, (40.0, 900.0), strict=True):
+        matrix = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-100, 3, -1, 0], [2, -stiffness, 0, -0.7]])
+        assert np.abs(one - np.sort(np.linalg.eigvals(matrix).real)[::-1]).max() < 1e-12
+    assert ds["kind"].values.tolist() == ["equilibrium"] * 2
+    assert np.abs(ds["exponent_sum"] - ds["mean_divergence"]).max() < 1e-12
+
+
 def test_lorenz_at_rho_20_has_two_equilibria_and_nothing_else():
     starts = np.array([(1.0, 1.0, 20.0), (-1.0, -1.0, 20.0)])  # mirror images, and so are the places that they lead to
     ds = sl.attractors(butterfly.with_values(rho=20.0), starts, method=sl.Taylor(order=12, lanes=2), every=0.75)

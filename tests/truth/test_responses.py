@@ -262,3 +262,28 @@ def test_a_start_that_hops_between_responses_joins_none_of_them():
     assert [len(set(group)) for group in groups] == [1, 1, 1]
     assert len({group[0] for group in groups}) == 3
     assert ds.sizes["event"] == 0, "no response ends: just no start leads there"
+
+
+def test_a_torus_is_born_where_the_forcing_no_longer_quenches_a_limit_cycle():
+    """To first order in mu the forced motion A cos(2 t), A = force/3, quenches the cycle of van der Pol's oscillator while A^2 > 2."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def quenched(t, x, v, *, mu=0.1, force=5.0, w=2.0):
+        return v, mu * (1 - x**2) * v - x + force * sl.cos(w * t)
+
+    ds = sl.bifurcation_diagram(quenched, {"force": (3.8, 5.0, 7)}, periods=1500)
+    assert ds.event_kind.values.tolist() == ["neimark_sacker"]
+    assert abs(ds.event_force.item() - 3 * math.sqrt(2)) < 0.2  # a step of the grid
+
+
+def test_multipliers_that_stay_near_the_unit_circle_bear_no_torus():
+    """The product of the multipliers of an oscillator with linear damping is below one: of it no torus can be born."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def ball(t, x, v, *, damping=0.03, w=2.0):
+        return v, 1 + 0.8 * sl.cos(w * t) - damping * v - sl.max(x, 0) ** 1.5
+
+    ds = sl.frequency_response(ball, (2.3, 2.5, 9), start="sweep_up", periods=3000)
+    sizes = np.hypot(ds.response_multiplier_real, ds.response_multiplier_imag)
+    assert sizes.max() > 0.96
+    assert "neimark_sacker" not in ds.event_kind.values

@@ -23,8 +23,9 @@ from saltus.flow.methods import Method
 
 #: Farthest that an orbit moves between two values, in units of its own range.
 LINK = 0.35
-#: A leading multiplier that is complex and beyond this is on its way to the unit circle.
-TURNING = 0.95
+#: A complex leading multiplier is on its way to the unit circle beyond this, if it grew by so much in the last step of the parameter that
+#: it is there after AHEAD more of them. Being near isn't enough: of a lightly damped oscillator all multipliers are, and stay there.
+TURNING, AHEAD = 0.95, 2.0
 #: Times that the step towards the end of a branch is halved, and how many times its last width the law is measured over.
 HALVINGS, OVER = 14, 64
 #: Steps towards the end of a branch at most.
@@ -131,9 +132,21 @@ def _told_by_neighbours(found: Found, last: int, beyond: int, multiplier: comple
     starts = np.flatnonzero((found.of[here] >= 0) & (found.of[here] == last))
     if len(starts) and (found.steady.kind.reshape(found.of.shape)[beyond, starts] == CHAOTIC).any():
         return "chaos"
-    if found.kind[last] != EQUILIBRIUM and abs(multiplier) > TURNING and abs(multiplier.imag) > 1e-9:
+    if found.kind[last] != EQUILIBRIUM and abs(multiplier.imag) > 1e-9 and _turns(found, last, 2 * here - beyond, abs(multiplier)):
         return "neimark_sacker"
     return "end"
+
+
+def _turns(found: Found, last: int, before: int, size: float) -> bool:
+    """Whether a leading multiplier of this size reaches the unit circle soon, by how it grew from the value before."""
+    alike = (found.place == before) & (found.kind == found.kind[last]) & (found.period == found.period[last])
+    if size <= TURNING or not alike.any():
+        return False
+    scale, points = found.steady.scale[found.row[last]], found.points(last)
+    apart = {int(j): orbit_distance(found.points(int(j)), points, scale) for j in np.flatnonzero(alike)}
+    nearest = min(apart, key=lambda j: apart[j])
+    grown = size - abs(_leading(found, nearest))
+    return apart[nearest] < LINK and AHEAD * grown >= 1.0 - size
 
 
 def _is_twice(found: Found, longer: int, shorter: int) -> bool:

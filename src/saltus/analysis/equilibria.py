@@ -84,8 +84,11 @@ def _evaluated(system: System, entries: tuple, states: np.ndarray, values: Mappi
     return np.stack([np.broadcast_to(np.asarray(column, float), len(states)) for column in columns], axis=1)
 
 
-def find_equilibria(family: Family, start: np.ndarray, scale: np.ndarray) -> Equilibria:
-    """The equilibria near states float64[k, D] at the parameter values of each row; float64[k, D] is the range of each state."""
+def find_equilibria(family: Family, start: np.ndarray, scale: np.ndarray, captures: bool = True) -> Equilibria:
+    """The equilibria near states float64[k, D] at the parameter values of each row; float64[k, D] is the range of each state.
+
+    ``captures``: whether to ask where they capture.
+    """
     system, values = family.system, family.values
     x, found = _newton(system, values, np.array(start, float), scale)
     place = np.where(found[:, None], x, np.nan)
@@ -96,7 +99,7 @@ def find_equilibria(family: Family, start: np.ndarray, scale: np.ndarray) -> Equ
         if np.isfinite(matrix).all():
             own = np.linalg.eigvals(matrix)
             eigenvalues[i] = own[np.lexsort((-own.imag, -own.real))]
-            if eigenvalues[i, 0].real < -MARGINAL * np.linalg.norm(matrix, 2):
+            if captures and eigenvalues[i, 0].real < -MARGINAL * np.linalg.norm(matrix, 2):
                 reach[i] = _reach(system, {n: v[[i]] for n, v in values.items()}, x[i], matrix, scale[i])
     return Equilibria(place, eigenvalues, reach)
 

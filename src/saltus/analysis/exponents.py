@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.batch_means import CONFIDENCE
-from saltus.analysis.growth import GOOD, STRETCH
+from saltus.analysis.equilibria import autonomous, find_equilibria
+from saltus.analysis.growth import AT_REST, GOOD, STRETCH
 from saltus.analysis.lyapunov_spectrum import Spectrum, running_ends, spectrum
 from saltus.analysis.orbit_measures import measure
 from saltus.analysis.orbits import Orbit
+from saltus.analysis.recurrence import SAME
 from saltus.analysis.walks import FlowWalk
 from saltus.flow.family import Family
 from saltus.kernels import status as st
@@ -69,7 +71,10 @@ class Exponents:
                     progress((first + share * count) / k)
 
             walk = FlowWalk(self.family.rows(rows), self._every)
-            self._keep(rows, walk, spectrum(walk, self._start[rows], self._periods, self._transient, self._every is None, show))
+            found = spectrum(walk, self._start[rows], self._periods, self._transient, self._every is None, show)
+            if self._every is not None and autonomous(self.family.system):
+                _rest(found, walk, self._start[rows], self._every)
+            self._keep(rows, walk, found)
 
     def _keep(self, rows: np.ndarray, walk: FlowWalk, found: Spectrum) -> None:
         """Write a group to its places."""
@@ -134,6 +139,29 @@ class Exponents:
             "periods": self._periods,
             "transient": self._transient,
         }
+
+
+def _rest(found: Spectrum, walk: FlowWalk, start: np.ndarray, every: float) -> None:
+    """Where a motion has come to an equilibrium, its exponents: the real parts of the eigenvalues of the Jacobian, exact but for rounding.
+
+    Means of growth lag behind: those of a pair of complex eigenvalues swing about its real part.
+    """
+    trail = found.growth.stretch.trail
+    state, whole = trail[:, -1], np.ptp(np.concatenate([start[:, None], trail], axis=1), axis=1)
+    widest = whole.max(axis=1, keepdims=True)  # in place of the range of a state that began at rest and has come to rest
+    scale = np.where(whole > AT_REST * widest, whole, np.where((widest > 0) & np.isfinite(widest), widest, 1.0))
+    still = find_equilibria(walk.family, state, scale, captures=False)
+    with np.errstate(invalid="ignore"):
+        attracts = (still.eigenvalues.real < 0).all(axis=1)
+        near = (np.abs(state - still.place) <= SAME * scale).all(axis=1)
+    arrived = np.flatnonzero(attracts & near & np.isin(found.growth.stretch.status, GOOD))
+    rounding = 64 * np.finfo(float).eps
+    for i in arrived:
+        own = still.eigenvalues[i]
+        found.exponents[i] = own.real * every
+        found.errors[i] = found.half_width[i] = rounding * np.abs(own).max() * every
+        found.batches[i], found.kinds[i] = 0, "equilibrium"
+        found.volume[i] = walk.of(np.array([i])).divergences(still.place[[i]][:, None])[0, 0]
 
 
 def _with_phase(exponents: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -84,10 +85,12 @@ def spectrum(
     weights = np.array([WINDOWS[name](stretch.count) for name in chosen])
     lines = {name: _lines(run, name, stretch, weights) for name in names}
     batch = "trajectory" in run.dims
+    told = json.loads(run.attrs.get("varied_parameters", "[]")) if batch else []  # a varied frequency shows in the lines
+    varied = {name: run[name].values for name in told if name in run.coords and name not in ("frequency", "order")}
     own = stretch.frequency.ndim == 2
     return spectrum_dataset(
         states=names,
-        units={name: run[name].attrs.get("units", "") for name in names},
+        units={name: run[name].attrs.get("units", "") for name in (*names, *varied)},
         frequency=stretch.frequency,
         order=stretch.order,
         amplitude={name: np.abs(line) for name, line in lines.items()},
@@ -99,7 +102,7 @@ def spectrum(
             "status": np.atleast_1d(run["status"].values),
         },
         forcing_period=np.atleast_1d(run["forcing_period"].values) if own else run.attrs.get("forcing_period_s"),
-        varied={},
+        varied=varied,
         attrs={key: value for key, value in run.attrs.items() if key not in ("result_hash", "forcing_period_s")},
         batch=batch,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -135,7 +136,7 @@ def run(
     own = own_system(system) if system else None
     folder = usable_folder(out or Path("saltus-runs") / study.stem)
     resources = _resources(spec, threads, workers, scheduler, shard)
-    _run(spec, text, folder, Inputs(study.parent, inputs or []), own, only or [], resources, progress)
+    _run(spec, text, folder, Inputs(study.parent, inputs or []), own, only or [], resources, progress, _again(folder, system))
 
 
 def _resources(spec: Study, threads: int | None, workers: int | None, scheduler: str, shard: str) -> Resources:
@@ -147,8 +148,9 @@ def _resources(spec: Study, threads: int | None, workers: int | None, scheduler:
 
 
 def _run(
-    spec: Study, text: str, folder: Path, inputs: Inputs, own: System | None, only: list[str], resources: Resources, progress: Progress
-) -> None:
+    spec: Study, text: str, folder: Path, inputs: Inputs, own: System | None, only: list[str], resources: Resources, progress: Progress,
+    again: str,
+) -> None:  # fmt: skip
     from saltus.cli import screen
     from saltus.study.run import run_study
 
@@ -156,13 +158,18 @@ def _run(
         with screen.reporting(progress.value) as (report, say):
             outcome = run_study(spec, text, folder, own, resources, report, say, inputs=inputs, only=only)
     except KeyboardInterrupt:
-        screen.fail(f"stopped; what is computed is kept. Go on with: saltus resume {folder}")
+        screen.fail(f"stopped; what is computed is kept. Go on with: {again}")
         raise
     for table in outcome.tables:
         screen.show(table)
     screen.files(outcome.files)
     for name in outcome.waiting:
-        screen.say(f"{name}: other shards aren't done yet. When they are: saltus resume {folder}")
+        screen.say(f"{name}: other shards aren't done yet. When they are: {again}")
+
+
+def _again(folder: Path, system: str) -> str:
+    """The command that goes on, with the system of one's own that the study was run with."""
+    return shlex.join(["saltus", "resume", str(folder), *(["--system", system] if system else [])])
 
 
 @app.command()
@@ -201,7 +208,8 @@ def resume(
 
     spec, text = read(copy_of(store))
     own = own_system(system) if system else None
-    _run(spec, text, store, inputs_of(store, text), own, only or [], _resources(spec, threads, workers, scheduler, shard), progress)
+    resources = _resources(spec, threads, workers, scheduler, shard)
+    _run(spec, text, store, inputs_of(store, text), own, only or [], resources, progress, _again(store, system))
 
 
 @app.command()

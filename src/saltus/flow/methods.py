@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from saltus.codegen.module import Flow, lane_width, ode45_module, taylor_module
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.pace import LONG, LOOK
 from saltus.system.system import System
@@ -36,6 +39,32 @@ def _check_positive(name: str, value: Any) -> None:
         or not 0 < value <= sys.float_info.max
     ):
         raise ParameterError(f"{name} must be a positive number, not {shown(value)}.")
+
+
+_M = TypeVar("_M", bound="Method")
+#: What ode45's options are called here.
+_MATLAB: Mapping[str, str] = {"reltol": "rtol", "abstol": "atol", "events": "events"}
+
+
+def _told(cls: type[_M]) -> type[_M]:
+    """Answer options that a method doesn't have by those that it has."""
+    signature, made = inspect.signature(cls), cls.__init__
+
+    @functools.wraps(made)
+    def init(self: _M, *args: Any, **kwargs: Any) -> None:
+        known = signature.parameters
+        for word in kwargs:
+            if word not in known:
+                own = _MATLAB.get(word.lower())
+                raise ParameterError(
+                    f"sl.{cls.__name__} has no option {shown(word)}. {f'Write {own}=.' if own in known else nearest(word, known)}"
+                )
+        if len(args) > len(known):
+            raise ParameterError(f"sl.{cls.__name__} takes {', '.join(f'{name}=' for name in known)}, not {len(args)} values in a row.")
+        made(self, *args, **kwargs)
+
+    cls.__init__ = init  # type: ignore[assignment, method-assign]
+    return cls
 
 
 class Method:
@@ -90,6 +119,7 @@ class Method:
         raise NotImplementedError
 
 
+@_told
 @dataclass(frozen=True)
 class Taylor(Method):
     """Taylor series, contacts located on the gap's own polynomial: machine precision, no contact missed. The default.
@@ -161,6 +191,7 @@ class Taylor(Method):
         return Taylor(self.order, self.tolerance * 2.0**-4, self.lanes, self.max_steps, self.max_events)
 
 
+@_told
 @dataclass(frozen=True)
 class ODE45(Method):
     """MATLAB's ode45 with odezero, digit for digit, for comparison with published results.

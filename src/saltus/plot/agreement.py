@@ -78,9 +78,11 @@ def _three(panels: np.ndarray, ds: xr.Dataset, pair: tuple[str, str]) -> np.ndar
     scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
     ids, codes = _occurring(ds)
     colors = dict(zip(ids, hues(max(ids, default=-1) + 1)[ids], strict=True))
+    methods = {which: maps.method_text(ds, f"_{which}") for which in "ab"}
+    other = "exact" if any(methods.values()) else ""
     for panel, which in zip(panels, "ab", strict=False):
         maps.draw_cells(panel, ds, pair, scales, paint(ds[f"basin_{which}"].values, colors))
-        panel.set_title(str(ds.attrs.get(f"name_{which}", f"map {which}")))
+        panel.set_title(str(ds.attrs.get(f"name_{which}", methods[which] or other or f"map {which}")))
     _difference(panels[2], ds, pair)
     for panel in panels[1:]:
         panel.set_ylabel("")

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 
 from saltus.errors import ParameterError
 from saltus.plot.picture import drawable
@@ -21,6 +22,8 @@ from saltus.plot.style import QUIET, RASTERISE_ABOVE, Scale, style, styled
 Direction = Literal["x", "y"]
 #: A gap is drawn into the limits if the axis grows by no more than this: an orbit far inside its gap must stay visible.
 _WIDEN = 2.0
+#: Numbers that differ by no more than this share of their size are one number.
+_FLAT = 1e-12
 #: Room that the name of a gap takes above a picture, in widths of the Axes.
 _NAME = 0.45
 
@@ -81,12 +84,20 @@ def set_limits(ax: Axes, direction: Direction, values: np.ndarray, marks: Sequen
     drawn = ax.dataLim.intervalx if direction == "x" else ax.dataLim.intervaly
     if np.isfinite(drawn).all():
         low, high = min(low, float(drawn[0])), max(high, float(drawn[1]))
+    if high - low <= _FLAT * max(abs(low), abs(high)):  # what is at rest moves by rounding only
+        low = high = 0.5 * (low + high)
     span = high - low or abs(high) or 1.0
     for mark in marks:
         if max(high, mark) - min(low, mark) <= _WIDEN * span:
             low, high = min(low, mark), max(high, mark)
     pad = margin * (high - low or span)
     (ax.set_xlim if direction == "x" else ax.set_ylim)(low - pad, high + pad)
+
+
+def few_ticks(ax: Axes) -> None:
+    """Numbers under a narrow picture that don't touch: few of them, and a common power of ten in place of leading zeros."""
+    ax.xaxis.set_major_locator(MaxNLocator(nbins=5))
+    ax.ticklabel_format(axis="x", style="sci", scilimits=(-3, 5), useMathText=True)
 
 
 def draw_gaps(ax: Axes, direction: Direction, regions: Regions, scale: Scale, label: bool = True) -> None:

@@ -49,7 +49,7 @@ def basins(
     """Map of the basins: a hue for each attractor, darker where it takes longer to settle, near-black where a start doesn't.
 
     Cells are centred on the starts. White-edged dots are the attractors at whole forcing periods. Of more than two states the title says
-    where the others start.
+    where the others start, and the method if it isn't the exact one.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def basins(
             _points(panel, ds, pair, scales, colors)
         if legend:
             _legend(panel, ds, pair, colors, settling, points)
-        panel.set_title(_section(ds, pair), loc="left", fontsize=8, color=QUIET)
+        panel.set_title(", ".join(filter(None, (_section(ds, pair), maps.method_text(ds)))), loc="left", fontsize=8, color=QUIET)
     return panel
 
 

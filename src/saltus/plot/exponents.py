@@ -54,9 +54,10 @@ def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax:
     labels = selection.chosen(ds, trajectory, _CALLER)
     with draw.panels(ax, len(labels), (6.3, 2.5), _CALLER) as panels:
         for label, panel in zip(labels, panels, strict=True):
-            _panel(panel, ds.sel(trajectory=label), legend)
+            one = ds.sel(trajectory=label)
+            _panel(panel, one, legend)
             if len(labels) > 1:
-                panel.set_ylabel(f"trajectory {label}\n{panel.get_ylabel()}")
+                panel.set_ylabel(f"{selection.named(one, label)}\n{panel.get_ylabel()}")
     return panels[0] if len(panels) == 1 else np.array(panels, dtype=object)
 
 

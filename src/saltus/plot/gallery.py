@@ -65,7 +65,7 @@ def gallery(ds: xr.Dataset, runs: xr.Dataset, attractors: Sequence[int] | None =
     schema.check(runs, caller=_CALLER, kinds=[schema.TRAJECTORY])
     colors = maps.colors_of(ds, order, _CALLER)
     ids = _chosen(runs, list(colors), attractors)
-    pair = schema.states_of(runs)[:2]
+    pair = _pair(runs)
     columns = 3 if len(pair) == 2 and all(f"attractor_{name}" in ds for name in pair) else 2 if len(pair) == 2 else 1
     with style():
         figure, grid = plt.subplots(
@@ -74,7 +74,9 @@ def gallery(ds: xr.Dataset, runs: xr.Dataset, attractors: Sequence[int] | None =
         )  # fmt: skip
         for row, key in zip(grid, ids, strict=True):
             _row(row, ds, runs, key)
-            if columns == 3:
+            if columns == 3 and not row[1].axison:  # at rest
+                row[2].set_axis_off()
+            elif columns == 3:
                 _poincare(row[2], ds, runs, key, colors[key])
             _title(row[0], ds, key, colors[key])
         for one in grid[:-1].flat:
@@ -102,6 +104,12 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
     return chosen
 
 
+def _pair(runs: xr.Dataset) -> tuple[str, ...]:
+    """The states of the phase portrait, as plot.phase chooses them; one where there are no two."""
+    known = schema.states_of(runs)
+    return (known[0], selection.rate_of(runs, known[0]) or known[1]) if len(known) > 1 else known[:1]
+
+
 # -- one row -------------------------------------------------------------------------------------------------------------------
 def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
     """The time history and the phase portrait."""
@@ -113,7 +121,13 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
     shown = (max(n, _FEWEST), n) if n else (_SHOWN_IF_APERIODIC, held)
     in_time, in_phase = (min(periods, held) if "period" in one else None for periods in shown)
     history(runs, label, periods=in_time, ax=row[0], time="T", legend=False)
-    if len(row) > 1:
+    if len(row) > 1 and str(ds["attractor_type"].sel(attractor=key).item()) == "equilibrium":  # all else would be rounding
+        names = [name for name in schema.states_of(runs) if f"attractor_{name}" in ds]
+        places = [ds[f"attractor_{name}"].sel(attractor=key).values.ravel()[0] for name in names]
+        scales = [display_scale(runs[name].attrs.get("units", ""), abs(place)) for name, place in zip(names, places, strict=True)]
+        told = [f"{name} = {scale.text(place)}" for name, place, scale in zip(names, places, scales, strict=True)]
+        draw.say(row[1], "\n".join(["At rest at", *told]))
+    elif len(row) > 1:
         phase(runs, label, periods=in_phase, ax=row[1], legend=False)
         for text in list(row[1].texts):
             text.remove()  # the time history beside it names the gaps too; here the names would meet the title
@@ -121,7 +135,7 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
 
 def _poincare(ax: Axes, ds: xr.Dataset, runs: xr.Dataset, key: int, color: np.ndarray) -> None:
     """The attractor at whole periods, the others pale behind it."""
-    pair = schema.states_of(runs)[:2]
+    pair = _pair(runs)
     clouds = np.stack([ds[f"attractor_{name}"].transpose("attractor", "phase").values for name in pair], axis=-1)
     own = ds["attractor"].values == key
     mine, others = (cloud[np.isfinite(cloud).all(axis=-1)] for cloud in (clouds[own], clouds[~own]))
@@ -133,6 +147,7 @@ def _poincare(ax: Axes, ds: xr.Dataset, runs: xr.Dataset, key: int, color: np.nd
         scales.append(display_scale(runs[name].attrs.get("units", ""), max(abs(low), abs(high))))
         draw.set_limits(ax, direction, np.array([low, high]) * scales[i].factor, margin=0.1)
         (ax.set_xlabel if direction == "x" else ax.set_ylabel)(scales[i].label(name))
+    draw.few_ticks(ax)
     mine, others = (cloud * [scale.factor for scale in scales] for cloud in (mine, others))
     size = 5.0 if len(mine) <= 12 else 3.6 if len(mine) <= 60 else 1.8
     look: dict[str, Any] = {

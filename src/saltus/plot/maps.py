@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -119,6 +120,20 @@ def describe(one: xr.Dataset) -> str:
     return f"{name}, {from_si(float(one['attractor_cycle']), 's', 3)}, {contacts:.4g} contact{'' if contacts == 1 else 's'}"
 
 
+def method_text(ds: xr.Dataset, suffix: str = "") -> str:
+    """How a map was computed, such as ``ode45, rtol 0.0001, atol 1e-07``; empty for the exact method. ``suffix``: ``_a`` of two maps."""
+    name = str(ds.attrs.get(f"method{suffix}", "Taylor"))
+    if name == "Taylor":
+        return ""
+    try:
+        options = dict(json.loads(ds.attrs.get(f"method_options{suffix}", "{}")))
+    except (ValueError, TypeError):  # of another program
+        options = {}
+    told = [f"{key} {float(options[key]):g}" for key in ("rtol", "atol") if key in options]
+    ignored = ["contacts not located"] if options.get("events") == "ignore" else []
+    return ", ".join([name.lower(), *told, *ignored])
+
+
 def share_text(fraction: float) -> str:
     """A share in per cent; one that rounds to nothing, or to all, says that it isn't."""
     if 0 < fraction < 0.0005:
@@ -129,7 +144,11 @@ def share_text(fraction: float) -> str:
 
 
 def peak_text(one: xr.Dataset) -> str:
-    """The largest first state of an attractor, such as ``peak 0.91 mm``."""
+    """The largest first state of an attractor, such as ``peak 0.91 mm``; of an equilibrium where it lies, such as ``x = -0.91 mm``."""
+    state = str(one.attrs.get("states", "")).split(" ")[0]
+    if str(one["attractor_type"].item()) == "equilibrium" and f"attractor_{state}" in one:
+        place = float(np.ravel(one[f"attractor_{state}"].values)[0])
+        return f"{state} = {display_scale(one['attractor_peak'].attrs.get('units', ''), abs(place)).text(float(f'{place:.3g}'))}"
     peak = float(one["attractor_peak"])
     return f"peak {display_scale(one['attractor_peak'].attrs.get('units', ''), abs(peak)).text(float(f'{peak:.3g}'))}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from saltus.results.schema import ENERGY, IMPACTS, check
 #: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a motion that repeats, and how often each
 #: must be seen.
 _SAME, _MOST_SPEEDS, _REPEATED = 1e-7, 6, 3
+#: Characters that fit beside each other in a picture of words.
+_LINE = 60
 
 
 @picture
@@ -91,7 +94,7 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
             return ""
         if len(own):
             values = ", ".join(scale.text(float(f"{own[i]:.6g}")) for i in first)
-            lines.append(f"{name.replace('_', ' ')}: {len(own)} contacts, at {values}")
+            lines.append(textwrap.fill(f"{name.replace('_', ' ')}: {len(own)} contacts, at {values}", _LINE, subsequent_indent="    "))
     return "\n".join(["The speeds at contact repeat.", *lines])
 
 

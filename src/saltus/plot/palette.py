@@ -24,7 +24,7 @@ _LIGHTNESS = np.linspace(0.56, 0.86, 13)
 _CHROMA = np.array([0.06, 0.09, 0.115, 0.14])
 _HUE = np.deg2rad(np.arange(0.0, 360.0, 6.0))
 #: A hue's shades: the lightest is mixed with so much white, the darkest keeps so much of the lightness.
-_TINT, _DARKEST = 0.38, 0.55
+_TINT, _DARKEST = 0.38, 0.64
 
 
 # -- colour spaces -------------------------------------------------------------------------------------------------------------

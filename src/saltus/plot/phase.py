@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,7 +16,6 @@ from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 from saltus.results.reader import reader
 from saltus.results.schema import STROBOSCOPE, check, kind_of, states_of
-from saltus.units import from_si
 
 _CALLER = "plot.phase"
 #: Without `periods` the last part of a forced run is shown: transients of lightly damped systems have mostly gone by then (of the rig with
@@ -50,7 +48,7 @@ def phase(
     trajectory : int or list of int, optional
         Which of a batch; without it all are laid over one another, at most 8.
     states : pair of str, optional
-        On the horizontal and the vertical axis; the first two by default.
+        On the horizontal and the vertical axis; by default the first one and the state that is its rate, else the second one.
     periods : int, float or pair, optional
         The last so many forcing periods, or from one to another. By default the last 30 % of a forced run,
         as the picture says, and all of a run without forcing.
@@ -85,7 +83,7 @@ def phase(
             draw.say(panel, "It stopped where it began: there is no motion to draw.", *singles)
             return panel
         for i, (one, shown) in enumerate(zip(singles, windows, strict=True)):
-            name = _name(one, run, labels[i]) if len(labels) > 1 else None
+            name = selection.named(one, labels[i]) if len(labels) > 1 else None
             color = CYCLE[i % len(CYCLE)] if name else None
             if kind_of(run) != STROBOSCOPE:
                 _curve(panel, one, pair, shown, scales, color, name)
@@ -95,7 +93,8 @@ def phase(
             draw.note_status(panel, one)
         _frame(panel, singles[0], pair, np.concatenate(curves), scales)
         if legend:
-            draw.legend(panel, regions.find(singles[0], pair), loc="upper left", bbox_to_anchor=(1.02, 1))
+            beside = 1.25 if any(text.get_position()[0] > 1.0 for text in panel.texts) else 1.02  # the names of gaps
+            draw.legend(panel, regions.find(singles[0], pair), loc="upper left", bbox_to_anchor=(beside, 1))
     return panel
 
 
@@ -105,7 +104,7 @@ def _pair(run: xr.Dataset, states: Any) -> tuple[str, str]:
     if states is None:
         if len(known) < 2:
             raise ParameterError(f"{_CALLER}: a phase portrait needs two states, this system has only {known[0]!r}. See plot.history.")
-        return known[0], known[1]
+        return known[0], selection.rate_of(run, known[0]) or known[1]
     if not isinstance(states, list | tuple | np.ndarray) or getattr(states, "shape", None) == () or len(states) != 2:
         raise ParameterError(f"{_CALLER}: states={shown(states)}. Give two names, such as states={known[:2]!r}.")
     first, second = (selection.state_named(run, name, _CALLER) for name in states)
@@ -159,12 +158,6 @@ def _frame(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], values: np.ndarray, 
         draw.set_limits(ax, direction, values[:, i] * scales[i].factor, marks)
     for i, direction in enumerate(directions):
         draw.draw_gaps(ax, direction, own[i], scales[i])
+    draw.few_ticks(ax)
     ax.set_xlabel(scales[0].label(pair[0]))
     ax.set_ylabel(scales[1].label(pair[1]))
-
-
-def _name(one: xr.Dataset, run: xr.Dataset, label: int) -> str:
-    """A trajectory by what sets it apart: the parameters that vary, else its number."""
-    varied = json.loads(run.attrs.get("varied_parameters", "[]"))
-    texts = [f"{name} = {from_si(float(one[name]), one[name].attrs.get('units', ''), 4)}" for name in varied if name in one]
-    return ", ".join(text.replace("_", " ") for text in texts) or f"trajectory {label}"

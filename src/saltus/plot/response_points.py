@@ -24,11 +24,13 @@ NEEDS = ("response_of", "response_branch", "response_type", "response_period")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 #: Name and marker of what happens to a branch between two values. That a branch isn't found any more is no mark: the picture shows it.
 _EVENTS = {
-    "hopf": ("Hopf", "p"), "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"), "neimark_sacker": ("Neimark-Sacker", "o"),
+    "hopf": ("Hopf", "p"), "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"), "neimark_sacker": ("Neimark-Sacker", "h"),
     "chaos": ("onset of chaos", "s"), "graze": ("graze", "^"),
 }  # fmt: skip
 #: Where the marks of events stand, in heights of the Axes.
 _EVENTS_AT = 1.025
+#: Mark of the empty axis that keeps the title clear of them.
+_ROOM = "saltus-room-of-events"
 #: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
 _EVEN = 1e-6
 #: More marks than these on an axis are drawn smaller; so many, or fewer, stand on a line through the picture, to where it happens.
@@ -182,6 +184,7 @@ def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str,
 
 def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
     """Marks above the picture, clear of its ticks, where something happens to a branch; each kind is named once."""
+    marked = False
     for one in datasets:
         name = event_name(one.axis)
         if name not in one.ds or not one.ds.sizes.get("event"):
@@ -191,6 +194,7 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
         for word, (text, marker) in _EVENTS.items():
             here = values[(words == word) & (values >= low) & (values <= high)]
             if here.size:
+                marked = True
                 size, width = (4.5, 0.8) if values.size <= _MANY_EVENTS else (3.0, 0.5)
                 above = np.full(here.size, _EVENTS_AT)
                 if values.size <= _FEW_EVENTS:
@@ -200,6 +204,20 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
                     here, above, transform=ax.get_xaxis_transform(), ls="none", marker=marker, ms=size, mfc="white",
                     mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False, zorder=5, label=text, gid=f"event {word}",
                 )  # fmt: skip
+    if marked:
+        _raise_titles(ax)
+
+
+def _raise_titles(ax: Axes) -> None:
+    """Make room for the marks below a title, which may be given later: titles keep clear of what an axis at the top says."""
+    if any(one.get_gid() == _ROOM for one in ax.child_axes):
+        return
+    top = ax.secondary_xaxis("top")
+    top.set_gid(_ROOM)
+    top.spines[:].set_visible(False)
+    top.tick_params(length=0, pad=4, labelsize=8)
+    top.set_xticks([float(np.sqrt(np.prod(ax.get_xlim()))) if ax.get_xscale() == "log" else float(np.mean(ax.get_xlim()))], [" "])
+    top.minorticks_off()
 
 
 def legend(ax: Axes, named: Mapping[str, Any], left: float = 1.02) -> None:

@@ -113,7 +113,8 @@ def _groups(ds: xr.Dataset, labels: Sequence[int], rows: np.ndarray) -> list[tup
     """Which crossings share a colour, the colour and its name."""
     if len(labels) > 1:
         who = ds["crossing_trajectory"].values
-        return [(who == label, CYCLE[i % len(CYCLE)], f"trajectory {label}") for i, label in enumerate(labels)]
+        names = [selection.named(ds.sel(trajectory=label), label) for label in labels]
+        return [(who == label, CYCLE[i % len(CYCLE)], name) for i, (label, name) in enumerate(zip(labels, names, strict=True))]
     directions = ds["crossing_direction"].values
     return [(rows & (directions == way), *look) for way, look in _DIRECTIONS.items()]
 
@@ -139,5 +140,7 @@ def _frame(ax: Axes, ds: xr.Dataset, direction: draw.Direction, name: str, value
         return
     own = regions.along(ds, name) if name in states_of(ds) and ds["guard_boundary"].ndim == 1 else None
     draw.set_limits(ax, direction, values * scale.factor, [b.value * scale.factor for b in own.boundaries] if own else [])
+    if direction == "x":
+        draw.few_ticks(ax)
     if own:
         draw.draw_gaps(ax, direction, own, scale)

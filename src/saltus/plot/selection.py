@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import numbers
 from collections.abc import Mapping
@@ -12,7 +13,8 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError, among, nearest, shown
-from saltus.results.schema import contact_name, forcing_period, sample_dim, states_of
+from saltus.results.schema import contact_name, equations_of, forcing_period, sample_dim, states_of
+from saltus.units import from_si
 
 Periods = int | float | tuple[float, float] | None
 #: The most trajectories that one picture can tell apart: the colours of the palette.
@@ -55,6 +57,19 @@ def single(run: xr.Dataset, label: int | None) -> xr.Dataset:
     if "contact_trajectory" in ds and "trajectory" in ds.coords:
         ds = ds.isel(contact=np.flatnonzero(ds["contact_trajectory"].values == int(ds["trajectory"])))
     return ds
+
+
+def named(one: xr.Dataset, label: int) -> str:
+    """One trajectory of a batch by what sets it apart: the parameters that vary, else its number."""
+    varied = json.loads(one.attrs.get("varied_parameters", "[]"))
+    known = [one[name] for name in varied if name in one.coords and one[name].ndim == 0]
+    texts = [f"{value.name} = {from_si(float(value), value.attrs.get('units', ''), 4)}" for value in known]
+    return ", ".join(text.replace("_", " ") for text in texts) or f"trajectory {label}"
+
+
+def rate_of(ds: xr.Dataset, state: str) -> str:
+    """The state that is the rate of another, as v is of x; empty if none is."""
+    return next((name for name in states_of(ds) if f"d{state}/dt = {name}" in equations_of(ds)), "")
 
 
 def state_named(run: xr.Dataset, name: str, caller: str) -> str:

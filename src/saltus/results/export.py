@@ -124,7 +124,15 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
     ResultFileError
         If a file can't be written. None is left half-written.
     """
-    _check(ds, "to_csv", (TRAJECTORY, STROBOSCOPE, RESPONSES))
+    try:
+        _check(ds, "to_csv", (TRAJECTORY, STROBOSCOPE, RESPONSES))
+    except ParameterError as error:
+        if not isinstance(ds, xr.Dataset) or "saltus_result" not in ds.attrs:
+            raise
+        raise ParameterError(
+            f"{error} Write .nc or .mat; or one table of it, ds[['...']].to_dataframe().to_csv({str(path)!r}). "
+            "A study writes its tables as CSV."
+        ) from None
     path = path_of(path)
     if kind_of(ds) == RESPONSES:
         main, side = tables.responses(ds), {"events": tables.events(ds)}

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from saltus.fence import csv_cell
 from saltus.units import from_si
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Rows printed at most; the files hold them all.
 ROWS = 24
@@ -107,6 +111,13 @@ def words(heading: str, values: Any, name: str | None = None) -> Column:
     """Words, or whole numbers that stand for something."""
     found = _items(values)
     return Column(heading, lambda i: str(found[i]), {name or heading: found})
+
+
+def varied(ds: xr.Dataset, trajectories: Any) -> list[Column]:
+    """A column for each parameter that differs from trajectory to trajectory, at the rows of these trajectories."""
+    names = [name for name in json.loads(ds.attrs.get("varied_parameters", "[]")) if name in ds.coords and ds[name].dims == ("trajectory",)]
+    own = [ds[name].sel(trajectory=trajectories) for name in names]
+    return [quantity(name.replace("_", " "), one.values, one.attrs.get("units", "")) for name, one in zip(names, own, strict=True)]
 
 
 def with_error(heading: str, values: Any, errors: Any, form: str = ".4g", unit: str = "") -> Column:

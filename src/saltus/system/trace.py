@@ -31,6 +31,12 @@ R = TypeVar("R")
 
 _HERE = str(Path(__file__).parent.parent)
 _LIBRARIES = tuple({sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None})
+#: How functions are called that people call with their arguments in a row.
+_CALLS = {
+    "freeplay": "sl.freeplay(x, stiffness=..., gap=...), or lower_gap= and upper_gap=, damping= with velocity=, preload=",
+    "piecewise": "sl.piecewise((value, condition), ..., otherwise=value)",
+    "table": 'sl.table(t, points, values, kind="linear", outside="hold")',
+}
 _HOW_TO = "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and functions that can be traced. " + OWN_FUNCTIONS
 
 
@@ -72,8 +78,8 @@ def system(
     states : str or sequence of str
         Names of the states: ``"x v"``.
     forced_at : str, optional
-        The parameter that holds the forcing frequency. It is in Hz (T = 1/f) unless ``units`` says ``"rad/s"``. The equations must
-        repeat after T. Leave out for a system without a period.
+        The parameter that holds the forcing frequency. It is in Hz (T = 1/f) unless its default, such as ``"94.2 rad/s"``, or ``units``
+        says ``rad/s``. The equations must repeat after T. Leave out for a system without a period.
     units : mapping of str to str, optional
         Coherent SI unit of states and parameters: ``{"x": "m", "mass": "kg", "damping_ratio": "1"}``. The unit of a parameter whose
         default is text (``mass="3 kg"``) is known already.
@@ -215,11 +221,16 @@ def _units(
         if name in declared:
             units[name] = check_declared(declared[name], name)
         elif name == forced_at:
-            units[name] = "Hz"
+            units[name] = "rad/s" if _is_angular(defaults[name], name) else "Hz"
         else:
             default = defaults.get(name)
             units[name] = coherent_unit(default, name) if isinstance(default, str) else ""
     return units
+
+
+def _is_angular(default: Any, name: str) -> bool:
+    """Whether a forcing frequency is written in radians, as ``"94.2 rad/s"``; turns and rpm are counted in Hz."""
+    return isinstance(default, str) and "rad" in default and coherent_unit(default, name) == "rad/s"
 
 
 # -- the call ------------------------------------------------------------------------------------------------------------------
@@ -299,6 +310,9 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
     if isinstance(error, NameError) and error.name:
         known = inspect.signature(function).parameters
         return f"{title} ({where}): {error.name!r} is no state, no parameter, and not defined outside either. {nearest(error.name, known)}"
+    for name, call in _CALLS.items():
+        if isinstance(error, TypeError) and str(error).startswith(f"{name}() "):
+            return f"{title} ({where}): sl.{str(error).rstrip('.')}. Write {call}."
     if isinstance(error, TypeError) and "for ^" in str(error):
         return f"{title} ({where}): a power is written x**2; ^ is something else in Python."
     return f"{title} ({where}) can't be traced: {type(error).__name__}: {str(error).rstrip('.?! ')}. {_HOW_TO}"

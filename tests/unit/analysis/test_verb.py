@@ -105,6 +105,20 @@ def test_progress_false_silences_what_is_compiled_and_only_the_outermost_counts(
     assert capfd.readouterr().err == "saltus: compiling an equation, about 20 s\n"
 
 
+@pytest.mark.parametrize(
+    ("call", "teaches"),
+    [
+        (lambda: sl.ODE45(RelTol=1e-4), r"sl\.ODE45 has no option 'RelTol'\. Write rtol="),
+        (lambda: sl.ODE45(rtoll=1e-4), "Did you mean 'rtol'"),
+        (lambda: sl.Taylor(rtol=1e-4), "Known: .*tolerance"),
+        (lambda: sl.ODE45(1e-4, 1e-7, "locate", None, 10, 3), "takes rtol=, atol="),
+    ],
+)
+def test_options_that_a_method_has_not_are_answered_by_those_that_it_has(call, teaches):
+    with pytest.raises(sl.SaltusError, match=teaches):
+        call()
+
+
 # -- what a System isn't -----------------------------------------------------------------------------------------------------------
 def test_a_system_says_what_to_do_in_place_of_calling_or_changing_it():
     with pytest.raises(sl.SaltusError, match=r"sl.simulate\(delangre, \.\.\.\)"):

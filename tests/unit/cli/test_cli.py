@@ -76,6 +76,18 @@ def test_ctrl_c_ends_with_a_message(monkeypatch, tmp_path):
     assert "Traceback" not in result.output
 
 
+def test_ctrl_c_tells_the_command_that_goes_on(monkeypatch, tmp_path):
+    def stopped(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("saltus.study.run.run_study", stopped)
+    (tmp_path / "rig.py").write_text('import saltus as sl\n\n@sl.system(states="x v")\ndef rig(t, x, v, *, k=2.0):\n    return v, -k * x\n')
+    (tmp_path / "a.toml").write_text('[study]\nname = "a"\n[system]\n[poincare]\nsurface = "x turns"\nt_end = "1 s"\n')
+    own, out = f"{tmp_path / 'rig.py'}:rig", tmp_path / "an answer"
+    said = " ".join(saltus("run", str(tmp_path / "a.toml"), "--system", own, "--out", str(out)).output.split())
+    assert f"saltus resume '{out}' --system {own}" in said
+
+
 def test_a_file_that_cannot_be_written(monkeypatch, tmp_path):
     def refused(path):
         raise PermissionError(13, "Permission denied", "/out/demo.csv")

@@ -21,6 +21,14 @@ def texts(ax):
     return [one.get_text() for one in ax.get_legend().get_texts()]
 
 
+def test_maps_are_named_by_their_methods_where_these_differ():
+    ds = agreement_map(A, B).assign_attrs(
+        method_a="ODE45", method_options_a='{"rtol": 1e-4, "atol": 1e-7, "events": "ignore"}', method_b="Taylor"
+    )
+    titles = [one.get_title(loc="left") for one in agreement(ds)]
+    assert titles[:2] == ["ode45, rtol 0.0001, atol 1e-07, contacts not located", "exact"]
+
+
 def test_three_panels():
     panels = agreement(agreement_map(A, B))
     assert [one.get_title(loc="left") for one in panels] == ["map a", "map b", "75.0 % agree"]

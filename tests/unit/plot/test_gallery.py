@@ -4,6 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import saltus as sl
 from saltus.errors import ParameterError
 from saltus.plot import gallery, palette
 from saltus.plot.gallery import title_of
@@ -97,3 +98,24 @@ def test_errors_teach(known, batch, points, which, message):
     with pytest.raises(ParameterError, match=message):
         gallery(*arguments)
     assert not plt.get_fignums()
+
+
+def test_an_equilibrium_is_a_flat_line_and_twins_are_told_apart():
+    """What is left of the motion is rounding; drawn to the height of the picture it looked like an oscillation."""
+
+    @sl.system(states="x v", units={"x": "m", "v": "m/s"})
+    def saddle(t, x, v, *, rate="100 1/s^2", damping="3 1/s"):
+        return v, rate * (sl.sign(x) * sl.min(sl.abs(x), 1e-3) * 2 - x) - damping * v
+
+    starts = {"x": [1.9e-3, -1.9e-3], "v": 0.0}
+    found = sl.attractors(saddle, starts, every=0.3, progress=False)
+    assert found.attractor_type.values.tolist() == ["equilibrium"] * 2
+    runs = sl.simulate(saddle, {name: found[f"attractor_{name}"].values[:, 0] for name in "xv"}, t_end=3.0, progress=False)
+    runs["x"][:] += 1e-18 * np.sin(np.arange(runs.sizes["time"]))
+    figure = gallery(found, runs)
+    for row, place in zip(rows(figure), (-2.0, 2.0), strict=True):
+        low, high = row[0].get_ylim()
+        assert low < place < high
+        assert high - low > 0.1
+        assert f"x = {place:g} mm".replace("-", "\N{MINUS SIGN}") in row[0].get_title(loc="left")
+        assert row[1].texts[0].get_text().startswith("At rest at")

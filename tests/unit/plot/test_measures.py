@@ -115,3 +115,22 @@ def test_each_result_knows_its_picture(name, tmp_path):
     assert draw(tmp_path / "result.nc", None, 1, None).name == f"result-{name}.png"
     with pytest.raises(ParameterError, match="can't be drawn as history"):
         draw(tmp_path / "result.nc", "history", None, None)
+
+
+def test_trajectories_are_named_by_what_varies():
+    def varied(ds):
+        return ds.assign_coords(gap=("trajectory", [1e-3, 2e-3], {"units": "m"})).assign_attrs(varied_parameters='["gap"]')
+
+    assert {"gap = 1 mm", "gap = 2 mm"} <= set(points(sl.plot.section(varied(data.section(2)))))
+    legend = sl.plot.spectrum(varied(data.spectrum(2))).get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["gap = 1 mm", "gap = 2 mm"]
+
+
+def test_words_stay_inside_their_picture():
+    rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    ds = sl.impact_statistics(rig, {"x": ["0.2 mm", "1 mm"], "v": 0.0}, periods=60, transient=300, progress=False)
+    axes = sl.plot.impacts(ds)
+    (words,) = axes.texts
+    assert "The speeds at contact repeat." in words.get_text()
+    axes.figure.canvas.draw()
+    assert words.get_window_extent().x1 < axes.figure.bbox.x1

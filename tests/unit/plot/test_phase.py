@@ -1,9 +1,12 @@
 """A phase portrait: settled part, colours by region, Poincare points at whole periods."""
 
+from itertools import pairwise
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import saltus as sl
 from saltus.errors import ParameterError
 from saltus.plot import phase
 
@@ -121,3 +124,31 @@ def test_too_many_to_tell_apart(batch):
 def test_only_results_are_drawn():
     with pytest.raises(ParameterError, match="simulate or stroboscope"):
         phase([1, 2])
+
+
+def test_a_phase_portrait_shows_a_state_and_its_rate():
+    """Of two masses the second state is another displacement."""
+
+    @sl.system(states="a b va vb")
+    def pair(t, a, b, va, vb, *, gap=0.5):
+        return va, vb, -a, -4 * b - sl.max(b - gap, 0)
+
+    run = sl.simulate(pair, {"a": [1.0, 2.0], "b": 1.0, "va": 0.0, "vb": 0.0}, t_end=5.0, progress=False)
+    ax = phase(run, 0)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("a", "va")
+    ax = phase(run, states=("a", "b"))
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("a", "b")
+    ax.figure.canvas.draw()
+    (name,) = ax.texts
+    assert not name.get_window_extent().overlaps(ax.get_legend().get_window_extent())
+
+
+def test_numbers_under_a_narrow_picture_do_not_touch():
+    @sl.system(states="a w", units={"a": "rad", "w": "rad/s"})
+    def shaft(t, a, w, *, stiffness="100 1/s^2"):
+        return w, -stiffness * a
+
+    ax = phase(sl.simulate(shaft, (7e-4, 0.0), t_end=5.0, progress=False))
+    ax.figure.canvas.draw()
+    boxes = [label.get_window_extent() for label in ax.get_xticklabels() if label.get_text()]
+    assert all(a.x1 < b.x0 for a, b in pairwise(boxes))

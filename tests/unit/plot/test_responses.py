@@ -308,3 +308,16 @@ def all_points_or_none(ax):
 def test_axes_of_the_caller_are_used(peak):
     _, ax = plt.subplots()
     assert frequency_response(peak, ax=ax) is ax
+
+
+def test_a_title_stands_above_the_marks_of_events_and_every_mark_is_its_own():
+    for axes in (frequency_response(resonance()), bifurcation_diagram(cascade())):
+        marks = [line for line in axes.lines if str(line.get_gid()).startswith("event ")]
+        assert marks
+        axes.set_title("a title", loc="left")
+        axes.figure.canvas.draw()
+        title = axes._left_title.get_window_extent()
+        assert all(line.get_window_extent().y1 < title.y0 for line in marks)
+    looks = [marker for _, marker in response_points._EVENTS.values()]
+    assert len(set(looks)) == len(looks)
+    assert not set(looks) & set(response_points.MARKERS[:1])  # the first of several Datasets

@@ -214,7 +214,7 @@ def test_a_single_code_comes_back_as_a_list(engine, tmp_path):
 
 
 def test_csv_says_that_it_is_for_trajectories(tmp_path):
-    with pytest.raises(ParameterError, match="this Dataset is from basins"):
+    with pytest.raises(ParameterError, match=r"this Dataset is from basins\. Write \.nc or \.mat; or one table of it"):
         to_csv(basins(), tmp_path / "map.csv")
 
 

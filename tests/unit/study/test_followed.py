@@ -110,7 +110,8 @@ def test_tables_are_plain_numbers(whole):
 
 def test_without_forcing_lengths_are_times(tmp_path):
     """The transient is left out before the spectrum is taken."""
-    text = '[study]\nname = "free"\n[system]\nmodel = "aeroelastic"\n[spectrum]\nt_end = "2 s"\ntransient = "1 s"\nstates = ["{}"]\n'
+    text = '[study]\nname = "free"\n[system]\nmodel = "aeroelastic"\n[spectrum]\nt_end = "2 s"\ntransient = "1 s"\n'
+    text += 'samples = 200\nstates = ["{}"]\n'
     system = sl.models.aeroelastic()
     state = system.states[0]
     start = ", ".join(f'{name} = {0.01 if system.units[name] in ("", "1") else chr(34) + "0.01 " + system.units[name] + chr(34)}'
@@ -121,6 +122,26 @@ def test_without_forcing_lengths_are_times(tmp_path):
     found = load(tmp_path / "spectrum.nc")
     assert float(found["frequency"][1]) == pytest.approx(1.0)
     assert float(found[f"{state}_amplitude"][0]) == pytest.approx(abs(float(late[state][:-1].mean())), rel=1e-9)
+
+
+def test_without_forcing_a_motion_has_the_samples_that_it_has_in_python_and_rows_name_what_varies(tmp_path):
+    start = '{ plunge = "10 mm", pitch = "2 deg", plunge_rate = "0 m/s", pitch_rate = "0 rad/s" }'
+    asked = f'start = {start}\nt_end = "1 s"\nvalues.airspeed = ["8 m/s", "9 m/s"]\n'
+    head = '[study]\nname = "free"\n[system]\nmodel = "aeroelastic"\n'
+    run(tmp_path, head + "".join(f"[{question}]\n{asked}" for question in ("simulate", "spectrum", "impacts")))
+    motion = sl.simulate(sl.models.aeroelastic(), t_end=1.0, values={"airspeed": [8.0, 9.0]}, threads=1, progress=False)
+    assert load(tmp_path / "run.nc").sizes["time"] == motion.sizes["time"] > 1000
+    for name in ("table", "spectrum", "impact-statistics"):
+        frame = pd.read_csv(tmp_path / f"{name}.csv", comment="#")
+        assert frame["airspeed [m/s]"].tolist() == [8.0 + one for one in frame["trajectory"]], name
+
+
+def test_a_batch_of_frequencies_has_a_spectrum_each(tmp_path):
+    text = HEAD + '[spectrum]\nperiods = 8\ntransient = 40\nvalues.frequency = ["14 Hz", "15 Hz"]\n'
+    run(tmp_path, text, pictures=True)
+    frame = pd.read_csv(tmp_path / "spectrum.csv", comment="#")
+    assert sorted(set(frame["trajectory"])) == [0, 1]
+    assert (tmp_path / "spectrum.png").exists()
 
 
 # -- going on --------------------------------------------------------------------------------------------------------------------

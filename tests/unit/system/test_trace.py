@@ -86,6 +86,27 @@ def test_defaults_with_units():
     assert declared.values["own"] == pytest.approx(4 * math.pi, rel=1e-15)
 
 
+def test_a_default_in_rad_per_second_says_that_the_forcing_is_counted_so():
+    def rig(t, x, v, *, force=1.0, omega="10 rad/s"):
+        return v, force * cos(omega * t) - x
+
+    made = make(rig, forced_at="omega")
+    assert (made.units["omega"], made.values["omega"]) == ("rad/s", 10.0)
+    assert made.period() == pytest.approx(2 * math.pi / 10, rel=1e-15)
+
+    def turning(t, x, v, *, force=1.0, speed="900 rpm"):
+        return v, force * cos(2 * pi * speed * t) - x
+
+    assert make(turning, forced_at="speed").units["speed"] == "Hz"
+
+
+@pytest.mark.parametrize("law", [lambda x: freeplay(x, 4.0, 0.1), lambda x: freeplay(x, k=4.0, gap=0.1)])
+def test_a_law_called_otherwise_is_answered_by_how_it_is_called(law):
+    with pytest.raises(TraceError, match=r"sl\.freeplay\(\) .*Write sl\.freeplay\(x, stiffness=\.\.\., gap=\.\.\.\)") as caught:
+        make(lambda t, x, v: (v, -law(x)))
+    assert "np.interp" not in str(caught.value)
+
+
 def test_a_forcing_frequency_in_rad_per_second():
     def rig(t, x, v, *, omega=10.0):
         return v, cos(omega * t)

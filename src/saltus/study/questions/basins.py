@@ -132,7 +132,7 @@ class Maps(Question):
 
             with plot.style():
                 axes = plot.basins(ds)
-                axes.set_title(job.name, loc="left")
+                axes.set_title(": ".join(filter(None, (job.name, axes.get_title("left")))), loc="left")
                 outcome.files.append(save_picture(axes.figure, folder / f"{job.slug}.png"))
                 if ds.sizes["attractor"] > 0 and ds.attrs["method"] == "Taylor":
                     figure = plot.gallery(ds, _motions(job, ds), attractors=list(range(min(ds.sizes["attractor"], GALLERY))))

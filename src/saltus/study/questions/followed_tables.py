@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.results.schema import states_of
-from saltus.study.table import ROWS, Column, TextTable, number, quantity, table, with_error, words
+from saltus.study.table import ROWS, Column, TextTable, number, quantity, table, varied, with_error, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def section_table(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each crossing, sorted by trajectory and time."""
-    columns = [words("trajectory", ds["crossing_trajectory"].values)] if "trajectory" in ds.dims else []
+    columns = _of_trajectory(ds, ds["crossing_trajectory"].values) if "trajectory" in ds.dims else []
     columns.append(number("time", ds["crossing_time"].values, ".10g", "s"))
     if "crossing_phase" in ds and np.isfinite(ds["crossing_phase"].values).any():
         columns.append(number("phase of the forcing", ds["crossing_phase"].values, ".8f"))
@@ -34,7 +34,7 @@ def spectrum_table(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each line; on the screen the largest ones of the first state, in the order of the file."""
     first = f"{states_of(ds)[0]}_amplitude"
     like, dims = ds[first], _dims(ds[first])
-    columns = [words("trajectory", _flat(ds["trajectory"], like, dims))] if "trajectory" in like.dims else []
+    columns = _of_trajectory(ds, _flat(ds["trajectory"], like, dims)) if "trajectory" in like.dims else []
     columns.append(number("frequency", _flat(ds["frequency"], like, dims), ".8g", "Hz"))
     if "order" in ds.variables:
         columns.append(number("order", _flat(ds["order"], like, dims), ".6g"))
@@ -59,7 +59,7 @@ def impact_table(title: str, ds: xr.Dataset) -> TextTable:
         return _flat(ds[name], like, dims)
 
     speed = _unit(ds["speed_mean"])
-    columns = [words("trajectory", flat("trajectory"))] if "trajectory" in like.dims else []
+    columns = _of_trajectory(ds, flat("trajectory")) if "trajectory" in like.dims else []
     columns += [words("guard", flat("guard").astype(str)), words("contacts", flat("contacts"))]
     rates = [("contacts per second", "contacts_per_second", "1/s"), ("contacts per period", "contacts_per_period", "")]
     columns += [with_error(label, flat(name), flat(f"{name}_error"), unit=unit) for label, name, unit in rates if name in ds]
@@ -76,7 +76,7 @@ def energy_table(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each interval, of each trajectory."""
     like, dims = ds["residual"], _dims(ds["residual"])
     along = str(like.dims[-1])
-    columns = [words("trajectory", _flat(ds["trajectory"], like, dims))] if "trajectory" in like.dims else []
+    columns = _of_trajectory(ds, _flat(ds["trajectory"], like, dims)) if "trajectory" in like.dims else []
     columns.append(number(along, _flat(ds[along], like, dims), ".8g", "s" if along == "time" else ""))
     labels = {"supplied": "supplied", "dissipated": "dissipated", "change": "change", "energy": "stored at the end", "residual": "residual"}
     columns += [quantity(label, _flat(ds[name], like, dims), "J", 6) for name, label in labels.items()]
@@ -89,6 +89,11 @@ def energy_table(title: str, ds: xr.Dataset) -> TextTable:
 TABLES: dict[str, Callable[[str, xr.Dataset], TextTable]] = {
     "poincare": section_table, "spectrum": spectrum_table, "impacts": impact_table, "energy": energy_table,
 }  # fmt: skip
+
+
+def _of_trajectory(ds: xr.Dataset, rows: np.ndarray) -> list[Column]:
+    """Which trajectory a row is of, and the parameters that set it apart."""
+    return [words("trajectory", rows), *varied(ds, rows)]
 
 
 def _unit(values: xr.DataArray) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from saltus.results.schema import kind_text
-from saltus.study.table import ROWS, TextTable, interval, number, table, words
+from saltus.study.table import ROWS, TextTable, interval, number, table, varied, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +24,7 @@ def exponent_table(title: str, ds: xr.Dataset) -> TextTable:
     count, shown = ds.sizes["trajectory"], min(ds.sizes["exponent"], COLUMNS)
     periods = ds["response_period"].values.tolist() if "response_period" in ds else [0] * count
     kinds = [kind_text(str(kind), int(n)) for kind, n in zip(ds["kind"].values, periods, strict=True)]
-    columns = [words("", range(count), "trajectory"), words("motion", kinds)]
+    columns = [words("", range(count), "trajectory"), *varied(ds, ds["trajectory"].values), words("motion", kinds)]
     columns += [number(f"exponent {k + 1}", ds["lyapunov_exponent"].values[:, k], ".6g", unit) for k in range(shown)]
     low, high = (ds[name].values[:, 0] for name in ("lyapunov_low", "lyapunov_high"))
     columns.append(interval("95 % interval of the largest", low, high, "{:.6g}".format, unit))

@@ -38,9 +38,10 @@ class Simulate(Table):
     periods: int | None = Field(None, ge=1, le=MOST_PERIODS, description="Length in forcing periods.", examples=[60])
     t_end: Quantity | None = Field(None, description="End time; in place of periods.", examples=["2 s"])
     t_start: Quantity = Field("0 s", description="Start time.", examples=["0 s"])
-    samples: int = Field(
-        200, ge=1, le=MOST_COUNT, description="Samples per period; over the whole span if the system isn't forced.", examples=[200]
-    )
+    samples: int | None = Field(
+        None, ge=1, le=MOST_COUNT, examples=[200],
+        description="Samples per period, 200 by default; of a system without forcing over the whole span, up to 10 000 by default.",
+    )  # fmt: skip
     keep: int | None = Field(None, ge=1, le=MOST_PERIODS, description="Keep only this many periods at the end.", examples=[12])
     values: dict[str, list[Quantity]] = Field(
         default_factory=dict,

@@ -10,7 +10,7 @@ from saltus.analysis.settled import settled
 from saltus.errors import ParameterError
 from saltus.kernels.status import STATUS
 from saltus.results.schema import end_name, period_text, states_of
-from saltus.study.table import ROWS, TextTable, quantity, table, words
+from saltus.study.table import ROWS, TextTable, quantity, table, varied, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,8 @@ def run_table(title: str, run: xr.Dataset) -> TextTable:
         name for name in ("events", "grazes", "grazes_unresolved", "steps") if name == "events" or name == "steps" or batch[name].any()
     ]
     responses, total = response_texts(run), batch.sizes["trajectory"]
-    columns = [words("", range(total), "trajectory"), words("status", batch["status"].values.astype(str))]
+    columns = [words("", range(total), "trajectory"), *(varied(run, run["trajectory"].values) if "trajectory" in run.dims else [])]
+    columns.append(words("status", batch["status"].values.astype(str)))
     columns += [words({"events": "contacts"}.get(name, name.replace("_", " ")), batch[name].values) for name in counts]
     columns += [
         quantity(f"{name} at the end", batch[end_name(name)].values, batch[name].attrs.get("units", ""), 5) for name in states_of(run)

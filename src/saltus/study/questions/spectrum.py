@@ -22,9 +22,10 @@ class Spectrum(Followed):
     called = "Spectrum"
 
     states: list[str] | None = Field(None, min_length=1, description="Which states; all by default.", examples=[["x"]])
-    samples: int = Field(
-        200, ge=4, le=MOST_COUNT, description="Samples per period; over the whole span if the system isn't forced.", examples=[200]
-    )
+    samples: int | None = Field(
+        None, ge=4, le=MOST_COUNT, examples=[200],
+        description="Samples per period, 200 by default; of a system without forcing over the whole span, up to 10 000 by default.",
+    )  # fmt: skip
     window: Literal["none", "hann"] | None = Field(
         None, description="By default none where the response repeats, else hann.", examples=["hann"]
     )
