@@ -14,11 +14,11 @@ import llvmlite.binding as llvm
 from saltus.errors import CacheError, ParameterError, nearest, shown
 
 #: Rises when the same templates and equations would be made into other code: entries of the cache carry it in their names.
-PIPELINE = 2
+PIPELINE = 3
+#: LLVM's level for a template, and for an equation alone: that is straight lines of lanes, of which level 3 makes nothing faster (0026).
+LEVEL, LEVEL_ALONE = 3, 1
 #: Only one thread at a time: LLVM keeps modules in one context.
 _LLVM = threading.Lock()
-#: Characters of IR beyond which LLVM takes less trouble: a third of the time saved (0022).
-LONG = 1_500_000
 _NUMBER = itertools.count()
 
 
@@ -85,8 +85,9 @@ def object_code(
         the time, and gains nothing there (0028).
     """
     made_for = chosen or target()
+    alone = template is None
     with _LLVM:
-        machine = _target_machine(made_for)
+        machine = _target_machine(made_for, LEVEL_ALONE if alone else LEVEL)
         modules = [llvm.parse_bitcode(template)] if template is not None else []
         modules += [llvm.parse_assembly(text) for text in texts]
         module = modules[0]
@@ -98,13 +99,12 @@ def object_code(
             if not one.is_declaration:
                 one.linkage = "external" if one.name in called else "internal"
         module.verify()
-        quickly = sum(map(len, texts)) > LONG
-        _optimise(module, machine, 1 if quickly or open_sizes else 3, open_sizes)
-        return (_target_machine(made_for, 1) if quickly else machine).emit_object(module)
+        _optimise(module, machine, LEVEL_ALONE if alone or open_sizes else LEVEL, open_sizes)
+        return machine.emit_object(module)
 
 
 @lru_cache(maxsize=4)
-def _target_machine(made_for: Target, level: int = 3) -> llvm.TargetMachine:
+def _target_machine(made_for: Target, level: int = LEVEL) -> llvm.TargetMachine:
     if made_for.triple == llvm.get_process_triple():
         llvm.initialize_native_target()
         llvm.initialize_native_asmprinter()

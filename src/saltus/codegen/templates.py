@@ -23,7 +23,7 @@ BITCODE: dict[str, tuple[Interface, int]] = {
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")
 #: Rises when codegen/lowering makes other bitcode of the same templates.
-LOWERING = 2
+BITCODE_VERSION = 2
 
 
 @cache
@@ -41,7 +41,7 @@ def _texts(name: str) -> list[str]:
 
 def _hash(name: str, texts: list[str]) -> str:
     interface, lanes = BITCODE[name]
-    return hashlib.sha256("\0".join([*texts, repr(interface), str(lanes), str(LOWERING)]).encode()).hexdigest()
+    return hashlib.sha256("\0".join([*texts, repr(interface), str(lanes), str(BITCODE_VERSION)]).encode()).hexdigest()
 
 
 @cache

@@ -14,8 +14,8 @@ from saltus.kernels.lanes import any_lane, bits, fma, larger, load, magnitude, r
 def bound_series(lanes, h):
     """For every series that a gap reads: its first three terms at h, its change over h, its slope there, a bound of what follows its cubic.
 
-    Fills `bounds`: for x in [0, 1], gap(x h) = gap(0) + t1 x + t2 x^2 + t3 x^3 + rest(x), |rest| <= W/6, |rest'| <= W/2, |rest''| <= W
-    with W = sum of k(k-1)|t_k| for k >= 4 (k(k-1) >= 2k >= 6 there).
+    Fills `bounds`: for x in [0, 1], gap(x h) = gap(0) + t1 x + t2 x^2 + t3 x^3 + rest(x), |rest| <= x^4 W/12, |rest'| <= W/3, |rest''| <= W
+    with W = sum of k(k-1)|t_k| for k >= 4 (k(k-1) >= 3k >= 12 there); so it is for rest/x, with x^3.
     """
     work, bounds = lanes.work, lanes.bounds
     for j in range(NSERIES):
@@ -55,34 +55,41 @@ def without_known_root(on_boundary, a0, a1, a2, a3):
 
 @inner
 def locate(lanes, h):
-    """Find the lanes whose gaps may close within h. Fills NEAREST, TURNED, WHICH, SIGN, DEPTH, ONBOARD, SERIES for those with one proven
-    crossing; returns those undecided.
+    """Find the lanes whose gaps may close within h. Fills NEAREST and TURNED, and WHICH and what `found` holds of that gap for those with a
+    first crossing that is proven; returns those undecided.
     """
     bound_series(lanes, h)
-    nothing, none = splat(0.0, LANES), splat(-1.0, LANES)
     store(lanes.found, NEAREST, splat(math.inf, LANES))
-    store(lanes.found, TURNED, nothing)
-    store(lanes.found, WHICH, none)
-    store(lanes.found, SIGN, nothing)
-    store(lanes.found, DEPTH, nothing)
-    store(lanes.found, ONBOARD, nothing)
-    store(lanes.found, SERIES, none)
+    store(lanes.found, TURNED, splat(0.0, LANES))
+    store(lanes.found, WHICH, splat(-1.0, LANES))
+    store(lanes.found, SERIES, splat(-1.0, LANES))
     undecided = splat(0.0, LANES) > 1.0
     for g in range(NGUARDS):
-        clear, crosses = classify(lanes, g, h)
-        undecided = undecided | (~(clear | crosses)) | choose(lanes, g, crosses)
+        undecided = undecided | classify(lanes, g, h)
     undecided = undecided & (load(lanes.run, ACTIVE, LANES) > 0.5)
     store(lanes.found, WHICH, select(undecided, -1.0, load(lanes.found, WHICH, LANES)))
     return undecided
 
 
 @inner
+def one_way(p1, p2, p3, rest):
+    """Where a gap p0 + p1 x + p2 x^2 + p3 x^3 + rest falls, rises, is concave, is convex on all of [0, 1]; see `bound_series`."""
+    bend = 2.0 * p2
+    falls = p1 + larger(bend + larger(3.0 * p3, 0.0), 0.0) + (1.0 / 3.0) * rest < 0.0
+    rises = p1 + smaller(bend + smaller(3.0 * p3, 0.0), 0.0) - (1.0 / 3.0) * rest > 0.0
+    concave = larger(bend, bend + 6.0 * p3) + rest < 0.0
+    convex = smaller(bend, bend + 6.0 * p3) - rest > 0.0
+    return falls, rises, concave, convex
+
+
+@inner
 def classify(lanes, g, h):
-    """Where a gap is proven clear over the step, and where it is proven to cross; notes how near the clear ones come, where they turn.
+    """Tell where a gap is clear over the step, and where it crosses: `choose` then. Returns where neither is proven.
 
     A gap P (P/x where the root at 0 is known) is p0 + p1 x + p2 x^2 + p3 x^3 + rest on [0, 1]. If it is monotone or concave its end
     decides; if it is convex it crosses once where it ends below zero, and twice where its vertex is proven to be; else its quadratic part
-    less the bounds of what follows decides, or the slow path does. What lies within the rounding error of the gap is never proven.
+    less the bounds of what follows decides, or the part of the step up to the crossing that is predicted (`crosses_sooner`), or the slow
+    path does. What lies within the rounding error of the gap is never proven. How near clear gaps come, and when, goes to NEAREST, TURNED.
     """
     j, on_boundary = BOUNDS * GUARD_SERIES[g], load(lanes.fresh, g, LANES) > 0.5
     a0, a1, a2, a3, end = terms_of_gap(lanes, g)
@@ -92,50 +99,112 @@ def classify(lanes, g, h):
     inherited = load(lanes.prior, PRIOR_ROWS * g + NEW, LANES)
     store(lanes.prior, PRIOR_ROWS * g + OLD, inherited)
     noise = ROUNDING * (size + inherited)
-    bend = 2.0 * p2
-    turns = (p1 < 0.0) & (p1 + bend > 0.0)
-    flat_at = -p1 / bend  # where the quadratic part turns
+    turns = (p1 < 0.0) & (p1 + 2.0 * p2 > 0.0)
+    flat_at = -p1 / (2.0 * p2)  # where the quadratic part turns
     vertex = p0 + 0.5 * p1 * flat_at
     lowest = select(turns, vertex, smaller(p0, p0 + p1 + p2)) + smaller(p3, 0.0)
-    falls = p1 + larger(bend, 0.0) + larger(3.0 * p3, 0.0) + 0.5 * rest < 0.0
-    rises = p1 + smaller(bend, 0.0) + smaller(3.0 * p3, 0.0) - 0.5 * rest > 0.0
-    concave = larger(bend, bend + 6.0 * p3) + rest < 0.0
-    convex = smaller(bend, bend + 6.0 * p3) - rest > 0.0
+    falls, rises, concave, convex = one_way(p1, p2, p3, rest)
     dips = convex & turns & (6.0 * (vertex + larger(p3, 0.0) + noise) + rest < 0.0)
     inside = p0 > 0.0
     clear = inside & (((falls | rises | concave) & (end > noise)) | (6.0 * (lowest - noise) > rest))
-    crosses = inside & (((end < -noise) & (falls | concave | convex)) | dips)
+    once = inside & (end < -noise) & (falls | concave | convex)
     slope_at_end = load(lanes.side, g, LANES) * GUARD_SIGN[g] * load(lanes.bounds, j + SLOPE_AT_END, LANES)
     place = larger(smaller(flat_at, 1.0), 0.0)
     depth, margin = fma(fma(fma(a3, place, a2), place, a1), place, a0), load(lanes.found, NEAREST, LANES)
     nearer = clear & (~on_boundary) & (a1 < 0.0) & (slope_at_end > 0.0) & (depth < margin)
     store(lanes.found, NEAREST, select(nearer, depth, margin))
     store(lanes.found, TURNED, select(nearer, place * h, load(lanes.found, TURNED, LANES)))
-    return clear, crosses
+    until = select(once, splat(1.0, LANES), 0.0)
+    closes = (load(lanes.run, ACTIVE, LANES) > 0.5) & inside & (~clear)
+    if any_lane(closes):
+        sooner = closes & (~once) & (~dips)
+        if any_lane(sooner):
+            until = select(sooner, crosses_sooner(on_boundary, p0, p1, p2, p3, rest, noise), until)
+        crosses = closes & (dips | (until > 0.0))
+        unordered = choose(lanes, g, crosses, until, p0, p1, p2, p3, rest, noise) if any_lane(crosses) else crosses
+        return unordered | (~(clear | crosses))
+    return ~clear
 
 
 @inner
-def choose(lanes, g, crosses):
+def crosses_sooner(on_boundary, p0, p1, p2, p3, rest, noise):
+    """Share of the step, just behind the crossing that the quadratic part predicts, within which a gap is proven to cross once; or 0."""
+    share = smaller(BEHIND * first_root(p0, p1, p2), 1.0)
+    square = share * share
+    p1, p2, p3 = p1 * share, p2 * square, p3 * square * share
+    rest = rest * square * share * select(on_boundary, 1.0, share)
+    falls, _, concave, convex = one_way(p1, p2, p3, rest)
+    ends_below = 12.0 * (p0 + p1 + p2 + p3 + noise) + rest < 0.0
+    return select(ends_below & (falls | concave | convex), share, 0.0)
+
+
+@inner
+def first_root(p0, p1, p2):
+    """Where p0 + p1 x + p2 x^2, positive at 0, is zero first; infinite if it isn't."""
+    discriminant = p1 * p1 - 4.0 * p0 * p2
+    x = 2.0 * p0 / (root(larger(discriminant, 0.0)) - p1)
+    return select((discriminant >= 0.0) & (x > 0.0), x, math.inf)
+
+
+@inner
+def choose(lanes, g, crosses, until, p0, p1, p2, p3, rest, noise):
     """Make guard g the one that a lane crosses, where it is the first; returns the lanes in which that isn't known.
 
-    Gaps of one state, on the same side of it, differ by a constant: the nearer closes first.
+    Gaps of one state, on the same side of it, differ by a constant: the nearer closes first. Of others one is proven to be below zero at a
+    place between the two crossings that are predicted, the other above zero at a later one: so they are no one event either.
     """
     found, row = lanes.found, GUARD_ROW[g]
-    s = load(lanes.side, g, LANES) * GUARD_SIGN[g]
-    fresh, which, nearest = load(lanes.fresh, g, LANES), load(found, WHICH, LANES), load(found, DEPTH, LANES)
-    a0 = load(lanes.side, g, LANES) * load(lanes.work, GAP_ROW + g, LANES)
-    crosses, taken = crosses & (load(lanes.run, ACTIVE, LANES) > 0.5), which >= 0.0
+    s, fresh = load(lanes.side, g, LANES) * GUARD_SIGN[g], load(lanes.fresh, g, LANES)
+    a0, nearest = load(lanes.side, g, LANES) * load(lanes.work, GAP_ROW + g, LANES), load(found, DEPTH, LANES)
+    taken = load(found, WHICH, LANES) >= 0.0
     same_series = magnitude(load(found, SERIES, LANES) - row) < 0.5
     parallel = same_series & (s * load(found, SIGN, LANES) > 0.0) & (magnitude(a0 - nearest) > 0.0) & (~(fresh > 0.5))
+    first = crosses & ((~taken) | (parallel & (a0 < nearest)))
     unknown = crosses & taken & (~parallel)
-    crosses = crosses & ((~taken) | (a0 < nearest))
-    if any_lane(crosses):
-        store(found, WHICH, select(crosses, float(g), which))
-        store(found, DEPTH, select(crosses, a0, nearest))
-        store(found, SIGN, select(crosses, s, load(found, SIGN, LANES)))
-        store(found, SERIES, select(crosses, float(row), load(found, SERIES, LANES)))
-        store(found, ONBOARD, select(crosses, fresh, load(found, ONBOARD, LANES)))
+    if any_lane(unknown):
+        x, y = first_root(p0, p1, p2), first_root(load(found, P0, LANES), load(found, P1, LANES), load(found, P2, LANES))
+        near, far = 0.625 * x + 0.375 * y, 0.375 * x + 0.625 * y
+        apart = unknown & (magnitude(x - y) > TOGETHER)
+        ours, ours_at_most = enclosed(near, fresh > 0.5, p0, p1, p2, p3, rest, noise)
+        theirs, theirs_at_most = enclosed_chosen(found, far)
+        sooner = apart & (x < y) & (ours_at_most < 0.0) & (theirs > 0.0) & (far <= load(found, UNTIL, LANES))
+        later = apart & (x > y) & (theirs_at_most < 0.0) & (ours > 0.0) & (near <= until)
+        first, unknown = first | sooner, unknown & (~sooner) & (~later)
+    keep(found, WHICH, first, splat(float(g), LANES))
+    keep(found, SERIES, first, splat(float(row), LANES))
+    keep(found, DEPTH, first, a0)
+    keep(found, SIGN, first, s)
+    keep(found, ONBOARD, first, fresh)
+    keep(found, UNTIL, first, until)
+    if NGUARDS > 1:
+        keep(found, P0, first, p0)
+        keep(found, P1, first, p1)
+        keep(found, P2, first, p2)
+        keep(found, P3, first, p3)
+        keep(found, PREST, first, rest)
+        keep(found, PNOISE, first, noise)
     return unknown
+
+
+@inner
+def keep(rows, row, wanted, value):
+    """Write a value to a row in the lanes wanted."""
+    store(rows, row, select(wanted, value, load(rows, row, LANES)))
+
+
+@inner
+def enclosed(x, on_boundary, p0, p1, p2, p3, rest, noise):
+    """Between what a gap proven to be p0 + ... + rest lies at x in [0, 1], rounding and all."""
+    value = fma(fma(fma(p3, x, p2), x, p1), x, p0)
+    error = noise + (rest * x * x * x) * select(on_boundary, splat(1.0 / 12.0, LANES), x * (1.0 / 12.0))
+    return value - error, value + error
+
+
+@inner
+def enclosed_chosen(found, x):
+    """:func:`enclosed` of the gap chosen so far."""
+    p0, p1, p2, p3 = load(found, P0, LANES), load(found, P1, LANES), load(found, P2, LANES), load(found, P3, LANES)
+    return enclosed(x, load(found, ONBOARD, LANES) > 0.5, p0, p1, p2, p3, load(found, PREST, LANES), load(found, PNOISE, LANES))
 
 
 @inner
@@ -159,6 +228,8 @@ def newton(terms, base, found, h, wanted):
     without touching the others.
     """
     s, depth, fresh = load(found, SIGN, LANES), load(found, DEPTH, LANES), load(found, ONBOARD, LANES) > 0.5
+    until = load(found, UNTIL, LANES)
+    h = select(until > 0.0, until * h, h)
     x1, x2, x3 = load(terms, base + 1, LANES), load(terms, base + 2, LANES), load(terms, base + 3, LANES)
     a, b, c = select(fresh, s * x1, depth), s * select(fresh, x2, x1), s * select(fresh, x3, x2)
     x = 2.0 * a / (root(larger(b * b - 4.0 * a * c, 0.0)) - b)

@@ -40,9 +40,10 @@ END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED, BOUNCES, STARTING, MET, SHA
 RUN_ROWS = 18
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
-# Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when;
-# of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1), the row of its series.
-DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, FOUND_ROWS = range(10)
+# Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when.
+# Of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1), the row of its series, the share of the step within
+# which it crosses just once (0: it crosses twice); P, or P/x if it is fresh, on [0, 1]: terms 0 to 3, bound of the rest, rounding error.
+DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, UNTIL, P0, P1, P2, P3, PREST, PNOISE, FOUND_ROWS = range(17)
 # Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that it found to cross (bits), guards on
 # which the state rests (bits), whether a harmonic of time has another phase in every period, whether this step isn't made of numbers.
 WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN = range(7)

@@ -13,10 +13,10 @@ COLD = {
     "note_touch", "note_touches", "is_exact_zero", "final_contacts", "start_sides", "fill", "empty", "refill", "set_period", "is_broken",
     "record", "saltate", "overflowed", "end_stretch", "is_slow", "periods_behind", "write_samples",
 }  # fmt: skip
-#: Functions of lanes that few equations need: they stay functions, out of the way of the others.
-APART = {"probed", "look_ahead", "negligible_step", "add_what_was_left_out"}
-#: Functions that are called once a contact: inlining them would cost time of compiling, and gain none.
-_LEFT = {"attend", "change_side", "land_all"}
+#: Functions of lanes that few equations need: never inlined, so that they are out of the way of the others.
+NOINLINE = {"probed", "look_ahead", "negligible_step", "add_what_was_left_out"}
+#: Functions that run once a contact: inlined only where LLVM's cost model says so. Always would take time to compile, and gain none.
+_BY_COST_MODEL = {"attend", "change_side", "land_all"}
 _MANGLED = re.compile(r"_ZN8template(\d+)(\w+)")
 
 
@@ -54,11 +54,11 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
 def _advise(function: llvm.ValueRef, inlined: set[str]) -> None:
     """Tell LLVM what is to be inlined and what is rarely run."""
     own = function.name.split(".")[1] if "." in function.name else function.name
-    if own in APART:
+    if own in NOINLINE:
         function.add_function_attribute("noinline")
     elif own in COLD:
         function.add_function_attribute("cold")
-    elif own in inlined - _LEFT | {"numba"}:
+    elif own in inlined - _BY_COST_MODEL | {"numba"}:
         function.add_function_attribute("alwaysinline")
 
 
