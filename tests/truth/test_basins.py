@@ -449,9 +449,9 @@ def test_long_chaotic_transients_are_no_attractor(monkeypatch):
 
 # -- fractions -----------------------------------------------------------------------------------------------------------------
 def test_intervals_of_fractions_hold_those_of_a_fine_map():
-    """Wilson's 95 % intervals; four of them at once are widened to 99.9 %: 3.29 / 1.96 times as wide. The fine map: 200 x 200 cells."""
+    """Wilson's 95 % intervals; four of them at once are widened to 99.9 %: 3.29 / 1.96 times as wide. The fine map: 120 x 120 cells."""
     rig = sl.models.delangre("a", frequency=17.0)
-    fine = sl.basins(rig, **box(200))
+    fine = sl.basins(rig, **box(120))
     some = sl.basin_fractions(rig, samples=2000, x=SPAN_X, v=SPAN_V, progress=False)
     assert some.attractor_period.values.tolist() == fine.attractor_period.values.tolist() == [1, 1, 3, 9]
     share, wide = some.attractor_fraction.values, 3.29 / 1.96

@@ -292,14 +292,22 @@ def test_other_motions_of_the_lorenz_system():
 def test_a_freeplay_wing_at_rest_has_the_eigenvalues_of_its_jacobian():
     """Two pairs of complex eigenvalues: growth swings about their real parts, and its means are no exponents yet."""
 
-    @sl.system(states="x y vx vy")
-    def wing(t, x, y, vx, vy, *, gap=0.1, stiffness=40.0):
-        return vx, vy, 3 * y - 100 * x - vx, 2 * x - 8 - sl.freeplay(y, stiffness=stiffness, gap=gap) - 0.7 * vy
+    @sl.system(states="h a vh va")
+    def wing(t, h, a, vh, va, *, speed=10.0, free=math.pi / 180):
+        angle = a + vh / speed + 0.03 * va / speed
+        lift = 0.6231645 * speed**2 * angle
+        force, moment = -lift - 2800 * h - 27 * vh, 0.03 * lift - sl.freeplay(a, stiffness=40.0, gap=free) - 0.18 * va
+        return vh, va, (0.065 * force - 0.4 * moment) / 0.62, (12 * moment - 0.4 * force) / 0.62
 
-    ds = sl.lyapunov(wing, (0.0, -1.0, 0.0, 0.0), every=0.2, periods=300, transient=200, values={"stiffness": [40.0, 900.0]})
-    for one, stiffness in zip(ds["lyapunov_exponent"].values, (40.0, 900.0), strict=True):
-        matrix = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-100, 3, -1, 0], [2, -stiffness, 0, -0.7]])
-        assert np.abs(one - np.sort(np.linalg.eigvals(matrix).real)[::-1]).max() < 1e-12
+    start, speeds = (0.0, math.radians(4), 0.0, 0.0), [8.0, 12.0]
+    ds = sl.lyapunov(wing, start, every=0.2, periods=300, transient=200, values={"speed": speeds})
+    for one, speed in zip(ds["lyapunov_exponent"].values, speeds, strict=True):
+        moving = wing.with_values(speed=speed)
+        run = sl.simulate(moving, start, t_end=60.0)
+        place = np.array([run[f"end_{name}"].item() for name in wing.states])
+        steps = 1e-5 * np.eye(4)  # the law is linear about it
+        matrix = np.array([np.subtract(moving.rhs(0, place + step), moving.rhs(0, place - step)) / 2e-5 for step in steps]).T
+        assert np.abs(one - np.sort(np.linalg.eigvals(matrix).real)[::-1]).max() < 1e-7
     assert ds["kind"].values.tolist() == ["equilibrium"] * 2
     assert np.abs(ds["exponent_sum"] - ds["mean_divergence"]).max() < 1e-12
 

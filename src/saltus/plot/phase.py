@@ -105,7 +105,7 @@ def _pair(run: xr.Dataset, states: Any) -> tuple[str, str]:
         if len(known) < 2:
             raise ParameterError(f"{_CALLER}: a phase portrait needs two states, this system has only {known[0]!r}. See plot.history.")
         return known[0], selection.rate_of(run, known[0]) or known[1]
-    if not isinstance(states, list | tuple | np.ndarray) or len(states) != 2:
+    if not isinstance(states, list | tuple | np.ndarray) or getattr(states, "shape", None) == () or len(states) != 2:
         raise ParameterError(f"{_CALLER}: states={shown(states)}. Give two names, such as states={known[:2]!r}.")
     first, second = (selection.state_named(run, name, _CALLER) for name in states)
     return first, second

@@ -135,6 +135,8 @@ def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale
         sizes = {prefix + unit: size for prefix, size in known.items()}
         if _ANGLE.match(unit):
             sizes |= {f"m{unit}": 1e-3, _ANGLE.sub("deg", unit): math.pi / 180}
+        if isinstance(wanted, str) and wanted.startswith("u"):  # as keyboards write µ
+            wanted = f"µ{wanted[1:]}"
         if among(wanted, sizes):
             return Scale(1 / sizes[wanted], wanted)
         choice = ", ".join(sizes)

@@ -103,6 +103,7 @@ def test_colours_of_guards_that_bound_no_state(run):
     ("arguments", "message"),
     [
         ({"states": "x"}, "Give two names"),
+        ({"states": np.array(None)}, "Give two names"),
         ({"states": ("x", "w")}, "no state 'w'"),
         ({"units": {"V": "m/s"}}, "no state 'V'"),
         ({"trajectory": 9}, "no trajectory 9"),

@@ -129,3 +129,7 @@ def test_a_notebook_stays_interactive(tmp_path):
     paths = os.pathsep.join([str(tmp_path), *sys.path])
     environment = os.environ | {"MPLBACKEND": "module://notebook_backend", "PYTHONPATH": paths}
     subprocess.run([sys.executable, "-c", program], env=environment, check=True)
+
+
+def test_micro_is_understood_as_keyboards_write_it():
+    assert display_scale("m", 1e-4, "um") == display_scale("m", 1e-4, "µm")
