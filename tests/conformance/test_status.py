@@ -127,9 +127,9 @@ def test_a_slow_drive_takes_the_steps_it_needs():
 
 
 def test_a_run_that_would_never_end_says_how_long_it_takes():
-    """A drive of 1e-6 Hz on the rig, whose force is then 2e12 N: stopped after a million steps, with what the whole would take."""
+    """A drive of 1e-6 Hz on the rig, whose force is then 2e12 N: stopped soon, with what the whole would take."""
     rig = sl.models.delangre("b", frequency=1e-6)
-    with pytest.warns(sl.errors.SaltusWarning, match=r"of 1e\+06 s far in 1000001 steps: at this pace .* steps \(some .* days\)"):
+    with pytest.warns(sl.errors.SaltusWarning, match=r"of 1e\+06 s far in \d+ steps: at this pace .* steps \(some .* days\)"):
         run = sl.simulate(rig, (0.0, 0.0), periods=1, samples=1, time_errors="local")
     assert str(run.status.values) == "budget_steps"
 

@@ -16,14 +16,11 @@ from saltus.analysis.growth import GOOD, Growth, carry, grow
 from saltus.analysis.orbits import Orbit, polish
 from saltus.analysis.recurrence import NEAR, ROUND, SAME, recurrence
 from saltus.analysis.walks import Walk
-from saltus.analysis.wandering import SURE, UNCLEAR
+from saltus.analysis.wandering import BOUNDED, SURE, UNCLEAR
 from saltus.flow.maps import Map
 
 #: Points at which running means are kept: what a picture needs.
 RUNNING = 200
-#: Logarithm of the growth that a deviation may make on its way round a motion that repeats or nearly so: a factor of fifty. Over n blocks
-#: an exponent below this part of it can't be told from zero.
-BOUNDED = 4.0
 #: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the rounding of the faster: three digits are left.
 LOST = 29.0
 #: Factor on the rounding of a monodromy matrix beyond which a multiplier is lost, and blocks of the round trips that find it then.
@@ -176,7 +173,7 @@ def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
     limit = np.maximum(SURE * errors, BOUNDED / len(rates))
     if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # not one that was chaotic only at first
         return "chaotic"
-    if abs(second[0]) > limit[0]:
+    if abs(second[0]) > min(limit[0], 2 * BOUNDED / len(rates)):  # zero only if what grew stays bounded, however wide the error is
         return "unclear"
     if forced:
         return "quasi_periodic"

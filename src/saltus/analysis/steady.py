@@ -16,7 +16,7 @@ from saltus.analysis import unforced
 from saltus.analysis.equilibria import autonomous
 from saltus.analysis.polish import Closed, close
 from saltus.analysis.recurrence import LONGEST, ROUND, recurrence
-from saltus.analysis.wandering import growth_rates, kind_of_growth
+from saltus.analysis.wandering import kinds_of
 from saltus.flow.engine import Schedule
 from saltus.flow.family import Family
 from saltus.flow.threads import on_threads
@@ -198,7 +198,7 @@ def _settled_unforced(family: Family, points: np.ndarray, who: np.ndarray, near:
 def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) -> np.ndarray:
     """Type the trajectories that don't recur by their exponents; writes what is known, returns those that stay unclear."""
     maps = family.rows(who)
-    state, blocks = growth_rates(maps, start[who], result.scale[who])
+    state, kinds = kinds_of(maps.rows, start[who], result.scale[who], [[i] for i in range(len(who))])
     flight = maps.launch(state, TRAIL)
     trail = flight.advance(TRAIL)
     recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR_AT_LAST, maps.noise(result.scale[who]))  # by now
@@ -209,7 +209,7 @@ def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) 
         away = unforced.runs_away(trail)
         result.kind[who[away]] = ESCAPED
     for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2))):
-        kind = kind_of_growth(blocks[:, [i]])
+        kind = kinds[i]
         if (
             result.kind[who[i]] != ESCAPED
             and kind is not None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +17,15 @@ from saltus.flow.maps import Map
 
 #: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its way.
 BLOCK, BLOCKS, ALIGNING = 8, 192, 48
+#: Times that the exponent is measured at most, each time going on from where the last ended, until it says what the motion is.
+MEASURED = 4
 #: Standard errors that an exponent must be from zero.
 SURE = 4.0
 #: Exponent [per iterate] that is taken for zero whatever its error.
 FLOOR = 2e-3
+#: Logarithm of the growth that a deviation may make on its way round a motion that repeats or nearly so: a factor of fifty. Over n blocks
+#: an exponent below this part of it can't be told from zero; one above it isn't zero, whatever its error.
+BOUNDED = 4.0
 #: A trail that repeats to this, in units of the scale, is an orbit's; one whose repeats become so many times better is on its way to one.
 REPEATS, SETTLING = 1e-6, 0.05
 #: Standard error [per iterate] beyond which an exponent says nothing.
@@ -117,7 +123,6 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
     usable = [i for i in range(len(start)) if np.isfinite(points[i]).all() and not _settles(points[i], scale)]
     if not usable:
         return []
-    _, blocks = growth_rates(map_, start[usable], scale)
     groups: list[list[int]] = []
     trails = [Wandering("", 0.0, 0.0, points[i], scale) for i in usable]
     for i, trail in enumerate(trails):
@@ -126,8 +131,8 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
             groups.append([i])
         else:
             home.append(i)
-    kinds = [(group, kind_of_growth(blocks[:, group])) for group in groups]
-    return [Wandering(*kind, points[usable[group[0]]], scale) for group, kind in kinds if kind is not None]
+    _, kinds = kinds_of(lambda _: map_, start[usable], np.broadcast_to(scale, start[usable].shape), groups)
+    return [Wandering(*kind, points[usable[group[0]]], scale) for group, kind in zip(groups, kinds, strict=True) if kind is not None]
 
 
 def _settles(trail: np.ndarray, scale: np.ndarray) -> bool:
@@ -153,7 +158,45 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
         return None
     if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():  # growth like t looks positive at first
         return "chaotic", exponent, error
-    return ("quasi_periodic", exponent, error) if abs(second.mean()) <= max(SURE * error, FLOOR) else None
+    zero = max(FLOOR, min(SURE * error, BOUNDED / (len(second) * BLOCK)))
+    return ("quasi_periodic", exponent, error) if abs(second.mean()) <= zero else None
+
+
+def kinds_of(
+    part: Callable[[np.ndarray], Map | Family], start: np.ndarray, scale: np.ndarray, groups: Sequence[Sequence[int]]
+) -> tuple[np.ndarray, list[tuple[str, float, float] | None]]:
+    """What motions that never repeat are: their exponents are measured for longer while they could be zero as well as positive.
+
+    Parameters
+    ----------
+    part : callable
+        The map for some of the trajectories, by their numbers int64[m].
+    start, scale : float64[k, D]
+        Where trajectories stand, and the range of each state.
+    groups : sequence of sequence of int
+        Trajectories that are on one attractor.
+
+    Returns
+    -------
+    end : float64[k, D]
+        Where they stand then.
+    kinds : list
+        (kind, exponent, its standard error) of each group; None if they don't say even then.
+    """
+    state, blocks = growth_rates(part(np.arange(len(start))), start, scale)
+    rates = list(blocks.T)
+    kinds = [kind_of_growth(np.stack([rates[i] for i in group], axis=1)) for group in groups]
+    for _ in range(MEASURED - 1):
+        again = [n for n, kind in enumerate(kinds) if kind is None and all(np.isfinite(rates[i]).all() for i in groups[n])]
+        if not again:
+            break
+        rows = np.concatenate([groups[n] for n in again])
+        state[rows], blocks = growth_rates(part(rows), state[rows], scale[rows])
+        for i, more in zip(rows.tolist(), blocks.T, strict=True):
+            rates[i] = np.append(rates[i], more)
+        for n in again:
+            kinds[n] = kind_of_growth(np.stack([rates[i] for i in groups[n]], axis=1))
+    return state, kinds
 
 
 def growth_rates(map_: Map | Family, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,11 +13,11 @@ import xarray as xr
 from saltus.analysis.batch_means import CONFIDENCE, batch_means
 from saltus.analysis.embedding import embed as embedded
 from saltus.analysis.embedding import false_neighbours, first_minimum, hardly_correlated, least_dimension
-from saltus.analysis.lyapunov_spectrum import BOUNDED, running_ends
+from saltus.analysis.lyapunov_spectrum import running_ends
 from saltus.analysis.neighbours import CROWD, Evolutions, Search, crowd_distance, follow
 from saltus.analysis.series import LEAST_POINTS, check_length, columns_of, interval_of, samples_of
 from saltus.analysis.verb import verb
-from saltus.analysis.wandering import UNCLEAR
+from saltus.analysis.wandering import BOUNDED, UNCLEAR
 from saltus.errors import ParameterError, SaltusWarning, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.results import exponents_dataset

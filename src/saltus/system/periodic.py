@@ -150,10 +150,10 @@ def _not_periodic(system: System, entry: int, period: float) -> str:
     what = f"d{system.states[entry]}/dt" if entry < count else f"the boundary {system.guards[entry - count].name!r}"
     name = system.forced_at or ""
     unit = system.units[name]
-    drives = {"Hz": f"cos(2*pi*{name}*t)", "rad/s": f"cos({name}*t)"}
-    other = "rad/s" if unit == "Hz" else "Hz"
+    hertz, radians = f"cos(2*pi*{name}*t)", f"cos({name}*t)"
+    drive, another, other = (radians, hertz, "Hz") if unit == "rad/s" else (hertz, radians, "rad/s")
     return (
         f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by forced_at={name!r} [{unit}]. "
-        f"Write the drive as {drives[unit]}, or as {drives[other]} with units={{{name!r}: {other!r}}}; let every other forcing "
+        f"Write the drive as {drive}, or as {another} with units={{{name!r}: {other!r}}}; let every other forcing "
         f"frequency be a multiple of it; or say forced_at=None for a system without a period."
     )

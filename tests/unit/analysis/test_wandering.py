@@ -7,7 +7,7 @@ import pytest
 
 from saltus.analysis.recurrence import find, recurrence
 from saltus.analysis.settling import complete, settle
-from saltus.analysis.wandering import Wandering, growth_rates, merge
+from saltus.analysis.wandering import Wandering, growth_rates, kind_of_growth, kinds_of, merge
 from saltus.flow.maps import FunctionMap
 
 GOLDEN = math.pi * (math.sqrt(5) - 1)
@@ -261,3 +261,33 @@ def test_what_has_left_the_numbers_never_recurs():
     points = np.zeros((1, 128, 2))
     points[0, 100:] = np.nan
     assert recurrence(points, np.ones(2))[1][0] == np.inf
+
+
+class Fluctuating:
+    """A motion on which deviations grow by random factors, mean and deviation of their logarithm given [per block]."""
+
+    def __init__(self, mean: float, deviation: float) -> None:
+        self.mean, self.deviation, self.random, self.asked = mean, deviation, np.random.default_rng(7), 0
+
+    def tangent(self, state, count, direction):
+        self.asked += 1
+        return state, direction * np.exp(self.random.normal(self.mean, self.deviation, len(state)))[:, None, None]
+
+
+def test_weak_growth_that_fluctuates_is_measured_until_it_is_no_zero():
+    """0.025 an iterate, 3.8 standard errors from zero after one measurement: chaos that was taken for a torus."""
+    weak = Fluctuating(8 * 0.025, 8 * 0.08)
+    first = growth_rates(Fluctuating(8 * 0.025, 8 * 0.08), np.zeros((1, 2)), np.ones(2))[1]
+    assert kind_of_growth(first) is None
+    _, [kind] = kinds_of(lambda _: weak, np.zeros((1, 2)), np.ones((1, 2)), [[0]])
+    assert kind is not None
+    assert kind[0] == "chaotic"
+    assert abs(kind[1] - 0.025) < 4 * kind[2]
+    assert weak.asked > 192
+
+
+def test_what_is_told_at_once_is_not_measured_again():
+    for mean, name in ((8 * 0.3, "chaotic"), (0.0, "quasi_periodic")):
+        motion = Fluctuating(mean, 1e-3)
+        assert kinds_of(lambda _, motion=motion: motion, np.zeros((1, 2)), np.ones((1, 2)), [[0]])[1][0][0] == name
+        assert motion.asked == 192

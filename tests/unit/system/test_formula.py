@@ -40,7 +40,7 @@ def test_printed_equations_are_formulas_of_the_same_system(model):
         ("where(-1 < x < 1 and not v > 0, 1, 2)", lambda x, v: sl.where((x > -1) & (x < 1) & ~(v > 0), 1, 2)),
         ("where((x > 0) | (v < 0), 1, 2)", lambda x, v: sl.where((x > 0) | (v < 0), 1, 2)),
         ("max(x, v, 1) + abs(+x)", lambda x, v: sl.max(x, v, 1) + abs(x)),
-        ("freeplay(x, stiffness=mass, gap=upper_gap)", lambda x, mass, upper_gap: sl.system.freeplay(x, stiffness=mass, gap=upper_gap)),
+        ("freeplay(x, stiffness=mass, gap=upper_gap)", lambda x, mass, upper_gap: sl.freeplay(x, stiffness=mass, gap=upper_gap)),
         ("mod(t, 1/frequency) + t % 2", lambda t, frequency: sl.mod(t, 1 / frequency) + sl.mod(t, 2)),
         ("2 if 3 > 1 else x", lambda: 2.0),
         ("(x\n + v)", lambda x, v: x + v),
