@@ -64,21 +64,26 @@ class System:
         check_periodic(self)
 
     # -- values -----------------------------------------------------------------------------------------------------------------
-    def with_values(self, **values: Any) -> System:
+    def with_values(self, *unnamed: Any, **values: Any) -> System:
         """The same equations with other parameter values. Nothing is traced or compiled again.
 
         Parameters
         ----------
+        *unnamed
+            None: what stands here is answered by how to write it.
         **values : float or str
             By parameter name: a number in SI, or text with a unit, such as ``contact_stiffness="70 kN/m"``.
 
         Raises
         ------
         ParameterError
-            If a name is unknown, or a value isn't a finite number in the parameter's range.
+            If a name is unknown, a value has none, or it isn't a finite number in the parameter's range.
         UnitError
             If a text value has the wrong unit.
         """
+        if unnamed:
+            name = next(iter(self.values), "name")
+            raise ParameterError(f"with_values takes values by name, and {shown(unnamed[0])} has none. Write with_values({name}=...).")
         new = {name: checks.resolve_one(self._known(name), value, self.units[name], self.forced_at) for name, value in values.items()}
         if not new:
             return self

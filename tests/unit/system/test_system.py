@@ -25,6 +25,11 @@ def test_with_values_gives_a_copy_and_traces_nothing():
     assert stiff.fingerprint() == RIG.fingerprint()
 
 
+def test_values_are_given_by_name():
+    with pytest.raises(ParameterError, match=r"takes values by name, and \{'force': 3\} has none. Write with_values\(mass=...\)"):
+        RIG.with_values({"force": 3})
+
+
 some_values = st.dictionaries(st.sampled_from(sorted(RIG.values)), st.floats(1e-6, 1e6))
 
 
