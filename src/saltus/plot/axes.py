@@ -86,7 +86,9 @@ class _Around(BboxBase):
 
     def get_points(self) -> np.ndarray:
         """Corners [pixel]."""
-        return np.asarray(self._ax.bbox.padded(self._wider * self._ax.get_figure(root=True).dpi / 72).get_points())
+        figure = self._ax.get_figure(root=True)
+        pixels = self._wider * (figure.dpi if figure is not None else 72) / 72
+        return np.asarray(self._ax.bbox.padded(pixels).get_points())
 
 
 def set_limits(ax: Axes, direction: Direction, values: np.ndarray, marks: Sequence[float] = (), margin: float = 0.06) -> None:

@@ -60,7 +60,7 @@ def _above_rounding(amplitude: xr.DataArray) -> xr.DataArray:
     """Which lines are larger than what rounding alone can make: eps for each of the log2(N) stages of the transform of N samples, of the
     root of the sum of all squares (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., theorem 24.2).
     """
-    along = amplitude.dims[-1]
+    along = str(amplitude.dims[-1])
     stages = np.log2(2 * amplitude.sizes[along])
     return amplitude > 2 * np.finfo(float).eps * stages * np.sqrt((amplitude**2).sum(along))
 
