@@ -108,6 +108,16 @@ class Outcome:
     record_floats: np.ndarray
     complete: bool = True
 
+    def reached(self) -> int:
+        """How many samples there are: of a run that was interrupted those that some trajectory has reached."""
+        if self.complete:
+            return self.samples.shape[1]
+        return int(np.flatnonzero((self.sample_mode >= 0).any(axis=0)).max(initial=0)) + 1
+
+
+class RunInterrupted(Interrupted):
+    """Ctrl-C during a run of the engine: ``partial`` is the Outcome so far."""
+
 
 @dataclass
 class _Chunk:
@@ -140,7 +150,7 @@ def run(
 
     Raises
     ------
-    Interrupted
+    RunInterrupted
         On Ctrl-C, with the partial Outcome.
     """
     threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
@@ -156,9 +166,7 @@ def run(
         _run_chunks(chunks, module, stop, room, progress, workers)
     except KeyboardInterrupt:
         outcome.complete = False
-        interrupted = Interrupted()
-        interrupted.partial = _finish(outcome, whole, chunks, request.t_end)
-        raise interrupted from None
+        raise RunInterrupted(lambda: _finish(outcome, whole, chunks, request.t_end)) from None
     if room.stopped:
         warnings.warn(
             f"the contacts of this call, {room.kept} by now, filled half of the free memory: trajectories that were under way stopped with "

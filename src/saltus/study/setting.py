@@ -105,8 +105,8 @@ def system_of(table: SystemTable, own: System | None = None, formulas: Formulas 
     kinds = {"a model": table.model or table.case, "rates": table.rates, "--system": own}
     if len(given := [kind for kind, one in kinds.items() if one]) > 1:
         raise StudyError(f"[system] {' and '.join(given)}: these are several systems. Keep one.")
-    if not table.rates and (table.units or table.forced_at):
-        raise StudyError("[system] units and forced_at are for equations of your own: give them with rates, or leave them out.")
+    if not table.rates and (table.units or table.forced_at or table.guards):
+        raise StudyError("[system] units, guards and forced_at are for equations of your own: give them with rates, or leave them out.")
     if own is not None:
         base = own
     elif table.rates:
@@ -134,7 +134,9 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
             raise StudyError(f"[system] {unused[0]!r} stands in no rate. {nearest(unused[0], sorted(used))}")
         equations = Equations(rates, table.values, header.description if header else "")
         title, source = (header.name, header.source) if header else ("system", "")
-        return system(states=list(rates), units=table.units, forced_at=table.forced_at, name=title, source=source)(equations)
+        guards = {name: formulas.formula(text) for name, text in table.guards.items()}
+        decorate = system(states=list(rates), units=table.units, forced_at=table.forced_at, guards=guards, name=title, source=source)
+        return decorate(equations)
     except StudyError:
         raise
     except SaltusError as error:

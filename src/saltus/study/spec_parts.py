@@ -89,6 +89,11 @@ class SystemTable(Table):
     units: dict[str, str] = Field(
         default_factory=dict, description="Units of states and parameters of a system of your own.", examples=[{"x": "m", "v": "m/s"}]
     )
+    guards: dict[str, Formula] = Field(
+        default_factory=dict,
+        description="Names for the boundaries of a system of your own, each with its comparison.",
+        examples=[{"teeth": "x2 - x1 > gap"}],
+    )
     forced_at: str | None = Field(
         None, description="The parameter of a system of your own that is the forcing frequency.", examples=["frequency"]
     )

@@ -153,6 +153,12 @@ def test_a_formula_takes_part_in_the_identity(whole):
         assert identity(base) != identity(base.replace(old, new))
 
 
+def test_guards_have_the_names_that_the_study_gives_them(tmp_path):
+    text = RIG + '[system.guards]\n"the stop" = "gap < x"\n' + SECTION.replace('{ formula = "v - 0.01" }', '"the stop"')
+    (question,) = questions_of(parse(text), None, Inputs(files(tmp_path)))
+    assert [guard.name for guard in question.system.guards] == ["the stop"]
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -167,6 +173,9 @@ def test_a_formula_takes_part_in_the_identity(whole):
         (RIG.replace('"stop.csv"', '"down.csv"') + SIMULATE, "[system.tables.stop] down.csv: points must ascend"),
         (RIG.replace('"stop.csv"', '"bare.csv"') + SIMULATE, "begins with numbers. Its first line names the columns"),
         (RIG.replace("[system.tables.stop]", "[system.tables.sin]") + SIMULATE, "'sin' can't be the name of a term or a table"),
+        (RIG + '[system.guards]\nstop = "x > 2*gap"\n' + SIMULATE, "[system] written out: the guard 'stop' means no boundary"),
+        (RIG + '[system.guards]\nstop = "x - gap"\n' + SIMULATE, "the guard 'stop' must be one comparison, such as x > gap"),
+        ('[study]\nname="b"\n[system]\nmodel="delangre"\nguards.a="x > upper_gap"\n' + SIMULATE, "guards and forced_at are for equations"),
         (RIG.replace("[system]", '[system]\nmodel = "chain"') + SIMULATE, "[system] a model and rates: these are several systems"),
         (RIG + SIMULATE.replace("[simulate]", "[simulate]\nperiod = 3"), "has no key 'period'"),
         (RIG + RESPONSE.replace('"contact"', '"contact + q"'), "[frequency_response.outputs] the output 'stop force' of written out"),

@@ -209,9 +209,7 @@ def test_a_stop_keeps_what_is_computed(whole, copied, monkeypatch):
     (copied / "a-map.nc").unlink()
 
     def stopped(*_, **__):
-        stop = Interrupted()
-        stop.partial = load(whole.folder / "soft.nc")
-        raise stop
+        raise Interrupted(lambda: load(whole.folder / "soft.nc"))
 
     with monkeypatch.context() as patch:
         patch.setattr("saltus.analysis.bifurcation_diagram.bifurcation_diagram", stopped)
