@@ -313,10 +313,10 @@ class TestPeriodicity:
         assert make(rotor, forced_at="speed", units={"speed": "rad/s"}).period() == pytest.approx(0.05, rel=1e-15)
 
     def test_a_ramp(self):
-        with pytest.raises(TraceError, match="forced_at=None"):
+        with pytest.raises(TraceError, match="leave forced_at= out"):
             self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t) * t)
 
-        with pytest.raises(TraceError, match="forced_at=None"):
+        with pytest.raises(TraceError, match="leave forced_at= out"):
             self.forced(lambda t, x, a, f, g: a * t)
 
     def test_a_weak_drive_beside_a_strong_preload(self):
@@ -339,7 +339,7 @@ class TestPeriodicity:
     def test_phases_and_harmonics_pass(self):
         assert self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t + x) ** 3 + a * sin(200 * pi * f * t)).period() == 1 / 15
         assert self.forced(lambda t, x, a, f, g: 0.0).period() == 1 / 15
-        assert self.forced(lambda t, x, a, f, g: a * cos(f * t), forced_at=None).period() is None
+        assert self.forced(lambda t, x, a, f, g: a * cos(f * t), leave forced_at= out).period() is None
 
 
 @pytest.mark.parametrize(
