@@ -100,29 +100,22 @@ def simulate(
     if not among(time_errors, ("measured", "local")):
         raise ParameterError(f'time_errors must be "measured" or "local", not {shown(time_errors)}.')
     show, close = reporter(progress)
-    outcome = None
+    request = plan.request(group, length)
     try:
-        again = time_errors == "measured" and bool(system.guards) and method.records_contacts
-        request, fit = plan.request(group, length), method.suited_to(group.size * (measure.copies(method) if again else 1))
-        outcome = engine.run(system, fit, request, threads, _part(show, 0.0, 0.3 if again else 1.0))
-        errors = measure.local(outcome)
-        if again:
-            errors = measure.measured(system, fit, request, outcome, threads, _part(show, 0.3, 0.7))
+        if time_errors == "measured" and system.guards and method.records_contacts:
+            outcome, errors = measure.measured(system, method, request, threads, show)
+        else:
+            outcome = engine.run(system, method.suited_to(group.size), request, threads, show)
+            errors = measure.local(outcome)
     except Interrupted as stop:
-        so_far = stop.partial if outcome is None else outcome
-        if isinstance(so_far, Outcome):
-            stop.partial = _dataset(system, method, group, length, plan, so_far, measure.local(so_far))
+        if isinstance(stop.partial, Outcome):
+            stop.partial = _dataset(system, method, group, length, plan, stop.partial, measure.local(stop.partial))
         raise
     finally:
         close()
     result = _dataset(system, method, group, length, plan, outcome, errors)
     warn(result, length, system)
     return result
-
-
-def _part(show: Callable[[float], None] | None, begin: float, share: float) -> Callable[[float], None] | None:
-    """Progress of one of several runs as a part of the whole."""
-    return None if show is None else lambda done: show(begin + share * done)
 
 
 @dataclass(frozen=True)
