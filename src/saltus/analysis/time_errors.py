@@ -9,9 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from saltus.flow import engine
-from saltus.flow.engine import Outcome, Request, Schedule
+from saltus.flow.engine import Outcome, Request, RunInterrupted, Schedule
 from saltus.flow.methods import Method
-from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
 from saltus.system import expression as ex
 from saltus.system.evaluate import evaluate
@@ -52,7 +51,7 @@ def measured(
 
     Raises
     ------
-    Interrupted
+    RunInterrupted
         On Ctrl-C, with the Outcome so far.
     """
     n, silent = len(request.start), replace(request, schedule=Schedule.none())
@@ -73,9 +72,9 @@ def _in_one_call(
     together = replace(_together([request, *runs]), checks=total - n)
     try:
         whole = engine.run(system, method.suited_to(total), together, threads, show)
-    except Interrupted as stop:
-        stop.partial = stop.partial.of(0, n) if isinstance(stop.partial, Outcome) else None
-        raise
+    except RunInterrupted as stop:
+        so_far = stop
+        raise RunInterrupted(lambda: so_far.partial.of(0, n)) from None
     outcome, check = whole.of(0, n), whole.of(n, total)
     return outcome, np.max([_distances(outcome, check, i * n) for i in range(len(runs))], axis=0)
 
@@ -92,13 +91,12 @@ def _one_by_one(
     outcome = engine.run(system, method.suited_to(n), request, threads, part(0.0, BY_ITSELF))
     companion, share = method.companion().suited_to(n), (1.0 - BY_ITSELF) / len(runs)
     distance = np.zeros(len(outcome.record_integers))
-    for done, one in enumerate(runs):
-        try:
+    try:
+        for done, one in enumerate(runs):
             check = engine.run(system, companion, one, threads, part(BY_ITSELF + done * share, share))
-        except Interrupted as stop:
-            stop.partial = outcome
-            raise
-        distance = np.maximum(distance, _distances(outcome, check, 0))
+            distance = np.maximum(distance, _distances(outcome, check, 0))
+    except KeyboardInterrupt:
+        raise RunInterrupted(lambda: outcome) from None
     return outcome, distance
 
 

@@ -112,6 +112,12 @@ class Outcome:
     record_floats: np.ndarray
     complete: bool = True
 
+    def reached(self) -> int:
+        """How many samples there are: of a run that was interrupted those that some trajectory has reached."""
+        if self.complete:
+            return self.samples.shape[1]
+        return int(np.flatnonzero((self.sample_mode >= 0).any(axis=0)).max(initial=0)) + 1
+
     def of(self, first: int, last: int) -> Outcome:
         """That of some of the trajectories, as if they had been moved alone."""
         rows = slice(*np.searchsorted(self.record_integers[:, st.REC_TRAJECTORY], (first, last)))
@@ -123,6 +129,10 @@ class Outcome:
 
 #: Arrays of an outcome that have a row for each trajectory.
 _EACH = ("state", "time", "status", "mode", "counters", "minima", "samples", "sample_mode")
+
+
+class RunInterrupted(Interrupted):
+    """Ctrl-C during a run of the engine: ``partial`` is the Outcome so far."""
 
 
 @dataclass
@@ -156,7 +166,7 @@ def run(
 
     Raises
     ------
-    Interrupted
+    RunInterrupted
         On Ctrl-C, with the partial Outcome.
     """
     threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
@@ -172,9 +182,7 @@ def run(
         _run_chunks(chunks, module, stop, room, progress, workers)
     except KeyboardInterrupt:
         outcome.complete = False
-        interrupted = Interrupted()
-        interrupted.partial = _finish(outcome, whole, chunks, request.t_end)
-        raise interrupted from None
+        raise RunInterrupted(lambda: _finish(outcome, whole, chunks, request.t_end)) from None
     if room.stopped:
         warnings.warn(
             f"the contacts of this call, {room.kept} by now, filled half of the free memory: trajectories that were under way stopped with "

@@ -63,6 +63,7 @@ def system(
     *,
     forced_at: str | None = None,
     units: Mapping[str, str] | None = None,
+    guards: Mapping[str, Callable[..., Any]] | None = None,
     name: str | None = None,
     source: str = "",
     check_units: bool = True,
@@ -83,6 +84,9 @@ def system(
     units : mapping of str to str, optional
         Coherent SI unit of states and parameters: ``{"x": "m", "mass": "kg", "damping_ratio": "1"}``. The unit of a parameter whose
         default is text (``mass="3 kg"``) is known already.
+    guards : mapping of str to callable, optional
+        Names for guards, each with the comparison that it is called after, as a function of states and parameters by name:
+        ``{"teeth": lambda x1, x2, gap: x2 - x1 > gap}``. A guard without one is named after the parameter that sets it, or by its equation.
     name : str, optional
         What to call the system; the function's name if not given.
     source : str, optional
@@ -121,12 +125,18 @@ def system(
 
     if units is not None and not isinstance(units, Mapping):
         raise TraceError(f'units must be a mapping of names to units, such as units={{"x": "m"}}, not {units!r:.80}.')
+    if guards is not None and not isinstance(guards, Mapping):
+        raise TraceError(
+            f'guards must be a mapping of names to comparisons, such as guards={{"stop": lambda x, gap: x > gap}}, not {shown(guards)}.'
+        )
     if forced_at is not None and not isinstance(forced_at, str):
         raise TraceError(f'forced_at must be the name of a parameter, such as forced_at="frequency", not {forced_at!r:.80}.')
     if name is not None and not isinstance(name, str):
         raise TraceError(f"the name of a system can't be {name!r:.80}: {why_no_title(name)}.")
 
     def decorate(function: Callable[..., Any]) -> System:
+        from saltus.system.guard_names import with_guard_names  # which builds on this module
+
         if not callable(function):
             raise TraceError(f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, ...), not {function!r:.80}.")
         title, told = name or getattr(function, "__name__", "system").strip("<>"), inspect.getdoc(function) or ""
@@ -141,19 +151,20 @@ def system(
             )
         values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
         dimensions = DimensionCheck(names, known_units) if check_units else None
-        field, guards = _traced(function, names, tuple(defaults), title, dimensions)
-        _warn_of_unused(field, guards, defaults, forced_at, title)
-        return System(
+        field, found = _traced(function, names, tuple(defaults), title, dimensions)
+        _warn_of_unused(field, found, defaults, forced_at, title)
+        made = System(
             name=title,
             states=names,
             field=field,
-            guards=guards,
+            guards=found,
             values=values,
             units=known_units,
             forced_at=forced_at,
             source=source,
             description=told,
         )
+        return with_guard_names(made, guards) if guards else made
 
     return decorate
 

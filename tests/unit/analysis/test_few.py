@@ -80,9 +80,8 @@ def test_checks_move_as_the_companion_moves_them_and_are_not_sampled(method):
 
 def test_an_interrupted_run_shows_its_trajectories_and_no_copy(monkeypatch):
     def stopped(system, method, request, *rest):
-        stop = Interrupted()
-        stop.partial = run(system, method, request, *rest)
-        raise stop
+        outcome = run(system, method, request, *rest)
+        raise engine.RunInterrupted(lambda: outcome)
 
     run = time_errors.engine.run
     monkeypatch.setattr(time_errors.engine, "run", stopped)
