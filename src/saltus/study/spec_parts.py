@@ -97,6 +97,9 @@ class SystemTable(Table):
     forced_at: str | None = Field(
         None, description="The parameter of a system of your own that is the forcing frequency.", examples=["frequency"]
     )
+    check_units: bool = Field(
+        True, description="Whether units of what a formula of the rates adds or compares must be the same.", examples=[False]
+    )
     terms: dict[str, Formula] = Field(
         default_factory=dict,
         description="Formulas by name, for all other formulas of the study. One may use those before it.",
