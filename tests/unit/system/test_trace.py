@@ -339,7 +339,7 @@ class TestPeriodicity:
     def test_phases_and_harmonics_pass(self):
         assert self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t + x) ** 3 + a * sin(200 * pi * f * t)).period() == 1 / 15
         assert self.forced(lambda t, x, a, f, g: 0.0).period() == 1 / 15
-        assert self.forced(lambda t, x, a, f, g: a * cos(f * t), leave forced_at= out).period() is None
+        assert self.forced(lambda t, x, a, f, g: a * cos(f * t), forced_at=None).period() is None
 
 
 @pytest.mark.parametrize(
