@@ -168,6 +168,8 @@ def _real(value: Any, unit: str, name: str) -> float:
             return float(value)
         except OverflowError:
             return math.inf
+        except ValueError:  # a decimal that signals that it is none
+            return math.nan
     raise ParameterError(f"{name} = {shown(value)} is not a number. Write a number in SI, or text with a unit, such as {_example(unit)!r}.")
 
 

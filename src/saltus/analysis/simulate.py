@@ -105,14 +105,13 @@ def simulate(
         return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
 
     show, close = reporter(progress)
-    outcome = None
+    outcome, request = None, plan.request(group, length)
     try:
-        again = time_errors == "measured" and bool(system.guards) and method.records_contacts
-        request, fit = plan.request(group, length), method.suited_to(group.size * (measure.copies(method) if again else 1))
-        outcome = engine.run(system, fit, request, threads, _part(show, 0.0, 0.3 if again else 1.0))
-        errors = measure.local(outcome)
-        if again:
-            errors = measure.measured(system, fit, request, outcome, threads, _part(show, 0.3, 0.7))
+        if time_errors == "measured" and system.guards and method.records_contacts:
+            outcome, errors = measure.measured(system, method, request, threads, show)
+        else:
+            outcome = engine.run(system, method.suited_to(group.size), request, threads, show)
+            errors = measure.local(outcome)
         result = _dataset(system, method, group, length, plan, outcome, errors)
     except KeyboardInterrupt as stop:
         if outcome is not None:
@@ -122,11 +121,6 @@ def simulate(
         close()
     warn(result, length, system)
     return result
-
-
-def _part(show: Callable[[float], None] | None, begin: float, share: float) -> Callable[[float], None] | None:
-    """Progress of one of several runs as a part of the whole."""
-    return None if show is None else lambda done: show(begin + share * done)
 
 
 @dataclass(frozen=True)
