@@ -51,7 +51,7 @@ nb_output_stderr = "remove"  # what is being compiled, and how far it is, belong
 os.environ.pop("MPLBACKEND", None)
 os.environ["MATPLOTLIBRC"] = str(HERE / "matplotlibrc")
 # The commands `saltus ...` of the notebooks are those of this interpreter, and their tables are as wide as those of a terminal.
-os.environ["COLUMNS"] = "118"
+os.environ["COLUMNS"] = "170"
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
 # -- API -----------------------------------------------------------------------------------------------------------------------
