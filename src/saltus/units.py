@@ -168,6 +168,8 @@ def _real(value: Any, unit: str, name: str) -> float:
             return float(value)
         except OverflowError:
             return math.inf
+        except ValueError:  # a decimal that signals that it is none
+            return math.nan
     raise ParameterError(f"{name} = {shown(value)} is not a number. Write a number in SI, or text with a unit, such as {_example(unit)!r}.")
 
 
@@ -275,6 +277,8 @@ def from_si(value: float, unit: str, digits: int | None = 6) -> str:
         highest = 0 if head[0] in ("m", "s") else 9  # 1200 m, not 1.2 km: lengths and times of vibrations are short
         lift = 2 if unit == "m" else 0  # 0.4 mm, not 400 µm: the field writes gaps in mm
         exponent = min(3 * ((exact.adjusted() + lift) // 3), highest)
+        if unit == "m" and exact.adjusted() in (-2, -1):  # and 20 mm, as pictures do
+            exponent = -3
         if exponent < min(_PREFIXES) or exact.adjusted() - exponent >= 6:  # 3e-19 J and 2e15 N, not 3e-7 pJ and 2e6 GN
             exponent = 0
     text = _plain(exact.scaleb(-exponent))

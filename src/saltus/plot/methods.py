@@ -134,4 +134,11 @@ def _finish(panels: list[Axes], label: str, log: bool, x: np.ndarray) -> None:
     panels[2].set_ylabel("steps a period")
     panels[2].set_xlabel(label)
     for panel, title in ((panels[0], None), (panels[2], "processor time")):
-        panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize="small", title=title, markerscale=3, frameon=False)
+        panel.legend(
+            loc="center left",
+            bbox_to_anchor=(1.01, 0.5),
+            fontsize="small",
+            title=title,
+            markerscale=1.5 if x.size <= FEW else 3,
+            frameon=False,
+        )

@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
+
 from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest, shown
 from saltus.system import checks
 from saltus.system.dimensions import DimensionCheck
@@ -120,29 +122,22 @@ def system(
     if callable(states):
         raise TraceError('write @sl.system(states="x v"), with the names of the states, not bare @sl.system.')
     if not isinstance(states, str | list | tuple):
-        raise TraceError(f'states must be names, such as states="x v", not {states!r:.80}.')
+        raise TraceError(f'states must be names, such as states="x v", not {shown(states)}.')
     names = tuple(states.replace(",", " ").split()) if isinstance(states, str) else tuple(states)
 
-    if units is not None and not isinstance(units, Mapping):
-        raise TraceError(f'units must be a mapping of names to units, such as units={{"x": "m"}}, not {units!r:.80}.')
-    if guards is not None and not isinstance(guards, Mapping):
-        raise TraceError(
-            f'guards must be a mapping of names to comparisons, such as guards={{"stop": lambda x, gap: x > gap}}, not {shown(guards)}.'
-        )
-    if forced_at is not None and not isinstance(forced_at, str):
-        raise TraceError(f'forced_at must be the name of a parameter, such as forced_at="frequency", not {forced_at!r:.80}.')
-    if name is not None and not isinstance(name, str):
-        raise TraceError(f"the name of a system can't be {name!r:.80}: {why_no_title(name)}.")
+    _check_arguments(units, guards, forced_at, name, check_units)
 
     def decorate(function: Callable[..., Any]) -> System:
         from saltus.system.guard_names import with_guard_names  # which builds on this module
 
         if not callable(function):
-            raise TraceError(f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, ...), not {function!r:.80}.")
+            raise TraceError(
+                f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, ...), not {shown(function)}."
+            )
         title, told = name or getattr(function, "__name__", "system").strip("<>"), inspect.getdoc(function) or ""
         for what, text, why in (("name", title, why_no_title), ("source", source, why_no_text), ("docstring", told, why_no_text)):
             if why(text) is not None:
-                raise TraceError(f"the {what} of a system can't be {text!r:.80}: {why(text)}.")
+                raise TraceError(f"the {what} of a system can't be {shown(text)}: {why(text)}.")
         defaults = _parameters(function, names, title)
         known_units = _units(names, defaults, forced_at, dict(units or {}), title)
         if forced_at is not None and known_units[forced_at] not in ("Hz", "rad/s"):
@@ -169,6 +164,22 @@ def system(
     return decorate
 
 
+def _check_arguments(units: Any, guards: Any, forced_at: Any, name: Any, check_units: Any) -> None:
+    """Raise a TraceError for an argument of :func:`system` of a wrong kind."""
+    if units is not None and not isinstance(units, Mapping):
+        raise TraceError(f'units must be a mapping of names to units, such as units={{"x": "m"}}, not {shown(units)}.')
+    if guards is not None and not isinstance(guards, Mapping):
+        raise TraceError(
+            f'guards must be a mapping of names to comparisons, such as guards={{"stop": lambda x, gap: x > gap}}, not {shown(guards)}.'
+        )
+    if forced_at is not None and not isinstance(forced_at, str):
+        raise TraceError(f'forced_at must be the name of a parameter, such as forced_at="frequency", not {shown(forced_at)}.')
+    if not isinstance(check_units, bool | np.bool_):
+        raise TraceError(f"check_units must be True or False, not {shown(check_units)}.")
+    if name is not None and not isinstance(name, str):
+        raise TraceError(f"the name of a system can't be {shown(name)}: {why_no_title(name)}.")
+
+
 # -- the signature -------------------------------------------------------------------------------------------------------------
 def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: str) -> dict[str, Any]:
     """Names and defaults of the parameters; checks the signature."""
@@ -180,7 +191,7 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
     try:
         signature = inspect.signature(function)
     except ValueError:  # of a class or function of C
-        raise TraceError(f"{title}: Python doesn't tell what arguments {function!r:.80} takes. Write a function, {wanted}.") from None
+        raise TraceError(f"{title}: Python doesn't tell what arguments {shown(function)} takes. Write a function, {wanted}.") from None
     for argument in signature.parameters.values():
         if argument.kind == argument.VAR_POSITIONAL and len(positional) == 1:
             together = True
@@ -290,7 +301,7 @@ def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
     try:
         derivatives = [as_expr(value) for value in returned]
     except TypeError:
-        raise TraceError(f"it returns {returned!r} in place of the time derivatives of {', '.join(states)}.") from None
+        raise TraceError(f"it returns {shown(returned)} in place of the time derivatives of {', '.join(states)}.") from None
     if len(derivatives) != len(states):
         raise TraceError(
             f"it returns {len(derivatives)} value{'s' * (len(derivatives) != 1)}, but there are {len(states)} states "
