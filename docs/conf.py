@@ -36,6 +36,8 @@ pygments_style, pygments_dark_style = "friendly", "monokai"
 # -- text and notebooks --------------------------------------------------------------------------------------------------------
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
+# Where MathJax looks: the formulas of a System are HTML that a cell put out. Its class "text_html" isn't among MyST's own.
+myst_mathjax_classes = "tex2jax_process|mathjax_process|math|output_area|text_html"
 # Always executed: a page can't show what the code of today doesn't print. In a folder of its own, so that nothing is left behind.
 nb_execution_mode = "force"
 nb_execution_in_temp = True
@@ -49,7 +51,7 @@ nb_output_stderr = "remove"  # what is being compiled, and how far it is, belong
 os.environ.pop("MPLBACKEND", None)
 os.environ["MATPLOTLIBRC"] = str(HERE / "matplotlibrc")
 # The commands `saltus ...` of the notebooks are those of this interpreter, and their tables are as wide as those of a terminal.
-os.environ["COLUMNS"] = "118"
+os.environ["COLUMNS"] = "170"
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
 # -- API -----------------------------------------------------------------------------------------------------------------------

@@ -4,21 +4,54 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cache
 from types import FrameType
+from typing import Any
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a computation. ``partial`` holds what was finished; the rest has status ``interrupted`` or ``not_computed``."""
+    """Ctrl-C during a computation. ``partial`` holds what was finished; the rest has status ``interrupted`` or ``not_computed``.
 
-    partial: object = None
+    Parameters
+    ----------
+    assemble : callable, optional
+        Puts together what was finished. It is called when ``partial`` is first read: ten million samples take seconds, and Ctrl-C doesn't
+        wait for a result that nobody asks for.
+    """
+
+    def __init__(self, assemble: Callable[[], Any] | None = None) -> None:
+        super().__init__()
+        self._assemble = assemble and cache(assemble)
+
+    @property
+    def partial(self) -> Any:
+        """What was finished, as the function returns it; None if nothing was."""
+        return self._assemble and self._assemble()
+
+    @property
+    def has_partial(self) -> bool:
+        """Whether anything was finished."""
+        return self._assemble is not None
+
+    def then(self, result: Callable[[Any], Any]) -> Interrupted:
+        """The interruption whose ``partial`` is what ``result`` makes of this one's, if there is any."""
+        return Interrupted((lambda: result(self.partial)) if self.has_partial else None)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """From one process to another it goes with the finished part itself."""
+        return _interrupted, (self.partial,)
 
     def __str__(self) -> str:
-        if self.partial is None:
+        if not self.has_partial:
             return "stopped by Ctrl-C before anything was finished."
         return "stopped by Ctrl-C. What was finished stands in `partial` of this exception."
+
+
+def _interrupted(partial: Any) -> Interrupted:
+    return Interrupted(None if partial is None else lambda: partial)
 
 
 @contextmanager

@@ -24,7 +24,7 @@ from saltus.unit_table import COHERENT, DOUBTFUL, Unit, read_unit
 
 _NUMBER = re.compile(r"\s*(?P<number>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?(?P<tens>[0-9]+))?)(?P<unit>.*)", re.DOTALL)
 _HEAD = re.compile(r"(?:m|s|Hz|Nms|Nm|Ns|N|Pa|J|W|V|A)(?=$|[*/])")
-_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 #: The longest text that is read as a quantity: the longest that anybody writes has some 30 characters.
 LONGEST = 100
 
@@ -168,6 +168,8 @@ def _real(value: Any, unit: str, name: str) -> float:
             return float(value)
         except OverflowError:
             return math.inf
+        except ValueError:  # a decimal that signals that it is none
+            return math.nan
     raise ParameterError(f"{name} = {shown(value)} is not a number. Write a number in SI, or text with a unit, such as {_example(unit)!r}.")
 
 
@@ -274,7 +276,11 @@ def from_si(value: float, unit: str, digits: int | None = 6) -> str:
     if head and exact:
         highest = 0 if head[0] in ("m", "s") else 9  # 1200 m, not 1.2 km: lengths and times of vibrations are short
         lift = 2 if unit == "m" else 0  # 0.4 mm, not 400 µm: the field writes gaps in mm
-        exponent = min(max(3 * ((exact.adjusted() + lift) // 3), -9), highest)
+        exponent = min(3 * ((exact.adjusted() + lift) // 3), highest)
+        if unit == "m" and exact.adjusted() in (-2, -1):  # and 20 mm, as pictures do
+            exponent = -3
+        if exponent < min(_PREFIXES) or exact.adjusted() - exponent >= 6:  # 3e-19 J and 2e15 N, not 3e-7 pJ and 2e6 GN
+            exponent = 0
     text = _plain(exact.scaleb(-exponent))
     return text if unit in ("", "1") else f"{text} {_PREFIXES[exponent]}{unit}"
 

@@ -7,6 +7,7 @@ import json
 import os
 import random
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -14,6 +15,7 @@ import sys
 import time
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import matplotlib.image
@@ -42,7 +44,7 @@ STUDY = small_study(24)
 CHUNKS = 24
 #: The command with small chunks (in a process of --workers too, which imports this file first), and a moment between two commits, so that
 #: there is one to be killed in. Pictures are empty frames unless they are asked for: drawing takes longer than all else together. With
-#: `serve` it loads everything once and forks a child for each line, which starts within milliseconds.
+#: `serve` it runs the study once, by which everything is loaded and compiled, and forks a child for each line: a child has nothing to load.
 COMMAND = """
 import json, os, signal, sys, time
 import saltus.analysis.plan
@@ -69,36 +71,44 @@ def empty_pictures():
     saltus.plot.basins = lambda *_, **__: plt.figure(figsize=(2, 2)).add_subplot()
     saltus.plot.gallery = lambda *_, **__: plt.figure(figsize=(2, 2))
 
-def serve(study):
-    (job,) = saltus.study.maps.jobs_of(saltus.study.read.read(study)[0])
-    job.plan.chunk(0, job.plan.scout(1))
-    print("ready", flush=True)
-    for line in sys.stdin:
-        arguments, environment, log = json.loads(line)
+def run(arguments, pictures):
+    sys.argv = ["saltus", *arguments]
+    if not pictures:
+        empty_pictures()
+    try:
+        main()
+    except SystemExit as end:
+        sys.stdout.flush()
+        return end.code or 0
+    return 99
+
+def serve(out, study):
+    plots = saltus.plot.basins, saltus.plot.gallery
+    with open(os.devnull, "w") as sys.stdout:
+        code = run(["run", study, "--out", out, "--threads", "1", "--progress", "none"], False)
+    sys.stdout = sys.__stdout__
+    saltus.plot.basins, saltus.plot.gallery = plots
+    print("ready" if code == 0 else code, flush=True)
+    for asked in map(json.loads, sys.stdin):
+        if isinstance(asked, int):
+            print(os.waitstatus_to_exitcode(os.waitpid(asked, 0)[1]), flush=True)
+            continue
+        arguments, environment, log = asked
         child = os.fork()
         if child == 0:
+            os.setsid()  # what is sent to the group of a run reaches its workers, and not the tests
             os.environ.update(environment)
             signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in the background has it ignored
             to = os.open(log, os.O_CREAT | os.O_WRONLY | os.O_APPEND)
             os.dup2(to, 1)
             os.dup2(to, 2)
-            sys.argv = ["saltus", *arguments]
-            if "PICTURES" not in os.environ:
-                empty_pictures()
-            try:
-                main()
-            except SystemExit as end:
-                sys.stdout.flush()
-                os._exit(end.code or 0)
-            os._exit(99)
+            os._exit(run(arguments, "PICTURES" in os.environ))
         print(child, flush=True)
-        sys.stdin.readline()
-        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if sys.argv[1] == "serve":
-        serve(sys.argv[2])
+        serve(*sys.argv[2:])
     else:
         empty_pictures()
         main()
@@ -109,33 +119,35 @@ class Server:
     """Runs the command in children of a process that has loaded everything."""
 
     def __init__(self, place):
-        self.command, self.study, self.log = place / "command.py", place / "study.toml", place / "log.txt"
+        self.place, self.command, self.study, self.first = place, place / "command.py", place / "study.toml", place / "out"
+        self.logs = {}
         self.command.write_text(COMMAND)
         self.study.write_text(STUDY)
         self.process = subprocess.Popen(
-            [sys.executable, str(self.command), "serve", str(self.study)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
+            [sys.executable, str(self.command), "serve", str(self.first), str(self.study)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
         assert self.process.stdout.readline() == "ready\n"
 
     def start(self, *arguments, pause=0.0, pictures=False):
-        self.log.unlink(missing_ok=True)
-        environment = {"PAUSE": str(pause)} | ({"PICTURES": "1"} if pictures else {})
-        self._tell([list(map(str, arguments)), environment, str(self.log)])
-        return int(self.process.stdout.readline())
+        """Number of the process that runs the command."""
+        log, environment = self.place / f"log{len(self.logs)}.txt", {"PAUSE": str(pause)} | ({"PICTURES": "1"} if pictures else {})
+        child = self._answer([list(map(str, arguments)), environment, str(log)])
+        self.logs[child] = log
+        return child
 
-    def end(self):
-        """Exit code of the child, minus the number of the signal that ended it; what it printed."""
-        self._tell(None)
-        code = int(self.process.stdout.readline())
-        return code, self.log.read_text() if self.log.exists() else ""
+    def end(self, child):
+        """Exit code of the process, minus the number of the signal that ended it; what it printed."""
+        code, log = self._answer(child), self.logs[child]
+        return code, log.read_text() if log.exists() else ""
 
     def run(self, *arguments, pictures=False):
-        self.start(*arguments, pictures=pictures)
-        return self.end()
+        return self.end(self.start(*arguments, pictures=pictures))
 
-    def _tell(self, what):
-        self.process.stdin.write(json.dumps(what) + "\n")
+    def _answer(self, asked):
+        self.process.stdin.write(json.dumps(asked) + "\n")
         self.process.stdin.flush()
+        return int(self.process.stdout.readline())
 
 
 @pytest.fixture(scope="module")
@@ -151,14 +163,11 @@ def arguments(server, folder, *more):
 
 
 @pytest.fixture(scope="module")
-def undisturbed(server, tmp_path_factory):
-    """A run that nothing disturbed: the files of its store, and its map."""
-    folder = tmp_path_factory.mktemp("undisturbed") / "out"
-    code, text = server.run(*arguments(server, folder))
-    assert code == 0, text
-    files = contents(folder)
+def undisturbed(server):
+    """The run that nothing disturbed: the files of its store, and its map."""
+    files = contents(server.first)
     assert sum("/done/" in name for name in files) == CHUNKS
-    return files, load(folder / "basins.nc").drop_attrs()
+    return files, load(server.first / "basins.nc").drop_attrs()
 
 
 def contents(folder):
@@ -193,7 +202,7 @@ def test_killed_at_20_random_moments(server, undisturbed, tmp_path):
         wait_for(lambda goal=goal, child=child: committed(folder) >= goal or ended(child))
         time.sleep(moments.uniform(0.0, 0.05 if goal < CHUNKS else 0.5))
         os.kill(child, signal.SIGKILL)
-        killed += server.end()[0] == -signal.SIGKILL
+        killed += server.end(child)[0] == -signal.SIGKILL
         progress.append(committed(folder))
         if (folder / "stores" / "basins").exists():
             assert Store.open(folder / "stores" / "basins").damaged() == [], "what has a record is true before anything is mended"
@@ -218,17 +227,15 @@ def ended(child):
 def test_shards_at_the_same_time_one_of_them_killed(server, undisturbed, tmp_path):
     """Two jobs share the folder; one is killed and started again while the other works."""
     folder = tmp_path / "out"
-    other = subprocess.Popen(
-        [sys.executable, str(server.command), *map(str, arguments(server, folder, "--shard", "1/2"))],
-        env=os.environ | {"PAUSE": "0.01"}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-    )  # fmt: skip
-    child = server.start(*arguments(server, folder, "--shard", "0/2"), pause=0.01)
+    other = server.start(*arguments(server, folder, "--shard", "1/2"), pause=0.02)
+    child = server.start(*arguments(server, folder, "--shard", "0/2"), pause=0.02)
     wait_for(lambda: committed(folder) >= 3)
     os.kill(child, signal.SIGKILL)
-    assert server.end()[0] == -signal.SIGKILL
+    assert server.end(child)[0] == -signal.SIGKILL
     code, text = server.run(*arguments(server, folder, "--shard", "0/2"))
     assert code == 0, text
-    assert other.wait(300) == 0, other.stdout.read()
+    code, text = server.end(other)
+    assert code == 0, text
     code, text = server.run("resume", folder, "--threads", 1, "--progress", "none")
     assert code == 0, text
     as_if_undisturbed(folder, undisturbed)
@@ -241,17 +248,13 @@ def workers_of(process):
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):
             parent = int(stat.read_text().rsplit(")", 1)[1].split()[1])
-            if parent == process.pid and b"spawn_main" in (stat.parent / "cmdline").read_bytes():
+            if parent == process and b"spawn_main" in (stat.parent / "cmdline").read_bytes():
                 found.append(int(stat.parent.name))
     return sorted(found)
 
 
 def with_workers(server, folder, count, pause):
-    words = ["run", server.study, "--out", folder, "--workers", count, "--progress", "none"]
-    return subprocess.Popen(
-        [sys.executable, str(server.command), *map(str, words)],
-        env=os.environ | {"PAUSE": str(pause)}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
-    )  # fmt: skip
+    return server.start("run", server.study, "--out", folder, "--workers", count, "--progress", "none", pause=pause)
 
 
 def test_two_workers_and_one_of_them_killed(server, undisturbed, tmp_path):
@@ -262,8 +265,8 @@ def test_two_workers_and_one_of_them_killed(server, undisturbed, tmp_path):
     assert len(workers) == 2
     os.kill(workers[0], signal.SIGKILL)
     at = committed(tmp_path / "out")
-    text = run.communicate(timeout=300)[0]
-    assert run.returncode == 0, text
+    code, text = server.end(run)
+    assert code == 0, text
     assert at < CHUNKS - 4, "it was killed while there was work to do"
     as_if_undisturbed(tmp_path / "out", undisturbed)
 
@@ -273,9 +276,9 @@ def test_the_only_worker_killed(server, undisturbed, tmp_path):
     run = with_workers(server, tmp_path / "out", 1, 0.08)
     wait_for(lambda: committed(tmp_path / "out") >= 3)
     os.kill(*workers_of(run), signal.SIGKILL)
-    text = run.communicate(timeout=300)[0]
+    code, text = server.end(run)
     assert "Traceback" not in text
-    assert run.returncode == 0, text
+    assert code == 0, text
     as_if_undisturbed(tmp_path / "out", undisturbed)
 
 
@@ -285,7 +288,7 @@ def family(process):
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):
             parents[int(stat.parent.name)] = int(stat.read_text().rsplit(")", 1)[1].split()[1])
-    found, more = {process.pid}, True
+    found, more = {process}, True
     while more:
         more = {child for child, parent in parents.items() if parent in found} - found
         found |= more
@@ -321,8 +324,8 @@ def test_two_workers_give_the_bits_of_one_thread_and_listen_nowhere(server, undi
     processes = family(run)
     assert len(processes) >= 3
     assert listening(sockets_of(processes)) == set()
-    text = run.communicate(timeout=300)[0]
-    assert run.returncode == 0, text
+    code, text = server.end(run)
+    assert code == 0, text
     assert "Traceback" not in text
     as_if_undisturbed(tmp_path / "out", undisturbed)
 
@@ -333,9 +336,9 @@ def test_ctrl_c_with_workers(server, undisturbed, tmp_path):
     run = with_workers(server, folder, 2, 0.05)
     wait_for(lambda: committed(folder) >= 3)
     processes = family(run)
-    os.killpg(run.pid, signal.SIGINT)
-    text = run.communicate(timeout=300)[0]
-    assert run.returncode == 130, text
+    os.killpg(run, signal.SIGINT)
+    code, text = server.end(run)
+    assert code == 130, text
     assert text.count("saltus: stopped") == 2, text  # what to type; and that files are whole
     assert "Traceback" not in text
     wait_for(lambda: not [one for one in processes if Path(f"/proc/{one}").exists() and not ended(one)])
@@ -368,7 +371,7 @@ def test_ctrl_c(server, undisturbed, tmp_path, goal):
     wait_for(lambda: (folder / "stores" / "basins").exists() and committed(folder) >= goal)
     time.sleep(0.05)
     os.kill(child, signal.SIGINT)
-    code, text = server.end()
+    code, text = server.end(child)
     assert code == 130, text
     assert "saltus: stopped." in text
     assert "Traceback" not in text
@@ -436,15 +439,21 @@ def test_full_disk_leaves_no_half_picture(server, small_disk):
 
 
 # -- damage, other studies, other processes --------------------------------------------------------------------------------------
-@pytest.fixture
-def half(server, tmp_path):
+@pytest.fixture(scope="module")
+def killed_half_way(server, tmp_path_factory):
     """A folder whose run was killed after five chunks."""
-    folder = tmp_path / "out"
+    folder = tmp_path_factory.mktemp("half") / "out"
     child = server.start(*arguments(server, folder), pause=0.02)
     wait_for(lambda: committed(folder) >= 5)
     os.kill(child, signal.SIGKILL)
-    assert server.end()[0] == -signal.SIGKILL
+    assert server.end(child)[0] == -signal.SIGKILL
     return folder
+
+
+@pytest.fixture
+def half(killed_half_way, tmp_path):
+    """A copy of it for one test."""
+    return shutil.copytree(killed_half_way, tmp_path / "out", symlinks=True)
 
 
 def test_a_cut_and_a_flipped_chunk_are_computed_again(server, undisturbed, half):
@@ -497,39 +506,58 @@ def test_a_second_process_is_refused(server, undisturbed, tmp_path, monkeypatch)
     assert f"is being written by process {first} on" in second.stderr
     assert "Wait for it, stop it, or choose another path." in second.stderr
     assert f"process {first} on" in seen.stdout, "status needs no lock"
-    code, text = server.end()
+    code, text = server.end(first)
     assert code == 0, text
     as_if_undisturbed(folder, undisturbed)
 
 
 # -- a poison cell ---------------------------------------------------------------------------------------------------------------
-@pytest.fixture
-def poisoned(monkeypatch, tmp_path):
-    """A function that computes the map with one start replaced, in the same chunks, with the same attractors; both maps."""
-    monkeypatch.setattr(plan, "CHUNK", 48)
-    monkeypatch.setattr(maps, "CHUNK", 48)
-    monkeypatch.setattr(plan, "SCOUTS", 256)
-    monkeypatch.setattr(plan, "CHECKED", 64)
+@pytest.fixture(scope="module")
+def small_chunks():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plan, "CHUNK", 48)
+        patch.setattr(maps, "CHUNK", 48)
+        patch.setattr(plan, "SCOUTS", 256)
+        patch.setattr(plan, "CHECKED", 64)
+        yield
+
+
+@pytest.fixture(scope="module")
+def mapped(small_chunks, tmp_path_factory):
+    """A function that computes the map by a method, in the same chunks and with the same attractors each time."""
     (job,) = jobs_of(parse(STUDY.replace("count = 24", "count = 12")))
-    found, whole = job.plan.scout(1), BasinPlan.starts
+    found = job.plan.scout(1)
+
+    def run(method):
+        one = replace(job, plan=replace(job.plan, method=method))
+        store = open_store(one, tmp_path_factory.mktemp("mapped"))
+        with store.lock():
+            store.put("attractors", found_data(found))
+        assert compute(one, store, Resources(threads=1), lambda _: None, print)
+        return finish(one, store, 1)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def healthy(mapped):
+    """The same function, which computes each map once."""
+    return cache(mapped)
+
+
+@pytest.fixture
+def poisoned(mapped, monkeypatch):
+    """The same function, with one start replaced."""
+    whole = BasinPlan.starts
 
     def run(method, cell, start):
-        results = []
-        for name in ("healthy", "poisoned"):
-            one = replace(job, plan=replace(job.plan, method=method))
-            store = open_store(one, tmp_path / name)
-            with store.lock():
-                store.put("attractors", found_data(found))
-            assert compute(one, store, Resources(threads=1), lambda _: None, print)
-            results.append(finish(one, store, 1))
+        def starts(self, cells):
+            states = whole(self, cells)
+            states[cells == cell] = start
+            return states
 
-            def starts(self, cells):
-                states = whole(self, cells)
-                states[cells == cell] = start
-                return states
-
-            monkeypatch.setattr(BasinPlan, "starts", starts)
-        return results
+        monkeypatch.setattr(BasinPlan, "starts", starts)
+        return mapped(method)
 
     return run
 
@@ -546,18 +574,18 @@ def poisoned(monkeypatch, tmp_path):
     ],
 )
 @pytest.mark.parametrize("cell", [70, 96])
-def test_a_poison_cell_hurts_only_itself(poisoned, start, method, label, status, cell):
+def test_a_poison_cell_hurts_only_itself(healthy, poisoned, start, method, label, status, cell):
     """A start that overflows, isn't a number, or never gets anywhere has a code; all other cells are those of a map without it."""
-    healthy, poisoned_ = poisoned(method, cell, start)
-    here = np.unravel_index(cell, healthy.basin.shape)
+    healthy_, poisoned_ = healthy(method), poisoned(method, cell, start)
+    here = np.unravel_index(cell, healthy_.basin.shape)
     assert int(poisoned_.basin.values[here]) == label
     assert int(poisoned_.status.values[here]) == status
     assert int(poisoned_.periods_to_settle.values[here]) == -1
     for name in ("basin", "status", "periods_to_settle", "grazes_unresolved"):
         mended = poisoned_[name].values.copy()
-        mended[here] = healthy[name].values[here]
-        np.testing.assert_array_equal(mended, healthy[name].values)
+        mended[here] = healthy_[name].values[here]
+        np.testing.assert_array_equal(mended, healthy_[name].values)
     for name in ("attractor_period", "attractor_peak", "attractor_x"):
-        np.testing.assert_array_equal(poisoned_[name], healthy[name])
-    assert poisoned_.attrs["unsettled_cells"] == healthy.attrs["unsettled_cells"] + 1
+        np.testing.assert_array_equal(poisoned_[name], healthy_[name])
+    assert poisoned_.attrs["unsettled_cells"] == healthy_.attrs["unsettled_cells"] + 1
     assert "lead to no known attractor" in " ".join(attractor_table("a", poisoned_).notes)

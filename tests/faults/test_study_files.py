@@ -114,16 +114,16 @@ def out(finished, tmp_path):
 
 
 def test_inputs_of_one_name_stay_two(out):
-    before = (out / "table.csv").read_text()
+    before = (out / "run.csv").read_text()
     assert saltus("resume", out).exit_code == 0
-    assert (out / "table.csv").read_text() == before
+    assert (out / "run.csv").read_text() == before
     assert sorted(file.read_text() for file in (out / "inputs").iterdir()) == [PRINTED, PRINTED.replace("0.02", "0.03")]
 
 
 def test_the_answer_holds_the_hash_of_each_input(finished, out):
     import hashlib
 
-    table = (out / "table.csv").read_text()
+    table = (out / "run.csv").read_text()
     for name in ("a/t.csv", "b/t.csv"):
         assert f"# {name}: SHA-256 {hashlib.sha256((finished / name).read_bytes()).hexdigest()}\n" in table
 
@@ -150,7 +150,7 @@ def test_what_changed_since_it_was_written_is_told(out, name):
 
 def test_a_link_that_leaves_the_folder_is_not_written_through(out, tmp_path):
     (tmp_path / "victim").write_text("precious")
-    for name in ("run.nc", "table.csv", "study.seal"):
+    for name in ("run.nc", "run.csv", "study.seal"):
         shutil.copy(out / name, tmp_path / name)
         (out / name).unlink()
         (out / name).symlink_to(tmp_path / "victim")

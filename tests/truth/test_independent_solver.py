@@ -12,10 +12,6 @@ import pytest
 
 import saltus as sl
 
-pytest.importorskip("heyoka", reason="extra `reference` isn't installed")
-
-from oracles import heyoka_systems
-
 TIME, SHARE = 2e-14, 1e-13
 
 CHAIN = {
@@ -44,6 +40,9 @@ CASES = {
 @pytest.fixture(scope="module", params=CASES)
 def pair(request):
     """System, our run, heyoka's at its finest tolerance, heyoka's at 1e-13."""
+    pytest.importorskip("heyoka", reason="extra `reference` isn't installed")
+    from oracles import heyoka_systems  # here, since only one of the processes that collect these tests runs them
+
     system, start, span, contacts = CASES[request.param]
     run = sl.simulate(system, start, **span, samples=50)
     oracles = [

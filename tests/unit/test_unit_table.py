@@ -3,14 +3,14 @@
 import math
 from decimal import Context, Decimal
 from fractions import Fraction
+from functools import cache
 
 import pytest
 
 from saltus.errors import UnitError
 from saltus.unit_table import _LONG, _TABLE, COHERENT, Unit, _taken, read_unit
 
-pint = pytest.importorskip("pint")
-REGISTRY = pint.UnitRegistry(non_int_type=Decimal)
+pytest.importorskip("pint")
 #: What pint calls them, where its word is another or means something else there.
 THEIRS = {
     "Nm": "newton*meter", "Ns": "newton*second", "Nms": "newton*meter*second", "Nmm": "newton*millimeter", "in": "inch", "mil": "thou",
@@ -24,10 +24,18 @@ THEIRS = {
 }  # fmt: skip
 
 
+@cache
+def registry():
+    """Their definitions, which take a second to read: not while tests are collected."""
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
 @pytest.mark.parametrize("symbol", sorted(_TABLE))
 def test_a_unit_is_what_another_library_says(symbol):
     ours = _TABLE[symbol][0]
-    theirs = REGISTRY.Quantity(Decimal(1), THEIRS.get(symbol, symbol)).to_base_units()
+    theirs = registry().Quantity(Decimal(1), THEIRS.get(symbol, symbol)).to_base_units()
     dimension = {str(name): Fraction(str(power)) for name, power in theirs.units._units.items()}
     names = {"m": "meter", "kg": "kilogram", "s": "second", "A": "ampere", "K": "kelvin", "rad": "radian"}
     assert {names[base]: power for base, power in ours.dimension.items()} == dimension
@@ -39,7 +47,7 @@ def test_prefixes_are_powers_of_ten():
     for symbol, (unit, _) in _TABLE.items():
         for prefix in _taken(symbol):
             if prefix + symbol not in _TABLE:
-                scale = REGISTRY.Quantity(Decimal(1), {"μ": "µ"}.get(prefix, prefix) + "meter").to("meter").magnitude
+                scale = registry().Quantity(Decimal(1), {"μ": "µ"}.get(prefix, prefix) + "meter").to("meter").magnitude
                 assert read_unit(prefix + symbol).factor == unit.factor.scaleb(scale.adjusted(), Context(prec=60))
 
 

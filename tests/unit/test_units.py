@@ -195,6 +195,17 @@ def test_hertz_and_rad_per_second_differ_by_two_pi(value):
         (1 / 15, "s", "66.6667 ms"),
         (999.9999999, "N", "1 kN"),
         (math.nan, "m", "nan m"),
+        (5e-10, "J", "500 pJ"),
+        (0.02104, "m", "21.04 mm"),
+        (-0.5, "m", "-500 mm"),
+        (0.99999999, "m", "1 m"),
+        (0.02, "m/s", "20 mm/s"),
+        (1e-12, "s", "1 ps"),
+        (-3e-19, "J", "-3e-19 J"),
+        (9.999999999e-13, "J", "1 pJ"),
+        (5e-324, "N", "5e-324 N"),
+        (2e14, "N/m", "200000 GN/m"),
+        (2e15, "N/m", "2e15 N/m"),
     ],
 )
 def test_numbers_are_written_as_people_write_them(value, unit, text):

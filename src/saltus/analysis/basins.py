@@ -86,9 +86,8 @@ def basins(
         label_all(plan, found, range(plan.chunks), lambda i, part: result.put(plan.cells_of(i), part), threads, _part(show, SCOUTING, 1.0))
         return plan.finish(result, found, threads)
     except KeyboardInterrupt:
-        interrupted = Interrupted()
-        interrupted.partial = None if found is None else plan.dataset(result, found, threads)
-        raise interrupted from None
+        scouted = found
+        raise Interrupted(None if scouted is None else lambda: plan.dataset(result, scouted, threads)) from None
     finally:
         close()
 

@@ -23,6 +23,8 @@ RADII = 2.0 ** -np.arange(1.0, 21.0, 2.0)
 BETWEEN = (2.0**1.5, 2.0, 2.0**0.5)
 #: Points on the outer shell for each dimension beyond the first; the inner shell has as many.
 DIRECTIONS = 16
+#: Every so-manyth point of the outer shell is followed first: a radius that is too large is nearly always seen to be by these alone.
+SPARSE = 4
 #: What is left of the distance after the returns that are looked at together, and how many these may be.
 CONTRACTION, MOST_RETURNS = 0.5, 64
 #: Points of an orbit that get a neighbourhood: a trajectory on its way passes all of them in a response.
@@ -111,16 +113,24 @@ def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, n
     iterates = orbit.period * _returns(orbit)
     norms = np.stack([_norm(matrix, scale) for matrix in monodromy])
     _, own = map_.sequences(points, iterates)
-    shell = np.concatenate([sphere(size), 0.5 * sphere(size)])
-    lengths, asked = np.linalg.norm(shell, axis=1), _asked(orbit)
+    outer, asked = sphere(size), _asked(orbit)
+    few = np.arange(2 * len(outer)) % SPARSE == 0
+    few[len(outer) :] = False
+    shell = np.concatenate([outer, 0.5 * outer])
 
-    def passes(radius: np.ndarray, which: np.ndarray) -> np.ndarray:
-        starts = points[which, None, :] + radius[:, None, None] * (shell @ np.linalg.inv(norms[which]).transpose(0, 2, 1))
+    def contracts(radius: np.ndarray, which: np.ndarray, some: np.ndarray) -> np.ndarray:
+        starts = points[which, None, :] + radius[:, None, None] * (some @ np.linalg.inv(norms[which]).transpose(0, 2, 1))
         with np.errstate(all="ignore"):  # what escapes doesn't contract
             ends, met = map_.sequences(starts.reshape(-1, size), iterates)
             back = np.linalg.norm((ends.reshape(starts.shape) - points[which, None, :]) @ norms[which].transpose(0, 2, 1), axis=2)
-            nearer = (back <= asked * radius[:, None] * lengths).all(axis=1)
-        return nearer & [_alike(met[i * len(shell) : (i + 1) * len(shell)], own[k]) for i, k in enumerate(which)]
+            nearer = (back <= asked * radius[:, None] * np.linalg.norm(some, axis=1)).all(axis=1)
+        return nearer & [_alike(met[i * len(some) : (i + 1) * len(some)], own[k]) for i, k in enumerate(which)]
+
+    def passes(radius: np.ndarray, which: np.ndarray) -> np.ndarray:
+        passed = contracts(radius, which, shell[few])
+        if passed.any():
+            passed[passed] = contracts(radius[passed], which[passed], shell[~few])
+        return passed
 
     best = np.zeros(n)
     for radius in RADII:

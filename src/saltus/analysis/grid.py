@@ -18,7 +18,7 @@ from saltus.flow.family import Family
 from saltus.flow.methods import Method
 from saltus.flow.room import check_room
 from saltus.system.system import System
-from saltus.units import to_si
+from saltus.units import from_si, to_si
 
 #: Directions of a sweep by what users write.
 SWEEPS = {"sweep_up": "up", "sweep_down": "down"}
@@ -139,11 +139,17 @@ def axis(system: System, name: str, given: Any) -> np.ndarray:
     """Values along one parameter [SI], ascending, from (first, last, count[, scale]) or a list or array of values."""
     if name not in system.values:
         raise ParameterError(f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}")
-    example = f'{name}=("{system.parameter_text(name)}", ..., 200) or (..., 200, "log")'
+    example = f"{name}=({_text(system, name, 0.5)}, {_text(system, name, 2.0)}, 200)"
     values = along(name, given, lambda value: single(system, name, value), "values", example)
     if not len(values) or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
         raise ParameterError(f"the values of {name} must ascend and be finite, such as {example}.")
     return values
+
+
+def _text(system: System, name: str, factor: float) -> str:
+    """A multiple of a parameter's value as it is written in Python; of 1 where the value is zero."""
+    value = factor * (system.values[name] or 1.0)
+    return repr(from_si(value, system.units[name])) if system.units[name] not in ("", "1") else f"{value:g}"
 
 
 def _starts(system: System, start: Any, box: Any, seed: int) -> tuple[np.ndarray, tuple[str, ...], bool]:

@@ -130,9 +130,7 @@ def lyapunov(
     try:
         work.run(show)
     except KeyboardInterrupt as stop:
-        interrupted = Interrupted()
-        interrupted.partial = dataset()
-        raise interrupted from stop
+        raise Interrupted(dataset) from stop
     finally:
         close()
     result = dataset()

@@ -39,12 +39,9 @@ def respond(
         found = find(grid, method, periods, threads, show)
     finally:
         close()
-    result = _dataset(grid, method, periods, found, threads, sample, wanted)
     if not found.complete:
-        stopped = Interrupted()
-        stopped.partial = result
-        raise stopped
-    return result
+        raise Interrupted(lambda: _dataset(grid, method, periods, found, threads, sample, wanted))
+    return _dataset(grid, method, periods, found, threads, sample, wanted)
 
 
 def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: int | None, sample: str, outputs: Outputs) -> xr.Dataset:

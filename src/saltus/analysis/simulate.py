@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -99,30 +100,27 @@ def simulate(
     plan = _plan(system, group, length, samples, keep)
     if not among(time_errors, ("measured", "local")):
         raise ParameterError(f'time_errors must be "measured" or "local", not {shown(time_errors)}.')
+
+    def so_far(outcome: Outcome) -> xr.Dataset:
+        return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
+
     show, close = reporter(progress)
-    outcome = None
+    outcome, request = None, plan.request(group, length)
     try:
-        again = time_errors == "measured" and bool(system.guards) and method.records_contacts
-        request, fit = plan.request(group, length), method.suited_to(group.size * (measure.copies(method) if again else 1))
-        outcome = engine.run(system, fit, request, threads, _part(show, 0.0, 0.3 if again else 1.0))
-        errors = measure.local(outcome)
-        if again:
-            errors = measure.measured(system, fit, request, outcome, threads, _part(show, 0.3, 0.7))
-    except Interrupted as stop:
-        so_far = stop.partial if outcome is None else outcome
-        if isinstance(so_far, Outcome):
-            stop.partial = _dataset(system, method, group, length, plan, so_far, measure.local(so_far))
-        raise
+        if time_errors == "measured" and system.guards and method.records_contacts:
+            outcome, errors = measure.measured(system, method, request, threads, show)
+        else:
+            outcome = engine.run(system, method.suited_to(group.size), request, threads, show)
+            errors = measure.local(outcome)
+        result = _dataset(system, method, group, length, plan, outcome, errors)
+    except KeyboardInterrupt as stop:
+        if outcome is not None:
+            raise Interrupted(partial(so_far, outcome)) from None
+        raise stop.then(so_far) if isinstance(stop, engine.RunInterrupted) else stop from None
     finally:
         close()
-    result = _dataset(system, method, group, length, plan, outcome, errors)
     warn(result, length, system)
     return result
-
-
-def _part(show: Callable[[float], None] | None, begin: float, share: float) -> Callable[[float], None] | None:
-    """Progress of one of several runs as a part of the whole."""
-    return None if show is None else lambda done: show(begin + share * done)
 
 
 @dataclass(frozen=True)
@@ -168,19 +166,20 @@ def _dataset(
     system: System, method: Method, group: Ensemble, length: Span, plan: _Plan, outcome: Outcome, errors: np.ndarray
 ) -> xr.Dataset:
     """Everything under its name."""
-    at = plan.schedule.count + plan.schedule.fraction
+    reached = slice(outcome.reached())
+    count, fraction = plan.schedule.count[reached], plan.schedule.fraction[reached]
     forced = system.forced_at is not None
     own_periods = forced and bool(np.ptp(length.period) > 0)
     scale = length.period[:, None] if own_periods else length.period[0]
-    time = np.minimum(length.t_start + (plan.schedule.count * scale + plan.schedule.fraction * scale), length.t_end)
+    time = np.minimum(length.t_start + (count * scale + fraction * scale), length.t_end)
     return trajectory_dataset(
         time=time,
-        values={name: outcome.samples[:, :, i] for i, name in enumerate(system.states)},
-        mode=outcome.sample_mode,
+        values={name: outcome.samples[:, reached, i] for i, name in enumerate(system.states)},
+        mode=outcome.sample_mode[:, reached],
         contacts=answers.contacts(outcome, len(system.states), errors),
         end_time=outcome.time,
         end={name: outcome.state[:, i] for i, name in enumerate(system.states)},
-        period=at if forced else None,
+        period=count + fraction if forced else None,
         forcing_period=(length.period if own_periods else float(length.period[0])) if forced else None,
         **answers.common(system, method, group, outcome),
     )

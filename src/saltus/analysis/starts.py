@@ -103,8 +103,15 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
 
 def check_system(system: Any) -> None:
     """Raises ParameterError for what isn't a System."""
-    if not isinstance(system, System):
-        raise ParameterError(f"the system must be a System, not {type(system).__name__}. Put @sl.system(states=...) above the function.")
+    if isinstance(system, System):
+        return
+    name = getattr(system, "__name__", "")
+    if callable(system) and str(getattr(system, "__module__", "")).startswith("saltus.models"):
+        raise ParameterError(f"sl.models.{name} is the function that makes a System. Call it: sl.models.{name}().")
+    told = "Put @sl.system(states=...) above the function." if callable(system) else "Take one of sl.models, such as sl.models.delangre()."
+    if isinstance(system, Mapping) and "format" in system:
+        told = "Write sl.System.from_dict(...) of what System.to_dict() gave."
+    raise ParameterError(f"the system must be a System, not {type(system).__name__}. {told}")
 
 
 def looks_every(system: System, every: Any) -> float | None:

@@ -17,7 +17,6 @@ from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method
 from saltus.flow.progress import reporter
-from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
 from saltus.system.system import System
 from saltus.units import to_si
@@ -106,10 +105,8 @@ def computed(
     show, close = reporter(progress)
     try:
         return dataset(engine.run(system, method, request, threads, show))
-    except Interrupted as stop:
-        if isinstance(stop.partial, Outcome):
-            stop.partial = dataset(stop.partial)
-        raise
+    except engine.RunInterrupted as stop:
+        raise stop.then(dataset) from None
     finally:
         close()
 

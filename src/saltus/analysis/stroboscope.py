@@ -19,7 +19,6 @@ from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.flow.room import check_room
-from saltus.interrupt import Interrupted
 from saltus.results import stroboscope_dataset
 from saltus.system.system import System
 
@@ -76,10 +75,11 @@ def stroboscope(
     request = Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, schedule, None)
 
     def dataset(outcome: Outcome) -> xr.Dataset:
+        reached = slice(outcome.reached())
         own_periods = bool(np.ptp(length.period) > 0)
         return stroboscope_dataset(
-            period=kept,
-            values={name: outcome.samples[:, :, i] for i, name in enumerate(system.states)},
+            period=kept[reached],
+            values={name: outcome.samples[:, reached, i] for i, name in enumerate(system.states)},
             forcing_period=length.period if own_periods else float(length.period[0]),
             **{**answers.common(system, method, group, outcome), "batch": True},
         )
@@ -87,10 +87,8 @@ def stroboscope(
     show, close = reporter(progress)
     try:
         result = dataset(engine.run(system, method.suited_to(group.size), request, threads, show))
-    except Interrupted as stop:
-        if isinstance(stop.partial, Outcome):
-            stop.partial = dataset(stop.partial)
-        raise
+    except engine.RunInterrupted as stop:
+        raise stop.then(dataset) from None
     finally:
         close()
     warn(result)

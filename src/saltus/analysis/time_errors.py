@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from saltus.flow import engine
-from saltus.flow.engine import Outcome, Request, Schedule
+from saltus.flow.engine import Outcome, Request, RunInterrupted, Schedule
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.system import expression as ex
@@ -21,8 +21,10 @@ from saltus.system.system import System
 COPIES = 3
 #: The estimate is this many times the largest distance so far: where errors are rounding, and where the companion is exact beside them.
 SAFETY, SAFETY_OF_EXACT_COMPANION = 8.0, 4.0
-#: Up to so many trajectories, the copies run together: they fill lanes that would stay empty.
+#: Up to so many trajectories move in one call with their copies.
 FEW = 16
+#: Share of the work that is the run itself, where its copies come after it.
+BY_ITSELF = 0.3
 #: Seed of the signs of the nudges. They are the same for every trajectory, so that no result depends on its neighbours.
 SEED = 20
 
@@ -32,39 +34,70 @@ def local(outcome: Outcome) -> np.ndarray:
     return outcome.record_floats[:, st.REC_TIME_ERROR]
 
 
-def copies(method: Method) -> int:
-    """How many more runs of a trajectory its errors are measured by."""
-    return COPIES if method.exact else 1
-
-
 def measured(
-    system: System, method: Method, request: Request, outcome: Outcome, threads: int | None, show: Callable[[float], None] | None
-) -> np.ndarray:
-    """Estimated error of the time of every contact of an outcome [s]; infinite from where on nothing is known.
+    system: System, method: Method, request: Request, threads: int | None, show: Callable[[float], None] | None
+) -> tuple[Outcome, np.ndarray]:
+    """Run a request, and the copies that tell its errors.
 
     Parameters
     ----------
-    system, method, request, outcome
-        What was run, how, and what came out.
-    threads, show
+    system, method, request, threads, show
         As for :func:`saltus.flow.engine.run`.
+
+    Returns
+    -------
+    Outcome, float64[contact]
+        What came out, and the estimated error of the time of every contact [s]; infinite from where on nothing is known.
+
+    Raises
+    ------
+    RunInterrupted
+        On Ctrl-C, with the Outcome so far.
     """
     n, silent = len(request.start), replace(request, schedule=Schedule.none())
     runs = _nudged(system, silent) if method.exact else [silent]
-    batches = [runs] if n <= FEW else [[one] for one in runs]
-    companion = method.companion().suited_to(n * len(batches[0]))
-    distance = np.zeros(len(outcome.record_integers))
-    for done, batch in enumerate(batches):
-
-        def part(share: float, done: int = done) -> None:
-            if show:
-                show((done + share) / len(batches))
-
-        check = engine.run(system, companion, _together(batch), threads, part if show else None)
-        for i in range(len(batch)):
-            distance = np.maximum(distance, _distances(outcome, check, i * n))
+    if method.exact and n <= FEW:
+        outcome, distance = _in_one_call(system, method, request, runs, threads, show)
+    else:
+        outcome, distance = _one_by_one(system, method, request, runs, threads, show)
     error = (SAFETY if method.exact else SAFETY_OF_EXACT_COMPANION) * distance
-    return np.maximum(error, local(outcome) + 4.0 * np.spacing(np.abs(outcome.record_floats[:, -1])))
+    return outcome, np.maximum(error, local(outcome) + 4.0 * np.spacing(np.abs(outcome.record_floats[:, -1])))
+
+
+def _in_one_call(
+    system: System, method: Method, request: Request, runs: list[Request], threads: int | None, show: Callable[[float], None] | None
+) -> tuple[Outcome, np.ndarray]:
+    """Outcome and largest distances, trajectories and copies moved together: copies fill lanes that would stay empty."""
+    n, total = len(request.start), (1 + len(runs)) * len(request.start)
+    together = replace(_together([request, *runs]), checks=total - n)
+    try:
+        whole = engine.run(system, method.suited_to(total), together, threads, show)
+    except RunInterrupted as stop:
+        so_far = stop
+        raise RunInterrupted(lambda: so_far.partial.of(0, n)) from None
+    outcome, check = whole.of(0, n), whole.of(n, total)
+    return outcome, np.max([_distances(outcome, check, i * n) for i in range(len(runs))], axis=0)
+
+
+def _one_by_one(
+    system: System, method: Method, request: Request, runs: list[Request], threads: int | None, show: Callable[[float], None] | None
+) -> tuple[Outcome, np.ndarray]:
+    """The same, one run after the other: the contacts of one copy need room at a time."""
+
+    def part(begin: float, share: float) -> Callable[[float], None] | None:
+        return None if show is None else lambda done: show(begin + share * done)
+
+    n = len(request.start)
+    outcome = engine.run(system, method.suited_to(n), request, threads, part(0.0, BY_ITSELF))
+    companion, share = method.companion().suited_to(n), (1.0 - BY_ITSELF) / len(runs)
+    distance = np.zeros(len(outcome.record_integers))
+    try:
+        for done, one in enumerate(runs):
+            check = engine.run(system, companion, one, threads, part(BY_ITSELF + done * share, share))
+            distance = np.maximum(distance, _distances(outcome, check, 0))
+    except KeyboardInterrupt:
+        raise RunInterrupted(lambda: outcome) from None
+    return outcome, distance
 
 
 # -- nudges ----------------------------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from saltus.arguments import Kinds
 from saltus.codegen.announce import silent
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.engine import MOST_THREADS
+from saltus.flow.engine import MOST_THREADS, RunInterrupted
 from saltus.interrupt import Interrupted
 from saltus.system.system import System
 
@@ -61,10 +61,10 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
         try:
             with quiet:
                 return function(*args, **kwargs)
-        except Interrupted:
-            raise
-        except KeyboardInterrupt:
-            raise Interrupted from None
+        except KeyboardInterrupt as stop:
+            if isinstance(stop, Interrupted) and not isinstance(stop, RunInterrupted):
+                raise
+            raise Interrupted from None  # what a run inside has finished is no answer
         finally:
             _INSIDE.reset(token)
 

@@ -363,13 +363,27 @@ def cache_show() -> None:
 
 
 @cache.command("clear")
-def cache_clear() -> None:
+def cache_clear(
+    everything: Annotated[bool, typer.Option("--all", help="Forget too which result files saltus wrote here.")] = False,
+) -> None:
     """Delete the compiled kernels. They are built again when they are needed.
+
+    The folder also knows the checksums of the result files that saltus wrote here, so that they are loaded at once. They stay: a file
+    whose checksum is forgotten is read by another process first, which takes a second. With --all they go too.
 
     Example: `saltus cache clear`
     """
     from saltus.cli import screen
     from saltus.codegen import cache as kernels
+    from saltus.results import known
 
     count = kernels.clear()
     screen.say(f"deleted {count} {'entry' if count == 1 else 'entries'} from {kernels.folder()}")
+    if everything:
+        screen.say(f"forgot {_result_files(known.forget())}")
+    elif kept := known.count():
+        screen.say(f"kept the checksums of {_result_files(kept)}, which are loaded at once; --all forgets them")
+
+
+def _result_files(count: int) -> str:
+    return f"{count} result {'file' if count == 1 else 'files'}"

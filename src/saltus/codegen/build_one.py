@@ -11,8 +11,10 @@ import os
 import sys
 
 from saltus.codegen import building, machine
+from saltus.codegen.asker import end_with_asker
 
 if __name__ == "__main__":
+    end_with_asker()
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what anything prints is no part of the answer
     template, texts, called, target, open_sizes = json.load(sys.stdin)

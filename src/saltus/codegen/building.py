@@ -21,6 +21,7 @@ from pathlib import Path
 
 from saltus.codegen import cache, machine, templates
 from saltus.codegen.announce import announce
+from saltus.codegen.asker import ASKED_BY
 from saltus.errors import CacheError
 from saltus.interrupt import check_stop
 
@@ -169,13 +170,14 @@ def _made_elsewhere(order: Order) -> bytes | None:
 def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) -> bytes | None:
     """What a module writes when it is run by another process and given these bytes; None if there is none, or it doesn't succeed."""
     path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = {**os.environ, "PYTHONPATH": path, ASKED_BY: str(os.getpid())}
     try:
         with tempfile.TemporaryFile() as file:  # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
             file.write(given)
             file.seek(0)
             process = subprocess.Popen(
                 [sys.executable, "-P", "-m", module, *options],  # -P: not what lies in the working folder
-                stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path},
+                stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
                 start_new_session=True,  # Ctrl-C is for this process
             )  # fmt: skip
     except OSError:  # no processes here

@@ -7,15 +7,13 @@ disturb each other; its checksum is verified before anything of it is used, and 
 
 from __future__ import annotations
 
-import os
 import shutil
 import time
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-import platformdirs
-
+from saltus.cache_folder import cache_folder
 from saltus.codegen import entry
 from saltus.errors import SaltusWarning
 
@@ -35,8 +33,7 @@ class Entry:
 
 def folder() -> Path:
     """Where generated kernels are kept: ``$SALTUS_CACHE``, else the user's cache folder."""
-    chosen = os.environ.get("SALTUS_CACHE")
-    return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("saltus", appauthor=False))
+    return cache_folder()
 
 
 def entries() -> list[Entry]:

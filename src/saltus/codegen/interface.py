@@ -53,7 +53,7 @@ _I1, _I2 = "int64[::1]", "int64[:, ::1]"
 #: Types of a batch, the first arguments of every `propagate`, in order (kernels/batch.py), and the budget.
 BATCH = (
     _F1, _F1, _F2, "int64", _F2, _I1, _F1, _I1, _I1, _F2, _I1, _I1, _F1, _I2, _F2,
-    _I1, _F1, _I1, _F3, _I2, _I1, _I2, _F2, _I1, _F1, _F1, "int64",
+    _I1, _F1, _I1, _F3, _I2, _I1, _I2, _F2, _I1, _F2, _F1, "int64",
 )  # fmt: skip
 
 _CLOCKS = {"numbers_of_clocks": (ARRAY, ARRAY)}

@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -79,6 +79,9 @@ class Request:
         First period since the start whose contacts are kept; None keeps none.
     t_end : float
         Time that was asked for [s]: what adding up periods rounds beyond it is cut off.
+    checks : int
+        So many trajectories at the end are there to check the others: they move as the method's companion moves them, which must be of the
+        same kernels, and no samples of them are taken.
     """
 
     start: np.ndarray
@@ -90,6 +93,7 @@ class Request:
     schedule: Schedule
     record_from: int | None
     t_end: float = np.inf
+    checks: int = 0
 
 
 @dataclass
@@ -107,6 +111,28 @@ class Outcome:
     record_integers: np.ndarray
     record_floats: np.ndarray
     complete: bool = True
+
+    def reached(self) -> int:
+        """How many samples there are: of a run that was interrupted those that some trajectory has reached."""
+        if self.complete:
+            return self.samples.shape[1]
+        return int(np.flatnonzero((self.sample_mode >= 0).any(axis=0)).max(initial=0)) + 1
+
+    def of(self, first: int, last: int) -> Outcome:
+        """That of some of the trajectories, as if they had been moved alone."""
+        rows = slice(*np.searchsorted(self.record_integers[:, st.REC_TRAJECTORY], (first, last)))
+        integers = self.record_integers[rows].copy()
+        integers[:, st.REC_TRAJECTORY] -= first
+        each = {name: getattr(self, name)[first:last] for name in _EACH}
+        return replace(self, **each, record_integers=integers, record_floats=self.record_floats[rows])
+
+
+#: Arrays of an outcome that have a row for each trajectory.
+_EACH = ("state", "time", "status", "mode", "counters", "minima", "samples", "sample_mode")
+
+
+class RunInterrupted(Interrupted):
+    """Ctrl-C during a run of the engine: ``partial`` is the Outcome so far."""
 
 
 @dataclass
@@ -140,25 +166,23 @@ def run(
 
     Raises
     ------
-    Interrupted
+    RunInterrupted
         On Ctrl-C, with the partial Outcome.
     """
     threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
     module = method.kernels(system.origin)
     outcome, whole = allocate(request, len(system.states), module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
-    shared = {"options": method.numbers(periods), "data": tables_of(system.origin)}
-    due = method.due(periods)
-    chunks = [_cut(request, whole, first, shared, due) for first in range(0, len(request.start), CHUNK)]
+    data, due = tables_of(system.origin), method.due(periods)
+    whole["options"] = options_of(method, periods, len(request.start), request.checks)
+    chunks = [_cut(request, whole, first, data, due) for first in range(0, len(request.start), CHUNK)]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
     try:
         _run_chunks(chunks, module, stop, room, progress, workers)
     except KeyboardInterrupt:
         outcome.complete = False
-        interrupted = Interrupted()
-        interrupted.partial = _finish(outcome, whole, chunks, request.t_end)
-        raise interrupted from None
+        raise RunInterrupted(lambda: _finish(outcome, whole, chunks, request.t_end)) from None
     if room.stopped:
         warnings.warn(
             f"the contacts of this call, {room.kept} by now, filled half of the free memory: trajectories that were under way stopped with "
@@ -167,6 +191,14 @@ def run(
             stacklevel=4,
         )
     return _finish(outcome, whole, chunks, request.t_end)
+
+
+def options_of(method: Method, periods: float, count: int, checks: int = 0) -> np.ndarray:
+    """The numbers of a method as its kernels read them, for so many trajectories of which the last ones are checks."""
+    options = np.tile(method.numbers(periods), (count, 1))
+    if checks:
+        options[-checks:] = method.companion().numbers(periods)
+    return options
 
 
 @lru_cache(maxsize=64)
@@ -179,6 +211,7 @@ def tables_of(system: System) -> np.ndarray:
 def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict[str, np.ndarray]]:
     """The arrays that all chunks write to, at the start of a run, and the outcome that shows them."""
     n, m = len(request.start), len(request.schedule.count)
+    sampled = n - request.checks
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
     whole = {
         "period": request.period,
@@ -194,9 +227,9 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
         "end_phase": request.end_phase,
         "counters": np.zeros((n, len(st.COUNTERS)), np.int64),
         "minima": np.full((n, len(st.MINIMA)), np.inf),
-        "cursor": np.zeros(n, np.int64),
-        "samples": np.full((n, m, states), np.nan),
-        "sample_mode": np.full((n, m), -1, np.int64),
+        "cursor": np.repeat([0, -1], [sampled, request.checks]),
+        "samples": np.full((sampled, m, states), np.nan),
+        "sample_mode": np.full((sampled, m), -1, np.int64),
         **marks(n),
     }
     outcome = Outcome(
@@ -210,7 +243,7 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
 ARGUMENTS = Batch._fields
 
 
-def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dict[str, np.ndarray], due: float | None) -> _Chunk:
+def _cut(request: Request, whole: dict[str, np.ndarray], first: int, data: np.ndarray, due: float | None) -> _Chunk:
     """The arrays of one chunk: views of the whole, and tables of its own."""
     last = min(first + CHUNK, len(request.start))
     arrays = {name: array[first:last] for name, array in whole.items()}
@@ -220,7 +253,7 @@ def _cut(request: Request, whole: dict[str, np.ndarray], first: int, common: dic
     arrays["sample_count"], arrays["sample_fraction"] = request.schedule.count, request.schedule.fraction
     arrays["rec_first"] = np.full(last - first, 0 if request.record_from is None else request.record_from, np.int64)
     arrays["rec_used"] = np.zeros(1, np.int64)
-    arrays |= common
+    arrays["data"] = data
     return _Chunk(first, arrays, request.record_from is not None, due)
 
 

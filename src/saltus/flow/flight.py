@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate, slice_of, tables_of
+from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate, options_of, slice_of, tables_of
 from saltus.flow.methods import Method
 from saltus.flow.pace import marks, resume
 from saltus.interrupt import check_stop
@@ -26,6 +26,7 @@ _FOLLOW = (
     "end_phase",
     "counters",
     "minima",
+    "options",
     *marks(0),
 )
 
@@ -56,7 +57,8 @@ class Flight:
         request = Request(start, parameters, period, 0.0, np.zeros(count, np.int64), np.zeros(count), Schedule.none(), None)
         _, self._arrays = allocate(request, start.shape[1], self._module)
         self._arrays["param"] = np.ascontiguousarray(parameters, float)
-        self._options, self._data, self._due = method.numbers(longest), tables_of(system.origin), method.due(longest)
+        self._arrays["options"] = options_of(method, longest, count)
+        self._data, self._due = tables_of(system.origin), method.due(longest)
         self.age = 0
 
     def __len__(self) -> int:
@@ -101,8 +103,7 @@ class Flight:
             sample_count=np.arange(self.age + 1, self.age + periods + 1, dtype=np.int64), sample_fraction=np.zeros(periods),
             sample_mode=np.zeros((k, periods), np.int64), rec_first=np.zeros(k, np.int64),
             rec_i=np.zeros((0, st.RECORD_INTEGERS), np.int64),
-            rec_f=np.zeros((0, st.RECORD_FLOATS + states + 1)), rec_used=np.zeros(1, np.int64), options=self._options,
-            data=self._data,
+            rec_f=np.zeros((0, st.RECORD_FLOATS + states + 1)), rec_used=np.zeros(1, np.int64), data=self._data,
         )  # fmt: skip
         steps = slice_of(states)
         outcome, went_on = st.PAUSED, False

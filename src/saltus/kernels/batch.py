@@ -16,13 +16,13 @@ end_count/_phase   i8[n], f8[n]      where it ends
 counters, minima   i8[n, 6] f8[n, 2] see status.py
 sample_count       i8[M]             sample m is due at (sample_count + sample_fraction) periods after the start; ascending
 sample_fraction    f8[M]
-cursor             i8[n]             the next sample of each trajectory
-samples            f8[n, M, D]       out: states
+cursor             i8[n]             the next sample of each trajectory; -1: none is taken
+samples            f8[n, M, D]       out: states (only trajectories that are sampled need a row)
 sample_mode        i8[n, M]          out: modes
 rec_first          i8[n]             first period whose contacts are recorded
 rec_i, rec_f       [cap, .]          contact records, columns in status.py; cap = 0 records nothing
 rec_used           i8[1]             records in use
-options            f8[.]             numbers of the method (flow/methods.py)
+options            f8[n, .]          numbers of the method (flow/methods.py)
 data               f8[.]             tables of the system (kernels/clocks.py)
 =================  ================  =====================================================================================
 """

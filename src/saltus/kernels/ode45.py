@@ -130,7 +130,7 @@ def check_sides(i, batch, work):
 def due(i, batch):
     """Time of the next sample, infinite if there is none."""
     m = batch.cursor[i]
-    if m >= batch.sample_count.shape[0]:
+    if m < 0 or m >= batch.sample_count.shape[0]:
         return math.inf
     return batch.origin[i] + batch.sample_count[m] * batch.period[i] + batch.sample_fraction[m] * batch.period[i]
 
@@ -282,7 +282,7 @@ def take_up(i, theta, batch, work):
     gaps_at(t, NODE, Q, AT_NODE, work)
     rate_at(t, NODE, Q, K1, work)
     if batch.mode[i] < 0:
-        t_leg, length = t, first_length(t, end_time(i, batch), batch.options[RTOL], theta, work)
+        t_leg, length = t, first_length(t, end_time(i, batch), batch.options[i, RTOL], theta, work)
         batch.mode[i] = sides(AT_NODE, work)
         write_samples_here(i, t, batch, work)
     return t, t_leg, length, t_break
@@ -304,7 +304,7 @@ def start_leg(i, t, t_end, rtol, theta, batch, work):
     drive_at(t, Q, work)
     gaps_at(t, NODE, Q, AT_NODE, work)
     rate_at(t, NODE, Q, K1, work)
-    if batch.options[LOCATE] != 0.0:
+    if batch.options[i, LOCATE] != 0.0:
         batch.mode[i] = sides(AT_NODE, work)
     return first_length(t, t_end, rtol, theta, work)
 
@@ -316,7 +316,7 @@ def put_back(i, t, t_leg, length, status, batch, work):
         batch.state[i, j] = work[NODE + j]
     batch.carry[i, TIME], batch.carry[i, LEG], batch.carry[i, LENGTH] = t, t_leg, length
     batch.status[i] = status
-    if batch.options[LOCATE] == 0.0:
+    if batch.options[i, LOCATE] == 0.0:
         drive_at(t, Q, work)
         gaps_at(t, NODE, Q, AT_NODE, work)
         batch.mode[i] = sides(AT_NODE, work)
@@ -331,9 +331,9 @@ def status_at(i, t, t_end, batch):
     """Status of a trajectory at a node."""
     if t >= t_end:
         return OK
-    if batch.counters[i, EVENTS] > batch.options[MAX_EVENTS]:
+    if batch.counters[i, EVENTS] > batch.options[i, MAX_EVENTS]:
         return BUDGET_EVENTS
-    return BUDGET_STEPS if batch.counters[i, STEPS] >= batch.options[MAX_STEPS] else RUNNING
+    return BUDGET_STEPS if batch.counters[i, STEPS] >= batch.options[i, MAX_STEPS] else RUNNING
 
 
 @inner
@@ -354,8 +354,8 @@ def find_contact(t, t_new, t_leg, h, work):
 @kernel
 def advance(i, budget, batch, work):
     """Move a trajectory to its end, or until the budget of tries is used up or the table of contacts is full; returns the budget left."""
-    rtol, theta = batch.options[RTOL], batch.options[ATOL] / batch.options[RTOL]
-    locate = batch.options[LOCATE] != 0.0
+    rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]
+    locate = batch.options[i, LOCATE] != 0.0
     t_end = end_time(i, batch)
     t, t_leg, length, t_break = take_up(i, theta, batch, work)
     status = status_at(i, t, t_end, batch)

@@ -14,6 +14,7 @@ from saltus.kernels.isolation import (
     leading_sign,
     polynomial,
 )
+from saltus.kernels.lanes import lowest_bit
 from saltus.kernels.status import (
     BUDGET_EVENTS,
     CROSSING,
@@ -189,7 +190,7 @@ def note_touch(lanes, lane, batch, slow, g, d, start):
     record(lanes, lane, batch, start + d, g, side, velocity, kind, mode, mode, error, slow.state)
 
 
-# -- clocks --------------------------------------------------------------------------------------------------------------------
+# -- gaps at a node, clocks -----------------------------------------------------------------------------------------------------
 @kernel
 def follow_clocks(lanes, lane, batch, slow, known):
     """Bring the clocks of a lane to their pieces at its phase, from those that it holds if they are known; sets its next break."""
@@ -213,6 +214,45 @@ def show_clocks(lanes, lane, slow):
             slow.held[row] = lanes.clock[CLOCK_ROW + row, lane]
         for j in range(NCLOCKS):
             slow.held[HELD * j + REF] += lanes.clock[BASE, lane]
+
+
+@kernel
+def gaps_here(lanes, lane, batch, slow):
+    """All gaps at the node where a lane stands, to slow.gaps."""
+    for i in range(NSTATES):
+        slow.state[i] = lanes.y[i, lane]
+    show_clocks(lanes, lane, slow)
+    parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
+    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.held, slow.gaps)
+
+
+@inner
+def is_past(lanes, lane, g, slow):
+    """Whether a gap in slow.gaps is on the wrong side of its boundary, by more than the rounding of the terms of the step before."""
+    return slow.gaps[g] * lanes.side[g, lane] < -ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
+
+
+@kernel
+def pass_break(lanes, lane, batch, slow):
+    """Bring the clocks of a lane over a break at the end of its step.
+
+    A boundary may jump there, over the state or away from under it. The next step finds the state past it at once, with no step to blame:
+    so this counts as a landing in which nothing has changed sides yet.
+    """
+    was_past, jumped = 0, False
+    gaps_here(lanes, lane, batch, slow)
+    for g in range(NGUARDS):
+        if is_past(lanes, lane, g, slow):
+            was_past |= 1 << g
+    follow_clocks(lanes, lane, batch, slow, True)
+    gaps_here(lanes, lane, batch, slow)
+    for g in range(NGUARDS):
+        if lanes.fresh[g, lane] > 0.5 and abs(slow.gaps[g]) > TOLD * ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]:
+            lanes.fresh[g, lane] = 0.0
+        jumped = jumped or (is_past(lanes, lane, g, slow) and (was_past >> g) & 1 == 0)
+    if jumped and lanes.run[LANDED, lane] != lanes.clock[TAU, lane] + lanes.clock[BASE, lane]:
+        note_arrival(lanes, lane)
+        lanes.run[BOUNCES, lane] = -1.0
 
 
 # -- landing -------------------------------------------------------------------------------------------------------------------
@@ -265,12 +305,12 @@ def record(lanes, lane, batch, tau, g, direction, velocity, kind, before, after,
 
 
 @inner
-def time_error(lanes, lane, batch, g, rate, tau):
+def time_error(lanes, lane, g, rate, tau):
     """Local error of a contact's time: truncation and rounding of the gap's terms over its rate, and the rounding of the clock."""
     if rate == 0.0:
         return math.inf
     size = lanes.prior[PRIOR_ROWS * g + NEW, lane]
-    return (ROUNDING + 2.0 ** batch.options[LOG2_TOLERANCE]) * size / abs(rate) + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
+    return (ROUNDING + 2.0 ** lanes.run[TOLERANCE, lane]) * size / abs(rate) + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
 
 
 @inner
@@ -280,7 +320,7 @@ def land(lanes, lane, batch, g, rate, slow):
     if SNAP_STATE[g] >= 0:
         lanes.y[SNAP_STATE[g], lane] = lanes.c[SNAP_CONST[g], lane]
     lanes.fresh[g, lane] = 1.0
-    change_side(lanes, lane, batch, g, rate, before, slow)
+    change_side(lanes, lane, batch, g, rate, before, g, slow)
 
 
 @inner
@@ -293,8 +333,15 @@ def is_shallow(lanes, lane, g, rate):
 
 
 @inner
-def change_side(lanes, lane, batch, g, rate, before, slow):
-    """The state is on the other side of a guard: change its bit, count and record."""
+def jump_over(lanes, lane, batch, g, rate, slow):
+    """One contact that the boundary made: it jumped over the state, when that crossed another boundary or at a break (-1)."""
+    flipped = int(lanes.run[FLIPPED, lane])
+    change_side(lanes, lane, batch, g, rate, mode_of(lanes, lane), lowest_bit(flipped) if flipped != 0 else -1, slow)
+
+
+@inner
+def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
+    """The state is on the other side of a guard, for it crossed that boundary or another: change its bit, count and record."""
     who = lanes.memo[lane, WHO]
     velocity = rate * lanes.side[g, lane]
     lanes.side[g, lane] = -lanes.side[g, lane]
@@ -302,13 +349,13 @@ def change_side(lanes, lane, batch, g, rate, before, slow):
         for m in range(batch.cursor[who]):
             batch.sample_mode[who, m] = mode_of(lanes, lane)
         return
-    if TANGENT:
-        saltate(lanes, lane, batch, g, before, slow)
+    if TANGENT and crossed >= 0:
+        saltate(lanes, lane, batch, crossed, before, slow)
     if lanes.run[BOUNCES, lane] > 1.5:
         return  # a return with no time passed was recorded when it came first
     flipped = int(lanes.run[FLIPPED, lane])
     lanes.run[FLIPPED, lane] = flipped | (1 << g) | (((flipped >> g) & 1) << NGUARDS)
-    shallow = is_shallow(lanes, lane, g, rate)
+    shallow = crossed == g and is_shallow(lanes, lane, g, rate)
     lanes.run[MET, lane] += 1.0
     if shallow:
         lanes.run[SHALLOW, lane] += 1.0
@@ -319,13 +366,13 @@ def change_side(lanes, lane, batch, g, rate, before, slow):
         slow.state[i] = lanes.y[i, lane]
     tau, direction = lanes.clock[TAU, lane], int(lanes.side[g, lane])
     kind = GRAZE_SHALLOW if shallow else CROSSING
-    error = time_error(lanes, lane, batch, g, rate, tau)
+    error = time_error(lanes, lane, g, rate, tau)
     record(lanes, lane, batch, tau, g, direction, velocity, kind, before, mode_of(lanes, lane), error, slow.state)
 
 
 @kernel
 def saltate(lanes, lane, batch, g, before, slow):
-    """The jump of the tangent that the states carry, at a crossing of guard g out of mode `before`."""
+    """The jump of the tangent that the states carry, at a crossing of the boundary of guard g out of mode `before`."""
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
@@ -352,7 +399,7 @@ def note_arrival(lanes, lane):
 def land_all(lanes, lane, batch, hits, slow):
     """Every contact at the end of this step, together. Returns the status.
 
-    A gap may hold sides of other guards, and jump when they change: the state is then past that boundary without having met it.
+    A gap may hold sides of other guards, or clocks, and jump when they change: the state is then past that boundary without having met it.
     """
     who, d = lanes.memo[lane, WHO], lanes.found[DELTA, lane]
     arrived = note_arrival(lanes, lane)
@@ -363,10 +410,10 @@ def land_all(lanes, lane, batch, hits, slow):
             past = -lanes.side[g, lane] * lanes.work[GAP_ROW + g, lane]
             if d == 0.0 and lanes.fresh[g, lane] < 0.5 and past > ROUNDING * lanes.work[SCALE_ROW + g, lane]:
                 batch.counters[who, VIOLATIONS] += arrived
-                change_side(lanes, lane, batch, g, rate, mode_of(lanes, lane), slow)
+                jump_over(lanes, lane, batch, g, rate, slow)
             else:
                 land(lanes, lane, batch, g, rate, slow)
     if lanes.run[BOUNCES, lane] >= MOST_BOUNCES:
         lanes.run[MET, lane] -= (int(lanes.run[FLIPPED, lane]) >> NGUARDS) & 1  # there and back where sliding begins is one contact
         return SLIDING
-    return BUDGET_EVENTS if lanes.run[MET, lane] >= batch.options[MOST_CONTACTS] else RUNNING
+    return BUDGET_EVENTS if lanes.run[MET, lane] >= lanes.run[MOST_MET, lane] else RUNNING

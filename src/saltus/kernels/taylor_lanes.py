@@ -48,7 +48,7 @@ def set_due(lanes, lane, batch):
     """Phase of the next sample in this period, infinite if there is none."""
     who, m = lanes.memo[lane, WHO], batch.cursor[lanes.memo[lane, WHO]]
     lanes.run[DUE, lane] = math.inf
-    if m < batch.sample_count.shape[0] and batch.sample_count[m] <= lanes.memo[lane, COUNT]:
+    if 0 <= m < batch.sample_count.shape[0] and batch.sample_count[m] <= lanes.memo[lane, COUNT]:
         lanes.run[DUE, lane] = (batch.sample_count[m] - lanes.memo[lane, COUNT]) * batch.period[who] + batch.sample_fraction[
             m
         ] * batch.period[who]
@@ -69,12 +69,8 @@ def set_period(lanes, lane, batch, slow):
 @kernel
 def final_contacts(lanes, lane, batch, slow):
     """A gap that is exactly zero, or past zero by rounding, at the very end is an event there, reported once; or a graze if it turns."""
-    for i in range(NSTATES):
-        slow.state[i] = lanes.y[i, lane]
-    parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
-    show_clocks(lanes, lane, slow)
-    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.held, slow.gaps)
-    d, met = lanes.found[DELTA, lane], 0
+    gaps_here(lanes, lane, batch, slow)
+    d, met, past = lanes.found[DELTA, lane], 0, 0
     for g in range(NGUARDS):
         inside = slow.gaps[g] * lanes.side[g, lane]
         if lanes.fresh[g, lane] < 0.5 and inside <= 0.0:
@@ -82,10 +78,13 @@ def final_contacts(lanes, lane, batch, slow):
                 note_touch(lanes, lane, batch, slow, g, d, lanes.run[START, lane])
             else:
                 met |= 1 << g
+                past |= is_past(lanes, lane, g, slow) << g
     if met != 0:
         note_arrival(lanes, lane)
     for g in range(NGUARDS):
-        if (met >> g) & 1:
+        if (past >> g) & 1:
+            jump_over(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow)
+        elif (met >> g) & 1:
             land(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow)
 
 
@@ -94,9 +93,12 @@ def end_stretch(lanes, lane, batch, slow):
     """The end of a period, or of the run. Returns the status."""
     who = lanes.memo[lane, WHO]
     if lanes.memo[lane, COUNT] < batch.end_count[who]:
+        landed_now = lanes.run[LANDED, lane] == lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
         lanes.memo[lane, COUNT] += 1
         lanes.clock[TAU, lane] = 0.0
         set_period(lanes, lane, batch, slow)
+        if landed_now:  # the same instant, as the new period rounds it
+            lanes.run[LANDED, lane] = lanes.clock[BASE, lane]
         if lanes.run[DUE, lane] <= 0.0:
             write_samples(lanes, lane, batch, 0.0, slow)
     if lanes.memo[lane, COUNT] < batch.end_count[who] or lanes.clock[TAU, lane] < batch.end_phase[who]:
@@ -127,8 +129,9 @@ def is_slow(lanes, lane, batch):
     if lanes.run[TAKEN, lane] <= lanes.run[LIMIT, lane]:
         return False
     behind = periods_behind(lanes, lane, batch)
-    slow = not behind - lanes.run[MARK, lane] >= batch.options[PACE]
-    lanes.run[LIMIT, lane], lanes.run[MARK, lane] = lanes.run[TAKEN, lane] + batch.options[MOST_STEPS], behind
+    who = lanes.memo[lane, WHO]
+    slow = not behind - lanes.run[MARK, lane] >= batch.options[who, PACE]
+    lanes.run[LIMIT, lane], lanes.run[MARK, lane] = lanes.run[TAKEN, lane] + batch.options[who, MOST_STEPS], behind
     return slow
 
 
@@ -161,12 +164,12 @@ def attend(lanes, lane, batch, slow):
         if (lanes.memo[lane, RESTS] >> g) & 1:
             lanes.fresh[g, lane] = 1.0
     if NCLOCKS > 0 and lanes.clock[TAU, lane] >= lanes.run[WATCH, lane]:
-        follow_clocks(lanes, lane, batch, slow, True)
+        pass_break(lanes, lane, batch, slow)
     if status == RUNNING and lanes.clock[TAU, lane] >= lanes.run[END, lane]:
         status = end_stretch(lanes, lane, batch, slow)
     if status == RUNNING and is_slow(lanes, lane, batch):
         status = BUDGET_STEPS
-    if status == RUNNING and lanes.run[MET, lane] >= batch.options[MOST_CONTACTS]:
+    if status == RUNNING and lanes.run[MET, lane] >= lanes.run[MOST_MET, lane]:
         status = BUDGET_EVENTS
     lanes.memo[lane, DECIDED] = 0
     return status
@@ -176,9 +179,7 @@ def attend(lanes, lane, batch, slow):
 @kernel
 def start_sides(lanes, lane, batch, slow):
     """Sides of all guards from the state; on a boundary the guard is fresh and its side is settled by the first step."""
-    show_clocks(lanes, lane, slow)
-    parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
-    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.held, slow.gaps)
+    gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
         lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
         lanes.fresh[g, lane] = 1.0 if slow.gaps[g] == 0.0 else 0.0
@@ -201,13 +202,14 @@ def fill(lanes, lane, who, batch, slow):
     lanes.run[LEAST, lane], lanes.run[SLOWEST, lane] = batch.minima[who, GAP_MARGIN], batch.minima[who, CONTACT_SPEED]
     lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[FLIPPED, lane] = 0.0, 0.0, 0.0
     lanes.run[ACTIVE, lane] = 1.0
+    lanes.run[TOLERANCE, lane] = batch.options[who, LOG2_TOLERANCE]
+    lanes.run[MOST_MET, lane] = batch.options[who, MOST_CONTACTS]
     for i in range(NSTATES):
         lanes.y[i, lane] = batch.state[who, i]
-        slow.state[i] = batch.state[who, i]
     for g in range(NGUARDS):
         lanes.prior[PRIOR_ROWS * g + NEW, lane] = batch.carry[who, CARRIED + g]
     if batch.mode[who] < 0:
-        lanes.run[LIMIT, lane], lanes.run[MARK, lane] = batch.options[MOST_STEPS], periods_behind(lanes, lane, batch)
+        lanes.run[LIMIT, lane], lanes.run[MARK, lane] = batch.options[who, MOST_STEPS], periods_behind(lanes, lane, batch)
         start_sides(lanes, lane, batch, slow)
         if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
             write_samples(lanes, lane, batch, lanes.clock[TAU, lane], slow)

@@ -33,11 +33,13 @@ CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
 # step length, the phase at its start, time of the last landing, contacts in a row without time passing, whether the mode at the start is
 # still being settled (0/1); contacts so far, those too shallow to be sure of, the slowest; the guards that changed sides at the last
 # landing's instant (bits; bit NGUARDS: one of them changed back and was counted again); the number of steps at which its pace is looked at
-# next, and the periods behind it when that was done last; the phase of the next break of a clock, and from which on it counts as reached.
+# next, and the periods behind it when that was done last; the phase of the next break of a clock, and from which on it counts as reached;
+# log2 of the tolerance, and the contacts that the trajectory may make.
 END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED, BOUNCES, STARTING, MET, SHALLOW, SLOWEST, FLIPPED, LIMIT, MARK, BREAK, WATCH = range(
     18
 )
-RUN_ROWS = 18
+TOLERANCE, MOST_MET = 18, 19
+RUN_ROWS = 20
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
 # Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when.

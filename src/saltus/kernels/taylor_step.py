@@ -67,7 +67,7 @@ def disagrees(lanes, h, share, log2_tolerance):
         rounding = ROUNDING * load(lanes.probe_rate, 2 * NSTATES + i, LANES)
         if NSINGULAR > 0:
             rounding = rounding + rounding_of_gaps(lanes, i)
-        allowed = DEFECT * (coarse_exp2(splat(log2_tolerance, LANES)) * size + h * rounding)
+        allowed = DEFECT * (coarse_exp2(log2_tolerance) * size + h * rounding)
         wrong = wrong | (h * magnitude(rate - slope) > allowed)
     return wrong
 
@@ -120,7 +120,7 @@ def state_after(work, base, d):
 
 
 @inner
-def advance(lanes, room, options, records):
+def advance(lanes, room, records):
     """Evaluate the states at the end of the step, move the clock, land where that is simple; returns the lanes that need attention."""
     work, clock, run = lanes.work, lanes.clock, lanes.run
     d = load(lanes.found, DELTA, LANES)
@@ -155,7 +155,7 @@ def advance(lanes, room, options, records):
         due = due | crosses
     else:
         land_simply(lanes, crosses & (~due), tau)
-        due = due | (load(run, MET, LANES) >= options[MOST_CONTACTS]) | (load(lanes.found, WHICH, LANES) >= 0.0)
+        due = due | (load(run, MET, LANES) >= load(run, MOST_MET, LANES)) | (load(lanes.found, WHICH, LANES) >= 0.0)
     return (load(run, ACTIVE, LANES) > 0.5) & due
 
 
@@ -196,10 +196,11 @@ def step_all(lanes, batch, slow):
     room = load(lanes.run, END, LANES) - load(lanes.clock, TAU, LANES)
     if NCLOCKS > 0:
         room = smaller(load(lanes.run, BREAK, LANES) - load(lanes.clock, TAU, LANES), room)
-    h = step_length(lanes.work, batch.options[LOG2_TOLERANCE])
+    log2_tolerance = load(lanes.run, TOLERANCE, LANES)
+    h = step_length(lanes.work, log2_tolerance)
     h = away_from_boundaries(lanes, h, room) if NSINGULAR > 0 else smaller(h, room)
     if PROBED:
-        h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), batch.options[LOG2_TOLERANCE])
+        h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), log2_tolerance)
     store(lanes.run, STEP, h)
     undecided = locate(lanes, h)
     open_lanes = settle_sooner(lanes, undecided) if any_lane(undecided) else bits(refine_crossings(lanes, h, undecided))
@@ -207,4 +208,4 @@ def step_all(lanes, batch, slow):
     while waiting != 0:
         decide(lanes, lowest_bit(waiting), batch, slow)
         waiting &= waiting - 1
-    return open_lanes | bits(advance(lanes, room, batch.options, batch.rec_i.shape[0] > 0))
+    return open_lanes | bits(advance(lanes, room, batch.rec_i.shape[0] > 0))

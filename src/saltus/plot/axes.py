@@ -13,6 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import BboxBase
 
 from saltus.errors import ParameterError
 from saltus.plot.picture import drawable
@@ -24,6 +25,8 @@ Direction = Literal["x", "y"]
 _WIDEN = 2.0
 #: Numbers that differ by no more than this share of their size are one number.
 _FLAT = 1e-12
+#: Mark of gap lines, contact regions and their names, by direction.
+GAP_NAMES = "saltus-gaps-{}"
 #: Room that the name of a gap takes above a picture, in widths of the Axes.
 _NAME = 0.45
 
@@ -68,8 +71,24 @@ def _join(pieces: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def draw_points(ax: Axes, x: np.ndarray, y: np.ndarray, **look: Any) -> None:
-    """Markers; many of them become pixels in vector files."""
-    ax.plot(x, y, ls="none", rasterized=x.size > RASTERISE_ABOVE, **look)
+    """Markers, whole ones at the limits of the Axes too; many of them become pixels in vector files."""
+    (points,) = ax.plot(x, y, ls="none", rasterized=x.size > RASTERISE_ABOVE, **look)
+    points.set_clip_box(_Around(ax, points.get_markersize() / 2 + points.get_markeredgewidth()))
+
+
+class _Around(BboxBase):
+    """The frame of an Axes, wider by some points (1/72 inch) on each side, whatever becomes of the figure."""
+
+    def __init__(self, ax: Axes, wider: float) -> None:
+        super().__init__()
+        self._ax, self._wider = ax, wider
+        self.set_children(ax.bbox)
+
+    def get_points(self) -> np.ndarray:
+        """Corners [pixel]."""
+        figure = self._ax.get_figure(root=True)
+        pixels = self._wider * (figure.dpi if figure is not None else 72) / 72
+        return np.asarray(self._ax.bbox.padded(pixels).get_points())
 
 
 def set_limits(ax: Axes, direction: Direction, values: np.ndarray, marks: Sequence[float] = (), margin: float = 0.06) -> None:
@@ -102,7 +121,7 @@ def few_ticks(ax: Axes) -> None:
 
 def draw_gaps(ax: Axes, direction: Direction, regions: Regions, scale: Scale, label: bool = True) -> None:
     """Gap lines dashed and named, contact regions lightly shaded; once for an Axes, after its limits are set."""
-    tag = f"saltus-gaps-{direction}"
+    tag = GAP_NAMES.format(direction)
     if any(artist.get_gid() == tag for artist in ax.get_children()):
         return
     low, high = ax.get_xlim() if direction == "x" else ax.get_ylim()

@@ -131,8 +131,9 @@ def _frame(ax: Axes, datasets: list[points.Shown], variables: list[str], state: 
         draw.draw_gaps(ax, "y", fixed, scale)
     names = ds["guard"].values[ds["guard_state"].values == state].tolist() if len(varied) else []
     for row, name in zip(varied, names, strict=True):  # a gap that the parameter itself moves
-        text = str(name).replace("_", " ")
-        ax.text(1.01, row[-1] * scale.factor, text, transform=ax.get_yaxis_transform(), va="center", color=QUIET, fontsize=7, clip_on=False)
+        text, low, high = str(name).replace("_", " "), *ax.get_ylim()
+        if low <= row[-1] * scale.factor <= high:
+            ax.text(1.01, row[-1] * scale.factor, text, transform=ax.get_yaxis_transform(), va="center", color=QUIET, fontsize=7)
         ax.plot(ds[datasets[0].axis].values * across.factor, row * scale.factor, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid="gap")
     shown = str(ds.attrs.get("sample", "stroboscope")) if variables[0] == sample_name(state) else "stroboscope"
     ax.set_ylabel(scale.label(_SHOWN.get(shown, "{}").format(state)))

@@ -129,8 +129,8 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
         draw.say(row[1], "\n".join(["At rest at", *told]))
     elif len(row) > 1:
         phase(runs, label, periods=in_phase, ax=row[1], legend=False)
-        for text in list(row[1].texts):
-            text.remove()  # the time history beside it names the gaps too; here the names would meet the title
+        for names in [one for one in row[1].child_axes if one.get_gid() == draw.GAP_NAMES.format("x")]:
+            names.remove()  # the time history beside it names the gaps too; here the names would meet the title
 
 
 def _poincare(ax: Axes, ds: xr.Dataset, runs: xr.Dataset, key: int, color: np.ndarray) -> None:

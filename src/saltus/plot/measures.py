@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from saltus.plot import axes as draw
 from saltus.plot import selection
@@ -143,6 +144,8 @@ def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, leg
         for name, (color, line) in curves.items():
             label = {"change": "change of the stored energy", "energy": "stored at the end"}.get(name, name)
             panel.plot(ds[dim].values, ds[name].values * scale.factor, color=color, ls=line, lw=1.0, label=label)
+        if dim != "time":
+            panel.xaxis.set_major_locator(MaxNLocator(integer=True))
         panel.set_xlabel("time [s]" if dim == "time" else "forcing periods")
         panel.set_ylabel(scale.label("energy in an interval"))
         panel.set_title(f"imbalance {float(ds['imbalance']):.1e}", loc="left", fontsize=8)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogFormatter
 
 from saltus.errors import ParameterError
 from saltus.plot import axes as draw
@@ -20,6 +21,8 @@ from saltus.results.schema import METHODS, check
 _CALLER = "plot.methods"
 #: Pieces of the axis over which medians and shares are taken: the eye can't follow 2000 values, and a share needs some dozen.
 PIECES = 30
+#: So many values, or fewer, are drawn as dots that are seen alone; so many pieces, or fewer, as steps over them.
+FEW, STEPS = 100, 8
 
 
 @picture
@@ -84,11 +87,19 @@ def _middles(bins: np.ndarray) -> np.ndarray:
     return np.sqrt(bins[1:] * bins[:-1]) if bins[0] > 0 and bins[-1] > 100 * bins[0] else 0.5 * (bins[1:] + bins[:-1])
 
 
+def _over(bins: np.ndarray, values: Any) -> tuple[np.ndarray, np.ndarray]:
+    """What is drawn of a number for each piece: a curve through their middles; of few pieces a step over each."""
+    if len(bins) > STEPS:
+        return _middles(bins), np.asarray(values)
+    return np.repeat(bins, 2)[1:-1], np.repeat(np.asarray(values), 2)
+
+
 def _draw_error(ax: Axes, one: xr.Dataset, x: np.ndarray, bins: np.ndarray, name: str, color: str) -> None:
     error = np.where(one["step_error"].values > 0, one["step_error"].values, np.nan)
-    draw.draw_points(ax, x, error, marker="o", ms=1.3, mfc=color, mec="none", alpha=0.35, zorder=2)
+    few = x.size <= FEW
+    draw.draw_points(ax, x, error, marker="o", ms=3.0 if few else 1.3, mfc=color, mec="none", alpha=0.6 if few else 0.35, zorder=2)
     medians = [float(np.nanmedian(error[piece])) if np.isfinite(error[piece]).any() else np.nan for piece in _in_pieces(x, bins)]
-    ax.plot(_middles(bins), medians, color=color, lw=1.4, label=name, zorder=3)
+    ax.plot(*_over(bins, medians), color=color, lw=1.4, label=name, zorder=3)
 
 
 def _draw_share(ax: Axes, one: xr.Dataset, x: np.ndarray, bins: np.ndarray, color: str) -> None:
@@ -98,14 +109,15 @@ def _draw_share(ax: Axes, one: xr.Dataset, x: np.ndarray, bins: np.ndarray, colo
     differ = np.array([(agrees[piece] == 0).sum() for piece in pieces], float)
     share = np.divide(differ, settled, out=np.full(len(pieces), np.nan), where=settled > 0)
     low, high = wilson(differ, settled)
-    ax.fill_between(_middles(bins), 100 * low, 100 * high, color=color, alpha=0.2, lw=0, zorder=2)
-    ax.plot(_middles(bins), 100 * share, color=color, lw=1.4, zorder=3)
+    ax.fill_between(*_over(bins, 100 * low), _over(bins, 100 * high)[1], color=color, alpha=0.2, lw=0, zorder=2)
+    ax.plot(*_over(bins, 100 * share), color=color, lw=1.4, zorder=3)
 
 
 def _draw_cost(ax: Axes, one: xr.Dataset, x: np.ndarray, name: str, color: str) -> None:
     cost = float(one["method_cpu_seconds"])
     label = f"{name}: {cost:.3g} s" if np.isfinite(cost) else name
-    draw.draw_points(ax, x, one["steps_per_period"].values, marker="o", ms=1.5, mfc=color, mec="none", label=label, zorder=2)
+    size = 3.0 if x.size <= FEW else 1.5
+    draw.draw_points(ax, x, one["steps_per_period"].values, marker="o", ms=size, mfc=color, mec="none", label=label, zorder=2)
 
 
 def _finish(panels: list[Axes], label: str, log: bool, x: np.ndarray) -> None:
@@ -116,8 +128,17 @@ def _finish(panels: list[Axes], label: str, log: bool, x: np.ndarray) -> None:
     panels[2].set_yscale("log")
     panels[0].set_ylabel("error of a period [range]")
     panels[1].set_ylabel("other answer [%]")
-    panels[1].set_ylim(0, 100)
+    panels[1].set_ylim(-3, 103)  # a curve at 0 or 100 isn't hidden by the frame
+    for axis in (panels[2].yaxis.set_major_formatter, panels[2].yaxis.set_minor_formatter):
+        axis(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.5)))
     panels[2].set_ylabel("steps a period")
     panels[2].set_xlabel(label)
     for panel, title in ((panels[0], None), (panels[2], "processor time")):
-        panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize="small", title=title, markerscale=3, frameon=False)
+        panel.legend(
+            loc="center left",
+            bbox_to_anchor=(1.01, 0.5),
+            fontsize="small",
+            title=title,
+            markerscale=1.5 if x.size <= FEW else 3,
+            frameon=False,
+        )

@@ -71,16 +71,19 @@ def _fonts(wanted: list[str]) -> list[str]:
 
 
 def _keep_ticks(figure: Figure) -> None:
-    """Ticks are made as they are needed, by the settings of that moment: write the present ones into the axes."""
+    """Ticks are made as they are needed, by the settings of that moment: write the present ones into the axes, but where a picture chose
+    its own.
+    """
     now: dict[str, Any] = {str(name): value for name, value in plt.rcParams.items()}
     for ax in figure.axes:
         for one in (ax, *ax.child_axes):
-            for direction in ("x", "y"):
-                look = {name: now[f"{direction}tick.{name}"] for name in ("labelsize", "direction", "color")}
-                one.tick_params(axis=direction, which="both", labelfontfamily=now["font.family"], **look)
+            for direction, axis in (("x", one.xaxis), ("y", one.yaxis)):
                 for which in ("major", "minor"):
-                    sizes = {name: now[f"{direction}tick.{which}.{name}"] for name in ("size", "width", "pad")}
-                    one.tick_params(axis=direction, which=which, **sizes)
+                    look = {name: now[f"{direction}tick.{name}"] for name in ("labelsize", "direction", "color")}
+                    look |= {name: now[f"{direction}tick.{which}.{name}"] for name in ("width", "pad")}
+                    look |= {"length": now[f"{direction}tick.{which}.size"], "labelfontfamily": now["font.family"]}
+                    chosen = axis.get_tick_params(which=which)
+                    axis.set_tick_params(which=which, **{name: value for name, value in look.items() if name not in chosen})
 
 
 # -- display units -------------------------------------------------------------------------------------------------------------

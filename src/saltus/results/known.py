@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-import platformdirs
+from saltus.cache_folder import cache_folder
 
 #: Names that are kept: where there are more when a process writes its first, all of them are forgotten.
 MOST = 20_000
@@ -20,8 +20,7 @@ _HERE: set[str] = set()
 
 def folder() -> Path:
     """Where they are kept: in ``$SALTUS_CACHE``, else in the user's cache folder."""
-    chosen = os.environ.get("SALTUS_CACHE")
-    return (Path(chosen) if chosen else Path(platformdirs.user_cache_dir("saltus", appauthor=False))) / "known-results"
+    return cache_folder() / "known-results"
 
 
 def is_known(digest: str) -> bool:
@@ -44,6 +43,26 @@ def note(digest: str) -> None:
         if _ours(place):
             _sweep(place)
             os.close(os.open(place / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600))
+
+
+def count() -> int:
+    """How many there are."""
+    try:
+        return len(os.listdir(folder()))
+    except OSError:
+        return 0
+
+
+def forget() -> int:
+    """Forget all of them; returns how many there were. Each file is tried once more when it is loaded next."""
+    before, place = count(), folder()
+    _HERE.clear()
+    with suppress(OSError):
+        if _ours(place):
+            for name in os.listdir(place):
+                with suppress(OSError):
+                    (place / name).unlink()
+    return before - count()
 
 
 def _ours(place: Path) -> bool:

@@ -86,8 +86,9 @@ def _computed(
     try:
         ds = compute(show).assign_attrs(labels)
     except Interrupted as stopped:
-        if stopped.partial is not None:
-            at.say(f"{title}: what was computed so far is in {save(stopped.partial.assign_attrs(labels), partial)}")  # type: ignore[attr-defined]
+        if stopped.has_partial:
+            at.say(f"{title}: what was computed so far goes to {partial}")
+            save(stopped.partial.assign_attrs(labels), partial)
         raise
     save(ds, file)
     partial.unlink(missing_ok=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from tomllib import TOMLDecodeError
@@ -22,6 +21,7 @@ from saltus.study.questions.simulate import Compare, Simulate
 from saltus.study.questions.spectrum import Spectrum
 from saltus.study.spec import Study
 from saltus.study.spec_parts import METHODS, Curve, Header, Output, Range, SystemTable
+from saltus.study.wording import toml
 
 TABLES: dict[str, type[BaseModel]] = {
     "study": Header, "system": SystemTable, "simulate": Simulate, "compare": Compare, "basins": Basins, "map": Map, "axes": Axis,
@@ -32,7 +32,6 @@ TABLES: dict[str, type[BaseModel]] = {
 #: Parts of a place that name the branch of a union, not a key.
 _BRANCHES = re.compile(r"float|str|(list|dict)\[.*\]|function-.*")
 _BARE_QUANTITY = re.compile(r"\s*([\w.-]+)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[A-Za-zµ][^#\"']*?)\s*(?:#.*)?")
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _EXPECTED = {
     "int_type": "a whole number",
     "float_type": "a number",
@@ -49,21 +48,6 @@ def _given(value: Any) -> str:
     """A value as a message repeats it: as TOML would write it, cut if it is long."""
     whole = toml(value)
     return whole if len(whole) <= SHOWN else f"{whole[:SHOWN]}…"
-
-
-def toml(value: Any) -> str:
-    """A value as TOML would write it on one line."""
-    match value:
-        case dict():
-            return (
-                "{ " + ", ".join(f"{key if _BARE_KEY.fullmatch(key) else toml(key)} = {toml(item)}" for key, item in value.items()) + " }"
-            )
-        case list():
-            return "[" + ", ".join(map(toml, value)) + "]"
-        case bool() | str():
-            return json.dumps(value, ensure_ascii=False)
-        case _:
-            return str(value)
 
 
 def syntax_fault(error: TOMLDecodeError, text: str) -> str:

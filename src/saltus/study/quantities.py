@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import StudyError, nearest
+from saltus.errors import ParameterError, StudyError, UnitError, nearest
 from saltus.units import to_si
 
 if TYPE_CHECKING:
@@ -34,7 +34,10 @@ def number(value: Quantity, unit: str, place: str, key: str) -> float:
     """
     if not isinstance(value, str) and unit not in ("", "1"):
         raise StudyError(f'[{place}] {key} = {value:g} has no unit. Write it with one, for example {key} = "{value:g} {unit}".')
-    return to_si(value, unit, f"[{place}] {key}")
+    try:
+        return to_si(value, unit, key)
+    except (ParameterError, UnitError) as error:
+        raise type(error)(f"[{place}] {error}") from None
 
 
 def parameters(system: System, values: Mapping[str, Quantity], place: str = "system") -> dict[str, float]:
@@ -60,6 +63,11 @@ def start(system: System, table: Mapping[str, Start], place: str = "simulate") -
         raise StudyError(f"[{place}] start lacks {', '.join(missing)}. {system.name} has the states {', '.join(system.states)}.")
     is_batch(table, place=place)
     return {state: _numbers(system, state, value, system.states, f"{place}.start") for state, value in table.items()}
+
+
+def start_or_rest(system: System, table: Mapping[str, Start] | None, place: str) -> dict[str, float | list[float]]:
+    """As :func:`start`; without one every state is zero."""
+    return dict.fromkeys(system.states, 0.0) if table is None else start(system, table, place)
 
 
 def starts(system: System, given: Starts | None, place: str) -> dict[str, float | list[float]] | str | None:

@@ -68,7 +68,7 @@ _FAULTS = 12
 _LONGEST = {"name": 200, "printed": 400, "exact": 400, "measured": 400, "description": 20_000, "source": 20_000}
 _WORD = 100
 #: Tables whose texts are formulas.
-_FORMULAS = ("rates", "terms", "outputs", "energy", "force", "surface")
+_FORMULAS = ("rates", "terms", "guards", "outputs", "energy", "force", "surface")
 
 
 def _short(data: Any, key: str = "", most: int = _WORD) -> None:

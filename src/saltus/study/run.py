@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import StudyError, nearest
+from saltus.errors import ParameterError, StudyError, TraceError, UnitError, nearest
 from saltus.results.files import remove_old_drafts
 from saltus.study.copies import keep_copy
 from saltus.study.inputs import Inputs
@@ -18,6 +19,7 @@ from saltus.study.questions.spectrum import Lines
 from saltus.study.running import Outcome, Report, Resources, Running
 from saltus.study.setting import Setting, setting_of
 from saltus.study.spec import Study
+from saltus.study.wording import fault
 
 if TYPE_CHECKING:
     from saltus.study.questions.question import Question
@@ -93,8 +95,18 @@ def run_study(
     at, outcome = Running(folder, text, resources, report, say, pictures), Outcome()
     for question in asked:
         if resources.shard is None or resources.shard[0] == 0 or question.shared:
-            outcome.add(question.answer(at))
+            with _told_of(question.asked_as):
+                outcome.add(question.answer(at))
     return outcome
+
+
+@contextmanager
+def _told_of(table: str) -> Iterator[None]:
+    """What an analysis says of its arguments is said of a table of the study."""
+    try:
+        yield
+    except (ParameterError, TraceError, UnitError) as error:
+        raise fault(table, error) from error
 
 
 def questions_of(study: Study, own: System | None, inputs: Inputs, only: Sequence[str] = ()) -> list[Question]:
@@ -107,13 +119,16 @@ def questions_of(study: Study, own: System | None, inputs: Inputs, only: Sequenc
     """
     setting = setting_of(study, own, inputs)
     for_all = inputs.taken
-    asked = [(name, question) for name, table in study.questions() for question in _PLANS[name](table, setting)]
+    asked: list[tuple[str, Question]] = []
+    for name, table in study.questions():
+        with _told_of(name):
+            asked += [(name, question) for question in _PLANS[name](table, setting)]
     stems = [stem for _, question in asked for stem in question.stems]
     twice = sorted({stem for stem in stems if stems.count(stem) > 1})
     if twice:
         raise StudyError(f"names of this study give the same file names, such as {twice[0]}. Let them differ in letters or digits.")
-    for _, question in asked:
-        question.shared_inputs = for_all
+    for name, question in asked:
+        question.shared_inputs, question.asked_as = for_all, name
     chosen = [question for name, question in asked if not only or _names(name, question) & set(only)]
     known = {name for one in asked for name in _names(*one)}
     for name in only:

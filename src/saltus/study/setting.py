@@ -7,14 +7,15 @@ from dataclasses import dataclass, field
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import SaltusError, StudyError, nearest
+from saltus.errors import ParameterError, SaltusError, StudyError, nearest
 from saltus.study import quantities
+from saltus.study.wording import fault
 from saltus.system.formula import Equations, Formula, Formulas
 
 if TYPE_CHECKING:
     from saltus.study.inputs import Inputs
     from saltus.study.spec import Study
-    from saltus.study.spec_parts import Header, Output, SystemTable
+    from saltus.study.spec_parts import Header, Output, Quantity, SystemTable
     from saltus.study.spec_parts import Table as SpecTable
     from saltus.system import System
 
@@ -41,14 +42,14 @@ class Setting:
 
     def system(self, values: Any, place: str) -> System:
         """The system with the values of one question."""
-        return self.base.with_values(**quantities.parameters(self.base, values, place)) if values else self.base
+        return _with_values(self.base, values, place) if values else self.base
 
     def formula(self, text: str, place: str) -> Formula:
         """A formula of the study. Raises StudyError if it can't be read."""
         try:
             return self.formulas.formula(text)
         except SaltusError as error:
-            raise StudyError(f"[{place}] {error}") from None
+            raise fault(place, error) from None
 
     def outputs(self, system: System, given: Mapping[str, Output], place: str) -> dict[str, Any] | None:
         """Outputs as the analyses take them, looked at now, so that a fault is told before anything is computed."""
@@ -59,7 +60,7 @@ class Setting:
         try:
             outputs_of(system, outputs)
         except SaltusError as error:
-            raise StudyError(f"[{place}] {error}") from None
+            raise fault(place, error) from None
         return outputs or None
 
     def method(self, own: SpecTable | None = None) -> Any:
@@ -87,7 +88,7 @@ def formulas_of(table: SystemTable, inputs: Inputs) -> Formulas:
     try:
         return Formulas(table.terms, tables)
     except SaltusError as error:
-        raise StudyError(f"[system] {error}") from None
+        raise fault("system", error) from None
 
 
 def system_of(table: SystemTable, own: System | None = None, formulas: Formulas | None = None, header: Header | None = None) -> System:
@@ -105,8 +106,9 @@ def system_of(table: SystemTable, own: System | None = None, formulas: Formulas 
     kinds = {"a model": table.model or table.case, "rates": table.rates, "--system": own}
     if len(given := [kind for kind, one in kinds.items() if one]) > 1:
         raise StudyError(f"[system] {' and '.join(given)}: these are several systems. Keep one.")
-    if not table.rates and (table.units or table.forced_at):
-        raise StudyError("[system] units and forced_at are for equations of your own: give them with rates, or leave them out.")
+    own_keys = [key for key in ("units", "guards", "forced_at", "check_units") if key in table.model_fields_set]
+    if not table.rates and own_keys:
+        raise StudyError(f"[system] {', '.join(own_keys)}: this is for equations of your own. Give rates, or leave it out.")
     if own is not None:
         base = own
     elif table.rates:
@@ -116,11 +118,23 @@ def system_of(table: SystemTable, own: System | None = None, formulas: Formulas 
             '[system] names no model. Write model = "delangre" (`saltus models` lists them), give rates, or --system my_rig.py:rig.'
         )
     else:
-        model = models.find(table.model)
-        if table.case is not None and "case" not in signature(model).parameters:
-            raise StudyError(f"[system] case: {table.model} has no cases.")
-        base = model() if table.case is None else model(table.case)
-    return base.with_values(**quantities.parameters(base, table.values))
+        try:
+            model = models.find(table.model)
+            if table.case is not None and "case" not in signature(model).parameters:
+                raise StudyError(f"[system] case: {table.model} has no cases.")
+            base = model() if table.case is None else model(table.case)
+        except ParameterError as error:
+            raise fault("system", error) from None
+    return _with_values(base, table.values, "system")
+
+
+def _with_values(system: System, values: Mapping[str, Quantity], place: str) -> System:
+    """The system with values as a table gives them. Raises StudyError or UnitError if one is refused."""
+    given = quantities.parameters(system, values, place)
+    try:
+        return system.with_values(**given)
+    except ParameterError as error:
+        raise fault(place, error) from None
 
 
 def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> System:
@@ -134,11 +148,15 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
             raise StudyError(f"[system] {unused[0]!r} stands in no rate. {nearest(unused[0], sorted(used))}")
         equations = Equations(rates, table.values, header.description if header else "")
         title, source = (header.name, header.source) if header else ("system", "")
-        return system(states=list(rates), units=table.units, forced_at=table.forced_at, name=title, source=source)(equations)
+        guards = {name: formulas.formula(text) for name, text in table.guards.items()}
+        return system(
+            states=list(rates), units=table.units, forced_at=table.forced_at, guards=guards, check_units=table.check_units, name=title,
+            source=source,
+        )(equations)  # fmt: skip
     except StudyError:
         raise
     except SaltusError as error:
-        raise StudyError(f"[system] {error}") from None
+        raise fault("system", error) from None
 
 
 def method_of(table: SpecTable) -> Any:

@@ -66,4 +66,4 @@ class Study(Table):
             elif table is self.simulate:
                 yield self.study.name, RUN
                 if self.compare is not None and self.compare.reference is not None:
-                    yield f"{self.study.name}, {REFERENCE}", REFERENCE
+                    yield f"{self.study.name}, reference", REFERENCE

@@ -89,8 +89,16 @@ class SystemTable(Table):
     units: dict[str, str] = Field(
         default_factory=dict, description="Units of states and parameters of a system of your own.", examples=[{"x": "m", "v": "m/s"}]
     )
+    guards: dict[str, Formula] = Field(
+        default_factory=dict,
+        description="Names for the boundaries of a system of your own, each with its comparison.",
+        examples=[{"teeth": "x2 - x1 > gap"}],
+    )
     forced_at: str | None = Field(
         None, description="The parameter of a system of your own that is the forcing frequency.", examples=["frequency"]
+    )
+    check_units: bool = Field(
+        True, description="Whether units of what a formula of the rates adds or compares must be the same.", examples=[False]
     )
     terms: dict[str, Formula] = Field(
         default_factory=dict,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import inspect
 import operator
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial, reduce
@@ -81,6 +82,8 @@ class Formula:
         except SaltusError:
             raise
         except (ArithmeticError, TypeError, ValueError) as error:
+            if isinstance(error, TypeError) and re.search(r"'(Relation|And|Or|Not)'", str(error)):
+                raise TraceError(f"{self.place}: a comparison is no number. Write 1 if x > gap else 0.") from None
             raise TraceError(f"{self.place} has no value: {error}.") from error
 
     def data(self) -> list[Any]:

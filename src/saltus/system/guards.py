@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from saltus.errors import TraceError
 from saltus.system import expression as ex
-from saltus.system.canonical import ONE, Canonical, Polynomial, proportion
+from saltus.system.canonical import ONE, Canonical, Polynomial, is_multiple, proportion
 from saltus.system.clocks import of_time_only, switch
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
 from saltus.system.text import Writer
@@ -84,6 +84,30 @@ def surface_guard(gap: Expr, name: str) -> Guard:
     return replace(level if positive and canonical.level_of(gap)[1] == 1.0 else Guard("", gap), name=name)
 
 
+def number_of(condition: Relation, guards: Sequence[Guard]) -> int | None:
+    """Which of some guards a comparison means, however it is written; None if it means none of them.
+
+    ``x > gap`` also means ``k*(x - gap) = 0``, if that is the only multiple of it.
+
+    Raises
+    ------
+    TraceError
+        If it is no boundary at all: of parameters or time only, or of equal things.
+    """
+    finder = _Finder(guards)
+    for relation in relations([ex.select(condition, 1, 0)]):
+        finder.add(relation)
+    found = finder.outcome[condition]
+    found = found.inner if isinstance(found, Not) else found
+    if not isinstance(found, Bit):
+        return None
+    if found.guard < len(guards):
+        return found.guard
+    meant = finder.polynomials[found.guard]
+    multiples = [number for number, known in enumerate(finder.polynomials[: len(guards)]) if is_multiple(known, meant)]
+    return multiples[0] if len(multiples) == 1 else None
+
+
 def relations(roots: Sequence[Expr]) -> Iterator[Relation]:
     """Every relation below the roots in the order of reading, those inside a gap before it; a relation may come more than once."""
     seen: set[Expr] = set()
@@ -106,33 +130,33 @@ class _Finder:
     def __init__(self, known: Sequence[Guard] = ()) -> None:
         self.guards: list[Guard] = list(known)
         self._canonical = Canonical()
-        self._polynomials: list[Polynomial] = [self._canonical.polynomial(guard.gap) for guard in known]
-        self._outcome: dict[Relation, Condition | bool] = {}
+        self.polynomials: list[Polynomial] = [self._canonical.polynomial(guard.gap) for guard in known]
+        self.outcome: dict[Relation, Condition | bool] = {}
         self._rewritten: dict[Expr, Expr] = {}
 
     def add(self, relation: Relation) -> None:
         """Find the guard of a relation, or make one."""
-        if relation in self._outcome:
+        if relation in self.outcome:
             return
         gap = self.rewrite(relation.gap)
         if of_time_only(gap) and not bits_in([gap]):
-            self._outcome[relation] = switch(gap)
+            self.outcome[relation] = switch(gap)
             return
         polynomial = self._canonical.polynomial(gap)
         if polynomial.keys() <= {ONE}:
             if not polynomial:
                 raise TraceError(f"an equation compares equal things: {gap!r} is always zero. Remove the comparison.")
-            self._outcome[relation] = polynomial[ONE] > 0
+            self.outcome[relation] = polynomial[ONE] > 0
             return
-        for number, known in enumerate(self._polynomials):
+        for number, known in enumerate(self.polynomials):
             sign = proportion(polynomial, known)
             if sign:
-                self._outcome[relation] = Bit(number) if sign > 0 else Not(Bit(number))
+                self.outcome[relation] = Bit(number) if sign > 0 else Not(Bit(number))
                 return
         _check_moves(gap, self._canonical.kinds(polynomial))
         guard, positive = _guard(gap, self._canonical)
-        self._outcome[relation] = Bit(len(self.guards)) if positive else Not(Bit(len(self.guards)))
-        self._polynomials.append(self._canonical.polynomial(guard.gap))
+        self.outcome[relation] = Bit(len(self.guards)) if positive else Not(Bit(len(self.guards)))
+        self.polynomials.append(self._canonical.polynomial(guard.gap))
         self.guards.append(guard)
 
     def rewrite(self, root: Expr) -> Expr:
@@ -152,7 +176,7 @@ class _Finder:
         """A condition on bits, or its value where that is certain."""
         match condition:
             case Relation():
-                return self._outcome[condition]
+                return self.outcome[condition]
             case Not(inner):
                 value = self._condition(inner)
                 return not value if isinstance(value, bool) else _opposite(value)

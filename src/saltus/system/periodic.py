@@ -155,5 +155,5 @@ def _not_periodic(system: System, entry: int, period: float) -> str:
     return (
         f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by forced_at={name!r} [{unit}]. "
         f"Write the drive as {drive}, or as {another} with units={{{name!r}: {other!r}}}; let every other forcing "
-        f"frequency be a multiple of it; or say forced_at=None for a system without a period."
+        f"frequency be a multiple of it; or leave forced_at= out for a system without a period."
     )

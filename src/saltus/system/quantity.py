@@ -48,6 +48,22 @@ def quantity(system: System, function: Quantity, what: str = "a quantity") -> tu
     TraceError
         If an argument is neither time, state nor parameter, or the function can't be traced.
     """
+    returned = called(system, function, what)
+    title = f"{what} of {system.name}"
+    try:
+        expression = as_expr(returned)
+    except Exception as error:
+        raise TraceError(explained(error, function, title)) from error
+    try:
+        (root,), guards = join_guards([expression], system.guards)
+        (root,) = lifted([root], guards)
+    except TraceError as error:
+        raise TraceError(f"{title} ({place(function)}): {error}") from error
+    return root, guards
+
+
+def called(system: System, function: Quantity, what: str) -> Any:
+    """What a function of time, states and parameters of a system returns for symbols. Raises as :func:`quantity` does."""
     if not callable(function) or isinstance(function, System):
         names = ", ".join(("t", *_own_states(system)))
         raise TraceError(
@@ -59,15 +75,9 @@ def quantity(system: System, function: Quantity, what: str = "a quantity") -> tu
         returned = function(*positional, **named)
         if returned is None:
             raise TraceError("it returns nothing. End it with: return ...")
-        expression = as_expr(returned)
     except Exception as error:
         raise TraceError(explained(error, function, title)) from error
-    try:
-        (root,), guards = join_guards([expression], system.guards)
-        (root,) = lifted([root], guards)
-    except TraceError as error:
-        raise TraceError(f"{title} ({place(function)}): {error}") from error
-    return root, guards
+    return returned
 
 
 def _own_states(system: System) -> tuple[str, ...]:

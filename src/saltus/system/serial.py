@@ -104,15 +104,16 @@ def arguments(data: Mapping[str, Any]) -> dict[str, Any]:
         )
     try:
         return _read(data)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
-        raise SaltusError(f"the data of a system is damaged ({type(error).__name__}: {error}). Trace the system again.") from error
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
+        why = " ".join(str(error).split())[:300]
+        raise SaltusError(f"the data of a system is damaged ({type(error).__name__}: {why}). Trace the system again.") from error
 
 
 def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     states, parameters = tuple(data["states"]), list(data["parameters"])
     for name in (*states, *parameters):
         _require(why_no_name(name) is None, f"{shown(name)} is no name: {why_no_name(name)}")
-    _require(why_no_title(data["name"]) is None, f"{data['name']!r} is no name of a system: {why_no_title(data['name'])}")
+    _require(why_no_title(data["name"]) is None, f"{shown(data['name'])} is no name of a system: {why_no_title(data['name'])}")
     for name in ("description", "source"):
         _require(why_no_text(data[name]) is None, f"its {name} can't be used: {why_no_text(data[name])}")
     _require(len({*states, *parameters}) == len(states) + len(parameters), "a name stands twice")

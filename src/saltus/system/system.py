@@ -136,7 +136,10 @@ class System:
         if values is not None and not isinstance(values, Mapping):
             raise ParameterError(f"values must be a mapping, such as {{{self.forced_at!r}: 15.0}}, not {shown(values)}.")
         frequency = (values or {}).get(self.forced_at, self.values[self.forced_at])
-        return (2 * math.pi if self.units[self.forced_at] == "rad/s" else 1.0) / frequency
+        try:
+            return (2 * math.pi if self.units[self.forced_at] == "rad/s" else 1.0) / frequency
+        except (TypeError, ArithmeticError):
+            raise ParameterError(f"{self.forced_at} must be a positive number or an array of them, not {shown(frequency)}.") from None
 
     # -- equations --------------------------------------------------------------------------------------------------------------
     @functools.cached_property

@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
+
 from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest, shown
 from saltus.system import checks
 from saltus.system.dimensions import DimensionCheck
@@ -63,6 +65,7 @@ def system(
     *,
     forced_at: str | None = None,
     units: Mapping[str, str] | None = None,
+    guards: Mapping[str, Callable[..., Any]] | None = None,
     name: str | None = None,
     source: str = "",
     check_units: bool = True,
@@ -83,6 +86,9 @@ def system(
     units : mapping of str to str, optional
         Coherent SI unit of states and parameters: ``{"x": "m", "mass": "kg", "damping_ratio": "1"}``. The unit of a parameter whose
         default is text (``mass="3 kg"``) is known already.
+    guards : mapping of str to callable, optional
+        Names for guards, each with the comparison that it is called after, as a function of states and parameters by name:
+        ``{"teeth": lambda x1, x2, gap: x2 - x1 > gap}``. A guard without one is named after the parameter that sets it, or by its equation.
     name : str, optional
         What to call the system; the function's name if not given.
     source : str, optional
@@ -116,23 +122,22 @@ def system(
     if callable(states):
         raise TraceError('write @sl.system(states="x v"), with the names of the states, not bare @sl.system.')
     if not isinstance(states, str | list | tuple):
-        raise TraceError(f'states must be names, such as states="x v", not {states!r:.80}.')
+        raise TraceError(f'states must be names, such as states="x v", not {shown(states)}.')
     names = tuple(states.replace(",", " ").split()) if isinstance(states, str) else tuple(states)
 
-    if units is not None and not isinstance(units, Mapping):
-        raise TraceError(f'units must be a mapping of names to units, such as units={{"x": "m"}}, not {units!r:.80}.')
-    if forced_at is not None and not isinstance(forced_at, str):
-        raise TraceError(f'forced_at must be the name of a parameter, such as forced_at="frequency", not {forced_at!r:.80}.')
-    if name is not None and not isinstance(name, str):
-        raise TraceError(f"the name of a system can't be {name!r:.80}: {why_no_title(name)}.")
+    _check_arguments(units, guards, forced_at, name, check_units)
 
     def decorate(function: Callable[..., Any]) -> System:
+        from saltus.system.guard_names import with_guard_names  # which builds on this module
+
         if not callable(function):
-            raise TraceError(f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, ...), not {function!r:.80}.")
+            raise TraceError(
+                f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, ...), not {shown(function)}."
+            )
         title, told = name or getattr(function, "__name__", "system").strip("<>"), inspect.getdoc(function) or ""
         for what, text, why in (("name", title, why_no_title), ("source", source, why_no_text), ("docstring", told, why_no_text)):
             if why(text) is not None:
-                raise TraceError(f"the {what} of a system can't be {text!r:.80}: {why(text)}.")
+                raise TraceError(f"the {what} of a system can't be {shown(text)}: {why(text)}.")
         defaults = _parameters(function, names, title)
         known_units = _units(names, defaults, forced_at, dict(units or {}), title)
         if forced_at is not None and known_units[forced_at] not in ("Hz", "rad/s"):
@@ -141,21 +146,38 @@ def system(
             )
         values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
         dimensions = DimensionCheck(names, known_units) if check_units else None
-        field, guards = _traced(function, names, tuple(defaults), title, dimensions)
-        _warn_of_unused(field, guards, defaults, forced_at, title)
-        return System(
+        field, found = _traced(function, names, tuple(defaults), title, dimensions)
+        _warn_of_unused(field, found, defaults, forced_at, title)
+        made = System(
             name=title,
             states=names,
             field=field,
-            guards=guards,
+            guards=found,
             values=values,
             units=known_units,
             forced_at=forced_at,
             source=source,
             description=told,
         )
+        return with_guard_names(made, guards) if guards else made
 
     return decorate
+
+
+def _check_arguments(units: Any, guards: Any, forced_at: Any, name: Any, check_units: Any) -> None:
+    """Raise a TraceError for an argument of :func:`system` of a wrong kind."""
+    if units is not None and not isinstance(units, Mapping):
+        raise TraceError(f'units must be a mapping of names to units, such as units={{"x": "m"}}, not {shown(units)}.')
+    if guards is not None and not isinstance(guards, Mapping):
+        raise TraceError(
+            f'guards must be a mapping of names to comparisons, such as guards={{"stop": lambda x, gap: x > gap}}, not {shown(guards)}.'
+        )
+    if forced_at is not None and not isinstance(forced_at, str):
+        raise TraceError(f'forced_at must be the name of a parameter, such as forced_at="frequency", not {shown(forced_at)}.')
+    if not isinstance(check_units, bool | np.bool_):
+        raise TraceError(f"check_units must be True or False, not {shown(check_units)}.")
+    if name is not None and not isinstance(name, str):
+        raise TraceError(f"the name of a system can't be {shown(name)}: {why_no_title(name)}.")
 
 
 # -- the signature -------------------------------------------------------------------------------------------------------------
@@ -169,7 +191,7 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
     try:
         signature = inspect.signature(function)
     except ValueError:  # of a class or function of C
-        raise TraceError(f"{title}: Python doesn't tell what arguments {function!r:.80} takes. Write a function, {wanted}.") from None
+        raise TraceError(f"{title}: Python doesn't tell what arguments {shown(function)} takes. Write a function, {wanted}.") from None
     for argument in signature.parameters.values():
         if argument.kind == argument.VAR_POSITIONAL and len(positional) == 1:
             together = True
@@ -279,7 +301,7 @@ def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
     try:
         derivatives = [as_expr(value) for value in returned]
     except TypeError:
-        raise TraceError(f"it returns {returned!r} in place of the time derivatives of {', '.join(states)}.") from None
+        raise TraceError(f"it returns {shown(returned)} in place of the time derivatives of {', '.join(states)}.") from None
     if len(derivatives) != len(states):
         raise TraceError(
             f"it returns {len(derivatives)} value{'s' * (len(derivatives) != 1)}, but there are {len(states)} states "

@@ -131,6 +131,29 @@ def test_a_neighbourhood_ends_where_the_contacts_change():
     assert np.abs(inside(neighbourhoods(plain, orbit, 0, np.ones(2)), 0, 2000)[:, 0]).max() > 0.1
 
 
+class TouchingInAWedge(FunctionMap):
+    """x -> A x, with a contact farther than 0.01 from (0, 0) within 0.1 of one direction."""
+
+    direction = 0.0
+
+    def sequences(self, start, count):
+        """See Map."""
+        end, _ = super().sequences(start, count)
+        turned = start @ np.array([[np.cos(self.direction), -np.sin(self.direction)], [np.sin(self.direction), np.cos(self.direction)]])
+        touches = (np.abs(np.arctan2(turned[:, 1], turned[:, 0])) < 0.1) & (np.linalg.norm(start, axis=1) > 0.01)
+        return end, [np.full(int(touch), 3) for touch in touches]
+
+
+@pytest.mark.parametrize("point", range(32))
+def test_every_point_of_the_shell_is_followed(point):
+    plain = linear([[0.5, 0.0], [0.0, 0.5]])
+    map_ = TouchingInAWedge(plain._function, "x y", plain._derivative)
+    map_.direction = point * np.pi / 16
+    orbit = polish(plain, np.array([0.1, 0.1]), 1, np.ones(2))
+    edge = inside(neighbourhoods(map_, orbit, 0, np.ones(2)), 0, 500)
+    assert 0.002 < np.linalg.norm(edge, axis=1).max() <= 0.01
+
+
 def test_newton_s_map_every_point_of_a_neighbourhood_ends_on_its_root():
     map_, scale = newton(), np.array([4.0, 4.0])
     starts = np.random.default_rng(1).uniform(-2, 2, (100, 2))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,11 @@ import saltus as sl
 from saltus.analysis import time_errors
 from saltus.analysis.answers import gap_units
 from saltus.codegen.module import lane_width
+from saltus.flow import engine
 from saltus.flow.family import Family
 from saltus.flow.methods import FEW
+from saltus.interrupt import Interrupted
+from saltus.kernels import status as st
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 
@@ -34,7 +38,7 @@ def test_few_trajectories_take_few_lanes_unless_the_user_chose():
 
 @pytest.mark.parametrize("method", [sl.Taylor(), sl.ODE45()], ids=["Taylor", "ODE45"])
 def test_one_trajectory_is_the_first_of_many_with_every_estimate(method):
-    many = {"x": np.linspace(1e-3, 3e-3, 9), "v": 0.0}
+    many = {"x": np.linspace(1e-3, 3e-3, time_errors.FEW + 1), "v": 0.0}  # whose copies are calls of their own
     alone, among = (sl.simulate(RIG, start, periods=12, method=method) for start in (("1 mm", 0.0), many))
     mine = among.isel(trajectory=0, contact=among["contact_trajectory"].values == 0)
     assert alone.sizes["contact"] > 20
@@ -43,16 +47,48 @@ def test_one_trajectory_is_the_first_of_many_with_every_estimate(method):
     assert alone.attrs["method_options"] == among.attrs["method_options"]
 
 
-def test_the_copies_of_a_trajectory_are_one_call(monkeypatch):
+def test_a_trajectory_and_its_copies_are_one_call(monkeypatch):
     calls, run = [], time_errors.engine.run
 
     def counted(system, method, request, *rest):
-        calls.append((len(request.start), method.lanes))
+        calls.append((len(request.start), request.checks, method.lanes))
         return run(system, method, request, *rest)
 
     monkeypatch.setattr(time_errors.engine, "run", counted)
     sl.simulate(RIG, (0.0, 0.0), periods=3)
-    assert calls == [(1, min(FEW, lane_width())), (time_errors.COPIES, min(FEW, lane_width()))]
+    assert calls == [(1 + time_errors.COPIES, time_errors.COPIES, min(FEW, lane_width()))]
+
+
+@pytest.mark.parametrize("method", [sl.Taylor(lanes=4), sl.Taylor(lanes=2, tolerance=2.0**-40)], ids=["default", "loose"])
+def test_checks_move_as_the_companion_moves_them_and_are_not_sampled(method):
+    """Two tolerances in one call: each trajectory comes out as in a call of its own method, to the bit; the loose steps are longer."""
+    start = np.array([[1e-3, 0.0], [2e-3, 0.0], [-1e-3, 0.5]])
+    schedule = engine.Schedule(np.arange(8), np.full(8, 0.25))
+    values, period, count = np.array([list(RIG.values.values())]), np.full(3, RIG.period()), np.full(3, 8)
+    request = engine.Request(start, values, period, 0.0, count, np.zeros(3), schedule, 0, checks=2)
+    whole = engine.run(RIG, method, request)
+    for first, last, mover in ((0, 1, method), (1, 3, method.companion())):
+        n = last - first
+        one = replace(request, start=start[first:last], period=period[:n], end_count=count[:n], end_phase=np.zeros(n), checks=0)
+        alone, part = engine.run(RIG, mover, one), whole.of(first, last)
+        for name in ("state", "time", "status", "mode", "counters", "minima", "record_integers", "record_floats"):
+            np.testing.assert_array_equal(getattr(part, name), getattr(alone, name), err_msg=name)
+        assert len(part.samples) == (1 if first == 0 else 0)
+        np.testing.assert_array_equal(part.samples, alone.samples[: len(part.samples)])
+    assert whole.counters[0, st.STEPS] != engine.run(RIG, method.companion(), replace(request, checks=0)).counters[0, st.STEPS]
+
+
+def test_an_interrupted_run_shows_its_trajectories_and_no_copy(monkeypatch):
+    def stopped(system, method, request, *rest):
+        outcome = run(system, method, request, *rest)
+        raise engine.RunInterrupted(lambda: outcome)
+
+    run = time_errors.engine.run
+    monkeypatch.setattr(time_errors.engine, "run", stopped)
+    with pytest.raises(Interrupted) as caught:
+        sl.simulate(RIG, {"x": [0.0, 1e-3], "v": 0.0}, periods=3)
+    assert caught.value.partial.sizes["trajectory"] == 2
+    assert set(caught.value.partial.contact_trajectory.values.tolist()) == {0, 1}
 
 
 def test_a_single_run_starts_no_thread_and_reports_its_progress(monkeypatch):

@@ -202,6 +202,12 @@ def test_a_system_must_be_one(call):
     rest = {"basins": dict(x=X, v=V), "attractors": dict(start=[0.1, 0.0]), "basin_fractions": dict(samples=4, x=SPAN_X)}[call]
     with pytest.raises(ParameterError, match="must be a System, not str"):
         getattr(sl, call)("rig", **rest)
+    with pytest.raises(ParameterError, match=r"Call it: sl\.models\.delangre\(\)\.$"):
+        getattr(sl, call)(sl.models.delangre, **rest)
+    with pytest.raises(ParameterError, match=r"sl\.System\.from_dict"):
+        getattr(sl, call)(sl.models.delangre().to_dict(), **rest)
+    with pytest.raises(ParameterError, match=r"Put @sl\.system"):
+        getattr(sl, call)(lambda t, x, v: (v, -x), **rest)
 
 
 @pytest.mark.parametrize("call", ["basins", "attractors", "basin_fractions"])

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from saltus.cli import app, commands
 from saltus.codegen import entry
+from saltus.results import known
 
 COMMANDS = ["demo", "run", "status", "resume", "plot", "reproduce", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
 
@@ -118,6 +119,16 @@ def test_cache(monkeypatch, tmp_path):
     assert saltus("cache").output == saltus("cache", "show").output
     assert "deleted 1 entry from" in saltus("cache", "clear").output
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_cache_clear_keeps_is_said_and_goes_when_asked(monkeypatch, tmp_path):
+    monkeypatch.setenv("SALTUS_CACHE", str(tmp_path))
+    known.note("ab" * 32)
+    assert "kept the checksums of 1 result file" in saltus("cache", "clear").output
+    assert known.is_known("ab" * 32)
+    assert "forgot 1 result file\n" in saltus("cache", "clear", "--all").output
+    assert not known.is_known("ab" * 32)
+    assert "result file" not in saltus("cache", "clear").output
 
 
 def test_doctor_fails_if_a_check_fails(monkeypatch):

@@ -11,6 +11,7 @@ import threading
 import time
 import warnings
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
@@ -468,3 +469,41 @@ def test_damaged_bitcode_is_told(monkeypatch, tmp_path, damage):
     for read in (templates.manifest.__wrapped__, lambda: templates._brought("ode45.bc.xz")):
         with pytest.raises(CacheError, match=r"bitcode/\S+ (is damaged|can't be read: .*): install saltus again|nstall saltus again"):
             read()
+
+
+def test_a_tilde_is_the_home_folder(monkeypatch, tmp_path):
+    """An env file or a systemd unit hands it over as it stands."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    monkeypatch.setenv("SALTUS_CACHE", "~/kernels")
+    assert cache.folder() == tmp_path / "kernels"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere a process keeps the number of a parent that is gone")
+def test_a_process_that_compiles_ends_with_the_one_that_asked(tmp_path):
+    """Killed, the asker can't end it: what it held is free all the same."""
+    import fcntl
+
+    lock = tmp_path / "held"
+    (tmp_path / "busy.py").write_text(
+        "import fcntl, sys, time\n"
+        "from saltus.codegen.asker import end_with_asker\n"
+        "file = open(sys.argv[1], 'w')\n"
+        "fcntl.flock(file, fcntl.LOCK_EX)\n"
+        "end_with_asker()\n"
+        "file.write('at work')\n"
+        "file.flush()\n"
+        "time.sleep(600)\n"
+    )
+    asks = f"from saltus.codegen import building\nbuilding._answer_of('busy', ({str(lock)!r},), b'', 'nothing')\n"
+    path = os.pathsep.join([str(tmp_path), str(Path(building.__file__).parents[2])])
+    asker = subprocess.Popen([sys.executable, "-c", asks], env={**os.environ, "PYTHONPATH": path})
+    try:
+        while not lock.exists() or not lock.read_text():
+            assert asker.poll() is None
+            time.sleep(0.05)
+    finally:
+        asker.kill()
+        asker.wait()
+    with lock.open() as file:
+        fcntl.flock(file, fcntl.LOCK_EX)  # waits until its holder has ended

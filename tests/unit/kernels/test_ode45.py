@@ -118,7 +118,7 @@ def flow(module, start, p, periods=0, *, rtol=1e-4, atol=1e-7, locate=True, extr
     rec_i, rec_f = np.zeros((rows, st.RECORD_INTEGERS), np.int64), np.zeros((rows, st.RECORD_FLOATS + states + 1))
     used = np.zeros(1, np.int64)
     count, fraction = np.array([s[0] for s in samples], np.int64), np.array([s[1] for s in samples], float)
-    options = np.array([rtol, atol, float(locate), max_steps, max_events])
+    options = np.tile([rtol, atol, float(locate), max_steps, max_events], (n, 1))
     integers, floats, outcome = [], [], st.PAUSED
     while outcome == st.PAUSED:
         outcome = module.propagate(

@@ -43,6 +43,7 @@ def test_a_row_for_each_attractor(known, batch):
     named = [one.get_text() for one in figure.legends[0].get_texts()]
     assert {"free", "contact", "Poincaré points", "other attractors"} <= set(named)
     assert len(named) == len(set(named))
+    assert not any(one.child_axes for one in rows(figure)[:, 1])  # names of gaps there would meet the title of the row
 
 
 def test_poincare_points_have_the_hue_of_the_map_and_stay_inside(known, batch):

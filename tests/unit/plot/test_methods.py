@@ -43,6 +43,15 @@ def test_shares_are_those_of_the_settled_starts():
     plt.close("all")
 
 
+def test_few_values_are_seen():
+    """One piece over all values is a step across them, not a curve of one point."""
+    panels = plot.methods(side_by_side(np.geomspace(1e3, 1e6, 13)))
+    x, share = panels[1].get_lines()[0].get_data()
+    np.testing.assert_allclose(x, [1e3, 1e6])
+    np.testing.assert_allclose(share, 100 * 7 / 13)
+    plt.close("all")
+
+
 def test_a_linear_grid_has_a_linear_axis():
     assert plot.methods(side_by_side(np.linspace(1.0, 2.0, 16)))[0].get_xscale() == "linear"
     plt.close("all")

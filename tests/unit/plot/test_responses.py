@@ -224,7 +224,12 @@ def test_gaps_are_dashed_and_named(diagram):
 def test_a_gap_that_the_parameter_moves_is_a_curve():
     values = np.linspace(1e-3, 2e-3, 5)
     rows = [(i, 0, "periodic", 1, 1e-3, [0.5e-3]) for i in range(5)]
-    x, y = layer(bifurcation_diagram(responses(values, rows, axis="gap", guards=Guards(("stop",), ("x",), values[None]))), "gap")
+    guards = Guards(("stop",), ("x",), values[None])
+    ax = bifurcation_diagram(responses(values, rows, axis="gap", guards=guards))
+    x, y = layer(ax, "gap")
+    assert not ax.texts  # the gap is above the picture
+    beside = bifurcation_diagram(responses(values, [(*row[:5], [4e-3 * row[0] / 4]) for row in rows], axis="gap", guards=guards))
+    assert [one.get_text() for one in beside.texts] == ["stop"]
     assert np.allclose(x, y)
     assert np.allclose(y, 1e3 * values)
 

@@ -5,13 +5,15 @@ import os
 import subprocess
 import sys
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.plot import regions
-from saltus.plot.style import OKABE_ITO, display_scale
+from saltus.plot.axes import draw_points
+from saltus.plot.style import OKABE_ITO, display_scale, style
 
 
 @pytest.mark.parametrize(
@@ -133,3 +135,33 @@ def test_a_notebook_stays_interactive(tmp_path):
 
 def test_micro_is_understood_as_keyboards_write_it():
     assert display_scale("m", 1e-4, "um") == display_scale("m", 1e-4, "µm")
+
+
+def test_ticks_keep_what_a_picture_chose_and_the_style_where_it_chose_nothing():
+    with style():
+        _, ax = plt.subplots()
+        top = ax.secondary_xaxis("top")
+        top.tick_params(length=0)
+    with plt.rc_context({"xtick.major.size": 77.0}):
+        assert top.xaxis.get_major_ticks()[0].tick2line.get_markersize() == 0
+        assert 0 < ax.xaxis.get_major_ticks()[0].tick1line.get_markersize() < 77
+    plt.close("all")
+
+
+def test_a_point_at_the_limit_is_drawn_whole_and_one_beyond_is_not():
+    def ink(x):
+        """Pixels left of the frame that a point at ``x`` blackens."""
+        figure, ax = plt.subplots(dpi=100)
+        ax.set_axis_off()
+        draw_points(ax, np.array([x]), np.array([0.5]), marker="o", ms=20, color="black")
+        ax.set_xlim(0, 1)
+        ax.set_ylim(0, 1)
+        figure.canvas.draw()
+        pixels = np.asarray(figure.canvas.buffer_rgba())[:, : int(ax.bbox.x0), 0]
+        plt.close(figure)
+        return int((pixels < 128).sum())
+
+    half = 0.5 * np.pi * (10 * 100 / 72) ** 2
+    assert ink(0.0) == pytest.approx(half, rel=0.1)
+    assert ink(-1.0) == 0
+    assert ink(0.5) == 0

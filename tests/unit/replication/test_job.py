@@ -129,7 +129,7 @@ def test_the_file_of_a_job_s_function_is_part_of_its_identity(tmp_path):
 
 # -- what a result depends on ----------------------------------------------------------------------------------------------------
 #: Packages that take no part in numbers: messages, what kinds arguments may be of, the end of work, and pictures of what was computed.
-NO_NUMBERS = ("errors", "arguments", "interrupt", "plot")
+NO_NUMBERS = ("cache_folder", "errors", "arguments", "interrupt", "plot")
 
 
 def sources(place):

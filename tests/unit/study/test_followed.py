@@ -10,10 +10,12 @@ import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.results import load
 from saltus.study.inputs import Inputs
+from saltus.study.questions.followed_tables import spectrum_table
 from saltus.study.read import parse
 from saltus.study.run import questions_of, run_study
 from saltus.study.running import Resources
 from saltus.study.status import status_tables
+from saltus.units import from_si
 
 HEAD = """
 [study]
@@ -131,9 +133,26 @@ def test_without_forcing_a_motion_has_the_samples_that_it_has_in_python_and_rows
     run(tmp_path, head + "".join(f"[{question}]\n{asked}" for question in ("simulate", "spectrum", "impacts")))
     motion = sl.simulate(sl.models.aeroelastic(), t_end=1.0, values={"airspeed": [8.0, 9.0]}, threads=1, progress=False)
     assert load(tmp_path / "run.nc").sizes["time"] == motion.sizes["time"] > 1000
-    for name in ("table", "spectrum", "impact-statistics"):
+    for name in ("run", "spectrum", "impact-statistics"):
         frame = pd.read_csv(tmp_path / f"{name}.csv", comment="#")
         assert frame["airspeed [m/s]"].tolist() == [8.0 + one for one in frame["trajectory"]], name
+
+
+def test_lines_of_rounding_are_not_printed():
+    """A linear oscillator in its steady state has one line; the others are those of doubles."""
+
+    @sl.system(states="x v", forced_at="f", units={"x": "m", "v": "m/s"})
+    def linear(t, x, v, *, c="0.5 N*s/m", k="40 N/m", mass="1 kg", force="1 N", f="1.3 Hz"):
+        return v, (force * sl.cos(2 * sl.pi * f * t) - k * x - c * v) / mass
+
+    w = 2 * np.pi * 1.3
+    steady = 1 / (40 - w**2 + 0.5j * w)
+    motion = sl.simulate(linear, (steady.real, (1j * w * steady).real), periods=4, progress=False)
+    lines = sl.spectrum(motion)
+    found = spectrum_table("lines", lines)
+    assert [row[:3] for row in found.rows] == [("1.3", "1", from_si(abs(steady), "m"))]
+    assert f"{lines.sizes['frequency'] - 1} of them no larger than rounding" in found.notes[-1]
+    assert len(found.data) == lines.sizes["frequency"] + 1
 
 
 def test_a_batch_of_frequencies_has_a_spectrum_each(tmp_path):

@@ -133,7 +133,7 @@ def test_the_files_of_curves_are_kept_and_changing_one_changes_the_answers(whole
     text = RIG + SIMULATE
     run(tmp_path / "out", text)
     assert sorted(file.name for file in (tmp_path / "out" / "inputs").iterdir()) == ["drive.csv", "stop.csv"]
-    assert "stop.csv: SHA-256" in (tmp_path / "out" / "table.csv").read_text()
+    assert "stop.csv: SHA-256" in (tmp_path / "out" / "run.csv").read_text()
     first = load(tmp_path / "out" / "run.nc")
     study, text = read(copy_of(tmp_path / "out"))
     run_study(study, text, tmp_path / "out", None, Resources(threads=1), lambda _: None, [].append, False,
@@ -153,6 +153,36 @@ def test_a_formula_takes_part_in_the_identity(whole):
         assert identity(base) != identity(base.replace(old, new))
 
 
+def test_guards_have_the_names_that_the_study_gives_them(tmp_path):
+    text = RIG + '[system.guards]\n"the stop" = "gap < x"\n' + SECTION.replace('{ formula = "v - 0.01" }', '"the stop"')
+    (question,) = questions_of(parse(text), None, Inputs(files(tmp_path)))
+    assert [guard.name for guard in question.system.guards] == ["the stop"]
+
+
+def test_a_motion_without_a_start_begins_at_rest(tmp_path):
+    (question,) = questions_of(parse(RIG + "[simulate]\nperiods = 6\n"), None, Inputs(files(tmp_path)))
+    assert question.arguments["start"] == {"x": 0.0, "v": 0.0}
+
+
+def test_units_of_rates_are_checked_unless_the_study_says_no(tmp_path):
+    text = """
+[study]
+name = "forgotten"
+[system]
+mass = "3 kg"
+k = "2 N/m"
+c = "6 N*s/m"
+units = { x = "m", v = "m/s" }
+rates = { x = "v", v = "-k*x - c*v/mass" }
+[simulate]
+t_end = "1 s"
+"""
+    with pytest.raises(StudyError, match=r"\[system\] forgotten.*\[system\] check_units = false leaves units unchecked"):
+        questions_of(parse(text), None, Inputs(files(tmp_path)))
+    (question,) = questions_of(parse(text.replace("[system]", "[system]\ncheck_units = false")), None, Inputs(tmp_path))
+    assert question.setting.base.name == "forgotten"
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -167,6 +197,9 @@ def test_a_formula_takes_part_in_the_identity(whole):
         (RIG.replace('"stop.csv"', '"down.csv"') + SIMULATE, "[system.tables.stop] down.csv: points must ascend"),
         (RIG.replace('"stop.csv"', '"bare.csv"') + SIMULATE, "begins with numbers. Its first line names the columns"),
         (RIG.replace("[system.tables.stop]", "[system.tables.sin]") + SIMULATE, "'sin' can't be the name of a term or a table"),
+        (RIG + '[system.guards]\nstop = "x > 2*gap"\n' + SIMULATE, "[system] written out: the guard 'stop' means no boundary"),
+        (RIG + '[system.guards]\nstop = "x - gap"\n' + SIMULATE, "the guard 'stop' must be one comparison, such as x > gap"),
+        ('[study]\nname="b"\n[system]\nmodel="delangre"\nguards.a="x > 0"\n' + SIMULATE, "guards: this is for equations of your own"),
         (RIG.replace("[system]", '[system]\nmodel = "chain"') + SIMULATE, "[system] a model and rates: these are several systems"),
         (RIG + SIMULATE.replace("[simulate]", "[simulate]\nperiod = 3"), "has no key 'period'"),
         (RIG + RESPONSE.replace('"contact"', '"contact + q"'), "[frequency_response.outputs] the output 'stop force' of written out"),
@@ -216,5 +249,5 @@ outputs = { "measured force" = "stop(depth)" }
 """
     question = questions_of(parse(text), None, Inputs(files(tmp_path)))[0]
     assert list(question.arguments["outputs"]) == ["measured force"]
-    with pytest.raises(StudyError, match="units and forced_at are for equations of your own"):
+    with pytest.raises(StudyError, match="this is for equations of your own"):
         questions_of(parse(text.replace("terms =", 'forced_at = "frequency"\nterms =')), None, Inputs(tmp_path))

@@ -86,7 +86,7 @@ def times(folder):
 # -- what comes out --------------------------------------------------------------------------------------------------------------
 def test_every_question_is_answered(whole):
     assert whole.names == [
-        "run.nc", "table.csv", "run.png",
+        "run.nc", "run.csv", "run.png",
         "frequency-response.nc", "frequency-response.csv", "frequency-response-responses.csv", "frequency-response.png",
         "soft.nc", "soft.csv", "soft-responses.csv", "soft.png",
         "a-map.nc", "a-map.csv", "a-map-responses.csv", "a-map.png",
@@ -129,10 +129,10 @@ def test_tables_tell_branches_and_kinds(whole):
 
 def test_csv_of_every_question_is_plain_numbers_in_si(whole):
     """What pandas reads are the numbers of the Dataset, to the last digit, with the unit in the heading."""
-    read = {name: pd.read_csv(whole.folder / f"{name}.csv", comment="#") for name in ("table", "frequency-response", "soft", "a-map")}
+    read = {name: pd.read_csv(whole.folder / f"{name}.csv", comment="#") for name in ("run", "frequency-response", "soft", "a-map")}
     run = load(whole.folder / "run.nc")
-    assert read["table"]["x at the end [m]"].tolist() == [float(run["end_x"])]
-    assert read["table"]["trajectory"].tolist() == [0]
+    assert read["run"]["x at the end [m]"].tolist() == [float(run["end_x"])]
+    assert read["run"]["trajectory"].tolist() == [0]
     ds, table = load(whole.folder / "frequency-response.nc"), read["frequency-response"]
     first = ds.isel(response=ds["response_branch"].values == 0)
     for name, value in (
@@ -209,9 +209,7 @@ def test_a_stop_keeps_what_is_computed(whole, copied, monkeypatch):
     (copied / "a-map.nc").unlink()
 
     def stopped(*_, **__):
-        stop = Interrupted()
-        stop.partial = load(whole.folder / "soft.nc")
-        raise stop
+        raise Interrupted(lambda: load(whole.folder / "soft.nc"))
 
     with monkeypatch.context() as patch:
         patch.setattr("saltus.analysis.bifurcation_diagram.bifurcation_diagram", stopped)
@@ -239,7 +237,7 @@ def test_only_one_question(tmp_path, no_computing, monkeypatch):
 
 def test_other_shards_leave_small_questions_to_the_first(tmp_path):
     assert Run(tmp_path / "second", HEAD + SIMULATE, shard=(1, 2)).outcome.files == []
-    assert Run(tmp_path / "first", HEAD + SIMULATE, shard=(0, 2)).names == ["run.nc", "table.csv"]
+    assert Run(tmp_path / "first", HEAD + SIMULATE, shard=(0, 2)).names == ["run.nc", "run.csv"]
 
 
 # -- what is refused before anything is computed ---------------------------------------------------------------------------------
@@ -251,7 +249,7 @@ def test_other_shards_leave_small_questions_to_the_first(tmp_path):
         (RESPONSE.replace('"14 Hz"', '"17 Hz"'), r"\[frequency_response\] the values of frequency must ascend"),
         (RESPONSE.replace("x =", "y ="), r"\[frequency_response\] start lacks x"),
         (RESPONSE.replace('"0 mm", "1 mm"]', '"0 mm", "1 mm"]').replace('"0 m/s"', '["0 m/s"]'), r"lists must have the same length"),
-        (RESPONSE.split("start")[0] + 'start = "sweep_sideways"\n', r"\[frequency_response\] start='sweep_sideways' isn't known"),
+        (RESPONSE.split("start")[0] + 'start = "sweep_sideways"\n', r"\[frequency_response\] start = .sweep_sideways. isn't known"),
         (RESPONSE.split("start")[0] + 'start = "random 5"\n', r"random starts need a box"),
         (RESPONSE.split("start")[0] + 'start = "random 5"\nbox = { x = ["1 mm", "2 kg"] }\n', r"\[frequency_response\.box\] x"),
         (RESPONSE + 'values = { forse = "1 N" }\n', r"\[frequency_response\.values\] 'forse' is unknown.*Did you mean 'force'"),
@@ -314,8 +312,8 @@ def test_every_key_tells_what_it_is():
 
 
 def test_examples_of_the_schema_are_read():
-    from saltus.study.messages import toml
     from saltus.study.questions.responses import BifurcationDiagram, FrequencyResponse
+    from saltus.study.wording import toml
 
     for key, table in (("frequency_response", FrequencyResponse), ("bifurcation_diagram", BifurcationDiagram)):
         lines = [f"{name} = {toml(field.examples[0])}" for name, field in table.model_fields.items()]

@@ -78,7 +78,7 @@ def test_not_a_study(text, part):
 
 
 def test_every_fault_is_named():
-    message = refusal(HEAD + "nme = 3\n[simulate]\nsampels = 3")
+    message = refusal(HEAD + "nme = 3\n[simulate]\nsampels = 3\nkep = 2")
     assert [line.split("]")[0] for line in message.splitlines()[1:]] == ["  - [study", "  - [simulate", "  - [simulate"]
 
 

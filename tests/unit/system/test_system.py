@@ -1,5 +1,7 @@
 """The System: values, checks, period, derived equations."""
 
+import datetime
+import decimal
 import math
 import subprocess
 import sys
@@ -9,9 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from saltus.errors import ParameterError, UnitError
+from saltus.errors import ParameterError, SaltusError, UnitError
 from saltus.models import aeroelastic, chain, delangre, gear_pair
+from saltus.system import system
 from saltus.system.evaluate import evaluate
+from saltus.system.system import System
 
 RIG = delangre()
 
@@ -110,6 +114,30 @@ def test_period():
     assert np.array_equal(RIG.period({"frequency": np.array([1.0, 2.0])}), [1.0, 0.5])
     assert RIG.period({"force": 1.0}) == 1 / 15
     assert aeroelastic().period() is None
+    for frequency in ({}, "9 Hz", None, [], 0):
+        with pytest.raises(ParameterError, match=r"frequency must be a positive number or an array of them, not .+\.$"):
+            RIG.period({"frequency": frequency})
+
+
+@pytest.mark.parametrize(
+    "value",
+    [{}, set(), b"3 N", np.zeros((2, 2)), np.array([None]), np.ma.masked_array([1.0], [True]), np.datetime64("2020"), datetime.timedelta(1),
+     decimal.Decimal("sNaN"), 1j, RIG, lambda: 3, np.array(["3 N"] * 2)],
+    ids=lambda value: type(value).__name__,
+)  # fmt: skip
+def test_what_is_no_value_is_refused_on_one_line(value):
+    """Whatever it is, and however its text looks."""
+    data = RIG.to_dict()
+    calls = [
+        lambda: RIG.with_values(force=value), lambda: RIG.with_values(value), lambda: System.from_dict({**data, "name": value}),
+        lambda: System.from_dict({**data, "field": [value]}), lambda: System.from_dict({**data, "nodes": [[value, [], 1.0]]}),
+        lambda: system(states="x", name=value), lambda: system(states="x", check_units=value), lambda: system(states="x")(value),
+    ]  # fmt: skip
+    for call in calls:
+        with pytest.raises(SaltusError) as caught:
+            call()
+        assert "\n" not in str(caught.value)
+        assert len(str(caught.value)) < 700
 
 
 def test_units_and_texts():

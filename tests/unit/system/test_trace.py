@@ -313,10 +313,10 @@ class TestPeriodicity:
         assert make(rotor, forced_at="speed", units={"speed": "rad/s"}).period() == pytest.approx(0.05, rel=1e-15)
 
     def test_a_ramp(self):
-        with pytest.raises(TraceError, match="forced_at=None"):
+        with pytest.raises(TraceError, match="leave forced_at= out"):
             self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t) * t)
 
-        with pytest.raises(TraceError, match="forced_at=None"):
+        with pytest.raises(TraceError, match="leave forced_at= out"):
             self.forced(lambda t, x, a, f, g: a * t)
 
     def test_a_weak_drive_beside_a_strong_preload(self):

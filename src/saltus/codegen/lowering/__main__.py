@@ -34,7 +34,9 @@ def main() -> None:
         os.environ["PYTHONHASHSEED"] = "0"
         os.execv(sys.executable, [sys.executable, "-P", "-m", "saltus.codegen.lowering", *sys.argv[1:]])
     from saltus.codegen import templates
+    from saltus.codegen.asker import end_with_asker
 
+    end_with_asker()
     parser = argparse.ArgumentParser(prog="python -m saltus.codegen.lowering", description=__doc__)
     parser.add_argument("names", nargs="*", help=f"of {', '.join(templates.BITCODE)}; default: those that aren't current")
     parser.add_argument("--all", action="store_true", help="all of them")

@@ -71,7 +71,7 @@ def simulated(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # 
     assert table is not None
     t_end = None if table.t_end is None else quantities.number(table.t_end, "s", "simulate", "t_end")
     return simulate(
-        system, quantities.start(system, table.start), table.periods, t_end, method=method_in(settings), samples=table.samples,
+        system, quantities.start_or_rest(system, table.start, "simulate"), table.periods, t_end, method=method_in(settings), samples=table.samples,
         keep=table.keep, values=quantities.varied(system, table.values), time_errors="local", threads=1, progress=show,
     )  # fmt: skip
 
@@ -81,7 +81,7 @@ def beside(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noq
     study = study_of(settings)
     table, system = study.simulate, _system(settings, study)
     assert table is not None
-    start = {name: np.atleast_1d(value) for name, value in quantities.start(system, table.start).items()}
+    start = {name: np.atleast_1d(value) for name, value in quantities.start_or_rest(system, table.start, "simulate").items()}
     offsets = settings["distance"] * np.linspace(-1.0, 1.0, settings["count"])
     first, second = system.states
     x = (start[first][:, None] + offsets).ravel()
@@ -119,7 +119,7 @@ def settled_from(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset: 
     study = study_of(settings)
     system = _system(settings, study)
     assert study.simulate is not None
-    start = quantities.start(system, study.simulate.start)
+    start = quantities.start_or_rest(system, study.simulate.start, "simulate")
     return attractors(system, start, method=method_in(settings), threads=1, progress=show)
 
 

@@ -13,6 +13,7 @@ from saltus.fence import MOST_PERIODS
 from saltus.study import quantities
 from saltus.study.questions.question import OneDataset, Question
 from saltus.study.spec_parts import METHOD, Method, Named, Quantity, Start
+from saltus.study.wording import fault
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +88,7 @@ class Looked(OneDataset):
         except StudyError:
             raise
         except SaltusError as error:
-            raise StudyError(f"[{place}] {error}") from error
+            raise fault(place, error) from error
 
     @classmethod
     def questions(cls, table: Any, setting: Setting) -> list[Question]:
@@ -102,7 +103,7 @@ class Looked(OneDataset):
             raise StudyError(f"[{place}] {system.name} is {'forced' if forced else 'not forced'}. Write {right}.")
         transient = 0.0 if table.transient is None else quantities.number(table.transient, "1" if forced else "s", place, "transient")
         return {
-            "start": quantities.start(system, table.start, place) if table.start is not None else dict.fromkeys(system.states, 0.0),
+            "start": quantities.start_or_rest(system, table.start, place),
             "periods": table.periods,
             "t_end": None if table.t_end is None else quantities.number(table.t_end, "s", place, "t_end"),
             "t_start": quantities.number(table.t_start, "s", place, "t_start"),
@@ -118,7 +119,7 @@ class Looked(OneDataset):
         try:
             return self.call({"method": self.method, "threads": threads, "progress": progress})
         except SaltusError as error:
-            raise StudyError(f"[{self.place}] {error}") from error
+            raise fault(self.place, error) from error
 
     @abstractmethod
     def call(self, how: dict[str, Any]) -> xr.Dataset:

@@ -43,12 +43,26 @@ def spectrum_table(title: str, ds: xr.Dataset) -> TextTable:
         columns.append(quantity(f"amplitude of {name}", _flat(amplitude, like, dims), _unit(amplitude), 6))
         columns.append(number(f"phase of {name}", _flat(phase, like, dims), ".4f", "rad"))
     size = _flat(like, like, dims)
-    shown = np.sort(np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")[:ROWS]).tolist()
+    largest = np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")
+    real = np.any([_flat(_above_rounding(ds[f"{name}_amplitude"]), like, dims) for name in states_of(ds)], axis=0)
+    shown = np.sort([row for row in largest[:ROWS] if real[row] or np.isnan(size[row])]).astype(int).tolist()
     windows = sorted(set(np.atleast_1d(ds["window"].values).astype(str).tolist()))
     periods = sorted(set(np.atleast_1d(ds["response_period"].values).tolist()))
     told = ", ".join(f"{n}T" if n else "not periodic within what was looked at" for n in periods)
     notes = [f"Window {', '.join(windows)}; response {told}. An amplitude is that of the cosine; frequency 0 is the mean."]
-    return table(title, columns, [*notes, *_left_out(size.size, "lines"), *_failed(ds)], shown)
+    if rest := size.size - len(shown):
+        noise = int(np.count_nonzero(~real & ~np.isnan(size)))
+        notes.append(f"{rest} more lines are in the file" + (f", {noise} of them no larger than rounding errors can be." if noise else "."))
+    return table(title, columns, [*notes, *_failed(ds)], shown)
+
+
+def _above_rounding(amplitude: xr.DataArray) -> xr.DataArray:
+    """Which lines are larger than what rounding alone can make: eps for each of the log2(N) stages of the transform of N samples, of the
+    root of the sum of all squares (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., theorem 24.2).
+    """
+    along = str(amplitude.dims[-1])
+    stages = np.log2(2 * amplitude.sizes[along])
+    return amplitude > 2 * np.finfo(float).eps * stages * np.sqrt((amplitude**2).sum(along))
 
 
 def impact_table(title: str, ds: xr.Dataset) -> TextTable:

@@ -33,12 +33,15 @@ class Question(ABC):
         Whether several jobs (shards) may work on it; else it is left to the first of them.
     shared_inputs : list of Input
         Files that take part in all answers: those of the system.
+    asked_as : str
+        The table of the study that asks it.
     """
 
     title: str
     stems: tuple[str, ...]
     shared: bool = False
     shared_inputs: Sequence[Input] = ()
+    asked_as: str = ""
 
     def inputs(self) -> list[Input]:
         """Files that take part in the answer."""

@@ -28,6 +28,7 @@ from saltus.study.spec_parts import (
     Range,
     Starts,
 )  # fmt: skip
+from saltus.study.wording import fault
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -133,7 +134,7 @@ def _check(system: System, axes: dict[str, Any], arguments: dict[str, Any], plac
         start, box, seed, follow = (arguments[name] for name in ("start", "box", "seed", "follow"))
         grid_of(system, _arrays(axes), start, box, None, seed, follow, arguments.get("every"))
     except SaltusError as error:
-        raise StudyError(f"[{place}] {error}") from error
+        raise fault(place, error) from error
 
 
 def _arrays(axes: dict[str, Any]) -> dict[str, Any]:
@@ -148,7 +149,7 @@ def _points(measured: Input, axis: str, system: System, place: str) -> xr.Datase
     try:
         return measured_points(measured.data, measured.path, axis, system.units.get(axis, "1"), system.units.get(system.states[0], "1"))
     except SaltusError as error:
-        raise StudyError(f"[{place}] {error}") from None
+        raise fault(place, error) from None
 
 
 class Responses(OneDataset):

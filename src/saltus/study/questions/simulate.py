@@ -16,6 +16,7 @@ from saltus.study.kept import kept_or_computed, save_picture
 from saltus.study.questions.question import Question
 from saltus.study.running import Outcome, Running
 from saltus.study.spec_parts import Method, Quantity, Start, Table
+from saltus.study.wording import fault
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,15 +25,16 @@ if TYPE_CHECKING:
     from saltus.study.questions.printed import Row
     from saltus.study.setting import Setting
 
-#: Stems of the files.
-RUN, REFERENCE, TABLE = "run", "reference", "table"
+#: Stems of the files: of the run, and of that of a second method.
+RUN, REFERENCE = "run", "run-reference"
 
 
 class Simulate(Table):
     """[simulate]: move one start, or a batch of them, and keep the motion with its contacts."""
 
-    start: dict[str, Start] = Field(
-        description="Every state at t_start. A list of values makes a batch; single values beside it hold for all.",
+    start: dict[str, Start] | None = Field(
+        None,
+        description="Every state at t_start. A list of values makes a batch; single values beside it hold for all. At rest by default.",
         examples=[{"x": "0 mm", "v": "0 m/s"}, {"x": ["0.2 mm", "0.4 mm"], "v": "0 m/s"}],
     )
     periods: int | None = Field(None, ge=1, le=MOST_PERIODS, description="Length in forcing periods.", examples=[60])
@@ -73,7 +75,7 @@ def questions(table: Simulate, setting: Setting) -> list[Question]:
     StudyError, UnitError
         If it doesn't fit the system.
     """
-    batch, compare, system = quantities.is_batch(table.start, table.values), setting.study.compare, setting.base
+    batch, compare, system = quantities.is_batch(table.start or {}, table.values), setting.study.compare, setting.base
     if batch and compare is not None:
         raise StudyError("[compare] is for one start: let [simulate] start hold single values.")
     if compare is not None and table.keep is not None:
@@ -81,7 +83,7 @@ def questions(table: Simulate, setting: Setting) -> list[Question]:
     if table.periods is not None and system.forced_at is None:
         raise StudyError(f'[simulate] periods: {system.name} has no forcing period. Write t_end = "2 s" in place of it.')
     arguments = {
-        "start": quantities.start(system, table.start),
+        "start": quantities.start_or_rest(system, table.start, "simulate"),
         "periods": table.periods,
         "t_end": None if table.t_end is None else quantities.number(table.t_end, "s", "simulate", "t_end"),
         "t_start": quantities.number(table.t_start, "s", "simulate", "t_start"),
@@ -96,7 +98,7 @@ class Motion(Question):
     """How given starts move."""
 
     def __init__(self, setting: Setting, arguments: Mapping[str, Any]) -> None:
-        self.title, self.stems = setting.study.study.name, (RUN, REFERENCE, TABLE)
+        self.title, self.stems = setting.study.study.name, (RUN, REFERENCE)
         self.setting, self.arguments, self.compare = setting, dict(arguments), setting.study.compare
 
         self._inputs, self.printed, self.exact = self._read() if self.compare is not None else ([], [], {})
@@ -128,7 +130,7 @@ class Motion(Question):
             table = run_table(self.title, runs[RUN])
         else:
             table = contact_table(self.title, runs[RUN], self.printed, self.exact, runs.get(REFERENCE))
-        files = [at.folder / f"{RUN}.nc", self.write_table(table, at.folder / f"{TABLE}.csv")]
+        files = [at.folder / f"{RUN}.nc", self.write_table(table, at.folder / f"{RUN}.csv")]
         files += [at.folder / f"{REFERENCE}.nc"] * (REFERENCE in runs)
         return Outcome([table], files + ([self._picture(runs[RUN], at.folder)] if at.pictures else []))
 
@@ -142,9 +144,9 @@ class Motion(Question):
             try:
                 return simulate(system, method=method, values=self.arguments["varied"], threads=at.resources.threads, progress=show, **call)
             except ParameterError as error:
-                raise StudyError(f"[simulate] {error}") from error
+                raise fault("simulate", error) from error
 
-        title = self.title if stem == RUN else f"{self.title}, {stem}"
+        title = self.title if stem == RUN else f"{self.title}, reference"
         return kept_or_computed(stem, title, identity(system, method, self.arguments), compute, at)
 
     def _picture(self, run: xr.Dataset, folder: Path) -> Path:

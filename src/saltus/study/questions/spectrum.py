@@ -42,6 +42,8 @@ class Lines(Looked):
         for name in table.states or []:
             if name not in self.system.states:
                 raise StudyError(f"[{self.place}] states: {name!r} is unknown to {self.system.name}. {nearest(name, self.system.states)}")
+        if table.last is not None and table.periods is None:
+            raise StudyError(f"[{self.place}] last counts forcing periods, and {self.system.name} isn't forced. Leave it out.")
         if table.last is not None and table.last > (table.periods or 0):
             raise StudyError(f"[{self.place}] last = {table.last} are more forcing periods than are looked at, periods = {table.periods}.")
         return {"states": table.states, "samples": table.samples, "window": table.window, "last": table.last}
