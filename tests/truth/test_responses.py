@@ -264,8 +264,8 @@ def test_a_start_that_hops_between_responses_joins_none_of_them():
     assert ds.sizes["event"] == 0, "no response ends: just no start leads there"
 
 
-#: One state of two orbits of the rig that attract, by their period. Followed in steps of 0.5 mHz, the first of each period and the second 8T
-#: end within a few mHz; the second 5T doubles its period at 14.64 Hz.
+#: One state of two orbits of the rig that attract, by their period. Followed in steps of 0.5 mHz, the first of each period ends within
+#: a few mHz, so does the second 8T; the second 5T doubles its period at 14.64 Hz.
 UNRELATED = {
     8: {13.75: (-0.00073242, 0.02373039), 14.0: (-0.00026599, -0.00667558)},
     5: {14.25: (-0.00030938, -0.00753661), 15.0: (-0.00040104, -0.01086994)},
