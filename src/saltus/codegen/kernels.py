@@ -59,8 +59,16 @@ class Call:
             elif value.dtype != dtype or value.ndim != dimensions or not value.flags.c_contiguous:
                 raise TypeError(f"a kernel takes a contiguous array of {dtype} with {dimensions} axes, not of {value.dtype} {value.shape}.")
             else:
-                numbers += (0, 0, value.size, 8, value.ctypes.data, *value.shape, *value.strides)
+                numbers += (0, 0, value.size, 8, _address(value), *value.shape, *value.strides)
         return np.array(numbers, np.int64)
+
+
+def _address(array: np.ndarray) -> int:
+    """Where a contiguous array lies, in a third of the time of ``array.ctypes``: a call asks for fifty."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]  # a buffer, which stubs for 3.11 don't know
+    except (TypeError, ValueError):  # read-only, or empty
+        return int(array.ctypes.data)
 
 
 class Kernels:

@@ -7,11 +7,12 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import saltus as sl
 from saltus.codegen import building, cache, kernels, machine, module, templates
-from saltus.codegen.kernels import FULL, GENERIC, SHAPE, TIERS
+from saltus.codegen.kernels import FULL, GENERIC, SHAPE, TIERS, Call
 
 needs_jit = pytest.mark.skipif(module.jit_disabled(), reason="nothing is compiled with the JIT off")
 METHODS = {
@@ -239,3 +240,15 @@ def test_new_values_never_recompile(monkeypatch):
     ):
         sl.simulate(other, {"x": [0.0, 1e-3], "v": [0.1, 0.0]}, 1, samples=1)
     sl.stroboscope(rig, (1e-3, 0.0), 2, values={"frequency": [14.0, 15.0, 16.0]})
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (5,), (3, 2)])
+@pytest.mark.parametrize("writeable", [True, False])
+def test_a_call_reads_arrays_where_they_lie(shape, writeable):
+    """Empty and read-only ones too; that of a part begins in the middle of its whole."""
+    array = np.zeros(shape)
+    array.flags.writeable = writeable
+    block = Call(("float64[::1]" if len(shape) < 2 else "float64[:,::1]",))
+    assert block.block((array,)).tolist() == [0, 0, array.size, 8, array.ctypes.data, *array.shape, *array.strides]
+    if shape == (5,):
+        assert block.block((array[2:],))[4] == array.ctypes.data + 16
