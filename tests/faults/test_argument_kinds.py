@@ -5,6 +5,7 @@ import random
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -180,6 +181,17 @@ def test_a_mask_is_not_dropped(ask):
 def test_an_array_that_may_have_a_mask_and_has_none_is_an_array():
     masked, plain = ({"x": kind([1e-3, 2e-3]), "v": 0.0} for kind in (np.ma.array, np.array))
     assert sl.stroboscope(rig, masked, 2).identical(sl.stroboscope(rig, plain, 2))
+
+
+@pytest.mark.parametrize("column", [pd.Series, lambda values, index: xr.DataArray(values, {"run": index})])
+def test_columns_whose_labels_differ_are_not_paired_row_by_row(column):
+    x, v, turned = column([1e-3, 2e-3], index=[0, 1]), column([0.1, 0.2], index=[0, 1]), column([0.2, 0.1], index=[1, 0])
+    with pytest.raises(ParameterError, match="different labels in their index"):
+        sl.stroboscope(rig, {"x": x, "v": turned}, 2)
+    with pytest.raises(ParameterError, match="different labels"):
+        sl.stroboscope(rig, {"x": x, "v": 0.0}, 2, values={"force": turned})
+    plain = sl.stroboscope(rig, {"x": [1e-3, 2e-3], "v": [0.1, 0.2]}, 2)
+    assert sl.stroboscope(rig, {"x": x, "v": v}, 2).identical(plain)
 
 
 def test_a_state_is_not_called_as_another_in_a_result():
