@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.codegen import blocks
 
 EPS = 2.0**-52
 
@@ -213,3 +214,22 @@ def test_r15_multipliers_and_exponents_of_orbits(row):
         assert math.isclose(exponent, float(row["LLE_per_s"]), rel_tol=1e-5)
     if np.all(multipliers.imag != 0):
         assert math.isclose(exponent, float(VALUES["R15a"]), rel_tol=1e-6)
+
+
+@pytest.mark.parametrize("length", [23, 24, 25, 26])
+def test_an_oscillator_driven_by_many_harmonics(length, monkeypatch):
+    """Its code is cut into blocks, here into short ones, at any place: between sine and cosine of a harmonic too."""
+    monkeypatch.setattr(blocks, "WHOLE", 50)
+    monkeypatch.setattr(blocks, "LENGTH", length)
+    decay, end, orders = 0.05, 0.5, np.arange(1, 13)
+
+    @sl.system(states="x v", forced_at="f", name=f"in blocks of {length}")
+    def driven(t, x, v, *, k=1.0, c=2 * decay, f=1.0):
+        return v, -k * x - c * v + sum(sl.cos(2 * sl.pi * n * f * t) / n**2 for n in range(1, 13))
+
+    w, own = 2 * np.pi * orders, math.sqrt(1 - decay**2)
+    steady = 1 / orders**2 / (1 - w**2 + 2j * decay * w)
+    x, v = 0.3 - steady.real.sum(), -(1j * w * steady).real.sum()
+    free = math.exp(-decay * end) * (x * math.cos(own * end) + (v + decay * x) / own * math.sin(own * end))
+    run = sl.simulate(driven, (0.3, 0.0), t_end=end, method=sl.Taylor(8), samples=1)
+    assert run.end_x.item() == pytest.approx(free + (steady * np.exp(1j * w * end)).real.sum(), rel=1e-13)
