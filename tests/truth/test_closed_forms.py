@@ -233,3 +233,30 @@ def test_an_oscillator_driven_by_many_harmonics(length, monkeypatch):
     free = math.exp(-decay * end) * (x * math.cos(own * end) + (v + decay * x) / own * math.sin(own * end))
     run = sl.simulate(driven, (0.3, 0.0), t_end=end, method=sl.Taylor(8), samples=1)
     assert run.end_x.item() == pytest.approx(free + (steady * np.exp(1j * w * end)).real.sum(), rel=1e-13)
+
+
+def ladder(rungs):
+    """A mass that meets one spring after the other: levels and the system."""
+    levels = np.linspace(0.1, 0.9, rungs)
+
+    @sl.system(states="x v")
+    def ladder(t, x, v, *, k=0.05):
+        return v, -x - sum(k * sl.max(x - float(level), 0.0) for level in levels)
+
+    return levels, ladder
+
+
+@pytest.mark.parametrize(("method", "error"), [(sl.ODE45(1e-8, 1e-10), 1e-6), pytest.param(sl.Taylor(), 1e-14, marks=pytest.mark.nightly)])
+def test_as_many_boundaries_as_a_mode_has_bits(method, error):
+    """Up through all of them and down again, with the energy that it began with."""
+    levels, mass = ladder(63)
+    run = sl.simulate(mass, (0.0, 2.0), t_end=4.0, samples=50, method=method, time_errors="local")
+    x, v = run.end_x.item(), run.end_v.item()
+    assert run.sizes["contact"] == 2 * 63
+    assert run.mode.values.max() == 2**63 - 1
+    assert v**2 / 2 + x**2 / 2 + 0.05 / 2 * (np.maximum(x - levels, 0) ** 2).sum() == pytest.approx(2.0, abs=error)
+
+
+def test_more_boundaries_than_that_are_refused():
+    with pytest.raises(sl.SaltusError, match="64 boundaries, and at most 63"):
+        ladder(64)
