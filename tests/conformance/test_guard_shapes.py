@@ -157,3 +157,21 @@ def test_max_is_a_boundary():
     assert (into.time, into.velocity) == (2.0, 0.5)
     assert out.time == pytest.approx(2 + math.pi / 3, abs=2e-15)
     assert out.velocity == pytest.approx(-0.5, abs=4e-15)
+
+
+@pytest.mark.parametrize("method", [sl.Taylor(12), sl.ODE45(1e-9, 1e-11)])
+def test_boundaries_that_depend_on_one_another_three_deep(method):
+    """The side of the last asks about the one before it, and so on: as an independent solver with short steps has it."""
+
+    @sl.system(states="x v w u")
+    def nested(t, x, v, w, u, *, k=3.0):
+        a = sl.where(u > 0.1, 0.3, 0.2)
+        b = sl.where(w > a * (1 + x), 0.25, 0.1)
+        c = sl.where(v > b * (1 + w), 0.4, -0.3)
+        return v, -k * x - sl.where(x > c * (1 + v), 2.0 * x, 0.0), v - w, x - u
+
+    start = (0.1, 0.5, 0.3, -0.2)
+    run = sl.simulate(nested, start, t_end=2.0, method=method, samples=2)
+    exact = solve_ivp(nested.rhs, (0, 2.0), start, method="DOP853", rtol=1e-10, atol=1e-12, max_step=2e-3).y[:, -1]
+    assert run.sizes["contact"] == 4
+    np.testing.assert_allclose([run[f"end_{name}"].item() for name in nested.states], exact, atol=1e-6)

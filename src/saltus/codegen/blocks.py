@@ -8,8 +8,12 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from saltus.errors import TraceError
+
 #: Lines of a function that stays whole, and of a block of one that doesn't.
 WHOLE, LENGTH = 1000, 250
+#: Bytes of the stack for the values that blocks hand on: threads have 8 MB on Linux, and less elsewhere.
+MOST_KEPT = 4_000_000
 
 _VALUE = re.compile(r"%r\d+\b")
 
@@ -40,6 +44,12 @@ def in_blocks(name: str, result: str, parameters: str, attributes: str, lines: l
         given = ", ".join(f"{kind} {value}" for kind, value in zip(_kinds(parameters), plain.split(", "), strict=True))
         calls.append(f"  call void @{name}.{i}({given}, ptr %kept)\n")
     places = sum(slot.width for slot in slots.values())
+    if 8 * places * lanes > MOST_KEPT:
+        raise TraceError(
+            f"the equation is too long to be compiled: {len(lines)} operations, whose values take {8e-6 * places * lanes:.1f} MB of the "
+            f"stack; at most {MOST_KEPT / 1e6:.0f} MB are used. Couple fewer states, or take a lower order or fewer lanes, such as "
+            "sl.Taylor(12, lanes=4)."
+        )
     memory = f"  %kept = alloca [{max(places, 1) * lanes} x double], align 64\n"
     return "\n".join(texts) + f"define {head}" + memory + "".join(calls) + "  ret void\n}\n"
 

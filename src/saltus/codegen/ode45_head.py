@@ -63,18 +63,23 @@ class _Stages:
 def _with_sides(system: System, stages: _Stages, roots: Iterable[Expr]) -> ScalarCode:
     """Code that first takes from the state the sides that the roots ask about."""
     roots = list(roots)
-    asked = {g for root in roots for node in ex.walk(root) if node.op == "select" for g in bits_of(node.payload)}
+    asked = {g for root in roots for g in _asked_by(root)}
     code = ScalarCode(stages.state_leaf, side=lambda i: f"b{i}", switch=stages.clocks.side)
+    waiting = list(asked)
+    while waiting:  # gaps ask about sides too, to any depth
+        more = _asked_by(system.guards[waiting.pop()].gap) - asked
+        asked |= more
+        waiting += more
     for i in evaluation_order(system):
-        if i in asked or any(i in _asked_by(system, g) for g in asked):
+        if i in asked:
             value = code.value(system.guards[i].gap)
             code.lines.append(f"b{i} = {value} > 0.0")
     return code
 
 
-def _asked_by(system: System, guard: int) -> set[int]:
-    """Guards whose sides the gap of a guard depends on."""
-    return {g for node in ex.walk(system.guards[guard].gap) if node.op == "select" for g in bits_of(node.payload)}
+def _asked_by(root: Expr) -> set[int]:
+    """Guards whose sides an expression itself asks about."""
+    return {g for node in ex.walk(root) if node.op == "select" for g in bits_of(node.payload)}
 
 
 def _outputs(code: ScalarCode, roots: Iterable[Expr]) -> str:

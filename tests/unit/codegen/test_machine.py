@@ -83,6 +83,12 @@ def test_wherever_a_function_is_cut_its_numbers_are_the_same(monkeypatch):
         np.testing.assert_allclose(out, wanted, rtol=1e-15, atol=1e-15, err_msg=f"blocks of {length}")
 
 
+def test_an_equation_whose_values_would_overrun_the_stack_is_refused(monkeypatch):
+    monkeypatch.setattr(blocks, "MOST_KEPT", 100)
+    with pytest.raises(sl.SaltusError, match="too long to be compiled"):
+        equation(row_of_masses(8), 4)
+
+
 def test_the_code_of_a_tangent_grows_as_that_of_its_equation():
     """All of its columns are one function: a tangent with sixteen has hardly more code, for its equation, than one with four."""
     shares = []
