@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parent.parent
 #: Where the page that compares finds its numbers.
 FOLDER = "docs/comparison"
 #: One after the other: two at a time would time each other.
-BENCHMARKS = ("benchmarks/startup.py", "benchmarks/compile.py", "benchmarks/flow.py", "benchmarks/basins.py")
+BENCHMARKS = ("benchmarks/startup.py", "benchmarks/compile.py", "benchmarks/flow.py", "benchmarks/contacts.py", "benchmarks/basins.py")
 
 
 def main() -> int:

@@ -40,7 +40,7 @@ ROWS = {
 
 
 def row_of_masses(masses: int, stops: int):
-    """Masses in a row between springs, the first ones with a stop."""
+    """Masses in a row between springs: stops at one side, from the first mass on, then at the other."""
     import saltus as sl
 
     @sl.system(states=" ".join([f"x{i}" for i in range(masses)] + [f"v{i}" for i in range(masses)]), forced_at="f")
@@ -50,8 +50,9 @@ def row_of_masses(masses: int, stops: int):
         for i in range(masses):
             left, right = (x[i - 1] if i else 0.0), (x[i + 1] if i + 1 < masses else 0.0)
             stop = sl.piecewise((stiffness * (x[i] - gap), x[i] > gap), otherwise=0) if i < stops else 0
+            other = sl.piecewise((stiffness * (x[i] + gap), x[i] < -gap), otherwise=0) if i + masses < stops else 0
             drive = force * sl.cos(2 * sl.pi * f * t) if i == 0 else 0
-            rates.append(-k * (x[i] - left) - k * (x[i] - right) - c * v[i] - stop + drive)
+            rates.append(-k * (x[i] - left) - k * (x[i] - right) - c * v[i] - stop - other + drive)
         return (*v, *rates)
 
     return masses_in_a_row

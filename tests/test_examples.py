@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import saltus as sl
 from saltus.analysis import plan
-from saltus.cli import app
+from saltus.cli.app import app
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_masses"
 

@@ -49,6 +49,14 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
 }
 
 
+def has_mask(value: Any, depth: int = 3) -> bool:
+    """Whether numbers in an array, or in arrays in lists and mappings, are masked: as plain numbers they would be whatever stands there."""
+    if isinstance(value, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(value))
+    inside = value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else ()
+    return depth > 0 and any(has_mask(one, depth - 1) for one in inside)
+
+
 class Kinds:
     """The kinds of a function's arguments, so far as they are plain and the function doesn't say it better itself.
 
@@ -64,8 +72,10 @@ class Kinds:
                 self._of[name] = kinds
 
     def check(self, caller: str, given: Mapping[str, Any]) -> None:
-        """Raise ParameterError for the first of the arguments that is of another kind."""
+        """Raise ParameterError for the first of the arguments that is of another kind, or has masked numbers."""
         for name, value in given.items():
+            if has_mask(value):
+                raise ParameterError(f"{caller}: {name} has masked numbers, and a mask isn't kept. Leave them out: array.compressed().")
             kinds = self._of.get(name)
             if kinds and not any(_KINDS[kind][0](value) for kind in kinds):
                 words = [_KINDS[kind][1] for kind in kinds if kind != "None"]

@@ -153,13 +153,44 @@ def test_shallow_contact_beyond_rounding_is_trusted():
 # -- the smallest margin ---------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("margin", [1e-12, 1e-9, 1e-6, 1e-3, 0.03, 0.5])
 def test_smallest_margin_of_an_oscillation(margin):
-    """x = sin t never meets the boundary at 1 + margin: the smallest margin is the margin, neither more nor less.
-
-    It is that of the first four terms of a step: exact towards a graze, where it matters, and to some per cent half an amplitude away.
-    """
+    """x = sin t never meets the boundary at 1 + margin: the smallest margin is the margin, neither more nor less, near or far."""
     run = sl.simulate(lab.with_values(spring=1.0, boundary=1 + margin), (0.0, 1.0), t_end=60.0, samples=2)
     assert contacts(run) == []
-    assert float(run.smallest_gap_margin) == pytest.approx((1 + margin) - 1, rel=1e-3 if margin < 0.1 else 0.03, abs=4e-15)
+    assert float(run.smallest_gap_margin) == pytest.approx((1 + margin) - 1, rel=1e-14, abs=4e-15)
+
+
+@pytest.mark.parametrize("margin", [1e-3, 0.03, 0.3])
+def test_smallest_margin_of_a_damped_swing(margin):
+    """Let go at -1, a damped oscillator comes to exp(-sigma pi / wd), and never so far again."""
+    sigma = 0.1
+    top = math.exp(-sigma * math.pi / math.sqrt(1 - sigma**2))
+    run = sl.simulate(lab.with_values(spring=1.0, damping=2 * sigma, boundary=top + margin), (-1.0, 0.0), t_end=30.0, samples=2)
+    assert contacts(run) == []
+    assert float(run.smallest_gap_margin) == pytest.approx(margin, abs=16 * EPS)
+
+
+@pytest.mark.parametrize("lean", [-1.0, 0.0, 1.0, 2.0])
+def test_smallest_margin_of_a_lopsided_turn(lean):
+    """x = (t - 1)^2 (t^2 + lean t + 3) + 0.3 turns at 0.3, where its leading terms at t = 0 don't say so."""
+    c = np.polyadd(np.polymul([1, -2, 1], [1, lean, 3]), [0.3])[::-1]
+    run = sl.simulate(quartic, (c[0], c[1], 2 * c[2], 6 * c[3]), t_end=3.0, samples=2)
+    assert contacts(run) == []
+    assert float(run.smallest_gap_margin) == pytest.approx(0.3, abs=64 * EPS)
+
+
+@sl.system(states="x u y w")
+def turned(t, x, u, y, w, *, push=3.0, level=0.0, force=0.0):
+    """y falls and rises with acceleration 1, and with more as soon as x is beyond a boundary; so it comes less near to its own."""
+    return u, 0.0 * x, w, 1.0 + sl.piecewise((push, x > level), otherwise=0) + sl.piecewise((force, y < level), otherwise=0)
+
+
+@pytest.mark.parametrize("x", [-0.5, -0.9, -0.999, -1.001, -1.5])
+def test_smallest_margin_is_of_turns_that_happen(x):
+    """x = x0 + t crosses zero at t = -x0. If that is before t = 1, y = 0.6 - t + t^2 / 2 turns sooner than at 0.1."""
+    run = sl.simulate(turned, (x, 1.0, 0.6, -1.0), t_end=2.0, samples=2)
+    at = min(-x, 1.0)
+    margin = 0.6 - at + at**2 / 2 - (1.0 - at) ** 2 / (2 * 4.0)
+    assert float(run.smallest_gap_margin) == pytest.approx(margin, abs=16 * EPS)
 
 
 def test_smallest_contact_speed():

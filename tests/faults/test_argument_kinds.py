@@ -5,6 +5,7 @@ import random
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -155,3 +156,73 @@ def test_a_long_message_keeps_its_beginning_and_its_end(kind):
     assert text.startswith("what is wrong")
     assert text.endswith("what to do")
     assert str(kind("short")) == "short"
+
+
+# -- what would be lost in silence ---------------------------------------------------------------------------------------------------
+MASKED = np.ma.array([1e-3, 9.0], mask=[False, True])
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda: sl.simulate(rig, {"x": MASKED, "v": 0.0}, 2),
+        lambda: sl.simulate(rig, [MASKED], 2),
+        lambda: sl.simulate(rig, (0.0, 0.0), 2, values={"force": MASKED}),
+        lambda: sl.basins(rig, x=MASKED, v=[0.0, 1.0]),
+        lambda: sl.frequency_response(rig, MASKED),
+        lambda: sl.table(0.5, MASKED, [0.0, 1.0]),
+    ],
+)
+def test_a_mask_is_not_dropped(ask):
+    with pytest.raises(sl.SaltusError, match="mask isn't kept"):
+        ask()
+
+
+def test_an_array_that_may_have_a_mask_and_has_none_is_an_array():
+    masked, plain = ({"x": kind([1e-3, 2e-3]), "v": 0.0} for kind in (np.ma.array, np.array))
+    assert sl.stroboscope(rig, masked, 2).identical(sl.stroboscope(rig, plain, 2))
+
+
+@pytest.mark.parametrize("column", [pd.Series, lambda values, index: xr.DataArray(values, {"run": index})])
+def test_columns_whose_labels_differ_are_not_paired_row_by_row(column):
+    x, v, turned = column([1e-3, 2e-3], index=[0, 1]), column([0.1, 0.2], index=[0, 1]), column([0.2, 0.1], index=[1, 0])
+    with pytest.raises(ParameterError, match="different labels in their index"):
+        sl.stroboscope(rig, {"x": x, "v": turned}, 2)
+    with pytest.raises(ParameterError, match="different labels"):
+        sl.stroboscope(rig, {"x": x, "v": 0.0}, 2, values={"force": turned})
+    plain = sl.stroboscope(rig, {"x": [1e-3, 2e-3], "v": [0.1, 0.2]}, 2)
+    assert sl.stroboscope(rig, {"x": x, "v": v}, 2).identical(plain)
+
+
+def test_a_state_is_not_called_as_another_in_a_result():
+    with pytest.raises(sl.SaltusError, match="'end_x'; rename it"):
+
+        @sl.system(states="x end_x")
+        def first(t, x, end_x):
+            return end_x, -x
+
+    with pytest.raises(sl.SaltusError, match="'contact_v'; rename it"):
+
+        @sl.system(states="contact_v v")
+        def second(t, contact_v, v):
+            return v, -contact_v
+
+
+def test_a_parameter_is_not_called_as_something_else_in_the_result():
+    @sl.system(states="x v")
+    def spring(t, x, v, *, end_x=1.0):
+        return v, -end_x * x
+
+    with pytest.raises(ParameterError, match="'end_x' would stand for two things"):
+        sl.simulate(spring, (1.0, 0.0), t_end=1.0, values={"end_x": [1.0, 2.0]})
+
+
+def test_an_equation_nested_too_deeply_is_refused():
+    @sl.system(states="x v")
+    def tower(t, x, v):
+        for _ in range(600):
+            x = sl.sin(x) + 1.0
+        return v, -x
+
+    with pytest.raises(sl.SaltusError, match="hundreds of operations stand within one another"):
+        sl.simulate(tower, (0.1, 0.0), t_end=1.0)

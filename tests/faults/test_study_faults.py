@@ -27,7 +27,7 @@ import saltus as sl
 from saltus.analysis import plan
 from saltus.analysis.plan import BasinPlan
 from saltus.analysis.serial import found_data
-from saltus.cli import app
+from saltus.cli.app import app
 from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.store import Store

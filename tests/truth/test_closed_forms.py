@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.codegen import blocks
 
 EPS = 2.0**-52
 
@@ -213,3 +214,49 @@ def test_r15_multipliers_and_exponents_of_orbits(row):
         assert math.isclose(exponent, float(row["LLE_per_s"]), rel_tol=1e-5)
     if np.all(multipliers.imag != 0):
         assert math.isclose(exponent, float(VALUES["R15a"]), rel_tol=1e-6)
+
+
+@pytest.mark.parametrize("length", [23, 24, 25, 26])
+def test_an_oscillator_driven_by_many_harmonics(length, monkeypatch):
+    """Its code is cut into blocks, here into short ones, at any place: between sine and cosine of a harmonic too."""
+    monkeypatch.setattr(blocks, "WHOLE", 50)
+    monkeypatch.setattr(blocks, "LENGTH", length)
+    decay, end, orders = 0.05, 0.5, np.arange(1, 13)
+
+    @sl.system(states="x v", forced_at="f", name=f"in blocks of {length}")
+    def driven(t, x, v, *, k=1.0, c=2 * decay, f=1.0):
+        return v, -k * x - c * v + sum(sl.cos(2 * sl.pi * n * f * t) / n**2 for n in range(1, 13))
+
+    w, own = 2 * np.pi * orders, math.sqrt(1 - decay**2)
+    steady = 1 / orders**2 / (1 - w**2 + 2j * decay * w)
+    x, v = 0.3 - steady.real.sum(), -(1j * w * steady).real.sum()
+    free = math.exp(-decay * end) * (x * math.cos(own * end) + (v + decay * x) / own * math.sin(own * end))
+    run = sl.simulate(driven, (0.3, 0.0), t_end=end, method=sl.Taylor(8), samples=1)
+    assert run.end_x.item() == pytest.approx(free + (steady * np.exp(1j * w * end)).real.sum(), rel=1e-13)
+
+
+def ladder(rungs):
+    """A mass that meets one spring after the other: levels and the system."""
+    levels = np.linspace(0.1, 0.9, rungs)
+
+    @sl.system(states="x v")
+    def ladder(t, x, v, *, k=0.05):
+        return v, -x - sum(k * sl.max(x - float(level), 0.0) for level in levels)
+
+    return levels, ladder
+
+
+@pytest.mark.nightly
+def test_as_many_boundaries_as_a_mode_has_bits():
+    """Up through all of them and down again, with the energy that it began with."""
+    levels, mass = ladder(63)
+    run = sl.simulate(mass, (0.0, 2.0), t_end=4.0, samples=50, time_errors="local")
+    x, v = run.end_x.item(), run.end_v.item()
+    assert run.sizes["contact"] == 2 * 63
+    assert run.mode.values.max() == 2**63 - 1
+    assert v**2 / 2 + x**2 / 2 + 0.05 / 2 * (np.maximum(x - levels, 0) ** 2).sum() == pytest.approx(2.0, abs=1e-14)
+
+
+def test_more_boundaries_than_that_are_refused():
+    with pytest.raises(sl.SaltusError, match="64 boundaries, and at most 63"):
+        ladder(64)

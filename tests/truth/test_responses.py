@@ -264,6 +264,39 @@ def test_a_start_that_hops_between_responses_joins_none_of_them():
     assert ds.sizes["event"] == 0, "no response ends: just no start leads there"
 
 
+#: One state of two orbits of the rig that attract, by their period. Followed in steps of 0.5 mHz, the first of each period ends within
+#: a few mHz, so does the second 8T; the second 5T doubles its period at 14.64 Hz.
+UNRELATED = {
+    8: {13.75: (-0.00073242, 0.02373039), 14.0: (-0.00026599, -0.00667558)},
+    5: {14.25: (-0.00030938, -0.00753661), 15.0: (-0.00040104, -0.01086994)},
+}
+
+
+@pytest.mark.parametrize("period", list(UNRELATED))
+def test_two_orbits_of_a_period_between_which_there_is_none_are_two_branches(period):
+    """Newton's method leads from the one to the other; the motion between the two values is of other periods, or chaotic."""
+    rig, states = sl.models.delangre("b", force="4 N"), np.array(list(UNRELATED[period].values()))
+    values = np.linspace(*UNRELATED[period], 2 if period == 8 else 4)
+    ds = sl.frequency_response(rig, values, start={"x": states[:, 0], "v": states[:, 1]})
+    found = []
+    for value, state in UNRELATED[period].items():
+        here = np.flatnonzero((ds.response_frequency.values == value) & (ds.response_period.values == period))
+        apart = [np.abs((points(ds, i) - state) / (1e-3, 0.1)).max(axis=1).min() for i in here]
+        assert min(apart) < 1e-4
+        found.append(here[int(np.argmin(apart))])
+    assert ds.response_branch.values[found[0]] != ds.response_branch.values[found[1]]
+    assert {"graze"}.isdisjoint(ds.event_kind.values[np.isin(ds.event_branch.values, ds.response_branch.values[found])].tolist())
+
+
+def test_a_sharp_resonance_between_two_values_is_followed_through():
+    """The phase turns by nearly 180 degrees, and the amplitude between the two values is forty times that at them."""
+    rig = sl.models.delangre("c", force="4 N", contact_stiffness=0.0, cubic=0.0, damping_ratio=0.003)
+    ds = sl.frequency_response(rig, ("3.5 Hz", "6.9 Hz", 3), periods=4000)
+    assert ds.response_period.values.tolist() == [1, 1, 1]
+    assert len(set(ds.response_branch.values.tolist())) == 1
+    assert "end" not in ds.event_kind.values
+
+
 def test_a_torus_is_born_where_the_forcing_no_longer_quenches_a_limit_cycle():
     """To first order in mu the forced motion A cos(2 t), A = force/3, quenches the cycle of van der Pol's oscillator while A^2 > 2."""
 

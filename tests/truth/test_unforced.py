@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 import saltus as sl
-from saltus.analysis.bifurcations import HALVINGS
+from saltus.analysis.continuation import HALVINGS
 from saltus.analysis.cycles import find_cycles, returns
 from saltus.analysis.equilibria import find_equilibria
 from saltus.flow.family import Family

@@ -53,15 +53,32 @@ def false_neighbours(series: np.ndarray, dimension: int, delay: int, exclude: in
     longer = embed(series, dimension + 1, delay)
     points = longer[:, :dimension]
     asked = np.unique(np.linspace(0, len(points) - 1, min(ASKED, len(points))).round().astype(int))
-    distance, place = cKDTree(points).query(points[asked], k=min(2 * exclude + 2, len(points)))
-    allowed = np.abs(place - asked[:, None]) > exclude
-    first, some = allowed.argmax(axis=1), allowed.any(axis=1)
-    rows = np.arange(len(asked))
-    near, partner = distance[rows, first][some], place[rows, first][some]
+    distance, place = _nearest_allowed(points, asked, exclude)
+    some = place >= 0
+    near, partner = distance[some], place[some]
     step = np.abs(longer[asked[some], dimension] - longer[partner, dimension])
     floor = 1e-9 * np.ptp(series)  # neighbours on a motion that repeats lie on one another but for rounding
     false = (step > STRETCHED * np.maximum(near, floor)) | (np.hypot(step, near) > SPREAD * series.std())
     return float(false.mean()) if some.any() else float("nan")
+
+
+def _nearest_allowed(points: np.ndarray, asked: np.ndarray, exclude: int) -> tuple[np.ndarray, np.ndarray]:
+    """Distance and index of the nearest point more than ``exclude`` samples away from each that is asked for; inf and -1 if there is none.
+
+    The few nearest are looked at first, four times as many where all of them are too near in time: for most points a few are enough.
+    """
+    tree, most = cKDTree(points), min(2 * exclude + 2, len(points))
+    distance, place = np.full(len(asked), np.inf), np.full(len(asked), -1)
+    left, count = np.arange(len(asked)), min(8, most)
+    while True:
+        near, who = (each.reshape(len(left), count) for each in tree.query(points[asked[left]], k=count))
+        allowed = np.abs(who - asked[left, None]) > exclude
+        rows, first = np.flatnonzero(allowed.any(axis=1)), allowed.argmax(axis=1)
+        distance[left[rows]], place[left[rows]] = near[rows, first[rows]], who[rows, first[rows]]
+        left = np.delete(left, rows)
+        if not len(left) or count == most:
+            return distance, place
+        count = min(4 * count, most)
 
 
 def least_dimension(series: np.ndarray, delay: int, exclude: int) -> int:

@@ -53,12 +53,12 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
     system : System, optional
         Its equations: tell whether they are singular where it stands.
     """
-    status = np.atleast_1d(run["status"].values)
-    texts = []
+    status = np.atleast_1d(run.variables["status"].values)
+    met, texts = set(status.tolist()), []
     for code, advice in _ADVICE.items():
         name, meaning = st.STATUS[code]
-        here = np.flatnonzero(status == name)
-        if len(here):
+        if name in met:
+            here = np.flatnonzero(status == name)
             if code == st.BUDGET_STEPS and asked is not None:
                 stuck = "" if system is None else _singular(run, asked, int(here[0]), system)
                 advice = stuck or f"{_outlook(run, asked, int(here[0]))} {advice}"

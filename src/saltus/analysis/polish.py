@@ -14,6 +14,8 @@ from saltus.flow.family import Family
 
 #: Newton steps: quadratic convergence from 1e-5 needs three.
 MOST_STEPS = 12
+#: A step longer than this many of the one before is slow: at a fold they halve.
+SLOW = 0.75
 #: A step so short, in units of the scale, is the last one: the next is rounding.
 CONVERGED = 1e-12
 
@@ -64,7 +66,7 @@ class Closed:
         return np.where(np.isnan(apart), np.inf, apart).min(axis=1)
 
 
-def close(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, longest: int) -> Closed:
+def close(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, longest: int, nearby: bool = False) -> Closed:
     """The periodic orbits near states that nearly recur.
 
     Parameters
@@ -79,13 +81,16 @@ def close(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, l
         Range of each state.
     longest : int
         Longest period looked for.
+    nearby : bool
+        Whether to give up where Newton's method is slow twice: the orbit isn't near then. Once, a contact between the two may be the
+        reason.
     """
     result = Closed.none(len(start), longest, start.shape[1])
     if not len(start):
         return result
     if not family.exact:
         return _followed(family, start, n, scale, result)
-    x, found = _newton(family, start, n, scale)
+    x, found = _newton(family, start, n, scale, 1 if nearby else MOST_STEPS)
     rows = np.flatnonzero(found)
     if not len(rows):
         return result
@@ -95,10 +100,13 @@ def close(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, l
     return _completed(family, rows, period, [orbit[:m] for orbit, m in zip(orbits, period, strict=True)], result)
 
 
-def _newton(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fixed points of the n-th iterates, float64[k, D], and where the iteration converged, bool[k]."""
+def _newton(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, most_slow: int) -> tuple[np.ndarray, np.ndarray]:
+    """Fixed points of the n-th iterates, float64[k, D], and where the iteration converged, bool[k].
+
+    So many of its steps may be slow.
+    """
     x, found = np.array(start, float), np.zeros(len(start), bool)
-    before = np.full(len(start), np.inf)
+    before, slow = np.full(len(start), np.inf), np.zeros(len(start), np.int64)
     rows = np.arange(len(start))
     for _ in range(MOST_STEPS):
         end, matrix = family.rows(rows).tangent(x[rows], n[rows])
@@ -111,8 +119,9 @@ def _newton(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray)
         length = np.abs(step / scale[rows]).max(axis=1)
         done = (length < CONVERGED) | ((length < AMPLIFIED) & (length > 0.5 * before[rows]))  # stiff orbits amplify rounding
         found[rows[done]] = True
+        slow[rows] += length > SLOW * before[rows]
         before[rows] = length
-        rows = rows[~done & (length < 1.0)]
+        rows = rows[~done & (length < 1.0) & (slow[rows] <= most_slow)]
         if not len(rows):
             break
     return x, found

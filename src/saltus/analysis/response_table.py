@@ -10,6 +10,7 @@ import xarray as xr
 
 from saltus.analysis import branches
 from saltus.analysis.answers import gap_unit, guards_over, provenance
+from saltus.analysis.followed import Followed
 from saltus.analysis.grid import Grid
 from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.analysis.responses import Found, find, numbers_of, table_of
@@ -48,8 +49,9 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
     table = table_of(found, numbers, grid, method)
     branch, happened = np.full(len(found), -1, np.int64), []
     if len(grid.axes) == 1 and found.complete:  # after Ctrl-C nothing more is computed
-        branch = branches.follow(found, grid, method, threads)
-        happened = branches.events(found, table, branch, grid, method, threads)
+        followed = Followed(found, grid, method, threads)
+        branch = branches.follow(found, followed, grid.places)
+        happened = branches.events(found, table, branch, followed, grid, method.exact)
     (name, *_) = grid.axes
     system = grid.system
     fixed = {key: value for key, value in system.values.items() if key not in grid.axes}

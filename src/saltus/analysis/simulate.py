@@ -149,8 +149,8 @@ def _plan(system: System, group: Ensemble, length: Span, samples: int | None, ke
         f"{group.size} trajectories with {count} samples each",
         "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
     )
-    whole_periods, rest = np.divmod(first * per + np.arange(count), per)
-    return _Plan(Schedule(whole_periods, rest / per), first)
+    periods = np.arange(first, first - (-count // per))
+    return _Plan(Schedule(np.repeat(periods, per)[:count], np.tile(np.arange(per) / per, len(periods))[:count]), first)
 
 
 def _per_span(trajectories: int) -> int:

@@ -73,6 +73,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     check_system(system)
     if values is not None and not isinstance(values, Mapping):
         raise ParameterError('values must be a mapping, such as values={"frequency": [5.0, 10.0]}.')
+    _check_labels({**(start if isinstance(start, Mapping) else {}), **(values or {})})
     columns = _columns(system, start)
     given = {name: _values(system, name, value) for name, value in (values or {}).items()}
     empty = [name for name, value in given.items() if not np.size(value)]
@@ -99,6 +100,24 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
         return Ensemble(states, np.stack(rows, axis=1), varied, True)
     return Ensemble(states, np.array([list(shared.values())]), {}, bool(sizes))
+
+
+def _check_labels(given: Mapping[str, Any]) -> None:
+    """Columns of pandas or xarray are taken row by row, so their labels must be the same, in the same order. Raises ParameterError."""
+    labelled = {name: labels for name, value in given.items() if (labels := _labels(value)) is not None}
+    for name, labels in labelled.items():
+        first = next(iter(labelled))
+        if not labels.equals(labelled[first]):
+            raise ParameterError(
+                f"{first} and {name} have different labels in their index. Align them first, or give plain numbers: .to_numpy()."
+            )
+
+
+def _labels(value: Any) -> Any:
+    """The index of a Series, or of a DataArray with one dim; None where there is none."""
+    if hasattr(value, "iloc"):
+        return value.index
+    return next(iter(value.indexes.values()), None) if hasattr(value, "indexes") else None
 
 
 def check_system(system: Any) -> None:

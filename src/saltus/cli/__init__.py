@@ -8,13 +8,23 @@ from __future__ import annotations
 import os
 import sys
 
-from saltus.cli.app import app
+from saltus.interrupt import ctrl_c_waits
+
+#: Exit code of what the user stopped: 128 + SIGINT, as shells expect.
+INTERRUPTED = 130
 
 
 def main() -> None:
-    """Entry point of the command."""
+    """Entry point of the command. Ctrl-C ends it with a word wherever it comes, while modules are imported too."""
     _replace_closed_streams()
-    app(prog_name="saltus")
+    os.environ["MPLBACKEND"] = "Agg"  # pictures go to files; a window needs what a terminal may not have
+    try:
+        with ctrl_c_waits():
+            from saltus.cli.app import app
+        app(prog_name="saltus")
+    except KeyboardInterrupt:
+        sys.stderr.write("saltus: stopped.\n")
+        sys.exit(INTERRUPTED)
 
 
 def _replace_closed_streams() -> None:
@@ -26,4 +36,4 @@ def _replace_closed_streams() -> None:
             setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115  (takes the lowest number: this one)
 
 
-__all__ = ["app", "main"]
+__all__ = ["INTERRUPTED", "main"]

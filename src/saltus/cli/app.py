@@ -9,10 +9,11 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from saltus.cli import INTERRUPTED
 from saltus.errors import SaltusError
 
-#: Exit codes: what was asked for can't be done as asked; stopped by the user (128 + SIGINT, as shells expect).
-REFUSED, INTERRUPTED = 2, 130
+#: Exit code where what was asked for can't be done as asked.
+REFUSED = 2
 
 
 class Commands(TyperGroup):
@@ -32,7 +33,14 @@ class Commands(TyperGroup):
         except OSError as error:
             if error.errno == errno.EBADF and not error.filename:  # standard output was closed meanwhile: nobody reads on, as with a pipe
                 raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)) from None
-            screen.fail(f"{error.filename or 'a file'}: {error.strerror or error}. Choose another folder, or free some space.")
+            if error.errno is None:  # a library that can't be loaded, not a file that can't be written
+                screen.fail(str(error))
+            else:
+                screen.fail(f"{error.filename or 'a file'}: {error.strerror or error}. Choose another folder, or free some space.")
+            raise typer.Exit(REFUSED) from None
+        except MemoryError as error:
+            why = f" ({error})" if str(error) else ""
+            screen.fail(f"memory is used up{why}. Ask for fewer starts, samples or cells, or take --threads 1.")
             raise typer.Exit(REFUSED) from None
         except KeyboardInterrupt:
             screen.fail("stopped. Files are written in full or not at all: none is left half-written.")

@@ -39,7 +39,8 @@ def in_blocks(name: str, result: str, parameters: str, attributes: str, lines: l
         texts.append(f"define internal void @{name}.{i}({parameters}, ptr %kept) noinline {attributes} {{\n{body}}}\n")
         given = ", ".join(f"{kind} {value}" for kind, value in zip(_kinds(parameters), plain.split(", "), strict=True))
         calls.append(f"  call void @{name}.{i}({given}, ptr %kept)\n")
-    memory = f"  %kept = alloca [{max(len(slots), 1) * lanes} x double], align 64\n"
+    places = sum(slot.width for slot in slots.values())
+    memory = f"  %kept = alloca [{max(places, 1) * lanes} x double], align 64\n"
     return "\n".join(texts) + f"define {head}" + memory + "".join(calls) + "  ret void\n}\n"
 
 
@@ -54,16 +55,23 @@ class _Slot(NamedTuple):
     type: str
     block: int
 
+    @property
+    def width(self) -> int:
+        """Places that it takes: a pair of vectors, as sine and cosine are, takes two."""
+        return max(self.type.count("double"), 1)
+
 
 def _slots(blocks: list[list[Line]]) -> dict[str, _Slot]:
     """Places for the values that another block than their own uses."""
     home = {line.name: (i, line.type) for i, block in enumerate(blocks) for line in block if line.name}
     slots: dict[str, _Slot] = {}
+    place = 0
     for i, block in enumerate(blocks):
         for line in block:
             for used in _VALUE.findall(line.text):
                 if home[used][0] != i and used not in slots:
-                    slots[used] = _Slot(len(slots), home[used][1], home[used][0])
+                    slots[used] = _Slot(place, home[used][1], home[used][0])
+                    place += slots[used].width
     return slots
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from functools import lru_cache
 from importlib import resources
 from types import ModuleType
@@ -14,6 +15,7 @@ from saltus.codegen.interface import CAPTURE, ODE45, TAYLOR, Interface
 from saltus.codegen.kernels import Kernels
 from saltus.codegen.ode45_head import ode45_head
 from saltus.codegen.taylor_head import taylor_head
+from saltus.errors import TraceError
 from saltus.system.quantity import acting_guards
 from saltus.system.system import System
 
@@ -65,13 +67,26 @@ def lane_width() -> int:
 def taylor_module(system: System, order: int, lanes: int) -> Flow:
     """The compiled Taylor flow of a system. Parameters are arguments: new values never recompile."""
     title = f"{system.name}, Taylor order {order}, {lanes} lanes"
-    return _flow(TAYLOR, f"taylor_{lanes}", taylor_head(system, order, lanes), title, f"{_described(system)} for Taylor")
+    head = _printed(system, lambda: taylor_head(system, order, lanes))
+    return _flow(TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor")
 
 
 @lru_cache(maxsize=64)
 def ode45_module(system: System) -> Flow:
     """The compiled ode45 of a system."""
-    return _flow(ODE45, "ode45", ode45_head(system), f"{system.name}, ode45", f"{_described(system)} for ODE45")
+    head = _printed(system, lambda: ode45_head(system))
+    return _flow(ODE45, "ode45", head, f"{system.name}, ode45", f"{_described(system)} for ODE45")
+
+
+def _printed(system: System, head: Callable[[], Head]) -> Head:
+    """The functions of an equation. Raises TraceError for one whose operations are nested deeper than Python follows."""
+    try:
+        return head()
+    except RecursionError:
+        raise TraceError(
+            f"{system.name}: hundreds of operations stand within one another in an expression of its equation, more than can be compiled. "
+            "Multiply in pairs, ((a*b)*(c*d))*..., or give a curve by sl.table."
+        ) from None
 
 
 @lru_cache(maxsize=1)

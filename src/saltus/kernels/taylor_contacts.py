@@ -93,7 +93,7 @@ def decide(lanes, lane, batch, slow):
     """Settle one lane's step by isolating the roots of all its gaps; writes DELTA, and the guards that cross to memo[HITS]."""
     h = lanes.run[STEP, lane]
     now = abs(lanes.clock[TAU, lane] + lanes.clock[BASE, lane])
-    first, hits, count = h, 0, 0
+    first, hits, count, least = h, 0, 0, lanes.run[LEAST, lane]
     lanes.memo[lane, DECIDED], lanes.memo[lane, RESTS], lanes.memo[lane, HITS] = 1, 0, 0
     if is_broken(lanes, lane, h, slow):
         lanes.memo[lane, BROKEN] = 1
@@ -108,6 +108,10 @@ def decide(lanes, lane, batch, slow):
     lanes.found[DELTA, lane] = first
     lanes.memo[lane, HITS] = hits
     note_touches(lanes, lane, batch, slow, first, count)
+    if first < h and lanes.run[LEAST, lane] < least:  # a gap may have turned behind the crossing, where it won't come to
+        lanes.run[LEAST, lane] = least
+        for g in range(NGUARDS if first > 0.0 else 0):
+            first_place(lanes, lane, g, first, slow, 0)
 
 
 @kernel

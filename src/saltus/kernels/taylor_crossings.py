@@ -109,11 +109,10 @@ def classify(lanes, g, h):
     clear = inside & (((falls | rises | concave) & (end > noise)) | (6.0 * (lowest - noise) > rest))
     once = inside & (end < -noise) & (falls | concave | convex)
     slope_at_end = load(lanes.side, g, LANES) * GUARD_SIGN[g] * load(lanes.bounds, j + SLOPE_AT_END, LANES)
-    place = larger(smaller(flat_at, 1.0), 0.0)
-    depth, margin = fma(fma(fma(a3, place, a2), place, a1), place, a0), load(lanes.found, NEAREST, LANES)
-    nearer = clear & (~on_boundary) & (a1 < 0.0) & (slope_at_end > 0.0) & (depth < margin)
-    store(lanes.found, NEAREST, select(nearer, depth, margin))
-    store(lanes.found, TURNED, select(nearer, place * h, load(lanes.found, TURNED, LANES)))
+    rises_again = slope_at_end > 0.0
+    near = clear & (~on_boundary) & (a1 < 0.0) & (turns | rises_again) & (6.0 * (lowest - load(lanes.run, LEAST, LANES)) < rest)
+    if any_lane(near):
+        note_turn(lanes, g, near, rises_again, h * larger(smaller(flat_at, 1.0), 0.0), h)
     until = select(once, splat(1.0, LANES), 0.0)
     closes = (load(lanes.run, ACTIVE, LANES) > 0.5) & inside & (~clear)
     if any_lane(closes):
@@ -124,6 +123,32 @@ def classify(lanes, g, h):
         unordered = choose(lanes, g, crosses, until, p0, p1, p2, p3, rest, noise) if any_lane(crosses) else crosses
         return unordered | (~(clear | crosses))
     return ~clear
+
+
+@kernel
+def note_turn(lanes, g, near, rises_again, d, h):
+    """Where gaps turn near d, and may come nearer to the boundary than ever before: how near, and when, to NEAREST and TURNED.
+
+    One that rises at the end of the step turns for certain; of others Newton's method tells.
+    """
+    work, row, s = lanes.work, GUARD_ROW[g], load(lanes.side, g, LANES) * GUARD_SIGN[g]
+    bend, change = splat(0.0, LANES), h
+    for _ in range(NEWTON_STEPS):
+        rate, bend = ORDER * load(work, row + ORDER, LANES), splat(0.0, LANES)
+        for k in range(ORDER - 1, 0, -1):
+            bend = fma(bend, d, rate)
+            rate = fma(rate, d, k * load(work, row + k, LANES))
+        closer = d - rate / bend
+        change = select((closer >= 0.0) & (closer <= h), closer - d, h)
+        d = select(change < h, d + change, d)
+    depth = load(work, row + ORDER, LANES)
+    for k in range(ORDER - 1, 0, -1):
+        depth = fma(depth, d, load(work, row + k, LANES))
+    depth = s * depth * d + load(lanes.side, g, LANES) * load(work, GAP_ROW + g, LANES)
+    turns = rises_again | ((s * bend > 0.0) & (magnitude(change) <= TURN_FOUND * h))
+    nearer = near & turns & (depth < load(lanes.found, NEAREST, LANES))
+    keep(lanes.found, TURNED, nearer, d)
+    keep(lanes.found, NEAREST, nearer, depth)
 
 
 @inner

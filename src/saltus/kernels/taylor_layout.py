@@ -85,6 +85,10 @@ WORTH_AIMING = 0.9
 SHORTENED = 0.75
 #: Crossings predicted so near to each other may be one event.
 TOGETHER = 2.0**-10
+#: Steps of Newton's method that find where a gap turns, from where its quadratic part does.
+NEWTON_STEPS = 4
+#: Length of the last of them, as a share of the step, at which it has found one.
+TURN_FOUND = 2.0**-20
 #: A step isn't made shorter than this share of the stretch.
 LEAST_SHARE = 2.0**-40
 

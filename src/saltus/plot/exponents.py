@@ -57,7 +57,7 @@ def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax:
             one = ds.sel(trajectory=label)
             _panel(panel, one, legend)
             if len(labels) > 1:
-                panel.set_ylabel(f"{selection.named(one, label)}\n{panel.get_ylabel()}")
+                panel.set_ylabel(f"{selection.named(ds, one, label)}\n{panel.get_ylabel()}")
     return panels[0] if len(panels) == 1 else np.array(panels, dtype=object)
 
 

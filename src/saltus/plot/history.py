@@ -87,7 +87,7 @@ def history(
         for i, (panel, one, part) in enumerate(zip(panels, singles, windows, strict=True)):
             _panel(panel, one, state, part, time, wanted)
             if len(labels) > 1:
-                panel.set_ylabel(f"{selection.named(one, labels[i])}\n{panel.get_ylabel()}")
+                panel.set_ylabel(f"{selection.named(run, one, labels[i])}\n{panel.get_ylabel()}")
             if legend and i == 0:
                 ticks = 0.25 if time == "both" and "period" in one else 0.05  # inches
                 above = panel.transAxes + ScaledTranslation(0, ticks, panel.figure.dpi_scale_trans)

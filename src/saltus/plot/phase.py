@@ -83,7 +83,7 @@ def phase(
             draw.say(panel, "It stopped where it began: there is no motion to draw.", *singles)
             return panel
         for i, (one, shown) in enumerate(zip(singles, windows, strict=True)):
-            name = selection.named(one, labels[i]) if len(labels) > 1 else None
+            name = selection.named(run, one, labels[i]) if len(labels) > 1 else None
             color = CYCLE[i % len(CYCLE)] if name else None
             if kind_of(run) != STROBOSCOPE:
                 _curve(panel, one, pair, shown, scales, color, name)

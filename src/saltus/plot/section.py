@@ -113,7 +113,7 @@ def _groups(ds: xr.Dataset, labels: Sequence[int], rows: np.ndarray) -> list[tup
     """Which crossings share a colour, the colour and its name."""
     if len(labels) > 1:
         who = ds["crossing_trajectory"].values
-        names = [selection.named(ds.sel(trajectory=label), label) for label in labels]
+        names = [selection.named(ds, ds.sel(trajectory=label), label) for label in labels]
         return [(who == label, CYCLE[i % len(CYCLE)], name) for i, (label, name) in enumerate(zip(labels, names, strict=True))]
     directions = ds["crossing_direction"].values
     return [(rows & (directions == way), *look) for way, look in _DIRECTIONS.items()]

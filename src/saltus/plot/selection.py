@@ -19,6 +19,8 @@ from saltus.units import from_si
 Periods = int | float | tuple[float, float] | None
 #: The most trajectories that one picture can tell apart: the colours of the palette.
 MOST = 8
+#: States at the start that tell trajectories apart in a legend.
+MOST_STATES = 2
 
 
 # -- trajectory ----------------------------------------------------------------------------------------------------------------
@@ -59,12 +61,30 @@ def single(run: xr.Dataset, label: int | None) -> xr.Dataset:
     return ds
 
 
-def named(one: xr.Dataset, label: int) -> str:
-    """One trajectory of a batch by what sets it apart: the parameters that vary, else its number."""
+def named(run: xr.Dataset, one: xr.Dataset, label: int) -> str:
+    """One trajectory of a batch by what sets it apart: the parameters that vary, else its start if that is known, else its number."""
     varied = json.loads(one.attrs.get("varied_parameters", "[]"))
     known = [one[name] for name in varied if name in one.coords and one[name].ndim == 0]
+    if known:
+        return _valued(known)
+    starts = _start_that_differs(run, one)
+    return f"from {_valued(starts)}" if starts else f"trajectory {label}"
+
+
+def _valued(known: list[xr.DataArray]) -> str:
     texts = [f"{value.name} = {from_si(float(value), value.attrs.get('units', ''), 4)}" for value in known]
-    return ", ".join(text.replace("_", " ") for text in texts) or f"trajectory {label}"
+    return ", ".join(text.replace("_", " ") for text in texts)
+
+
+def _start_that_differs(run: xr.Dataset, one: xr.Dataset) -> list[xr.DataArray]:
+    """The states at the start that aren't the same for all trajectories; none if the start wasn't kept, or more than a legend holds."""
+    dim = sample_dim(run)
+    sampled = dim in run.dims and all(name in run for name in states_of(run))
+    if not sampled or ("period" in run.coords and float(run["period"].values.min(initial=0.0)) != 0.0):
+        return []
+    first = {name: run[name].isel({dim: 0}).values for name in states_of(run)}
+    differing = [name for name, values in first.items() if np.ptp(values) > 0.0]
+    return [one[name].isel({dim: 0}) for name in differing] if len(differing) <= MOST_STATES else []
 
 
 def rate_of(ds: xr.Dataset, state: str) -> str:

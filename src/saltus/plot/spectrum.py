@@ -86,7 +86,7 @@ def spectrum(
             return panel
         floor = _SHOWN * largest * scale.factor / 3
         for i, (one, curve) in enumerate(zip(singles, curves, strict=True)):
-            name = selection.named(one, labels[i]) if len(labels) > 1 else None
+            name = selection.named(ds, one, labels[i]) if len(labels) > 1 else None
             _curve(panel, one, curve * scale.factor, floor, CYCLE[i % len(CYCLE)], name)
         panel.set_yscale("log")
         panel.set_ylim(floor, 3 * largest * scale.factor)

@@ -11,7 +11,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results import schema
-from saltus.results.finish import array_variable, finish
+from saltus.results.finish import Once, array_variable, finish
 from saltus.results.variable import Variable
 
 
@@ -94,8 +94,7 @@ class Builder:
 
     def __init__(self, kind: str, states: Sequence[str], units: Mapping[str, str], guards: Guards, batch: bool, count: int) -> None:
         self.table, self.batch, self.units = schema.TABLES[kind], batch, units
-        self.data: dict[str, Any] = {}
-        self.coords: dict[str, Any] = {}
+        self.data, self.coords = Once(), Once()
         self.guard_units = guards.units_among(units)
         self.attrs: dict[str, Any] = {"saltus_result": kind, "schema_version": schema.VERSION, "states": " ".join(states)}
         if not batch and count != 1:

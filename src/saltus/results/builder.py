@@ -10,7 +10,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results import schema
-from saltus.results.finish import array_variable, finish
+from saltus.results.finish import Once, array_variable, finish
 from saltus.results.variable import Variable
 
 
@@ -20,8 +20,7 @@ class Builder:
     def __init__(self, kind: str, states: Sequence[str], units: Mapping[str, str], gap_unit: str = "") -> None:
         self.kind, self.states, self.units, self.gap_unit = kind, tuple(states), units, gap_unit
         self.table = schema.TABLES[kind]
-        self.data: dict[str, Any] = {}
-        self.coords: dict[str, Any] = {}
+        self.data, self.coords = Once(), Once()
 
     def put(self, name: str, values: Any, *, dims: tuple[str, ...] = (), coord: bool = False, **attrs: Any) -> None:
         """Add a variable of the table; ``dims`` are those that the table leaves open."""

@@ -13,8 +13,11 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 import xarray as xr
 
+from saltus.errors import ParameterError
 from saltus.results.provenance import content_hash, to_json
 from saltus.results.result import Result
+
+_TWICE = "{!r} would stand for two things in the result. Rename the state, or the parameter, of this name."
 
 
 def array_variable(dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str, Any]) -> xr.Variable:
@@ -22,8 +25,20 @@ def array_variable(dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str
     return xr.Variable(dims, np.asarray(values), dict(attrs), fastpath=True)
 
 
+class Once(dict[str, xr.Variable]):
+    """Variables by name. Raises ParameterError where a name is given twice: a state, or a parameter, may be called as something else is."""
+
+    def __setitem__(self, name: str, variable: xr.Variable) -> None:
+        if name in self:
+            raise ParameterError(_TWICE.format(name))
+        super().__setitem__(name, variable)
+
+
 def finish(data: Mapping[str, xr.Variable], coords: Mapping[str, xr.Variable], attrs: Mapping[str, Any]) -> Result:
     """The Dataset of these variables; attributes that are neither text nor number become JSON text."""
+    for name in data:
+        if name in coords:
+            raise ParameterError(_TWICE.format(name))
     plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
     ds = Result(data, indexed(coords), plain)
     ds.attrs["result_hash"] = content_hash(ds)

@@ -106,9 +106,9 @@ def content_hash(ds: xr.Dataset) -> str:
     Attributes are left out, and so is the width in which a file format keeps an integer or a text: the same numbers have the same hash,
     whichever file they went through. Every bit of a float counts, the sign of a zero included.
     """
-    digest = hashlib.sha256()
-    for name in sorted(map(str, ds.variables)):
-        variable = ds.variables[name]
+    digest, variables = hashlib.sha256(), ds.variables
+    for name in sorted(map(str, variables)):
+        variable = variables[name]
         digest.update(f"{name} {variable.dims} {variable.shape}\n".encode())
         digest.update(_canonical(np.asarray(variable.values)))
     return digest.hexdigest()

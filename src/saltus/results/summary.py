@@ -8,7 +8,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import AGREEMENT, BASINS, EXPONENTS, NOISY, RESPONSES, UNCONVERGED, axes_of, kind_of, kind_text, parameters_of
+from saltus.results.schema import (
+    AGREEMENT,
+    BASINS,
+    EXPONENTS,
+    NOISY,
+    RESPONSES,
+    UNCONVERGED,
+    axes_of,
+    kind_of,
+    kind_text,
+    parameters_of,
+    states_of,
+)
 from saltus.results.summary_motions import WRITERS
 
 #: Attractors that get a line of their own; the others are counted.
@@ -77,20 +89,34 @@ def _starts(ds: xr.Dataset) -> str:
 def _attractors(ds: xr.Dataset) -> list[str]:
     count = ds.sizes["attractor"]
     unit = ds["attractor_peak"].attrs.get("units", "")
-    lines = [f"found    {_count(count, 'attractor')}"]
-    for i in range(min(count, _LINES)):
+    words = []
+    for i in range(count):
         one = ds.isel(attractor=i)
         period = int(one["attractor_period"])
         kind = str(one["attractor_type"].item())
         name = f"{kind} {period}T" if kind == "periodic" else kind_text(kind, period)
         if kind == "limit_cycle" and "attractor_cycle" in one:
             name += f", period {float(one['attractor_cycle']):.4g} s"
-        share = f", {float(one['attractor_fraction']):.2%} of the starts" if "attractor_fraction" in one else ""
         size = f"peak {float(one['attractor_peak']):.4g} {unit}".rstrip()
         if kind == NOISY:
             size += f", scatter {float(one['attractor_scatter']):.2g} {unit}".rstrip()
-        lines.append(f"  {i}: {name}, {size}{share}")
+        words.append(f"{name}, {size}")
+    lines = [f"found    {_count(count, 'attractor')}"]
+    for i, text in enumerate(words[:_LINES]):
+        one = ds.isel(attractor=i)
+        through = _through(one) if words.count(text) > 1 else ""
+        share = f", {float(one['attractor_fraction']):.2%} of the starts" if "attractor_fraction" in one else ""
+        lines.append(f"  {i}: {text}{through}{share}")
     return lines + ([f"  and {count - _LINES} more"] if count > _LINES else [])
+
+
+def _through(one: xr.Dataset) -> str:
+    """The first point that an attractor is known by: it tells mirror images apart, whose sizes are the same."""
+    names = [name for name in states_of(one) if f"attractor_{name}" in one]
+    points = {name: float(np.ravel(one[f"attractor_{name}"].values)[0]) for name in names}
+    units = {name: one[f"attractor_{name}"].attrs.get("units", "") for name in names}
+    told = ", ".join(f"{name} = {value:.4g} {units[name]}".rstrip() for name, value in points.items() if np.isfinite(value))
+    return f", through {told}" if told else ""
 
 
 def _unsettled(basin: xr.DataArray) -> str:

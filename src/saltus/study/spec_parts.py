@@ -50,7 +50,7 @@ class Table(BaseModel):
 class Header(Table):
     """[study]: what it is, for people."""
 
-    name: Title = Field(description="A title.", examples=["Rig b4 at 15 Hz"])
+    name: FileTitle = Field(description="A title.", examples=["Rig b4 at 15 Hz"])
     description: str = Field("", description="What the study shows.", examples=["Four starts, four responses"])
     source: str = Field("", description="Where the setting comes from.", examples=["Saunders et al. (2021), Table 2"])
 

@@ -1,4 +1,4 @@
-"""Checks on parameter values: what a number may be."""
+"""Checks on a system: what a parameter's value may be, and how many boundaries there may be."""
 
 from __future__ import annotations
 
@@ -6,11 +6,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, TraceError
 from saltus.units import to_si
 
 if TYPE_CHECKING:
     from saltus.system.system import System
+
+
+#: Boundaries that a system may have: each is a bit of the mode, a whole number of 64 bits that is never negative.
+MOST_GUARDS = 63
+
+
+def check_guards(system: str, count: int) -> None:
+    """Raise a TraceError if a system has more boundaries than its mode has bits."""
+    if count > MOST_GUARDS:
+        raise TraceError(
+            f"{system} has {count} boundaries, and at most {MOST_GUARDS} can be followed at once, those of a section or of turning points "
+            "and each knot of a table in a state among them. Take fewer stops, or coarser tables."
+        )
 
 
 def check_range(name: str, value: Any, forced_at: str | None) -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import keyword
 import unicodedata
+from collections.abc import Sequence
 from typing import Any
 
 from saltus.fence import has_control
 
 #: Letters that a system's name may have.
 LONGEST = 200
+#: What stands before a state's name in a result, and where the state is so called.
+_PLACES = {"end_": "the end", "contact_": "a contact"}
 #: Names that mean something else to whoever reads equations or what is generated from them.
 RESERVED = frozenset({"t", "np", "numpy", "math", "numba", "njit", "saltus", "kept", "kernel", "inner", "entry"})
 
@@ -23,6 +26,21 @@ def why_no_name(name: Any) -> str | None:
     if name.startswith("__") or name in RESERVED:
         return "this name means something else"
     return f"at most {LONGEST} letters" if len(name) > LONGEST else None
+
+
+def why_not_together(states: Sequence[str]) -> str | None:
+    """Why these can't be the states of one system, as the end of a sentence; None if they can.
+
+    Results call a state x at the end of a trajectory ``end_x``, and at a contact ``contact_x``.
+    """
+    if len(set(states)) < len(states):
+        return "a name stands twice"
+    for name in states:
+        for place, words in _PLACES.items():
+            state = name.removeprefix(place)
+            if state != name and state in states:
+                return f"results call {state} at {words} {name!r}; rename it"
+    return None
 
 
 def why_no_title(title: Any) -> str | None:

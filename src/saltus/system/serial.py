@@ -11,7 +11,7 @@ from saltus.errors import SaltusError, among, shown
 from saltus.system.clocks import affine, switch
 from saltus.system.expression import ELEMENTARY, And, Bit, Condition, Expr, Not, Or, Relation, constant, varies, walk
 from saltus.system.guards import Guard, bits_in
-from saltus.system.names import why_no_name, why_no_text, why_no_title
+from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
 from saltus.system.tables import Table
 from saltus.units import check_declared
 
@@ -116,6 +116,7 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     _require(why_no_title(data["name"]) is None, f"{shown(data['name'])} is no name of a system: {why_no_title(data['name'])}")
     for name in ("description", "source"):
         _require(why_no_text(data[name]) is None, f"its {name} can't be used: {why_no_text(data[name])}")
+    _require(why_not_together(states) is None, f"its states can't be told apart: {why_not_together(states)}")
     _require(len({*states, *parameters}) == len(states) + len(parameters), "a name stands twice")
     names = {"state": set(states), "param": set(parameters)}
     nodes: list[Expr] = []

@@ -60,6 +60,7 @@ class System:
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
         for name, value in self.values.items():
             checks.check_range(name, value, self.forced_at)
+        checks.check_guards(self.name, len(self.guards))
         check_overlaps(self, self.values)
         check_periodic(self)
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.arguments import has_mask
 from saltus.errors import TraceError, among, nearest, shown
 from saltus.system import expression as ex
 from saltus.system.clocks import affine
@@ -157,6 +158,8 @@ def curve(points: Any, values: Any, kind: str, outside: str, name: str) -> Table
             raise TraceError(f"sl.table: {what}={shown(word)}. {nearest(word, known)}")
     if not (isinstance(name, str) and name.isidentifier()):
         raise TraceError(f"sl.table: name={shown(name)} is no name. Use letters, digits and _.")
+    if has_mask([points, values]):
+        raise TraceError("sl.table: points or values are masked, and a mask isn't kept. Leave them out of both.")
     try:
         x, y = (np.array(data, dtype=np.float64) for data in (points, values))
     except (TypeError, ValueError, OverflowError):

@@ -23,7 +23,7 @@ from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, s
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.formula import Equations, Formula
 from saltus.system.guards import find_guards
-from saltus.system.names import why_no_name, why_no_text, why_no_title
+from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
 from saltus.system.singular import check_finite, check_gaps, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
@@ -223,8 +223,8 @@ def _check_states(states: tuple[str, ...], title: str) -> None:
     for name in states:
         if (why := why_no_name(name)) is not None:
             raise TraceError(f"{title}: {name!r} can't be the name of a state: {why}.")
-    if len(set(states)) < len(states):
-        raise TraceError(f"{title}: states={' '.join(states)!r} names a state twice.")
+    if (why := why_not_together(states)) is not None:
+        raise TraceError(f"{title}: states={' '.join(states)!r}: {why}.")
 
 
 def _units(

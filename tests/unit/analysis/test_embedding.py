@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from saltus.analysis.embedding import embed, false_neighbours, first_minimum, hardly_correlated, least_dimension, mutual_information
+from saltus.analysis.embedding import (
+    _nearest_allowed,
+    embed,
+    false_neighbours,
+    first_minimum,
+    hardly_correlated,
+    least_dimension,
+    mutual_information,
+)
 from saltus.analysis.neighbours import Search, crowd_distance, follow
 
 NOISE = np.random.default_rng(0).standard_normal(20_000)
@@ -69,3 +77,16 @@ def test_excluded_neighbours_and_those_too_close_are_not_taken():
     assert follow(twice, Search(1, 0.5, 1.0, 5)).distance.min() == 1.0  # copies of a point lie at distance 0
     assert crowd_distance(NOISE[:2000, None], 1e-9, 5) < 0.1
     assert crowd_distance(line[:10], 1e-9, 5) == math.inf
+
+
+@pytest.mark.parametrize("exclude", [0, 3, 40, 400])
+def test_the_nearest_point_that_is_not_too_near_in_time(exclude):
+    """Against all distances, on a slow walk: neighbours in time are nearer than any other."""
+    points = np.random.default_rng(1).normal(size=(700, 2)).cumsum(axis=0)
+    asked = np.arange(0, 700, 7)
+    distance, place = _nearest_allowed(points, asked, exclude)
+    every = np.linalg.norm(points[asked, None] - points, axis=2)
+    every[np.abs(asked[:, None] - np.arange(700)) <= exclude] = np.inf
+    np.testing.assert_allclose(distance, every.min(axis=1), rtol=1e-14)
+    np.testing.assert_array_equal(place, np.where(np.isfinite(distance), every.argmin(axis=1), -1))
+    assert np.isfinite(distance).all() == (exclude < 350)

@@ -10,7 +10,8 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
-from saltus.cli import app, commands
+from saltus.cli import commands
+from saltus.cli.app import app
 from saltus.codegen import entry
 from saltus.results import known
 
@@ -45,6 +46,31 @@ def test_help_teaches_with_an_example(command):
 
 def test_no_arguments_shows_the_commands():
     assert all(command.split()[0] in saltus().output for command in COMMANDS)
+
+
+def test_ctrl_c_while_the_command_starts_ends_it_with_a_word():
+    code = (
+        "import signal, sys\n"
+        "from saltus.cli import main\n"
+        "class Press:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'typer': signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Press())\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "saltus: stopped.\n")
+
+
+def test_memory_that_is_used_up_is_said(monkeypatch):
+    def full():
+        raise MemoryError
+
+    monkeypatch.setattr("saltus.models.describe", full)
+    result = saltus("models")
+    assert result.exit_code == 2
+    assert "memory is used up. Ask for fewer starts" in result.output + result.stderr
 
 
 def test_unknown_command():
@@ -166,8 +192,8 @@ def test_a_wrong_figure_gets_those_that_there_are(tmp_path):
 def test_a_closed_output_ends_quietly(command, how):
     """``saltus models | head``, ``saltus models >&-``: nothing is wrong with a file, so nothing is said about one."""
     close = {"nobody reads on": "", "closed from the start": "os.close(1); ", "closed on the way": "os.close(1); "}[how]
-    call = "cli.app(prog_name='saltus')" if how == "closed on the way" else "cli.main()"
-    code = f"import os, sys; from saltus import cli; sys.argv = ['saltus', *{command!r}]; {close}{call}"
+    call = "cli.app.app(prog_name='saltus')" if how == "closed on the way" else "cli.main()"
+    code = f"import os, sys; import saltus.cli.app; from saltus import cli; sys.argv = ['saltus', *{command!r}]; {close}{call}"
     read, write = os.pipe()
     os.close(read)
     try:

@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from saltus.analysis import plan
-from saltus.cli import app
+from saltus.cli.app import app
 from saltus.results import load
 from saltus.results.store import Store
 from saltus.study import maps

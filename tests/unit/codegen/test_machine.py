@@ -69,6 +69,20 @@ def test_a_long_equation_is_cut_into_blocks_with_the_same_operations(monkeypatch
     assert cut.count("@llvm.fma.v4f64(") == whole.count("@llvm.fma.v4f64(") > 400
 
 
+def test_wherever_a_function_is_cut_its_numbers_are_the_same(monkeypatch):
+    """Sine and cosine come as one value, twice as wide as others: also where the cut lies between them and who uses them."""
+    calls = [f"s{i}, c{i} = sincos({i + 1}.0 * y)\nstore(out, {2 * i}, s{i})\nstore(out, {2 * i + 1}, c{i})" for i in range(6)]
+    text = "def turns(a, out):\n    y = load(a, 0, LANES)\n" + "".join(f"    {line}\n" for call in calls for line in call.split("\n"))
+    angles, wanted = np.array([[0.1, 0.7, -2.0, 30.0]]), np.zeros((12, 4))
+    wanted[::2], wanted[1::2] = (turn(np.arange(1.0, 7.0)[:, None] * angles) for turn in (np.sin, np.cos))
+    monkeypatch.setattr(blocks, "WHOLE", 10)
+    for length in range(2, 12):
+        monkeypatch.setattr(blocks, "LENGTH", length)
+        out = np.zeros((12, 4))
+        compiled(text, (ARRAY, ARRAY), 4)(angles, out)
+        np.testing.assert_allclose(out, wanted, rtol=1e-15, atol=1e-15, err_msg=f"blocks of {length}")
+
+
 def test_the_code_of_a_tangent_grows_as_that_of_its_equation():
     """All of its columns are one function: a tangent with sixteen has hardly more code, for its equation, than one with four."""
     shares = []

@@ -9,6 +9,7 @@ import pytest
 import saltus as sl
 from saltus.errors import ParameterError
 from saltus.plot import phase
+from saltus.units import from_si
 
 from .conftest import GAPS, rig_run
 from .test_history import COLORS, ends
@@ -59,8 +60,9 @@ def test_states_can_be_turned(run):
 
 def test_a_batch_is_laid_over_one_another(batch):
     ax = phase(batch, periods=5)
-    orbits = [one for one in ax.lines if one.get_label().startswith("trajectory ")]
-    assert [one.get_label() for one in orbits] == [f"trajectory {k}" for k in range(4)]
+    orbits = [one for one in ax.lines if one.get_label().startswith("from ")]
+    starts = batch.x.isel({batch.x.dims[-1]: 0}).values
+    assert [one.get_label() for one in orbits] == [f"from x = {from_si(x, 'm', 4)}" for x in starts]
     assert len({one.get_color() for one in orbits}) == 4
     dots = [one for one in ax.lines if one.get_marker() == "o"]
     assert [len(one.get_xdata()) for one in dots] == [6] * 4

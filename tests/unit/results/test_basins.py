@@ -242,6 +242,17 @@ def test_describe_tells_what_a_map_holds():
     ]
 
 
+def test_mirror_images_of_one_size_are_told_apart_by_a_state_on_each():
+    twins = dataclasses.replace(
+        TABLE, kind=["periodic"] * 3, period=np.array([1, 1, 3]), peak=np.array([1e-3, 1e-3, 2e-3]),
+        points=[np.array([[-1e-3, 0.25]]), np.array([[1e-3, -0.25]]), TABLE.points[1]],
+    )  # fmt: skip
+    lines = describe(basins(attractors=twins)).splitlines()
+    assert "  0: periodic 1T, peak 0.001 m, through x = -0.001 m, v = 0.25 m/s, 50.00% of the starts" in lines
+    assert "  1: periodic 1T, peak 0.001 m, through x = 0.001 m, v = -0.25 m/s, 25.00% of the starts" in lines
+    assert not any("3T" in line and "through" in line for line in lines)
+
+
 def test_scatter_stands_where_an_attractor_is_noisy(tmp_path):
     noisy = dataclasses.replace(TABLE, kind=["periodic", "noisy_periodic", "chaotic"], scatter=np.array([np.nan, 4.31e-6, np.nan]))
     for ds in (basins(attractors=noisy), attractors(attractors=noisy)):
