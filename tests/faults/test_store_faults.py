@@ -278,7 +278,7 @@ def test_a_pipe_or_a_link_in_place_of_a_lock_is_refused(memory):
     for make in (os.mkfifo, lambda file: os.symlink(other, file)):
         lock.unlink()
         make(lock)
-        with pytest.raises(StoreError, match="no regular file. Remove it"), store.lock():
+        with pytest.raises(StoreError, match="no regular file"), store.lock():
             pass
     assert other.read_text() == "kept"
 
