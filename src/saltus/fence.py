@@ -6,6 +6,7 @@ text, does it hold what could hurt a terminal or a parser. The answer is a :clas
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import stat
@@ -15,6 +16,8 @@ from typing import Any
 
 #: Most bytes of a study, and of a table that it names.
 STUDY_BYTES, TABLE_BYTES = 1_000_000, 10_000_000
+#: Most bytes of a file of JSON in a store.
+STORED_BYTES = 100_000_000
 #: Most parts of a dotted key of TOML, and most levels of tables and lists: parsers take the square of it, or run out of stack.
 PARTS, LEVELS = 100, 20
 #: Most characters of a key.
@@ -32,7 +35,17 @@ _NUMBER = re.compile(r"[+-]?(\d[\d.]*(e[+-]?\d+)?|inf|nan)?( [\w%°/^·*()µΩ-]
 
 
 class RefusedError(ValueError):
-    """Something from outside isn't let in; the text says why, as the rest of a sentence about it."""
+    """Something from outside isn't let in; the text says why, as the rest of a sentence about it.
+
+    Attributes
+    ----------
+    errno : int or None
+        What the operating system said; None if the file can be opened, but isn't one that is let in.
+    """
+
+    def __init__(self, why: str, errno: int | None = None) -> None:
+        super().__init__(why)
+        self.errno = errno
 
 
 # -- files ---------------------------------------------------------------------------------------------------------------------
@@ -41,10 +54,11 @@ def regular(path: Path) -> None:
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError) as error:
-        raise RefusedError(f"can't be read: {getattr(error, 'strerror', None) or error}.") from None
+        raise RefusedError(f"can't be read: {getattr(error, 'strerror', None) or error}.", getattr(error, "errno", None)) from None
+    if stat.S_ISDIR(mode):
+        raise RefusedError("can't be read: it is a folder, not a file.", errno.EISDIR)
     if not stat.S_ISREG(mode):
-        kind = "a folder" if stat.S_ISDIR(mode) else "a pipe, a device or a socket"
-        raise RefusedError(f"can't be read: it is {kind}, not a file.")
+        raise RefusedError("can't be read: it is a pipe, a device or a socket, not a file.")
 
 
 def content(path: Path, most: int) -> bytes:
@@ -62,7 +76,7 @@ def content(path: Path, most: int) -> bytes:
                 raise RefusedError("can't be read: it is no regular file.")
             data = file.read(most + 1)
     except OSError as error:
-        raise RefusedError(f"can't be read: {error.strerror or error}.") from None
+        raise RefusedError(f"can't be read: {error.strerror or error}.", error.errno) from None
     if len(data) > most:
         raise RefusedError(f"can't be read: it is larger than {most / 1e6:g} MB, which nothing of this kind is.")
     return data

@@ -4,6 +4,7 @@ import errno
 import multiprocessing
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -255,6 +256,40 @@ def test_any_damaged_file_is_found_and_computed_again(memory):
                     store.get("attractors")
             compute(store.path, make=SMALL)
             assert contents(store.path) == undisturbed, name
+
+
+@posix
+@pytest.mark.parametrize("name", ["store.json", "done/1.json", "artifacts/attractors.json", "data.zarr/peak/c/1", "data.zarr/zarr.json"])
+@pytest.mark.parametrize("device", [os.mkfifo if sys.platform != "win32" else None, lambda file: os.symlink("/dev/zero", file)])
+def test_a_pipe_or_a_device_in_place_of_a_file_is_not_waited_for(name, device, memory):
+    store = compute(memory / "map", make=SMALL)
+    undisturbed = contents(store.path)
+    (store.path / name).unlink()
+    device(store.path / name)
+    assert store.damaged() == ([1] if name[-6:] == "1.json" or name.endswith("/1") else [])
+    assert contents(compute(store.path, make=SMALL).path) == undisturbed
+
+
+@posix
+def test_a_pipe_or_a_link_in_place_of_a_lock_is_refused(memory):
+    store, other = compute(memory / "map", make=SMALL), memory / "other"
+    other.write_text("kept")
+    lock = store.path / "locks/0-of-1"
+    for make in (os.mkfifo, lambda file: os.symlink(other, file)):
+        lock.unlink()
+        make(lock)
+        with pytest.raises(StoreError, match="no regular file"), store.lock():
+            pass
+    assert other.read_text() == "kept"
+
+
+@pytest.mark.parametrize("name", ["parts", "locks", "done", "artifacts", "data.zarr"])
+def test_a_folder_that_is_gone_is_made_again(name, memory):
+    store = compute(memory / "map", make=SMALL)
+    undisturbed = contents(store.path)
+    shutil.rmtree(store.path / name)
+    assert name == "done" or store.status().writers == ()
+    assert contents(compute(store.path, make=SMALL).path) == undisturbed
 
 
 def test_a_swapped_chunk_is_found(tmp_path):

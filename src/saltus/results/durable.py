@@ -11,6 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from saltus import fence
 from saltus.errors import ParameterError, SaltusError
 
 
@@ -79,16 +80,14 @@ def flush_names(folder: Path) -> None:
         os.close(handle)
 
 
-def read(path: Path) -> bytes | None:
-    """What is in a file; None if it isn't there or the disk can't read it any more."""
+def read(path: Path, most: int = fence.STORED_BYTES) -> bytes | None:
+    """What is in a file; None if it isn't there, isn't one of at most ``most`` bytes, or the disk can't read it any more."""
     try:
-        return path.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except OSError as error:
-        if error.errno == errno.EIO:
+        return fence.content(path, most)
+    except fence.RefusedError as refused:
+        if refused.errno in (None, errno.ENOENT, errno.ENOTDIR, errno.EIO):
             return None
-        raise StoreError(f"{path} can't be read: {error.strerror}. Mend its permissions or the disk.") from error
+        raise StoreError(f"{path} {refused} Mend its permissions or the disk, or remove it.") from refused
 
 
 def size(path: Path) -> int | None:

@@ -19,12 +19,15 @@ from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
+from saltus import fence
 from saltus.results.durable import StoreError
 
 #: All chunks, as a shard.
 WHOLE = (0, 1)
 #: How long to wait for a lock [s]: longer than another process's look at it takes, too short to be taken for queueing.
 _PATIENCE = 0.5
+#: Most bytes of the note of who holds a lock.
+_NOTE = 10_000
 
 #: Open lock files of this process. A forked child closes its copies, else it would go on holding the locks of a parent that was killed.
 _HANDLES: set[int] = set()
@@ -95,7 +98,7 @@ def overlap(one: tuple[int, int], other: tuple[int, int]) -> bool:
 # -- who holds what ------------------------------------------------------------------------------------------------------------
 def _locks(folder: Path) -> dict[tuple[int, int], Path]:
     """The lock files of shards, held or not."""
-    found = {file: re.fullmatch(r"(\d+)-of-(\d+)", file.name) for file in folder.iterdir()}
+    found = {file: re.fullmatch(r"(\d+)-of-(\d+)", file.name) for file in (folder.iterdir() if folder.is_dir() else ())}
     return {(int(match[1]), int(match[2])): file for file, match in found.items() if match}
 
 
@@ -127,16 +130,21 @@ def _holder(file: Path) -> str:
     """``process 4711 on node7 since 2026-01-01 12:00:00+00:00, shard 0 of 4``."""
     k, n = file.name.split("-of-") if "-of-" in file.name else ("0", "1")
     part = "" if n == "1" else f", shard {k} of {n}"
-    with suppress(OSError, ValueError):  # it may be about to write who it is
-        who = json.loads(file.read_bytes())
+    with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):  # it may be about to write who it is
+        who = json.loads(fence.content(file, _NOTE))
         return f"process {who['process']} on {who['host']} since {who['since']}{part}"
     return f"another process{part}"
 
 
 # -- the operating system ------------------------------------------------------------------------------------------------------
 def _open(file: Path, flags: int = os.O_RDWR | os.O_CREAT) -> int:
+    """Open a lock file: without waiting for the other end of a pipe, and not through a link, whose end would be emptied."""
     try:
-        return os.open(file, flags, 0o666)
+        if file.is_symlink() or (file.exists() and not file.is_file()):
+            raise StoreError(f"{file} can't be locked: it is no regular file. Remove it, then start again.")
+        return os.open(file, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    except StoreError:
+        raise
     except OSError as error:
         raise StoreError(f"{file} can't be locked: {error.strerror}. Choose a folder that can be written to.") from error
 

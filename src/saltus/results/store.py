@@ -144,7 +144,7 @@ class Store:
             raise StoreError(f"{path} is there already. Resume it if it is a store, or choose another path; nothing is overwritten.")
         store = cls(path, head)
         files = {f"data.zarr/{name}": data for name, data in store._codec.metadata.items()} | {HEAD: seal(head)}
-        write_folder(path, files, folders=("done", "artifacts", "locks", "parts", *(f"data.zarr/{array}/c" for array in chunks.arrays)))
+        write_folder(path, files, folders=store._folders())
         return store
 
     @classmethod
@@ -214,6 +214,7 @@ class Store:
             If an overlapping lock is held: names host, process and since when.
         """
         shard = _checked(shard)
+        self._make_folders()
         with locked(self.path / "locks", shard):
             self._sweep(shard)
             self._shard, self._process = shard, os.getpid()
@@ -221,6 +222,19 @@ class Store:
                 yield self
             finally:
                 self._shard = None
+
+    def _folders(self) -> tuple[str, ...]:
+        return ("done", "artifacts", "locks", "parts", *(f"data.zarr/{array}/c" for array in self.chunks.arrays))
+
+    def _make_folders(self) -> None:
+        """Make those that are gone again: tools that copy trees leave empty ones out. A store that was deleted stays so."""
+        if not (self.path / HEAD).exists():
+            raise StoreError(f"{self.path} holds no {HEAD} any more. Was it moved or deleted? Start again to make it anew.")
+        try:
+            for name in self._folders():
+                (self.path / name).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StoreError(f"{self.path} can't be written to: {error}. Mend its permissions or the disk.") from error
 
     def _sweep(self, shard: tuple[int, int]) -> None:
         """Remove drafts of killed writers: those that only the holder of this lock may write."""
@@ -360,7 +374,7 @@ class Store:
         if not checksums:
             sizes = {name: size(self._file(index, name)) for name in self.chunks.arrays}
             return {} if sizes == {name: told[name].get("bytes") for name in sizes} else None
-        files = {name: read(self._file(index, name)) for name in self.chunks.arrays}
+        files = {name: read(self._file(index, name), self._codec.largest(name)) for name in self.chunks.arrays}
         found = {name: data for name, data in files.items() if data is not None and sha256(data) == told[name].get("sha256")}
         return found if len(found) == len(files) else None
 

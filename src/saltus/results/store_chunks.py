@@ -140,6 +140,10 @@ class Codec:
         finally:
             self._memory.pop(key, None)
 
+    def largest(self, name: str) -> int:
+        """Most bytes of one array of a chunk: its values, and the checksum after them."""
+        return self._chunks.chunk * self._chunks.arrays[name].itemsize + 4
+
     @staticmethod
     def key(index: int, name: str) -> str:
         """Path of a chunk's file in the group."""
