@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from saltus.system.system import System
 
 
-#: Boundaries that a system may have: each is a bit of the mode, a whole number of 64 bits that is never negative.
-MOST_GUARDS = 63
+#: Boundaries that a system may have: each is a bit of the mode, and sets of them, with one bit more, are kept in doubles on the way.
+MOST_GUARDS = 52
 
 
 def check_guards(system: str, count: int) -> None:
