@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -72,6 +74,29 @@ def ctrl_c_waits() -> Iterator[None]:
         signal.signal(signal.SIGINT, handler)
     if noted:
         handler(*noted[0])
+
+
+@contextmanager
+def no_ctrl_c_is_lost() -> Iterator[None]:
+    """Within, a Ctrl-C that Python drops is pressed again.
+
+    It drops one that comes while it tells a weak reference, or a finalizer, that an object has gone: nobody could catch what is raised
+    there, so it is handed to ``sys.unraisablehook``, which prints it and goes on.
+    """
+    before = sys.unraisablehook
+
+    def again(dropped: Any) -> None:
+        if issubclass(dropped.exc_type, KeyboardInterrupt):
+            threading.Timer(0.01, _thread.interrupt_main).start()  # at once it would be dropped again, by this function
+        else:
+            before(dropped)
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        if sys.unraisablehook is again:
+            sys.unraisablehook = before
 
 
 class Stop:

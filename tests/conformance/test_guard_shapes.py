@@ -159,7 +159,7 @@ def test_max_is_a_boundary():
     assert out.velocity == pytest.approx(-0.5, abs=4e-15)
 
 
-@pytest.mark.parametrize("method", [sl.Taylor(12), sl.ODE45(1e-9, 1e-11)])
+@pytest.mark.parametrize("method", [sl.Taylor(8), sl.ODE45(1e-9, 1e-11)])
 def test_boundaries_that_depend_on_one_another_three_deep(method):
     """The side of the last asks about the one before it, and so on: as an independent solver with short steps has it."""
 

@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ import saltus as sl
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
-from saltus.interrupt import Stop, check_stop, ctrl_c_waits
+from saltus.interrupt import Stop, check_stop, ctrl_c_waits, no_ctrl_c_is_lost
 
 START = {"x": np.linspace(-4e-3, 4e-3, 24), "v": np.linspace(-0.5, 0.5, 24)}
 
@@ -202,3 +203,42 @@ def test_where_nobody_listens_for_ctrl_c_nobody_is_told():
     with ctrl_c_waits():
         os.kill(os.getpid(), signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+# -- where Python drops it -----------------------------------------------------------------------------------------------------------
+class Pressing:
+    """An object while whose end Ctrl-C comes."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.parametrize("told", ["its finalizer", "a weak reference"])
+def test_a_ctrl_c_that_python_drops_is_pressed_again(told):
+    def goes():
+        one = Pressing() if told == "its finalizer" else Stop()
+        return weakref.ref(one, lambda _: signal.raise_signal(signal.SIGINT)) if told == "a weak reference" else None
+
+    def wait():
+        kept = goes()
+        end = time.monotonic() + 30
+        while time.monotonic() < end:
+            time.sleep(0.01)
+        return kept
+
+    with pytest.raises(KeyboardInterrupt), no_ctrl_c_is_lost():
+        wait()
+
+
+def test_other_things_that_python_drops_are_told_as_before(monkeypatch):
+    seen = []
+    monkeypatch.setattr(sys, "unraisablehook", seen.append)
+
+    class Failing:
+        def __del__(self):
+            raise ValueError("at its end")
+
+    with no_ctrl_c_is_lost():
+        Failing()
+    assert [str(one.exc_value) for one in seen] == ["at its end"]
+    assert sys.unraisablehook == seen.append

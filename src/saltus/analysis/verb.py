@@ -16,7 +16,7 @@ from saltus.codegen.announce import silent
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import MOST_THREADS, RunInterrupted
-from saltus.interrupt import Interrupted
+from saltus.interrupt import Interrupted, no_ctrl_c_is_lost
 from saltus.system.system import System
 
 P = ParamSpec("P")
@@ -59,7 +59,7 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
         quiet: AbstractContextManager[Any] = silent() if kwargs.get("progress") is False else nullcontext()
         token = _INSIDE.set(True)
         try:
-            with quiet:
+            with quiet, no_ctrl_c_is_lost():
                 return function(*args, **kwargs)
         except KeyboardInterrupt as stop:
             if isinstance(stop, Interrupted) and not isinstance(stop, RunInterrupted):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import sys
 
-from saltus.interrupt import ctrl_c_waits
+from saltus.interrupt import ctrl_c_waits, no_ctrl_c_is_lost
 
 #: Exit code of what the user stopped: 128 + SIGINT, as shells expect.
 INTERRUPTED = 130
@@ -19,9 +19,10 @@ def main() -> None:
     _replace_closed_streams()
     os.environ["MPLBACKEND"] = "Agg"  # pictures go to files; a window needs what a terminal may not have
     try:
-        with ctrl_c_waits():
-            from saltus.cli.app import app
-        app(prog_name="saltus")
+        with no_ctrl_c_is_lost():
+            with ctrl_c_waits():
+                from saltus.cli.app import app
+            app(prog_name="saltus")
     except KeyboardInterrupt:
         sys.stderr.write("saltus: stopped.\n")
         sys.exit(INTERRUPTED)
