@@ -36,6 +36,7 @@ from saltus.study.maps import compute, finish, jobs_of, open_store
 from saltus.study.questions.basins_table import attractor_table
 from saltus.study.read import parse
 from saltus.study.running import Resources
+from small_maps import small_maps
 from small_study import small_study
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and fork are POSIX")
@@ -514,11 +515,7 @@ def test_a_second_process_is_refused(server, undisturbed, tmp_path, monkeypatch)
 # -- a poison cell ---------------------------------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def small_chunks():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "CHUNK", 48)
-        patch.setattr(maps, "CHUNK", 48)
-        patch.setattr(plan, "SCOUTS", 256)
-        patch.setattr(plan, "CHECKED", 64)
+    with small_maps(48):
         yield
 
 

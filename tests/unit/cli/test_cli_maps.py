@@ -16,7 +16,7 @@ from saltus.analysis import plan
 from saltus.cli.app import app
 from saltus.results import load
 from saltus.results.store import Store
-from saltus.study import maps
+from small_maps import small_maps
 from small_study import small_study
 
 #: 256 starts in eight chunks.
@@ -35,11 +35,7 @@ periods = 3
 
 @pytest.fixture(autouse=True, scope="module")
 def small():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "CHUNK", 32)
-        patch.setattr(maps, "CHUNK", 32)
-        patch.setattr(plan, "SCOUTS", 256)
-        patch.setattr(plan, "CHECKED", 64)
+    with small_maps(32):
         yield
 
 

@@ -18,6 +18,7 @@ from saltus.study.read import parse
 from saltus.study.run import run_study
 from saltus.study.running import Resources
 from saltus.study.status import status_table, status_tables, stores
+from small_maps import small_maps
 from small_study import small_study
 
 #: 576 starts in 12 chunks; four attractors.
@@ -30,11 +31,7 @@ PAIR = STUDY.replace("count = 24", "count = 8") + (
 
 @pytest.fixture(autouse=True, scope="module")
 def small():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "CHUNK", 48)
-        patch.setattr(maps, "CHUNK", 48)
-        patch.setattr(plan, "SCOUTS", 256)
-        patch.setattr(plan, "CHECKED", 64)
+    with small_maps(48):
         yield
 
 

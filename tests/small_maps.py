@@ -1,0 +1,22 @@
+"""Maps in small chunks with few scouts, for tests of what happens between chunks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from saltus.analysis import plan
+from saltus.study import maps
+
+
+@contextmanager
+def small_maps(chunk: int) -> Iterator[None]:
+    """Within, a chunk has so many cells."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plan, "CHUNK", chunk)
+        patch.setattr(maps, "CHUNK", chunk)
+        patch.setattr(plan, "SCOUTS", 256)
+        patch.setattr(plan, "CHECKED", 64)
+        yield
