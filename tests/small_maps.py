@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from saltus.analysis import plan
+from saltus.analysis.basins import pipeline
 from saltus.study import maps
 
 
@@ -15,8 +15,8 @@ from saltus.study import maps
 def small_maps(chunk: int) -> Iterator[None]:
     """Within, a chunk has so many cells."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "CHUNK", chunk)
+        patch.setattr(pipeline, "CHUNK", chunk)
         patch.setattr(maps, "CHUNK", chunk)
-        patch.setattr(plan, "SCOUTS", 256)
-        patch.setattr(plan, "CHECKED", 64)
+        patch.setattr(pipeline, "SCOUTS", 256)
+        patch.setattr(pipeline, "CHECKED", 64)
         yield

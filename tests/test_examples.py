@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import saltus as sl
-from saltus.analysis import plan
+from saltus.analysis.basins import pipeline
 from saltus.cli.app import app
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_masses"
@@ -35,8 +35,8 @@ def answered(tmp_path_factory):
     text = re.sub(r"count = \d+", "count = 8", text).replace("periods = 2000", "periods = 200")
     (place / "study.toml").write_text(text, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "SCOUTS", 64)
-        patch.setattr(plan, "CHECKED", 16)
+        patch.setattr(pipeline, "SCOUTS", 64)
+        patch.setattr(pipeline, "CHECKED", 16)
         yield place, saltus("run", place / "study.toml", "--system", f"{place / 'two_masses.py'}:rig", "--out", place / "out")
 
 

@@ -18,22 +18,22 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from saltus import models, plot
-    from saltus.analysis.attractors import attractors, basin_fractions
-    from saltus.analysis.basins import basins
-    from saltus.analysis.bifurcation_diagram import bifurcation_diagram
-    from saltus.analysis.compare import compare
-    from saltus.analysis.compare_methods import compare_methods
-    from saltus.analysis.energy import energy_balance
-    from saltus.analysis.frequency_response import frequency_response
-    from saltus.analysis.impacts import impact_statistics
-    from saltus.analysis.lyapunov import lyapunov
-    from saltus.analysis.poincare import poincare
-    from saltus.analysis.settled import settled
-    from saltus.analysis.simulate import simulate
-    from saltus.analysis.spectrum import spectrum
-    from saltus.analysis.stroboscope import stroboscope
-    from saltus.analysis.transmissibility import transmissibility
-    from saltus.analysis.wolf import wolf
+    from saltus.analysis.basins.attractors import attractors, basin_fractions
+    from saltus.analysis.basins.basins import basins
+    from saltus.analysis.basins.compare import compare
+    from saltus.analysis.lyapunov.lyapunov import lyapunov
+    from saltus.analysis.methods.compare_methods import compare_methods
+    from saltus.analysis.motion.energy import energy_balance
+    from saltus.analysis.motion.impacts import impact_statistics
+    from saltus.analysis.motion.poincare import poincare
+    from saltus.analysis.motion.settled import settled
+    from saltus.analysis.motion.simulate import simulate
+    from saltus.analysis.motion.spectrum import spectrum
+    from saltus.analysis.motion.stroboscope import stroboscope
+    from saltus.analysis.motion.transmissibility import transmissibility
+    from saltus.analysis.recorded.wolf import wolf
+    from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
+    from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.results import contacts, describe, load, samples, save, to_csv, to_mat
@@ -70,23 +70,23 @@ if TYPE_CHECKING:
 
 #: Public name: module that holds it.
 _HOMES = {
-    "attractors": "saltus.analysis.attractors",
-    "basin_fractions": "saltus.analysis.attractors",
-    "basins": "saltus.analysis.basins",
-    "bifurcation_diagram": "saltus.analysis.bifurcation_diagram",
-    "compare": "saltus.analysis.compare",
-    "compare_methods": "saltus.analysis.compare_methods",
-    "energy_balance": "saltus.analysis.energy",
-    "frequency_response": "saltus.analysis.frequency_response",
-    "impact_statistics": "saltus.analysis.impacts",
-    "lyapunov": "saltus.analysis.lyapunov",
-    "poincare": "saltus.analysis.poincare",
-    "settled": "saltus.analysis.settled",
-    "simulate": "saltus.analysis.simulate",
-    "spectrum": "saltus.analysis.spectrum",
-    "stroboscope": "saltus.analysis.stroboscope",
-    "transmissibility": "saltus.analysis.transmissibility",
-    "wolf": "saltus.analysis.wolf",
+    "attractors": "saltus.analysis.basins.attractors",
+    "basin_fractions": "saltus.analysis.basins.attractors",
+    "basins": "saltus.analysis.basins.basins",
+    "bifurcation_diagram": "saltus.analysis.responses.bifurcation_diagram",
+    "compare": "saltus.analysis.basins.compare",
+    "compare_methods": "saltus.analysis.methods.compare_methods",
+    "energy_balance": "saltus.analysis.motion.energy",
+    "frequency_response": "saltus.analysis.responses.frequency_response",
+    "impact_statistics": "saltus.analysis.motion.impacts",
+    "lyapunov": "saltus.analysis.lyapunov.lyapunov",
+    "poincare": "saltus.analysis.motion.poincare",
+    "settled": "saltus.analysis.motion.settled",
+    "simulate": "saltus.analysis.motion.simulate",
+    "spectrum": "saltus.analysis.motion.spectrum",
+    "stroboscope": "saltus.analysis.motion.stroboscope",
+    "transmissibility": "saltus.analysis.motion.transmissibility",
+    "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"), "saltus.results"),

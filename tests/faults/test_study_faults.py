@@ -24,9 +24,9 @@ import pytest
 from typer.testing import CliRunner
 
 import saltus as sl
-from saltus.analysis import plan
-from saltus.analysis.plan import BasinPlan
-from saltus.analysis.serial import found_data
+from saltus.analysis.basins import pipeline
+from saltus.analysis.basins.pipeline import BasinPlan
+from saltus.analysis.basins.serial import found_data
 from saltus.cli.app import app
 from saltus.kernels import status as st
 from saltus.results import load
@@ -48,10 +48,10 @@ CHUNKS = 24
 #: `serve` it runs the study once, by which everything is loaded and compiled, and forks a child for each line: a child has nothing to load.
 COMMAND = """
 import json, os, signal, sys, time
-import saltus.analysis.plan
+import saltus.analysis.basins.pipeline
 
-saltus.analysis.plan.CHUNK = 24
-saltus.analysis.plan.SCOUTS, saltus.analysis.plan.CHECKED = 64, 64
+saltus.analysis.basins.pipeline.CHUNK = 24
+saltus.analysis.basins.pipeline.SCOUTS, saltus.analysis.basins.pipeline.CHECKED = 64, 64
 
 if __name__ == "__main__":  # a process of --workers computes chunks only
     import saltus.plot, saltus.study.maps, saltus.study.read, saltus.study.run
@@ -498,7 +498,7 @@ def test_a_second_process_is_refused(server, undisturbed, tmp_path, monkeypatch)
     wait_for(lambda: committed(folder) >= 2)
     os.kill(first, signal.SIGSTOP)
     assert committed(folder) < CHUNKS
-    monkeypatch.setattr(plan, "CHUNK", 24)
+    monkeypatch.setattr(pipeline, "CHUNK", 24)
     monkeypatch.setattr(maps, "CHUNK", 24)
     second = CliRunner().invoke(app, ["resume", str(folder), "--threads", "1", "--progress", "none"], catch_exceptions=False)
     seen = CliRunner().invoke(app, ["status", str(folder)], catch_exceptions=False)

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from saltus.analysis import plan
-from saltus.analysis.basins import label_all
-from saltus.analysis.settled import settled
-from saltus.analysis.settling import Settling
+from saltus.analysis.basins import pipeline
+from saltus.analysis.basins.basins import label_all
+from saltus.analysis.basins.labels import Settling
+from saltus.analysis.motion.settled import settled
 from saltus.results import load
 from saltus.study import maps
 from saltus.study.maps import jobs_of
@@ -52,15 +52,15 @@ def tiny(name, count=8):
 
 @pytest.fixture(autouse=True)
 def few_checks(monkeypatch):
-    monkeypatch.setattr(plan, "CHECKED", 16)
+    monkeypatch.setattr(pipeline, "CHECKED", 16)
 
 
 @pytest.fixture
 def brief(monkeypatch):
     """Few scouts, and little time for motions that never repeat: what comes out means nothing, but all of it is made."""
-    monkeypatch.setattr(plan, "SCOUTS", 2)
-    monkeypatch.setattr("saltus.analysis.recurrence.WATCHED", 256)
-    monkeypatch.setattr("saltus.analysis.wandering.BLOCKS", 64)
+    monkeypatch.setattr(pipeline, "SCOUTS", 2)
+    monkeypatch.setattr("saltus.analysis.orbits.recurrence.WATCHED", 256)
+    monkeypatch.setattr("saltus.analysis.orbits.aperiodic.BLOCKS", 64)
     for module in ("recurrence", "noisy", "steady"):
         monkeypatch.setattr(f"saltus.analysis.{module}.TRAIL", 256)
 
@@ -198,4 +198,4 @@ def test_ode45_survives_orbits_that_do_not_close():
 
 
 def test_chunks_of_the_studies_are_those_of_the_plan():
-    assert maps.CHUNK == plan.CHUNK
+    assert maps.CHUNK == pipeline.CHUNK

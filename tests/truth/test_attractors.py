@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.attractors import attractors
+from saltus.analysis.basins.attractors import attractors
 from saltus.flow.maps import Stroboscope
 
 ORBITS = {row["name"]: row for row in csv.DictReader((Path(__file__).parents[1] / "reference" / "orbits.csv").open())}

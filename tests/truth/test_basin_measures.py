@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from saltus.analysis.uncertainty import (
+from saltus.analysis.basins.uncertainty import (
     basin_entropy,
     fractions,
     measure,

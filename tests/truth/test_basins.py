@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis import plan as plans
-from saltus.analysis.capture import Neighbourhoods
-from saltus.analysis.plan import basin_plan
-from saltus.analysis.recurrence import find
-from saltus.analysis.settling import settle
+from saltus.analysis.basins import pipeline as plans
+from saltus.analysis.basins.labels import settle
+from saltus.analysis.basins.pipeline import basin_plan
+from saltus.analysis.orbits.capture import Neighbourhoods
+from saltus.analysis.orbits.recurrence import find
 
 ORBITS = {row["name"]: row for row in csv.DictReader((Path(__file__).parents[1] / "reference" / "orbits.csv").open())}
 B4 = sl.models.delangre("b")
@@ -211,7 +211,7 @@ def test_the_size_of_chunks_changes_nothing(coarse, few_scouts, monkeypatch, siz
 
 def test_chunks_of_a_chaotic_map_change_nothing(monkeypatch):
     monkeypatch.setattr(plans, "SCOUTS", 16)
-    monkeypatch.setattr("saltus.analysis.recurrence.WATCHED", 2048)  # periods that the chaotic ones are followed
+    monkeypatch.setattr("saltus.analysis.orbits.recurrence.WATCHED", 2048)  # periods that the chaotic ones are followed
     system = duffing.with_values(damping=0.1, force=12.0)
     axes = dict(x=(-3, 3, 6), v=(-6, 6, 6), periods=256, progress=False)
     whole = sl.basins(system, **axes)

@@ -9,8 +9,8 @@ import pytest
 
 import saltus as sl
 from jumps import jumping
-from saltus.analysis.lyapunov_spectrum import kind_of, spectrum
-from saltus.analysis.walks import MapWalk
+from saltus.analysis.lyapunov.segments import MapWalk
+from saltus.analysis.lyapunov.spectrum import kind_of, spectrum
 from saltus.errors import SaltusWarning
 from saltus.flow.maps import FunctionMap, Stroboscope
 
@@ -97,7 +97,7 @@ def test_groups_that_fit_in_memory_are_computed_alike(monkeypatch):
     rig = sl.models.delangre("c").with_values(**CHAOTIC)
     starts = np.stack([np.linspace(0, 1e-3, 5), np.zeros(5)], axis=1)
     whole = sl.lyapunov(rig, starts, periods=100, transient=50)
-    monkeypatch.setattr("saltus.analysis.exponents.GROUP", 1024 * 6 * 2)
+    monkeypatch.setattr("saltus.analysis.lyapunov.exponents.GROUP", 1024 * 6 * 2)
     assert sl.lyapunov(rig, starts, periods=100, transient=50).identical(whole)
 
 

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 import saltus as sl
 from conformance.systems import lab
-from saltus.analysis.orbit_measures import measure
+from saltus.analysis.orbits.orbit_measures import measure
 from saltus.analysis.outputs import outputs_of
 from saltus.errors import ParameterError, TraceError
 from saltus.flow.family import Family

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.polish import close
+from saltus.analysis.orbits.polish import close
 from saltus.flow.family import Family
 from saltus.flow.maps import Stroboscope
 
@@ -152,7 +152,7 @@ def doubling_by_bisection(low, high):
 
     def gap(stiffness):
         rig = sl.models.delangre("c", force="4 N", frequency="17 Hz", contact_stiffness=stiffness)
-        from saltus.analysis.orbits import polish
+        from saltus.analysis.orbits.orbits import polish
 
         orbit = polish(Stroboscope(rig, sl.Taylor()), start_of("C4_17_K7694"), 1, np.array([1e-3, 0.1]))
         return np.linalg.det(orbit.monodromy[0] + np.eye(2))

@@ -10,7 +10,7 @@ import pytest
 
 import saltus as sl
 from jumps import jumping
-from saltus.analysis.orbits import polish
+from saltus.analysis.orbits.orbits import polish
 from saltus.flow.maps import Stroboscope
 
 REFERENCE = Path(__file__).parents[1] / "reference"

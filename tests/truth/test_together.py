@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import saltus as sl
-from saltus.analysis import plan
+from saltus.analysis.basins import pipeline
 
 METHOD = sl.Taylor(order=12, lanes=2)
 CUTS, POINTS, VALUES = [0.0, 0.2, 0.45, 0.5, 0.8, 1.0], [0.0, 0.2, 0.45, 0.8, 1.0], [1.0, 3.0, -1.0, 0.5, 1.0]
@@ -86,6 +86,6 @@ def test_a_contact_goes_on_over_the_end_of_a_period(start):
 
 
 def test_every_start_of_a_map_settles(monkeypatch):
-    monkeypatch.setattr(plan, "SCOUTS", 32)
+    monkeypatch.setattr(pipeline, "SCOUTS", 32)
     basins = sl.basins(both, x=(-1, 1, 6), v=(-1, 1, 6), method=METHOD)
     assert (basins.basin.values == 0).all()

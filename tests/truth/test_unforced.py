@@ -6,9 +6,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 import saltus as sl
-from saltus.analysis.continuation import HALVINGS
-from saltus.analysis.cycles import find_cycles, returns
-from saltus.analysis.equilibria import find_equilibria
+from saltus.analysis.orbits.cycles import find_cycles, returns
+from saltus.analysis.orbits.equilibria import find_equilibria
+from saltus.analysis.responses.continuation import HALVINGS
 from saltus.flow.family import Family
 
 FAST = sl.Taylor(order=12, lanes=2)

@@ -28,8 +28,8 @@ def test_a_run_imports_what_it_needs(start):
     """Trajectories, their contacts, time errors and the Dataset with its provenance: NumPy, xarray and the kernels."""
     modules = imported(f"{RIG}run = sl.simulate(rig, start={start}, periods=2, progress=False)\nassert run.sizes['contact'] > 0")
     assert not modules & HEAVY
-    others = {name for name in modules if name.startswith("saltus.analysis.")} - {"saltus.analysis.simulate"}
-    assert others == {f"saltus.analysis.{name}" for name in ("along", "answers", "messages", "starts", "time_errors", "verb")}
+    rooms = {"motion", "motion.simulate", "motion.time_errors", "axes", "dataset_parts", "outcome_messages", "starts", "verb"}
+    assert {name for name in modules if name.startswith("saltus.analysis.")} == {f"saltus.analysis.{name}" for name in rooms}
 
 
 def test_other_verbs_leave_out_what_is_for_others():

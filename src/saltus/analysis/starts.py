@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.along import along
+from saltus.analysis.axes import along
 from saltus.errors import ParameterError, SaltusError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.family import NO_PERIOD

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Show = Callable[[float], None]
 
 #: What stands between a job's settings, which are texts of a study file, and what is computed: the models, and the reading of such files.
-_READING = ("models", "study", "study.questions")
+_READING = ("models", "study")
 
 
 class JobError(SaltusError):

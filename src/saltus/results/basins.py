@@ -45,7 +45,7 @@ class AttractorTable:
     points : sequence of array, shape (n, D) each
         Stroboscopic points in the order in which they are visited [units of the states]; n may differ between attractors.
     fractions : tuple of three arrays, shape (m,), optional
-        Share of the starts, and the lower and upper end of its interval: what :func:`saltus.analysis.uncertainty.fractions` returns.
+        Share of the starts, and the lower and upper end of its interval: what :func:`saltus.analysis.basins.uncertainty.fractions` returns.
     cycle : array, shape (m,), optional
         Of a system without forcing: period of each limit cycle [s], else NaN.
     eigenvalues : array of complex, shape (m, D), optional

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
-    from saltus.analysis.found import Found
-    from saltus.analysis.plan import BasinPlan
-    from saltus.analysis.settling import Settling
+    from saltus.analysis.basins.labels import Settling
+    from saltus.analysis.basins.pipeline import BasinPlan
+    from saltus.analysis.orbits.found import Found
 
 #: Chunks handed out at a time, for each worker: enough to keep it busy, few enough that a large map doesn't fill the scheduler.
 AHEAD = 4

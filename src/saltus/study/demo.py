@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.analysis.settled import LAST, settled
+from saltus.analysis.motion.settled import LAST, settled
 from saltus.results.schema import period_text
 from saltus.study.questions.simulate_table import response_texts
 from saltus.study.table import Column, TextTable, quantity, table, words
@@ -76,8 +76,8 @@ def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods:
         If a value can't be used.
     """
     from saltus import models
-    from saltus.analysis.simulate import simulate
-    from saltus.analysis.stroboscope import stroboscope
+    from saltus.analysis.motion.simulate import simulate
+    from saltus.analysis.motion.stroboscope import stroboscope
 
     rig = models.delangre(case, force=force, frequency=frequency)
     x, v = np.array(STARTS).T

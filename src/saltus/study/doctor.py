@@ -71,7 +71,7 @@ def check_table(found: list[Check]) -> TextTable:
 
 def _parabola(method: Method) -> float:
     """Largest error of the contact times [s]; infinite if there aren't two."""
-    from saltus.analysis.simulate import simulate
+    from saltus.analysis.motion.simulate import simulate
 
     run = simulate(_probe(acceleration=-2.0, boundary=0.999), start={"x": 0.0, "v": 2.0}, t_end=2.0, method=method, samples=1)
     times = run["contact_time"].values
@@ -82,7 +82,7 @@ def _parabola(method: Method) -> float:
 
 def _oscillator(method: Method) -> float:
     """Largest error of x and v of x'' = -x after 10 cycles, from x = 1, v = 0."""
-    from saltus.analysis.simulate import simulate
+    from saltus.analysis.motion.simulate import simulate
 
     run = simulate(_probe(stiffness=1.0, boundary=2.0), start={"x": 1.0, "v": 0.0}, t_end=20 * math.pi, method=method, samples=1)
     return max(abs(float(run["end_x"]) - 1.0), abs(float(run["end_v"])))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
-from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.results.provenance import to_json, version
@@ -14,9 +14,11 @@ from saltus.system.formula import Formula
 if TYPE_CHECKING:
     from saltus.system import System
 
+#: The folder of saltus.
+PACKAGE = Path(__file__).parents[1]
 #: All code that takes part in the way from equations, values and arguments to a Dataset: these packages and modules import nothing else of
 #: saltus, but for messages. Models and the reading of study files stand in the equations, values and arguments themselves.
-COMPUTING = ("fence", "interrupt", "unit_table", "units", "system", "kernels", "codegen", "codegen.lowering", "flow", "results", "analysis")
+COMPUTING = ("fence", "interrupt", "unit_table", "units", "system", "kernels", "codegen", "flow", "results", "analysis")
 
 
 def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[str, str]:
@@ -44,17 +46,13 @@ def code_hash(*more: str) -> str:
     ``more`` is for results that are kept under what a study file says, before it is read: the models and the reading count there too.
     """
     digest = hashlib.sha256()
-    for place in (*COMPUTING, *more):
-        for name, source in _sources(place):
-            digest.update(f"{place}/{name}\n".encode() + source)
+    for name, source in dict(pair for place in (*COMPUTING, *more) for pair in _sources(place)).items():
+        digest.update(f"{name}\n".encode() + source)
     return digest.hexdigest()
 
 
-def _sources(place: str) -> list[tuple[str, bytes]]:
-    """Name and text of the modules of a package of saltus, such as ``study.questions``, or of one module that stands alone."""
-    parent, _, alone = f"saltus.{place}".rpartition(".")
-    found = {file.name: file for file in resources.files(parent).iterdir()}
-    if f"{alone}.py" in found:
-        return [(f"{alone}.py", found[f"{alone}.py"].read_bytes())]
-    files = sorted(resources.files(f"saltus.{place}").iterdir(), key=lambda item: item.name)
-    return [(file.name, file.read_bytes()) for file in files if file.name.endswith(".py")]
+def _sources(place: str) -> Iterator[tuple[str, bytes]]:
+    """Name and text of the modules of a package of saltus, such as ``study.questions``, rooms in it too, or of one module alone."""
+    alone = PACKAGE / f"{place.replace('.', '/')}.py"
+    for file in [alone] if alone.is_file() else sorted(alone.with_suffix("").rglob("*.py")):
+        yield file.relative_to(PACKAGE).as_posix(), file.read_bytes()

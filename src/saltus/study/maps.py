@@ -10,10 +10,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from saltus.analysis.basins import label_all
-from saltus.analysis.plan import CHUNK, BasinPlan, basin_plan, memory
-from saltus.analysis.serial import cell_types, found_data, found_from, settling_arrays, settling_from
-from saltus.analysis.settling import Settling, settle
+from saltus.analysis.basins.basins import label_all
+from saltus.analysis.basins.labels import Settling, settle
+from saltus.analysis.basins.pipeline import CHUNK, BasinPlan, basin_plan, memory
+from saltus.analysis.basins.serial import cell_types, found_data, found_from, settling_arrays, settling_from
 from saltus.flow.threads import usable_processors
 from saltus.results.store import Store
 from saltus.study import quantities
@@ -29,7 +29,7 @@ from saltus.study.spec import Study
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.analysis.found import Found
+    from saltus.analysis.orbits.found import Found
     from saltus.system import System
 
 #: Chunks from which on a map is worth an estimate.

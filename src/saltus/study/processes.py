@@ -16,9 +16,9 @@ from saltus.flow.threads import usable_processors
 from saltus.interrupt import ctrl_c_waits
 
 if TYPE_CHECKING:
-    from saltus.analysis.found import Found
-    from saltus.analysis.plan import BasinPlan
-    from saltus.analysis.settling import Settling
+    from saltus.analysis.basins.labels import Settling
+    from saltus.analysis.basins.pipeline import BasinPlan
+    from saltus.analysis.orbits.found import Found
 
 #: Chunks that a process has at a time: one that it computes, one that it begins while the first is committed.
 AHEAD = 2

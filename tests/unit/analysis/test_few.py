@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis import time_errors
-from saltus.analysis.answers import gap_units
+from saltus.analysis.dataset_parts import gap_units
+from saltus.analysis.motion import time_errors
 from saltus.codegen.module import lane_width
 from saltus.flow import engine
 from saltus.flow.family import Family

@@ -3,7 +3,7 @@
 import pytest
 
 import saltus as sl
-from saltus.analysis.answers import gap_unit, gap_units
+from saltus.analysis.dataset_parts import gap_unit, gap_units
 from saltus.analysis.outputs import outputs_of
 from saltus.errors import UnitError
 

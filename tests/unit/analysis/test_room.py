@@ -40,7 +40,7 @@ def test_free_memory_is_told_and_sensible():
 def test_states_count(small):
     """What fits with two states doesn't with many."""
     room.check_room(2.5e7, "things", "Less.")
-    from saltus.analysis.plan import memory
+    from saltus.analysis.basins.pipeline import memory
 
     assert memory(10**6, 12) > 2 * memory(10**6, 2) - 2.5e8
 

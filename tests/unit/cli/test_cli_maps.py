@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from saltus.analysis import plan
+from saltus.analysis.basins import pipeline
 from saltus.cli.app import app
 from saltus.results import load
 from saltus.results.store import Store
@@ -324,7 +324,7 @@ def test_nonsense_for_a_scheduler(stopped, address):
 
 def test_a_scheduler_is_asked_for_before_anything_is_computed(study, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(plan.BasinPlan, "scout", lambda *_: pytest.fail("attractors are looked for"))
+    monkeypatch.setattr(pipeline.BasinPlan, "scout", lambda *_: pytest.fail("attractors are looked for"))
     refused(saltus("run", study(), "--out", tmp_path / "out", "--scheduler", "nonsense", "--progress", "none"), "doesn't answer")
 
 

@@ -186,7 +186,7 @@ def test_what_changed_is_computed_again(whole, tmp_path, monkeypatch, old, new, 
     folder.mkdir()
     (folder / "upper-stop.nc").write_bytes((whole[0] / "upper-stop.nc").read_bytes())
     calls, said = [], []
-    monkeypatch.setattr("saltus.analysis.poincare.poincare", lambda *_, **call: calls.append(call) or load(folder / "upper-stop.nc"))
+    monkeypatch.setattr("saltus.analysis.motion.poincare.poincare", lambda *_, **call: calls.append(call) or load(folder / "upper-stop.nc"))
     text = STUDY.replace(old, new)
     run_study(parse(text), text, folder, None, Resources(threads=1), lambda _: None, said.append, False, only=["poincare"])
     assert told in said[0]

@@ -7,6 +7,7 @@ import json
 
 import pytest
 
+from edited_copy import edited_copy
 from saltus.errors import SaltusError, StudyError, UnitError
 from saltus.study import identity
 from saltus.study.inputs import Inputs
@@ -176,25 +177,14 @@ def test_what_changes_nothing_does_not(text):
     assert job(text).identity() == job().identity()
 
 
-def test_the_code_is_part_of_the_identity(monkeypatch):
+def test_the_code_is_part_of_the_identity(tmp_path, monkeypatch):
     """A label that comes from other code isn't mixed with this one's: every file that a label depends on counts."""
-    read = identity.resources.files
     before = identity.code_hash.__wrapped__()
     assert before == identity.code_hash.__wrapped__() == job().identity()["code"]
-
-    class Changed:
-        def __init__(self, file):
-            self.name, self._file = file.name, file
-
-        def read_bytes(self):
-            return self._file.read_bytes() + (b"#" if self.name == target else b"")
-
-    for target in ("taylor_step.py", "settling.py", "engine.py", "trace.py", "recurrence.py", "capture.py", "maps.py", "module.py",
+    for target in ("taylor_step.py", "labels.py", "engine.py", "trace.py", "recurrence.py", "capture.py", "maps.py", "module.py",
                    "assemble.py", "units.py"):  # fmt: skip
         with monkeypatch.context() as patch:
-            patch.setattr(
-                identity.resources, "files", lambda package: type("F", (), {"iterdir": lambda _: map(Changed, read(package).iterdir())})()
-            )
+            edited_copy(tmp_path / target, target, patch)
             assert identity.code_hash.__wrapped__() != before, target
 
 

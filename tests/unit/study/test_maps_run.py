@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import saltus as sl
-from saltus.analysis import plan
+from saltus.analysis.basins import pipeline
 from saltus.errors import StudyError
 from saltus.results import load
 from saltus.results.store import Store, StoreError
@@ -141,8 +141,8 @@ def test_only_what_is_missing_is_computed(whole, tmp_path):
 
 def test_a_finished_study_computes_nothing(whole, tmp_path, monkeypatch):
     folder = copied(whole, tmp_path / "run")
-    monkeypatch.setattr(plan.BasinPlan, "chunk", lambda *_: pytest.fail("a chunk is computed again"))
-    monkeypatch.setattr(plan.BasinPlan, "scout", lambda *_: pytest.fail("attractors are looked for again"))
+    monkeypatch.setattr(pipeline.BasinPlan, "chunk", lambda *_: pytest.fail("a chunk is computed again"))
+    monkeypatch.setattr(pipeline.BasinPlan, "scout", lambda *_: pytest.fail("attractors are looked for again"))
     again = Run(folder)
     assert again.outcome.waiting == []
     assert load(folder / "basins.nc").drop_attrs().identical(load(whole.folder / "basins.nc").drop_attrs())

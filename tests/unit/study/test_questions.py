@@ -212,7 +212,7 @@ def test_a_stop_keeps_what_is_computed(whole, copied, monkeypatch):
         raise Interrupted(lambda: load(whole.folder / "soft.nc"))
 
     with monkeypatch.context() as patch:
-        patch.setattr("saltus.analysis.bifurcation_diagram.bifurcation_diagram", stopped)
+        patch.setattr("saltus.analysis.responses.bifurcation_diagram.bifurcation_diagram", stopped)
         with pytest.raises(KeyboardInterrupt):
             Run(copied)
     assert (copied / "soft-partial.nc").exists()
@@ -226,7 +226,7 @@ def test_a_stop_keeps_what_is_computed(whole, copied, monkeypatch):
 def test_only_one_question(tmp_path, no_computing, monkeypatch):
     calls = []
     monkeypatch.setattr(
-        "saltus.analysis.bifurcation_diagram.bifurcation_diagram", lambda *_, **call: calls.append(call) or pytest.skip("reached")
+        "saltus.analysis.responses.bifurcation_diagram.bifurcation_diagram", lambda *_, **call: calls.append(call) or pytest.skip("reached")
     )
     for name in ("soft", "A map", "a-map"):
         assert len(questions_of(parse(STUDY), None, Inputs(tmp_path), [name])) == 1

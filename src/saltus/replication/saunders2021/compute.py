@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.analysis.answers import gap_unit, provenance
-from saltus.analysis.attractors import attractors
-from saltus.analysis.basins import label_all
-from saltus.analysis.capture import Neighbourhoods
-from saltus.analysis.found import Found
-from saltus.analysis.lyapunov import lyapunov
-from saltus.analysis.orbits import Orbit, polish, same
-from saltus.analysis.portrait import portraits
-from saltus.analysis.settling import Settling
-from saltus.analysis.simulate import simulate
-from saltus.analysis.stroboscope import stroboscope
+from saltus.analysis.basins.attractors import attractors
+from saltus.analysis.basins.basins import label_all
+from saltus.analysis.basins.labels import Settling
+from saltus.analysis.dataset_parts import gap_unit, provenance
+from saltus.analysis.lyapunov.lyapunov import lyapunov
+from saltus.analysis.motion.simulate import simulate
+from saltus.analysis.motion.stroboscope import stroboscope
+from saltus.analysis.orbits.capture import Neighbourhoods
+from saltus.analysis.orbits.found import Found
+from saltus.analysis.orbits.orbits import Orbit, polish, same
+from saltus.analysis.orbits.portrait import portraits
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.replication.job import Show

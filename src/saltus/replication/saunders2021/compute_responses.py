@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.analysis.answers import provenance
-from saltus.analysis.bifurcation_diagram import bifurcation_diagram
-from saltus.analysis.compare_methods import compare_methods, method_label
-from saltus.analysis.frequency_response import frequency_response
-from saltus.analysis.method_errors import one_period_errors
+from saltus.analysis.dataset_parts import provenance
+from saltus.analysis.methods.compare_methods import compare_methods, method_label
+from saltus.analysis.methods.method_errors import one_period_errors
+from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
+from saltus.analysis.responses.frequency_response import frequency_response
 from saltus.flow import Taylor
 from saltus.replication.job import Show
 from saltus.replication.saunders2021.compute import Inputs, Settings, method_in

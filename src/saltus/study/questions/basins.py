@@ -139,7 +139,7 @@ class Maps(Question):
                     outcome.files.append(save_picture(figure, folder / f"{job.slug}{ATTRACTORS}.png"))
 
     def _write_agreement(self, job: MapJob, ds: xr.Dataset, other: xr.Dataset, folder: Path, outcome: Outcome, pictures: bool) -> None:
-        from saltus.analysis.compare import compare
+        from saltus.analysis.basins.compare import compare
         from saltus.results import save
         from saltus.study.questions.basins_table import agreement_table
 
@@ -157,7 +157,7 @@ class Maps(Question):
 
 def _motions(job: MapJob, ds: xr.Dataset) -> xr.Dataset:
     """A motion on each attractor, long enough for its picture."""
-    from saltus.analysis.simulate import simulate
+    from saltus.analysis.motion.simulate import simulate
 
     system = job.plan.system
     start = {name: ds[f"attractor_{name}"].values[:, 0] for name in system.states}

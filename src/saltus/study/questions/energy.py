@@ -71,7 +71,7 @@ class Balance(Looked):
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Draw the balance."""
-        from saltus.analysis.energy import energy_balance
+        from saltus.analysis.motion.energy import energy_balance
 
         asked = {name: value for name, value in self.arguments.items() if name != "functions"}
         call: dict[str, Any] = asked | self.functions | how

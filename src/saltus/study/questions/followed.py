@@ -73,7 +73,7 @@ class Looked(OneDataset):
     several: ClassVar[bool] = False
 
     def __init__(self, table: Any, setting: Setting) -> None:
-        from saltus.analysis.stretch import stretch
+        from saltus.analysis.motion.window import stretch
 
         place = self.place
         quantities.is_batch(table.start or {}, table.values, place=place)

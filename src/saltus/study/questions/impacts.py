@@ -61,6 +61,6 @@ class Statistics(Looked):
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Count contacts."""
-        from saltus.analysis.impacts import impact_statistics
+        from saltus.analysis.motion.impacts import impact_statistics
 
         return impact_statistics(self.system, **self.arguments, **how)

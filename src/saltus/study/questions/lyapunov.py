@@ -73,7 +73,7 @@ class Exponents(OneDataset):
 
     def compute(self, threads: int | None, progress: Callable[[float], None]) -> xr.Dataset:
         """Call the analysis."""
-        from saltus.analysis.lyapunov import lyapunov
+        from saltus.analysis.lyapunov.lyapunov import lyapunov
 
         return lyapunov(self.system, flow=self.method, threads=threads, progress=progress, **self.arguments)
 

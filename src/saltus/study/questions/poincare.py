@@ -52,7 +52,7 @@ class Section(Looked):
 
     def more_arguments(self, table: Poincare, setting: Setting) -> dict[str, Any]:
         """The surface in SI, and the direction."""
-        from saltus.analysis.poincare import crossed
+        from saltus.analysis.motion.poincare import crossed
 
         needs_contacts(self.method, self.place)
         surface: Any = table.surface
@@ -69,6 +69,6 @@ class Section(Looked):
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Crossings."""
-        from saltus.analysis.poincare import poincare
+        from saltus.analysis.motion.poincare import poincare
 
         return poincare(self.system, **self.arguments, **how)

@@ -128,7 +128,7 @@ def _followed(system: System, table: FrequencyResponse | BifurcationDiagram, set
 
 def _check(system: System, axes: dict[str, Any], arguments: dict[str, Any], place: str) -> None:
     """Have the analysis look at its arguments before anything is computed."""
-    from saltus.analysis.grid import grid_of
+    from saltus.analysis.responses.grid import grid_of
 
     try:
         start, box, seed, follow = (arguments[name] for name in ("start", "box", "seed", "follow"))
@@ -167,8 +167,8 @@ class Responses(OneDataset):
 
     def compute(self, threads: int | None, progress: Callable[[float], None]) -> xr.Dataset:
         """Call the analysis."""
-        from saltus.analysis.bifurcation_diagram import bifurcation_diagram
-        from saltus.analysis.frequency_response import frequency_response
+        from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
+        from saltus.analysis.responses.frequency_response import frequency_response
 
         axes = _arrays({"frequency": self.arguments["frequency"]} if "frequency" in self.arguments else self.arguments["vary"])
         call = {name: value for name, value in self.arguments.items() if name not in ("frequency", "vary")}

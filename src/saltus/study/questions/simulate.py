@@ -135,7 +135,7 @@ class Motion(Question):
         return Outcome([table], files + ([self._picture(runs[RUN], at.folder)] if at.pictures else []))
 
     def _run(self, stem: str, method: Any, at: Running) -> xr.Dataset:
-        from saltus.analysis.simulate import simulate
+        from saltus.analysis.motion.simulate import simulate
 
         system = self.setting.base
         call = {name: value for name, value in self.arguments.items() if name != "varied"}

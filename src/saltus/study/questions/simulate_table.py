@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.analysis.settled import settled
+from saltus.analysis.motion.settled import settled
 from saltus.errors import ParameterError
 from saltus.kernels.status import STATUS
 from saltus.results.schema import end_name, period_text, states_of

@@ -50,8 +50,8 @@ class Lines(Looked):
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Simulate, leave the transient out, take the spectrum."""
-        from saltus.analysis.simulate import simulate
-        from saltus.analysis.spectrum import spectrum
+        from saltus.analysis.motion.simulate import simulate
+        from saltus.analysis.motion.spectrum import spectrum
 
         asked = self.arguments
         motion = {name: asked[name] for name in ("start", "t_start", "values", "samples")}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.settled import settled
+from saltus.analysis.motion.settled import settled
 from saltus.plot.maps import share_text
 from saltus.replication.saunders2021.claims.reading import (
     EXACT,

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from saltus.analysis.compare import compare
+from saltus.analysis.basins.compare import compare
 from saltus.plot import maps
 from saltus.plot.basins import paint
 from saltus.plot.palette import hues

@@ -83,7 +83,7 @@ def four_starts(data: Data) -> Figure:
 
 def _rows(run: xr.Dataset, titles: Sequence[str], shown: Sequence[int]) -> Figure:
     """A row for each trajectory: time history, and phase portrait with Poincaré points."""
-    from saltus.analysis.settled import settled
+    from saltus.analysis.motion.settled import settled
     from saltus.results.schema import period_text
 
     found = settled(run)["response_period"].values

@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from saltus.analysis.compare import compare
+from saltus.analysis.basins.compare import compare
 from saltus.plot import maps
 from saltus.plot.style import display_scale
 from saltus.replication.saunders2021.pictures.looks import EXACT, LOOKS, OFF, ON, Data, Look, lag, periods_of, strobe

@@ -1,0 +1,49 @@
+"""How much there is to read: lines of code of each package, without comments, docstrings, blank lines and imports.
+
+Usage: ``python benchmarks/size.py [FOLDER]``
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import sys
+import tokenize
+from collections import defaultdict
+from pathlib import Path
+
+SKIPPED = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+
+
+def lines_of_code(text: str) -> int:
+    """Lines that hold a token of code; a statement over five lines counts five."""
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    lines = {line for token in tokens if token.type not in SKIPPED for line in range(token.start[0], token.end[0] + 1)}
+    return len(lines - left_out(ast.parse(text)))
+
+
+def left_out(tree: ast.Module) -> set[int]:
+    """Lines of imports and docstrings."""
+    nodes: list[ast.stmt] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            nodes.append(node)
+        if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(node, clean=False) is not None:
+            nodes.append(node.body[0])
+    return {line for node in nodes for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)}
+
+
+def main(root: Path) -> None:
+    """A row for each package, and their sum."""
+    rows: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0])
+    for file in root.rglob("*.py"):
+        text, parts = file.read_text(encoding="utf-8"), file.relative_to(root).parts
+        for name in (parts[0] if len(parts) > 1 else ".", "all"):
+            rows[name] = [a + b for a, b in zip(rows[name], (1, text.count("\n"), lines_of_code(text)), strict=True)]
+    print(f"{'package':12s} {'files':>6s} {'lines':>7s} {'code':>7s}")
+    for name, row in sorted(rows.items(), key=lambda item: item[1][2]):
+        print(f"{name:12s} {row[0]:6d} {row[1]:7d} {row[2]:7d}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1] / "src" / "saltus")

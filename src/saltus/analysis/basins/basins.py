@@ -1,0 +1,111 @@
+"""`basins`: which attractor each start leads to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import xarray as xr
+
+from saltus.analysis.basins.labels import Settling
+from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
+from saltus.analysis.orbits.found import Found
+from saltus.analysis.verb import verb
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporter
+from saltus.flow.threads import on_threads
+from saltus.interrupt import Interrupted
+from saltus.system.system import System
+
+#: Share of the progress that the search for attractors takes.
+SCOUTING = 0.05
+
+
+@verb
+def basins(
+    system: System,
+    *,
+    at: Mapping[str, Any] | None = None,
+    method: Method | None = None,
+    periods: int = 2000,
+    every: float | str | None = None,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+    **axes: Any,
+) -> xr.Dataset:
+    """The attractor that each start of a grid leads to, every attractor typed and verified.
+
+    Attractors are first found from a fixed sample of 1024 starts; a trajectory ends when it enters a neighbourhood of one of them in which
+    the return map was seen to contract with an unchanged sequence of contacts. What isn't captured is followed further, and new attractors
+    are looked for there.
+
+    Parameters
+    ----------
+    system : System
+        Equations, contacts and values.
+    **axes : (low, high, count), or a list or array of starts
+        Two states, the range of each [SI or text with a unit] and the number of starts, ends included:
+        ``x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)``.
+    at : mapping, optional
+        Starts of the other states; default zero.
+    method : Method
+        Default :class:`saltus.Taylor`.
+    periods : int
+        Forcing periods that a trajectory is followed at most.
+    every : float or str, optional
+        Time between two looks [s]: needed for a system without forcing.
+    threads : int, optional
+        Default all processors. Results don't depend on it.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds.
+
+    Returns
+    -------
+    Dataset
+        Dims: the two states, ``attractor``, ``multiplier``, ``phase``. Variables ``basin``, ``periods_to_settle``, ``status``,
+        ``grazes_unresolved`` and the table ``attractor_*``; attributes: fractions' uncertainty, ``smallest_basin_seen``, ``flip_rate``,
+        ``basin_entropy``, ``uncertainty_exponent``, ...
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset so far.
+
+    References
+    ----------
+    Daza et al., Scientific Reports 6 (2016) 31416 (entropies); McDonald et al., Physica D 17 (1985) 125 (uncertainty exponent).
+    """
+    plan = basin_plan(system, axes, at, check_method(method), periods, every)
+    show, close = reporter(progress)
+    result = Settling.empty(plan.cells, len(system.states))
+    found = None
+    try:
+        found = plan.scout(threads, _part(show, 0.0, SCOUTING))
+        label_all(plan, found, range(plan.chunks), lambda i, part: result.put(plan.cells_of(i), part), threads, _part(show, SCOUTING, 1.0))
+        return plan.finish(result, found, threads)
+    except KeyboardInterrupt:
+        scouted = found
+        raise Interrupted(None if scouted is None else lambda: plan.dataset(result, scouted, threads)) from None
+    finally:
+        close()
+
+
+def label_all(
+    plan: BasinPlan,
+    found: Found,
+    chunks: Sequence[int],
+    done: Callable[[int, Settling], None],
+    threads: int | None,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Label chunks on threads; ``done(index, settling)`` is called from this thread as each is ready, in any order."""
+    map_ = plan.map(1)
+    map_.launch(plan.starts(plan.cells_of(0)[:1]), 1)  # compiles before threads ask for it
+    on_threads(lambda index: plan.chunk(index, found, map_), chunks, done, threads, progress)
+
+
+def _part(show: Callable[[float], None] | None, begin: float, end: float) -> Callable[[float], None] | None:
+    """Progress of one stage as a part of the whole."""
+    return None if show is None else lambda share: show(begin + (end - begin) * share)

@@ -1,0 +1,130 @@
+"""Where many starts lead, once the attractors are known: a pure function of its arguments, so that any part can be computed anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.orbits.found import Found
+from saltus.analysis.orbits.recurrence import find, wanders_on
+from saltus.flow.maps import Map, Travel
+from saltus.flow.threads import on_threads
+from saltus.kernels import status as st
+
+#: Codes of cells that belong to no attractor.
+ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
+#: Not captured by any attractor known so far: for the post-pass.
+OPEN = -5
+#: Iterates between two looks at who has been captured.
+BLOCK = 8
+#: Starts that one thread follows at a time.
+PIECE = 4096
+#: Age at which a trajectory may be taken for one on a chaotic attractor, and between looks after that.
+WANDERS = 64
+#: Trajectories that nothing captured from which new attractors are looked for.
+SAMPLE = 256
+
+
+@dataclass(frozen=True)
+class Settling:
+    """What came of k starts.
+
+    Attributes
+    ----------
+    label : int64[k]
+        Attractor, or a code below zero.
+    periods : int64[k]
+        Iterates until captured; -1 if it wasn't.
+    status : int64[k]
+        How it ended: codes of kernels/status.py.
+    unresolved : int64[k]
+        Grazes on the way that were shallower than the local error.
+    end : float64[k, D]
+        Where it stood last.
+    """
+
+    label: np.ndarray
+    periods: np.ndarray
+    status: np.ndarray
+    unresolved: np.ndarray
+    end: np.ndarray
+
+    @classmethod
+    def empty(cls, count: int, size: int) -> Settling:
+        """Nothing computed yet."""
+        label, periods = np.full(count, NOT_COMPUTED, np.int64), np.full(count, -1, np.int64)
+        return cls(label, periods, np.full(count, st.NOT_COMPUTED, np.int64), np.zeros(count, np.int64), np.full((count, size), np.nan))
+
+    def put(self, where: np.ndarray | slice, other: Settling) -> None:
+        """Write another's results to some places."""
+        for name in ("label", "periods", "status", "unresolved", "end"):
+            getattr(self, name)[where] = getattr(other, name)
+
+
+def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
+    """Follow trajectories until an attractor captures them, float64[k, D], for ``most`` iterates at the longest."""
+    result = Settling.empty(len(start), start.shape[1])
+    travel, who = map_.launch(start, most), np.arange(len(start))
+    trail = np.zeros((len(start), 0, start.shape[1]))
+    while len(who) and travel.age < most:
+        points = travel.advance(min(BLOCK, most - travel.age))
+        label, when = found.near.capture(points)
+        periods = travel.age - points.shape[1] + when + 1
+        if found.wandering:
+            trail = np.concatenate([trail, points], axis=1)[:, -WANDERS:]
+            if travel.age % WANDERS == 0 or travel.age >= most:
+                on = wanders_on(found, trail, found.wandering[0].scale)
+                here = (label < 0) & (on >= 0)
+                label[here], periods[here] = len(found.orbits) + on[here], travel.age
+        going = travel.going & (label < 0)
+        leaves = np.flatnonzero(~going)
+        label[leaves] = np.where(label[leaves] >= 0, label[leaves], np.where(travel.status[leaves] == st.NONFINITE, ESCAPED, FAILED))
+        _write(result, who[leaves], label[leaves], periods[leaves], travel, leaves)
+        travel.keep(going)
+        who, trail = who[going], trail[going]
+    _write(result, who, np.full(len(who), OPEN), np.full(len(who), -1), travel, np.arange(len(who)))
+    return result
+
+
+def settle_all(
+    map_: Map, start: np.ndarray, found: Found, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None
+) -> Settling:
+    """:func:`settle` for any number of starts, in pieces on threads."""
+    result = Settling.empty(len(start), start.shape[1])
+    pieces = [slice(first, first + PIECE) for first in range(0, len(start), PIECE)]
+    on_threads(lambda piece: settle(map_, start[piece], found, most), pieces, result.put, threads, progress)
+    return result
+
+
+def _write(result: Settling, who: np.ndarray, label: np.ndarray, periods: np.ndarray, travel: Travel, rows: np.ndarray) -> None:
+    result.label[who], result.periods[who] = label, np.where(label >= 0, periods, -1)
+    result.status[who], result.unresolved[who] = travel.status[rows], travel.unresolved[rows]
+    result.end[who] = travel.state[rows]
+
+
+def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most: int, threads: int | None = None) -> Found:
+    """Look for new attractors where nothing captured, label what they capture, and give all attractors their final ids.
+
+    Changes ``result``. The trajectories go on from where they stood. Returns the attractors in their final order.
+    """
+    opened = np.flatnonzero(result.label == OPEN)
+    if not len(opened):
+        return found
+    sample = np.sort(np.random.default_rng(0).choice(opened, min(SAMPLE, len(opened)), replace=False))
+    wider, _, _ = find(map_, result.end[sample], scale, most, found)
+    _renumber(result.label, found, wider)
+    more = settle_all(map_, result.end[opened], wider, most, threads)
+    more.periods[more.periods >= 0] += most
+    more.unresolved[:] += result.unresolved[opened]
+    still = more.label == OPEN
+    more.label[still], more.status[still] = UNCONVERGED, st.LONG_TRANSIENT
+    result.put(opened, more)
+    return wider
+
+
+def _renumber(label: np.ndarray, before: Found, after: Found) -> None:
+    ids = np.array([*map(after.index, before.orbits), *map(after.index, before.wandering)], np.int64)
+    if len(ids):
+        label[label >= 0] = ids[label[label >= 0]]

@@ -1,0 +1,1 @@
+"""How fast small deviations grow along motions of a flow."""

@@ -1,0 +1,170 @@
+"""Exponents of many trajectories of a flow: group after group, so that memory stays bounded, into the columns of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.lyapunov.qr import AT_REST, GOOD, STRETCH
+from saltus.analysis.lyapunov.segments import FlowWalk
+from saltus.analysis.lyapunov.spectrum import Spectrum, spectrum
+from saltus.analysis.orbits.equilibria import autonomous, find_equilibria
+from saltus.analysis.orbits.orbit_measures import measure
+from saltus.analysis.orbits.orbits import Orbit
+from saltus.analysis.orbits.recurrence import SAME
+from saltus.analysis.statistics import CONFIDENCE, running_ends
+from saltus.flow.family import Family
+from saltus.kernels import status as st
+
+#: Numbers that the tangents of one stretch of a group may hold: 32 MB, and some copies of it.
+GROUP = 4_000_000
+#: Growth rates of a group: 80 MB, and some copies of it.
+RATES = 10_000_000
+#: Share of the range of a gap below which an orbit that misses or overshoots its boundary is near a graze. Exponents belong to
+#: infinitesimal deviations. A gap is known, and a deviation seen, to a thousandth of the motion at best: of an orbit so close to a boundary
+#: nobody could tell on which side of the graze it is, and beyond it the exponents are others. A motion that never repeats
+#: comes as close as one likes to every boundary that it meets, so of such a one only the grazes themselves count.
+NEAR_GRAZE = 1e-3
+#: The two conventions of a forced system.
+FORCED = "lyapunov_exponent: of the stroboscopic map; flow_lyapunov_exponent: of the flow, with a zero for the phase of the forcing"
+
+
+class Exponents:
+    """The exponents of k trajectories, computed by :meth:`run`; what isn't computed yet is NaN.
+
+    Parameters
+    ----------
+    family : Family
+        The flow, with a row for each trajectory.
+    start : float64[k, D]
+        Starts.
+    periods, transient : int
+        Blocks that count, and blocks before them.
+    every : float or None
+        Time of a block, for a system without forcing [s].
+    """
+
+    algorithm = "variational equations with saltation, QR method"
+
+    def __init__(self, family: Family, start: np.ndarray, periods: int, transient: int, every: float | None):
+        self.family, self._start, self._periods, self._transient, self._every = family, start, periods, transient, every
+        self._ends = running_ends(periods)
+        k, size, m = *start.shape, len(self._ends)
+        nan = np.full
+        self._mean, self._error, self._half = (nan((k, size), np.nan) for _ in range(3))
+        self._running, self._running_half = (nan((k, size, m), np.nan) for _ in range(2))
+        self._volume, self._margin = nan(k, np.nan), nan(k, np.inf)
+        self._kind, self._period, self._batches = nan(k, "unclear", dtype=object), nan(k, 0), nan(k, 0)
+        self._status, self._near, self._grazes, self._unresolved = nan(k, st.NOT_COMPUTED), nan(k, 0), nan(k, 0), nan(k, 0)
+
+    def run(self, progress: Callable[[float], None] | None = None) -> None:
+        """Compute all, in groups."""
+        k, size = self._start.shape
+        step = max(min(GROUP // (STRETCH * size * (size + 1)), RATES // (self._periods * size)), 1)
+        for first in range(0, k, step):
+            rows = np.arange(first, min(first + step, k))
+
+            def show(share: float, first: int = first, count: int = len(rows)) -> None:
+                if progress:
+                    progress((first + share * count) / k)
+
+            walk = FlowWalk(self.family.rows(rows), self._every)
+            found = spectrum(walk, self._start[rows], self._periods, self._transient, self._every is None, show)
+            if self._every is not None and autonomous(self.family.system):
+                _rest(found, walk, self._start[rows], self._every)
+            self._keep(rows, walk, found)
+
+    def _keep(self, rows: np.ndarray, walk: FlowWalk, found: Spectrum) -> None:
+        """Write a group to its places."""
+        stretch = found.growth.stretch
+        self._mean[rows], self._error[rows], self._half[rows] = found.exponents, found.errors, found.half_width
+        self._running[rows], self._running_half[rows] = found.running.mean, found.running.half_width
+        self._volume[rows], self._batches[rows], self._kind[rows] = found.volume, found.batches, found.kinds
+        self._period[rows] = [
+            orbit.period if orbit and kind == "periodic" else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)
+        ]
+        self._status[rows] = stretch.status
+        self._grazes[rows], self._unresolved[rows], self._margin[rows] = stretch.grazes, stretch.unresolved, stretch.margin
+        for i, orbit in enumerate(found.orbits):
+            if orbit is not None:
+                self._of_orbit(rows[i], walk.of(np.array([i])), orbit)
+        self._near[rows] |= (self._grazes[rows] > 0) | (self._unresolved[rows] > 0)
+
+    def _of_orbit(self, row: int, walk: FlowWalk, orbit: Orbit) -> None:
+        """Grazes and margin of the orbit alone, in place of those on the way to it."""
+        stretch = walk.move(orbit.points[:1], orbit.period)
+        self._grazes[row], self._unresolved[row] = stretch.grazes[0], stretch.unresolved[0]
+        numbers = measure(walk.family, orbit.points[:1], np.array([orbit.period]))
+        self._margin[row] = numbers.margin[0]
+        self._near[row] = numbers.margin[0] < NEAR_GRAZE * numbers.span[0]
+
+    def columns(self, factor: np.ndarray) -> dict[str, Any]:
+        """The columns of the result; exponents times a factor for each trajectory, float64[k]."""
+        one, two = factor[:, None], factor[:, None, None]
+        mean, half = self._mean * one, self._half * one
+        running, running_half = self._running * two, self._running_half * two
+        lost = ~np.isin(self._status, GOOD)
+        mean[lost], half[lost] = np.nan, np.nan
+        return {
+            "kind": self._kind.astype(str),
+            "response_period": self._period,
+            "lyapunov_exponent": mean,
+            "lyapunov_error": np.where(np.isnan(mean), np.nan, self._error * one),
+            "lyapunov_low": mean - half,
+            "lyapunov_high": mean + half,
+            "flow_lyapunov_exponent": _with_phase(mean) if self._every is None else mean,
+            "exponent_sum": mean.sum(axis=1),
+            "mean_divergence": self._volume * factor,
+            "independent_batches": self._batches,
+            "near_graze": self._near,
+            "grazes": self._grazes,
+            "grazes_unresolved": self._unresolved,
+            "smallest_gap_margin": self._margin,
+            "block_time": self.family.period,
+            "status": [st.STATUS[code][0] for code in self._status.tolist()],
+            "running_time": self.family.period[:, None] * self._ends,
+            "running_exponent": running,
+            "running_low": running - running_half,
+            "running_high": running + running_half,
+        }
+
+    def settings(self) -> dict[str, Any]:
+        """What was asked for, as attributes."""
+        return {
+            "algorithm": self.algorithm,
+            "convention": FORCED if self._every is None else "both are the exponents of the flow",
+            "confidence": CONFIDENCE,
+            "periods": self._periods,
+            "transient": self._transient,
+        }
+
+
+def _rest(found: Spectrum, walk: FlowWalk, start: np.ndarray, every: float) -> None:
+    """Where a motion has come to an equilibrium, its exponents: the real parts of the eigenvalues of the Jacobian, exact but for rounding.
+
+    Means of growth lag behind: those of a pair of complex eigenvalues swing about its real part.
+    """
+    trail = found.growth.stretch.trail
+    state, whole = trail[:, -1], np.ptp(np.concatenate([start[:, None], trail], axis=1), axis=1)
+    widest = whole.max(axis=1, keepdims=True)  # in place of the range of a state that began at rest and has come to rest
+    scale = np.where(whole > AT_REST * widest, whole, np.where((widest > 0) & np.isfinite(widest), widest, 1.0))
+    still = find_equilibria(walk.family, state, scale, captures=False)
+    with np.errstate(invalid="ignore"):
+        attracts = (still.eigenvalues.real < 0).all(axis=1)
+        near = (np.abs(state - still.place) <= SAME * scale).all(axis=1)
+    arrived = np.flatnonzero(attracts & near & np.isin(found.growth.stretch.status, GOOD))
+    rounding = 64 * np.finfo(float).eps
+    for i in arrived:
+        own = still.eigenvalues[i]
+        found.exponents[i] = own.real * every
+        found.errors[i] = found.half_width[i] = rounding * np.abs(own).max() * every
+        found.batches[i], found.kinds[i] = 0, "equilibrium"
+        found.volume[i] = walk.of(np.array([i])).divergences(still.place[[i]][:, None])[0, 0]
+
+
+def _with_phase(exponents: np.ndarray) -> np.ndarray:
+    """Exponents float64[k, D] and the zero of the phase, in descending order."""
+    zero = np.where(np.isnan(exponents[:, :1]), np.nan, 0.0)
+    return -np.sort(-np.concatenate([exponents, zero], axis=1), axis=1)

@@ -1,0 +1,169 @@
+"""`lyapunov`: how fast small deviations grow or die along a motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.dataset_parts import gap_unit, provenance, shared_values
+from saltus.analysis.lyapunov.exponents import Exponents
+from saltus.analysis.lyapunov.wolf_on_flow import NeighbourExponents
+from saltus.analysis.outcome_messages import warn
+from saltus.analysis.starts import Ensemble, check_system, ensemble
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError, among, nearest, shown
+from saltus.flow.counts import whole
+from saltus.flow.family import Family
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporter
+from saltus.interrupt import Interrupted
+from saltus.results import exponents_dataset
+from saltus.system.system import System
+from saltus.units import to_si
+
+METHODS = ("variational", "wolf")
+#: Units in which exponents are given: what one block is worth, and whether the logarithm is natural.
+UNITS = {"1/s": (False, 1.0), "1/period": (True, 1.0), "bit/s": (False, math.log(2)), "bit/period": (True, math.log(2))}
+#: Blocks from which something can be said at least: the error of the mean needs 8 independent batches, of some blocks each.
+LEAST_PERIODS = 64
+
+
+@verb
+def lyapunov(
+    system: System,
+    start: Any = None,
+    *,
+    method: str = "variational",
+    flow: Method | None = None,
+    periods: int = 2000,
+    transient: int = 500,
+    every: float | str | None = None,
+    values: Mapping[str, Any] | None = None,
+    unit: str = "1/s",
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Lyapunov exponents of the motions that given starts lead to, with their errors.
+
+    A motion that settles to a periodic orbit has exactly the exponents of the orbit, the logarithms of the magnitudes of its Floquet
+    multipliers over its period. Any other has the mean growth of small deviations, by the variational equations, their jumps at contacts
+    (saltation) and the QR method, over ``periods`` blocks after ``transient``. A block is a forcing period.
+
+    Two conventions are in use. A forced system of D states has D exponents as a stroboscopic map: ``lyapunov_exponent``. As a flow,
+    the phase of the forcing is one more state, whose exponent is zero: ``flow_lyapunov_exponent``. Without forcing both are the D
+    exponents of the flow, which has a zero of its own unless the motion ends in an equilibrium.
+
+    Parameters
+    ----------
+    system : System
+        Equations, contacts and parameter values.
+    start : sequence, mapping or array
+        Starts, as for :func:`saltus.simulate`; one or many. Default: all zero.
+    method : {"variational", "wolf"}
+        ``"wolf"``: the largest exponent only, from the growth of the distance between neighbours on the trajectory, as much of the
+        literature has it (:func:`saltus.wolf`). Points are all states and the phase of the forcing, 32 in a block; an evolution is
+        one block. It is the largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
+    flow : Method
+        How to integrate. Default :class:`saltus.Taylor`. With ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts
+        aren't known.
+    periods : int
+        Blocks that growth is measured over, at least 64. The error falls with the square root of it.
+    transient : int
+        Blocks before them that don't count. In the last 128 of them the directions align.
+    every : float or str, optional
+        Time of a block [s], for a system without forcing: about a turn of the motion. Deviations should grow by less than 1e8 in it.
+    values : mapping
+        Parameter values of this call: one each, or an array with one for each trajectory.
+    unit : {"1/s", "1/period", "bit/s", "bit/period"}
+        Unit of the exponents; a bit is a factor of two. Those per period are for forced systems.
+    threads : int
+        Default all processors. Results don't depend on it.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds. A callable gets the share done.
+
+    Returns
+    -------
+    Dataset
+        Dims ``trajectory``, ``exponent`` (descending), ``flow_exponent``, ``running``. ``lyapunov_exponent`` with ``lyapunov_error``
+        (standard error) and the 95 % interval ``lyapunov_low``, ``lyapunov_high``: of an orbit the effect of rounding; of any other
+        motion from batch means whose batches grow until they are independent (Flyvbjerg & Petersen 1989), ``independent_batches`` of them,
+        by Student's t. ``kind``: ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or
+        ``unclear``; ``response_period``: n of
+        nT, or 0. ``exponent_sum`` beside ``mean_divergence``, which must agree: the mean trace of the Jacobian and what contacts
+        add, found without the tangent. ``near_graze``: 1 if the motion after the transient grazes a boundary, or is an orbit that
+        misses one by less than a thousandth of its size: then deviations that could be seen in practice don't grow as infinitesimal
+        ones do. ``running_exponent`` and its interval over ``running_time``; ``status``.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset with the trajectories that were finished.
+
+    References
+    ----------
+    Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980) 9-30; Eckmann & Ruelle, Rev. Mod. Phys. 57 (1985) 617-656; Leine &
+    Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (2004), section 7; Flyvbjerg & Petersen, J. Chem. Phys. 91 (1989)
+    461-466; Wolf, Swift, Swinney & Vastano, Physica D 16 (1985) 285-317.
+    """
+    check_system(system)
+    _check_words(method, unit, system)
+    flow = check_method(flow)
+    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    periods, transient = whole(periods, "periods", LEAST_PERIODS), whole(transient, "transient", 0)
+    rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))
+    block = None if every is None else to_si(every, "s", "every")
+    if block is not None and not 0 < block < math.inf:
+        raise ParameterError(f"every must be a positive time, not {shown(every)}.")
+    family = Family(system, flow, rows, block, threads)
+    show, close = reporter(progress)
+    work = (Exponents if method == "variational" else NeighbourExponents)(family, group.start, periods, transient, block)
+
+    def dataset() -> xr.Dataset:
+        return _dataset(system, flow, group, work, unit)
+
+    try:
+        work.run(show)
+    except KeyboardInterrupt as stop:
+        raise Interrupted(dataset) from stop
+    finally:
+        close()
+    result = dataset()
+    warn(result)
+    return result
+
+
+def _check_words(method: Any, unit: Any, system: System) -> None:
+    if isinstance(method, Method):
+        raise ParameterError(
+            f'method says how exponents are measured: "variational" or "wolf". How to integrate is flow=sl.{method.name}(...).'
+        )
+    if not among(method, METHODS):
+        raise ParameterError(f"there is no method {shown(method)}. {nearest(method, METHODS)}")
+    if not among(unit, UNITS):
+        raise ParameterError(f"exponents aren't given in {shown(unit)}. {nearest(unit, UNITS)}")
+    if UNITS[unit][0] and system.forced_at is None:
+        raise ParameterError(
+            f"{system.name} has no forcing period, so {shown(unit)} has no meaning. Take unit={unit.replace('period', 's')!r}."
+        )
+
+
+def _dataset(system: System, flow: Method, group: Ensemble, work: Exponents | NeighbourExponents, unit: str) -> xr.Dataset:
+    """Everything under its name and in its unit."""
+    per_period, logarithm = UNITS[unit]
+    factor = (1.0 if per_period else 1.0 / work.family.period) / logarithm
+    attrs = provenance(system, flow, shared_values(system, group), group.varied) | work.settings() | {"unit": unit}
+    return exponents_dataset(
+        columns=work.columns(np.broadcast_to(factor, group.size)),
+        rate=unit,
+        states=system.states,
+        units=system.units,
+        gap_unit=gap_unit(system),
+        varied=group.varied,
+        attrs=attrs,
+    )

@@ -1,0 +1,173 @@
+"""Lyapunov spectra of trajectories of a flow or of any map, with what kind of motion they belong to.
+
+A trajectory that settles to a periodic orbit has the exponents of the orbit, ln |multiplier| per period, exact but for rounding. Any other
+has the means of its growth rates, and the statistics of these say how sure they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.lyapunov.qr import GOOD, Growth, carry, grow
+from saltus.analysis.lyapunov.segments import Walk
+from saltus.analysis.orbits.aperiodic import SURE
+from saltus.analysis.orbits.orbits import Orbit, polish
+from saltus.analysis.orbits.recurrence import NEAR, ROUND, SAME, recurrence
+from saltus.analysis.statistics import BOUNDED, UNCLEAR, Means, batch_means, running_ends
+from saltus.flow.maps import Map
+
+#: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the rounding of the faster: three digits are left.
+LOST = 29.0
+#: Factor on the rounding of a monodromy matrix beyond which a multiplier is lost, and blocks of the round trips that find it then.
+AMPLIFIED, TRIPS = 1e6, 256
+#: What a slow approach to an orbit must at least have gained over half of the last stretch.
+GAINED = 0.5
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Exponents of k trajectories of D states, per block.
+
+    Attributes
+    ----------
+    exponents, errors, half_width : float64[k, D]
+        In descending order, their standard errors, and half of the 95 % confidence interval.
+    volume : float64[k]
+        Mean growth of volumes, found without the tangent: the sum of the exponents.
+    batches : int64[k]
+        Independent batches that the error of the largest comes from; 0 for an orbit.
+    orbits : list of Orbit or None
+        The periodic orbit to which each settles.
+    kinds : list of str
+        ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``.
+    ends : int64[m]
+        Blocks after which running means are kept,
+    running : Means
+        and these, float64[k, D, m].
+    growth : Growth
+        What they come from.
+    """
+
+    exponents: np.ndarray
+    errors: np.ndarray
+    half_width: np.ndarray
+    volume: np.ndarray
+    batches: np.ndarray
+    orbits: list[Orbit | None]
+    kinds: list[str]
+    ends: np.ndarray
+    running: Means
+    growth: Growth
+
+
+def spectrum(
+    walk: Walk,
+    start: np.ndarray,
+    count: int,
+    transient: int,
+    forced: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> Spectrum:
+    """Exponents over ``count`` blocks after a transient, of trajectories from float64[k, D].
+
+    Without forcing a motion that repeats has an exponent of zero along itself; that makes a difference to what it is called.
+    """
+    growth = grow(walk, start, count, transient, progress)
+    rates = _told(np.take_along_axis(growth.rates, np.argsort(-growth.rates.mean(axis=1), axis=1, kind="stable")[:, None], axis=2))
+    ends = running_ends(count)
+    running = batch_means(np.swapaxes(rates, 1, 2), ends)
+    exponents, errors, half_width = (part[..., -1].copy() for part in (running.mean, running.error, running.half_width))
+    batches, volume = running.batches[:, 0, -1].copy(), growth.volume.mean(axis=1)
+    orbits = _orbits(walk, growth)
+    kinds = []
+    for i, orbit in enumerate(orbits):
+        if orbit is None:
+            kinds.append(kind_of(rates[i], errors[i], forced))
+            continue
+        kinds.append("periodic" if forced else "equilibrium")
+        exponents[i], errors[i] = _of_orbit(walk, i, orbit, growth.scale[i])
+        half_width[i], batches[i] = errors[i], 0
+        volume[i] = _volume(walk, i, orbit)
+    return Spectrum(exponents, errors, half_width, volume, batches, orbits, kinds, ends, running, growth)
+
+
+def _told(rates: np.ndarray) -> np.ndarray:
+    """Rates float64[k, n, D] with NaN for directions that are lost in the rounding of the fastest one."""
+    with np.errstate(invalid="ignore"):
+        lost = ~((rates[:, :, :1] - rates).mean(axis=1, keepdims=True) < LOST)
+    return np.where(lost, np.nan, rates)
+
+
+# -- orbits --------------------------------------------------------------------------------------------------------------------
+def _orbits(walk: Walk, growth: Growth) -> list[Orbit | None]:
+    """The stable periodic orbit to which each trajectory has come, None for the others."""
+    trail, found = growth.stretch.trail, []
+    with np.errstate(invalid="ignore"):  # those that ran away
+        period, apart = recurrence(trail[:, -ROUND - 1 :], growth.scale)
+    for i, one in enumerate(trail):
+        map_ = walk.map_of(i)
+        near = max(NEAR, 4.0 * map_.noise)
+        good = growth.stretch.status[i] in GOOD and apart[i] <= near
+        orbit = polish(map_, one[-1], int(period[i]), growth.scale[i]) if good else None
+        found.append(orbit if orbit is not None and orbit.stable and _arrives(one, orbit, growth.scale[i], map_, near) else None)
+    return found
+
+
+def _arrives(trail: np.ndarray, orbit: Orbit, scale: np.ndarray, map_: Map, near: float) -> bool:
+    """Whether a trail float64[m, D] lies on an orbit at its end, or comes closer to it all the time."""
+    n, half = orbit.period, len(trail) // 2
+    distance = np.abs((trail[:, None] - orbit.points[None]) / scale).max(axis=2).min(axis=1)
+    early, late = distance[max(half - n, 0) : half + 1].max(), distance[-n:].max()
+    return bool(late <= max(SAME, 4.0 * map_.noise) or (late <= near and late < GAINED * early))
+
+
+def _of_orbit(walk: Walk, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Exponents of an orbit per block, and what the map's own errors make of them (Bauer & Fike: times the condition of the eigenvectors).
+
+    Multipliers that are lost in the rounding of the largest are found as growth round the orbit, block by block.
+    """
+    noise, n = walk.map_of(i).noise, orbit.period
+    monodromy = orbit.monodromy[0] * scale / scale[:, None]
+    condition = min(np.linalg.cond(np.linalg.eig(monodromy)[1]), 1.0 / noise)
+    magnitudes = -np.sort(-np.abs(orbit.multipliers))
+    with np.errstate(divide="ignore"):
+        exponents, amplified = np.log(magnitudes) / n, condition * np.linalg.norm(monodromy, 2) / magnitudes
+        errors = noise * amplified / n
+    lost = amplified > AMPLIFIED
+    if lost.any():
+        exponents[lost], errors[lost] = (part[lost] for part in _round_trips(walk, i, orbit, scale))
+    return exponents, errors
+
+
+def _round_trips(walk: Walk, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean growth per block over the later half of many round trips of an orbit, and how far that of its two halves lies apart."""
+    n, size = orbit.points.shape
+    blocks = walk.of(np.full(n, i)).matrices(orbit.points[:, None])[:, 0]
+    trips = max(-(-TRIPS // n), 8) // 4 * 4
+    rates, _ = carry(np.tile(blocks, (trips, 1, 1))[None], np.eye(size)[None], scale[None])
+    early, late = rates[0, trips // 2 * n :].reshape(2, -1, size).mean(axis=1)
+    return 0.5 * (early + late), np.abs(late - early) + walk.map_of(i).noise
+
+
+def _volume(walk: Walk, i: int, orbit: Orbit) -> float:
+    """Mean growth of volumes over an orbit."""
+    return float(walk.of(np.full(orbit.period, i)).divergences(orbit.points[:, None]).mean())
+
+
+# -- kinds ---------------------------------------------------------------------------------------------------------------------
+def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
+    """What a motion that isn't an orbit of the map is called, from rates float64[n, D] and the errors of their means."""
+    mean, first, second = rates.mean(axis=0), *(half.mean(axis=0) for half in np.array_split(rates, 2))
+    if not np.isfinite(mean[0]) or not errors[0] <= UNCLEAR:
+        return "unclear"
+    limit = np.maximum(SURE * errors, BOUNDED / len(rates))
+    if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # not one that was chaotic only at first
+        return "chaotic"
+    if abs(second[0]) > min(limit[0], 2 * BOUNDED / len(rates)):  # zero only if what grew stays bounded, however wide the error is
+        return "unclear"
+    if forced:
+        return "quasi_periodic"
+    return "quasi_periodic" if len(mean) > 2 and abs(second[1]) <= limit[1] else "limit_cycle"

@@ -1,0 +1,152 @@
+"""`compare_methods`: the same question put to several methods. What changes, where, how large is the error, and what does each cost?"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.basins.basins import basins
+from saltus.analysis.basins.compare import compare
+from saltus.analysis.dataset_parts import provenance
+from saltus.analysis.methods.method_errors import cell_agreement, one_period_errors, orbit_distances, response_noise
+from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
+from saltus.analysis.responses.frequency_response import frequency_response
+from saltus.analysis.starts import check_system
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError, among, shown
+from saltus.flow.family import Family
+from saltus.flow.methods import ODE45, Method, Taylor, check_method
+from saltus.results import methods_dataset
+from saltus.results.intervals import wilson
+from saltus.system.system import System
+
+#: The question of Saunders et al. (2021): ode45 as it comes, with and without event location.
+USUAL = (ODE45(rtol=1e-4, atol=1e-7), ODE45(rtol=1e-4, atol=1e-7, events="ignore"))
+_ANALYSES: dict[str, Callable[..., xr.Dataset]] = {
+    "basins": basins,
+    "bifurcation_diagram": bifurcation_diagram,
+    "frequency_response": frequency_response,
+}
+
+
+@verb
+def compare_methods(
+    system: System,
+    analysis: Callable[..., xr.Dataset] | str,
+    methods: Sequence[Method] = USUAL,
+    *,
+    reference: Method | None = None,
+    computed: Mapping[str, xr.Dataset] | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+    **arguments: Any,
+) -> xr.Dataset:
+    """One analysis by several methods beside an exact one: what changes, at which values, with error and cost side by side.
+
+    Parameters
+    ----------
+    system : System
+        Equations, contacts and values.
+    analysis : function or str
+        :func:`saltus.frequency_response`, :func:`saltus.bifurcation_diagram` or :func:`saltus.basins`.
+    methods : sequence of Method
+        What is compared; default ode45 at (1e-4, 1e-7) with and without event location.
+    reference : Method
+        What it is compared with; default :class:`saltus.Taylor`, exact but for rounding.
+    computed : mapping of str to Dataset, optional
+        Results that exist already, by :func:`method_label`; they aren't computed again, and their cost stays unknown.
+    progress : bool or callable
+        As for the analysis; each method is one bar.
+    **arguments
+        Those of the analysis.
+
+    Returns
+    -------
+    Dataset
+        Dim ``method`` (labels; the reference first): ``method_cpu_seconds`` (all threads, without compiling), ``method_agreement``, the
+        share of starts with the same answer as the reference, and its 95 % interval. For responses also, over the parameters and
+        ``start``: ``rms``, ``peak``, ``period``, ``type``, ``agrees`` (1, 0, -1 where one of both didn't settle), ``known`` (whether the
+        reference has this response at that value, from any start), ``orbit_distance`` (units of the response's size); over the
+        parameters: ``step_error`` and ``step_error_rms``, the error of one forcing period started on the reference's own responses (units
+        of the motion's range), and ``steps_per_period``. For basins, over both states: ``basin`` in the numbers of the reference, and
+        ``agrees``.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    """
+    check_system(system)
+    name: Any = analysis if isinstance(analysis, str) else getattr(analysis, "__name__", analysis)
+    if not among(name, _ANALYSES):
+        raise ParameterError(f"methods are compared by {', '.join(sorted(_ANALYSES))}, not by {shown(name)}.")
+    if "method" in arguments:
+        raise ParameterError("give the methods as methods=[...]; method= is for a single analysis.")
+    everything = list(dict.fromkeys([check_method(reference or Taylor()), *map(check_method, methods)]))
+    if len(everything) < 2:
+        raise ParameterError("there is nothing to compare: give at least one method beside the reference.")
+    results, costs = [], []
+    for method in everything:
+        known = (computed or {}).get(method_label(method))
+        ds, cost = _timed(system, name, method, {**arguments, "progress": progress}) if known is None else (known, np.nan)
+        results.append(ds)
+        costs.append(cost)
+    parts = _of_basins(results) if name == "basins" else _of_responses(system, everything, results, arguments.get("threads"))
+    agreeing, differing = (np.array([int((part == code).sum()) for part in parts["agrees"]], float) for code in (1, 0))
+    settled = np.where(agreeing + differing > 0, agreeing + differing, np.nan)
+    low, high = wilson(agreeing, settled)
+    return methods_dataset(
+        base=results[0],
+        labels=[method_label(method) for method in everything],
+        columns={"method_cpu_seconds": np.array(costs), "method_agreement": agreeing / settled, "method_agreement_low": low,
+                 "method_agreement_high": high},
+        fields=parts,
+        attrs=provenance(system, everything[0], system.values) | {"analysis": name},
+    )  # fmt: skip
+
+
+def method_label(method: Method) -> str:
+    """A method in a few words: ``Taylor``, ``ode45 located (0.0001, 1e-07)``, ``ode45 not located (0.0001, 1e-07)``."""
+    if isinstance(method, ODE45):
+        return f"ode45 {'' if method.events == 'locate' else 'not '}located ({method.rtol:g}, {method.atol:g})"
+    usual = {f: v for f, v in method.options().items() if v != type(method)().options()[f]}
+    return method.name + (f" ({', '.join(f'{f}={v:g}' for f, v in usual.items())})" if usual else "")
+
+
+def _timed(system: System, name: str, method: Method, arguments: Mapping[str, Any]) -> tuple[xr.Dataset, float]:
+    """The analysis by one method, and its processor time [s] without that of compiling."""
+    row = np.array([list(system.values.values())])
+    every = 1.0 if system.forced_at is None else None
+    Family(system, method, row, every).tangent(np.zeros((1, len(system.states))), 1)
+    Family(system, method, row, every).run(np.zeros((1, len(system.states))), 1)
+    begin = time.process_time()
+    ds = _ANALYSES[name](system, method=method, **arguments)
+    return ds, time.process_time() - begin
+
+
+def _of_responses(system: System, methods: list[Method], results: list[xr.Dataset], threads: int | None) -> dict[str, np.ndarray]:
+    """Fields over (method, parameters..., start), and over (method, parameters...)."""
+    exact = results[0]
+    fields: dict[str, list[np.ndarray]] = {name: [] for name in ("rms", "peak", "period", "type")}
+    fields |= {name: [] for name in ("agrees", "known", "orbit_distance", "step_error", "step_error_rms", "steps_per_period")}
+    for method, ds in zip(methods, results, strict=True):
+        for name in ("rms", "peak", "period", "type"):
+            fields[name].append(ds[name].values)
+        noise = response_noise(system, method, exact)
+        distance, nearest = orbit_distances(exact, ds)
+        fields["orbit_distance"].append(distance)
+        fields["agrees"].append(cell_agreement(exact, ds, distance, noise))
+        fields["known"].append(cell_agreement(exact, ds, nearest, noise))
+        for name, values in one_period_errors(system, methods[0], method, exact, threads).items():
+            fields[name].append(values)
+    return {name: np.stack(parts) for name, parts in fields.items()}
+
+
+def _of_basins(results: list[xr.Dataset]) -> dict[str, np.ndarray]:
+    """Fields over (method, states...)."""
+    exact = results[0]
+    both = [compare(exact, ds) for ds in results]
+    return {"basin": np.stack([ds["basin_b"].values for ds in both]), "agrees": np.stack([ds["agreement"].values for ds in both])}

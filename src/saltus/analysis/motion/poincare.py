@@ -1,0 +1,210 @@
+"""`poincare`: where the motion crosses a surface in the space of states and time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis import dataset_parts
+from saltus.analysis.motion.window import Stretch, common, computed, stretch, with_each
+from saltus.analysis.outcome_messages import warn
+from saltus.analysis.starts import check_system
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError, among, nearest, shown
+from saltus.flow.engine import Outcome, Schedule
+from saltus.flow.methods import Method, check_method
+from saltus.kernels import status as st
+from saltus.results import motion_dataset, schema
+from saltus.system.guards import equation_of
+from saltus.system.quantity import Quantity, acting_guards, turning_surface, with_level, with_surface
+from saltus.system.system import System
+
+#: Touches that are closer than this are one [forcing periods; the span if unforced]: where a gap is flat its minimum is that uncertain.
+SAME_TOUCH = 1e-9
+
+
+@verb
+def poincare(
+    system: System,
+    start: Any,
+    surface: Quantity | str | tuple[str, float | str],
+    *,
+    direction: int = 0,
+    periods: int | None = None,
+    t_end: float | str | None = None,
+    t_start: float | str = 0.0,
+    transient: int | float | str = 0,
+    method: Method | None = None,
+    values: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Poincare section: the states at which a motion crosses a surface.
+
+    The surface is located as a contact is: no crossing is missed, and its time is exact to rounding. For the section at whole forcing
+    periods see :func:`saltus.stroboscope`.
+
+    Parameters
+    ----------
+    system, start, t_start, method, values, threads, progress
+        As for :func:`saltus.simulate`. The method must locate contacts. A Taylor flow isn't disturbed by the surface; ``ODE45`` restarts at
+        each crossing, as MATLAB does at a terminal event, so its steps and with them its errors are others than without the surface.
+    surface : callable, str or tuple
+        A function of (t, states, parameters), zero on the surface: ``lambda x, v: v + 10 * x``; its arguments are found by name. Or
+        ``("x", "0.3 mm")``, a level of a state; or ``"x turns"``, the turning points of a state; or the name of a guard of the system.
+    direction : {0, 1, -1}
+        Keep all crossings, or only those where the function rises (1) or falls (-1).
+    periods : int
+        Whole forcing periods to look at, after the transient; or
+    t_end : float or str
+        the time at the end [s].
+    transient : int, or float or str
+        Whole forcing periods before the first crossing is kept; of an unforced system a time [s].
+
+    Returns
+    -------
+    Dataset
+        Dims ``crossing`` (one table for all trajectories, sorted by trajectory and time), ``guard`` (of the system itself), and
+        ``trajectory`` for many. Each state at the crossings, ``crossing_time``, ``crossing_phase`` (t/T mod 1, NaN if unforced),
+        ``crossing_period``, ``crossing_direction``, ``crossing_rate`` of the function (zero: a tangency), ``crossing_kind``
+        (``graze_unresolved``: too shallow to be sure of), ``crossing_trajectory``; per trajectory ``crossings``, ``tangencies``,
+        ``contacts``, ``status``, counters. The run covers the interval (begin, end]: a start on the surface is no crossing, an end on it
+        is. ``status`` and ``grazes_unresolved`` count doubtful touches of the surface too.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used, or the method doesn't locate contacts.
+    TraceError
+        If the function of the surface can't be traced, or depends on no state.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset so far.
+
+    References
+    ----------
+    M. Henon, On the numerical computation of Poincare maps, Physica D 5 (1982) 412-414.
+    """
+    check_system(system)
+    method = check_method(method)
+    if not method.records_contacts:
+        raise ParameterError(
+            f'poincare needs a method that locates contacts, and {method.name}(events="ignore") steps over them: a crossing would be where '
+            f'a step happens to end. Use sl.Taylor() or sl.ODE45(..., events="locate").'
+        )
+    if not isinstance(direction, int | float | np.integer | np.floating) or direction not in (-1, 0, 1):
+        raise ParameterError(f"direction must be 0, 1 or -1, not {shown(direction)}.")
+    found = crossed(system, surface, values if isinstance(values, Mapping) else {})
+    seen = stretch(found.system, start, values, periods, t_end, t_start, transient)
+
+    def dataset(outcome: Outcome) -> xr.Dataset:
+        return _dataset(system, method, seen, found, direction, outcome)
+
+    result = computed(found.system, method, seen.request(found.system, Schedule.none(), record=True), dataset, threads, progress)
+    warn(result)
+    return result
+
+
+@dataclass(frozen=True)
+class Crossed:
+    """The system with the surface among its guards, which of them it is, and the unit of its function; the surface in words."""
+
+    system: System
+    guard: int
+    unit: str
+    text: str
+
+
+def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
+    """What the user means by a surface; ``values`` may hold its level. Raises as :func:`poincare` does."""
+    if callable(surface):
+        return _last(with_surface(system, surface), "", "")
+    if isinstance(surface, tuple | list):
+        if len(surface) != 2 or not isinstance(surface[0], str):
+            raise ParameterError(f'a surface at a level is a pair of a state and a value, such as ("x", "0.3 mm"), not {shown(surface)}.')
+        leveled = with_level(system, surface[0], surface[1])
+        level = leveled.guards[-1].name
+        return _last(leveled, system.units[surface[0]], "" if level in values else f"{surface[0]} = {leveled.parameter_text(level)}")
+    names = [guard.name for guard in system.guards]
+    if among(surface, names):
+        owner = system.guards[names.index(surface)].state
+        number = names.index(surface)
+        return Crossed(system, number, system.units[owner] if owner else "", equation_of(number, system.guards))
+    turns = {f"{name} turns": name for name in system.states}
+    if among(surface, turns):
+        return _last(turning_surface(system, turns[surface]), schema.rate_unit(system.units[turns[surface]]), surface)
+    raise ParameterError(
+        f"{system.name} has no guard {shown(surface)}. {nearest(surface, (*names, *turns))} Or give a function, or a level such as "
+        f'("{system.states[0]}", 0.0).'
+    )
+
+
+def _last(system: System, unit: str, text: str) -> Crossed:
+    """The surface is the last guard; without words of its own its equation says what it is."""
+    number = len(system.guards) - 1
+    return Crossed(system, number, unit, text or equation_of(number, system.guards))
+
+
+def _dataset(system: System, method: Method, seen: Stretch, crossed: Crossed, direction: int, outcome: Outcome) -> xr.Dataset:
+    """The crossings that were asked for, under their names."""
+    table, numbers = outcome.record_integers, outcome.record_floats
+    who, guard = table[:, st.REC_TRAJECTORY], table[:, st.REC_GUARD]
+    time = dataset_parts.contact_times(outcome)
+    late = time > seen.begin[who]
+    flips = ((table[:, st.REC_MODE_BEFORE] ^ table[:, st.REC_MODE_AFTER]) >> guard) & 1 == 1
+    ours = late & (guard == crossed.guard)
+    wanted = ours & flips & ((direction == 0) | (table[:, st.REC_DIRECTION] == direction))
+    kept, rows = np.flatnonzero(wanted), who[wanted]
+    kinds = np.array([st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))])
+
+    def count(of: np.ndarray) -> np.ndarray:
+        return np.bincount(who[of], minlength=seen.group.size)
+
+    arguments = common(seen, system, method, outcome)
+    arguments["attrs"] |= {"surface": crossed.text, "direction": direction, "transient": _transient(seen)}
+    states = {name: numbers[kept, st.RECORD_FLOATS + i] for i, name in enumerate(system.states)}
+    columns = {
+        "crossing_time": time[kept],
+        "crossing_time_error": numbers[kept, st.REC_TIME_ERROR],
+        "crossing_period": table[kept, st.REC_PERIOD],
+        "crossing_phase": _phases(seen, numbers[kept, st.REC_PHASE], rows),
+        "crossing_direction": table[kept, st.REC_DIRECTION],
+        "crossing_rate": numbers[kept, st.REC_VELOCITY],
+        "crossing_kind": kinds[table[kept, st.REC_KIND]],
+        "crossing_trajectory": rows,
+    }
+    contacts = late & flips & np.isin(guard, acting_guards(system))
+    return motion_dataset(
+        schema.SECTION,
+        **with_each(
+            arguments, crossings=count(wanted), tangencies=count(_distinct(seen, who, time, ours & ~flips)), contacts=count(contacts)
+        ),
+        table={**states, **columns},
+        table_units={"crossing_rate": schema.rate_unit(crossed.unit)},
+    )
+
+
+def _distinct(seen: Stretch, who: np.ndarray, time: np.ndarray, touches: np.ndarray) -> np.ndarray:
+    """The touches without repeats: one in the instant of another event is seen from the step before it and from the step after it."""
+    rows = np.flatnonzero(touches)
+    again = np.zeros(len(rows), dtype=bool)
+    again[1:] = (np.diff(who[rows]) == 0) & (np.diff(time[rows]) <= SAME_TOUCH * seen.length.period[who[rows[1:]]])
+    distinct = touches.copy()
+    distinct[rows[again]] = False
+    return distinct
+
+
+def _phases(seen: Stretch, elapsed: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """t/T mod 1 from the time since the last whole period after the start."""
+    if seen.system.forced_at is None:
+        return np.full(len(rows), np.nan)
+    period = seen.length.period[rows]
+    return (elapsed / period + (seen.length.t_start / period) % 1.0) % 1.0
+
+
+def _transient(seen: Stretch) -> float:
+    """The transient as the user gave it: forcing periods, or seconds."""
+    return float(seen.skipped if seen.system.forced_at is not None else seen.begin[0] - seen.length.t_start)

@@ -1,0 +1,185 @@
+"""`simulate`: trajectories with every contact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis import dataset_parts
+from saltus.analysis.motion import time_errors as measure
+from saltus.analysis.outcome_messages import warn
+from saltus.analysis.starts import Ensemble, Span, ensemble, span
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError, among, shown
+from saltus.flow import engine
+from saltus.flow.counts import whole
+from saltus.flow.engine import Outcome, Request, Schedule
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporter
+from saltus.flow.room import check_room
+from saltus.interrupt import Interrupted
+from saltus.results import trajectory_dataset
+from saltus.system.system import System
+
+#: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
+PER_PERIOD = 200
+#: Samples over the whole span of an unforced system: a curve without corners over a hundred oscillations; fewer of many trajectories.
+MOST_PER_SPAN, LEAST_PER_SPAN = 10_000, 2000
+
+
+@verb
+def simulate(
+    system: System,
+    start: Any = None,
+    periods: int | None = None,
+    t_end: float | str | None = None,
+    *,
+    t_start: float | str = 0.0,
+    method: Method | None = None,
+    samples: int | None = None,
+    keep: int | None = None,
+    values: Mapping[str, Any] | None = None,
+    time_errors: str = "measured",
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Run one trajectory, or many, and keep samples and every contact.
+
+    Parameters
+    ----------
+    system : System
+        Equations, contacts and parameter values.
+    start : sequence, mapping or array
+        State at the start: ``(0.0, 0.0)``, ``("1 mm", 0)``, ``{"x": [...], "v": [...]}`` or an array (trajectory, state). Numbers are
+        SI. Default: all zero.
+    periods : int
+        Whole forcing periods to run; or
+    t_end : float or str
+        the time at the end [s].
+    t_start : float or str
+        Time at the start [s]; the phase of the forcing is that of this time.
+    method : Method
+        Default :class:`saltus.Taylor`; :class:`saltus.ODE45` for MATLAB's.
+    samples : int
+        Samples per forcing period (default 200), or over the whole span if the system isn't forced (default 10 000, and down to
+        2000 for many trajectories).
+    keep : int
+        Keep samples and contacts of the last so many periods only (default all).
+    values : mapping
+        Parameter values of this call: one each, or an array with one for each trajectory (the forcing frequency included).
+    time_errors : str
+        ``"measured"``: ``contact_time_error`` is estimated from three more runs of every trajectory, by a more exact method and nudged by
+        roundings. ``"local"``: the error of the step that holds the contact only, at a quarter of the cost.
+    threads : int
+        Default all processors. Results don't depend on it.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds. A callable gets the share done.
+
+    Returns
+    -------
+    Dataset
+        Dims ``time``, ``contact``, ``guard``, and ``trajectory`` for many starts or values. Variables: each state, ``mode``,
+        ``contact_time``, ``contact_time_error``, ``contact_guard``, ``contact_direction``, ``contact_velocity``, ``contact_kind``, ...,
+        ``status``, counters. If the trajectories have forcing periods of their own, samples lie along ``period``.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset so far.
+    """
+    method = check_method(method)
+    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    length = span(system, group, periods, t_end, t_start)
+    plan = _plan(system, group, length, samples, keep)
+    if not among(time_errors, ("measured", "local")):
+        raise ParameterError(f'time_errors must be "measured" or "local", not {shown(time_errors)}.')
+
+    def so_far(outcome: Outcome) -> xr.Dataset:
+        return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
+
+    show, close = reporter(progress)
+    outcome, request = None, plan.request(group, length)
+    try:
+        if time_errors == "measured" and system.guards and method.records_contacts:
+            outcome, errors = measure.measured(system, method, request, threads, show)
+        else:
+            outcome = engine.run(system, method.suited_to(group.size), request, threads, show)
+            errors = measure.local(outcome)
+        result = _dataset(system, method, group, length, plan, outcome, errors)
+    except KeyboardInterrupt as stop:
+        if outcome is not None:
+            raise Interrupted(partial(so_far, outcome)) from None
+        raise stop.then(so_far) if isinstance(stop, engine.RunInterrupted) else stop from None
+    finally:
+        close()
+    warn(result, length, system)
+    return result
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Which samples and contacts are kept."""
+
+    schedule: Schedule
+    first: int
+
+    def request(self, group: Ensemble, length: Span) -> Request:
+        begin, end = length.t_start, length.t_end
+        return Request(group.start, group.parameters, length.period, begin, length.count, length.phase, self.schedule, self.first, end)
+
+
+def _plan(system: System, group: Ensemble, length: Span, samples: int | None, keep: int | None) -> _Plan:
+    per = _whole(samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD)
+    last = int(np.max(length.count + length.phase / length.period))
+    kept = _whole(keep, "keep", max(last, 1))
+    if keep is not None and system.forced_at is None:
+        raise ParameterError(f"{system.name} has no forcing period, so keep= has no meaning. Start later, or take fewer samples=.")
+    first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
+    longest = np.max((length.count + length.phase / length.period) * per)
+    count = int(longest + 1e-9) + 1 - first * per
+    check_room(
+        count * group.size * (16.0 * len(system.states) + 16.0),
+        f"{group.size} trajectories with {count} samples each",
+        "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
+    )
+    periods = np.arange(first, first - (-count // per))
+    return _Plan(Schedule(np.repeat(periods, per)[:count], np.tile(np.arange(per) / per, len(periods))[:count]), first)
+
+
+def _per_span(trajectories: int) -> int:
+    """Samples of a motion without forcing: enough for a smooth curve, fewer where there are many trajectories."""
+    return max(MOST_PER_SPAN // max(trajectories // 20, 1), LEAST_PER_SPAN)
+
+
+def _whole(value: int | None, name: str, default: int) -> int:
+    return default if value is None else whole(value, name)
+
+
+def _dataset(
+    system: System, method: Method, group: Ensemble, length: Span, plan: _Plan, outcome: Outcome, errors: np.ndarray
+) -> xr.Dataset:
+    """Everything under its name."""
+    reached = slice(outcome.reached())
+    count, fraction = plan.schedule.count[reached], plan.schedule.fraction[reached]
+    forced = system.forced_at is not None
+    own_periods = forced and bool(np.ptp(length.period) > 0)
+    scale = length.period[:, None] if own_periods else length.period[0]
+    time = np.minimum(length.t_start + (count * scale + fraction * scale), length.t_end)
+    return trajectory_dataset(
+        time=time,
+        values={name: outcome.samples[:, reached, i] for i, name in enumerate(system.states)},
+        mode=outcome.sample_mode[:, reached],
+        contacts=dataset_parts.contacts(outcome, len(system.states), errors),
+        end_time=outcome.time,
+        end={name: outcome.state[:, i] for i, name in enumerate(system.states)},
+        period=count + fraction if forced else None,
+        forcing_period=(length.period if own_periods else float(length.period[0])) if forced else None,
+        **dataset_parts.common(system, method, group, outcome),
+    )

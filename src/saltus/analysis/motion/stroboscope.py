@@ -1,0 +1,95 @@
+"""`stroboscope`: states at whole forcing periods."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis import dataset_parts
+from saltus.analysis.outcome_messages import warn
+from saltus.analysis.starts import ensemble, span
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError
+from saltus.flow import engine
+from saltus.flow.counts import whole
+from saltus.flow.engine import Outcome, Request, Schedule
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporter
+from saltus.flow.room import check_room
+from saltus.results import stroboscope_dataset
+from saltus.system.system import System
+
+
+@verb
+def stroboscope(
+    system: System,
+    start: Any = None,
+    periods: int = 1,
+    keep: int | None = None,
+    *,
+    t_start: float | str = 0.0,
+    method: Method | None = None,
+    values: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """States at whole forcing periods after the start (the stroboscopic map, iterated). The phase stays exact over millions of periods.
+
+    Parameters
+    ----------
+    system, start, t_start, method, values, threads, progress
+        As for :func:`saltus.simulate`.
+    periods : int
+        Whole forcing periods to run.
+    keep : int
+        How many of the last whole periods to keep (default all, the start included). A run of 1e6 starts that keeps one takes well under
+        1 GB.
+
+    Returns
+    -------
+    Dataset
+        Dims ``trajectory``, ``period`` (whole periods since the start), ``guard``; a variable per state, ``status``, counters.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used, or the system isn't forced.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset so far.
+    """
+    method = check_method(method)
+    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    if system.forced_at is None:
+        raise ParameterError(f"{system.name} has no forcing period to be seen once in. Take sl.simulate with t_end=, or sl.poincare.")
+    length = span(system, group, periods, None, t_start)
+    whole_periods = whole(periods, "periods")
+    first = 0 if keep is None else max(whole_periods + 1 - whole(keep, "keep"), 0)
+    count = whole_periods + 1 - first
+    size = count * group.size * (16.0 * len(system.states) + 16.0)
+    check_room(size, f"{group.size} trajectories with {count} periods each", "Give keep= (last periods).")
+    kept = np.arange(first, whole_periods + 1, dtype=np.int64)
+    schedule = Schedule(kept, np.zeros(len(kept)))
+    request = Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, schedule, None)
+
+    def dataset(outcome: Outcome) -> xr.Dataset:
+        reached = slice(outcome.reached())
+        own_periods = bool(np.ptp(length.period) > 0)
+        return stroboscope_dataset(
+            period=kept[reached],
+            values={name: outcome.samples[:, reached, i] for i, name in enumerate(system.states)},
+            forcing_period=length.period if own_periods else float(length.period[0]),
+            **{**dataset_parts.common(system, method, group, outcome), "batch": True},
+        )
+
+    show, close = reporter(progress)
+    try:
+        result = dataset(engine.run(system, method.suited_to(group.size), request, threads, show))
+    except engine.RunInterrupted as stop:
+        raise stop.then(dataset) from None
+    finally:
+        close()
+    warn(result)
+    return result

@@ -1,0 +1,140 @@
+"""A stretch of motion after a transient: what sections, impact statistics and energy balances are taken from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis import dataset_parts
+from saltus.analysis.starts import Ensemble, Span, ensemble, span
+from saltus.errors import ParameterError, shown
+from saltus.flow import engine
+from saltus.flow.counts import whole
+from saltus.flow.engine import Outcome, Request, Schedule
+from saltus.flow.methods import Method
+from saltus.flow.progress import reporter
+from saltus.kernels import status as st
+from saltus.system.system import System
+from saltus.units import to_si
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Which trajectories run, and from when on they are looked at.
+
+    Attributes
+    ----------
+    system : System
+        Equations and values.
+    group : Ensemble
+        Trajectories.
+    length : Span
+        From the start to the end, transient included.
+    skipped : int
+        Whole forcing periods of the transient; of an unforced system 0.
+    begin : float64[n]
+        Time at which the transient ends [s].
+    """
+
+    system: System
+    group: Ensemble
+    length: Span
+    skipped: int
+    begin: np.ndarray
+
+    @property
+    def duration(self) -> np.ndarray:
+        """Time that is looked at, float64[n] [s]."""
+        return self.length.t_start + self.length.count * self.length.period + self.length.phase - self.begin
+
+    @property
+    def forcing_period(self) -> float | np.ndarray | None:
+        """One for all, or one each [s]; None for an unforced system."""
+        if self.system.forced_at is None:
+            return None
+        return self.length.period if np.ptp(self.length.period) > 0 else float(self.length.period[0])
+
+    def request(self, system: System, schedule: Schedule, record: bool) -> Request:
+        """The request for this system, or one with more states: those start at zero."""
+        more = len(system.states) - self.group.start.shape[1]
+        start = np.pad(self.group.start, ((0, 0), (0, more)))
+        length = self.length
+        return Request(
+            start, self.group.parameters, length.period, length.t_start, length.count, length.phase, schedule,
+            self.skipped if record else None,
+        )  # fmt: skip
+
+
+def stretch(system: System, start: Any, values: Any, periods: Any, t_end: Any, t_start: Any, transient: Any) -> Stretch:
+    """What the user asked for.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        As :func:`saltus.simulate`; or if the transient isn't a number of periods (a time, if unforced), or outlasts the run.
+    """
+    group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
+    if system.forced_at is None:
+        length = span(system, group, periods, t_end, t_start)
+        skip = to_si(transient, "s", "transient")
+        begin = np.full(group.size, length.t_start + skip)
+        if not 0 <= skip < float(length.period[0]):
+            raise ParameterError(f"transient = {shown(transient)} must be a time >= 0 s that ends before t_end = {shown(t_end)}.")
+        return Stretch(system, group, length, 0, begin)
+    skipped = whole(transient, "transient", 0)
+    length = span(system, group, None if periods is None else whole(periods, "periods") + skipped, t_end, t_start)
+    begin = length.t_start + skipped * length.period
+    if np.any(skipped >= length.count + length.phase / length.period):
+        raise ParameterError(f"transient = {skipped} periods outlast the run up to t_end = {shown(t_end)}. Give a later t_end.")
+    return Stretch(system, group, length, skipped, begin)
+
+
+def computed(
+    system: System,
+    method: Method,
+    request: Request,
+    dataset: Callable[[Outcome], xr.Dataset],
+    threads: int | None,
+    progress: bool | Callable[[float], None] | None,
+) -> xr.Dataset:
+    """The Dataset of a request; on Ctrl-C the one so far, in the ``partial`` of the exception."""
+    show, close = reporter(progress)
+    try:
+        return dataset(engine.run(system, method, request, threads, show))
+    except engine.RunInterrupted as stop:
+        raise stop.then(dataset) from None
+    finally:
+        close()
+
+
+def common(seen: Stretch, system: System, method: Method, outcome: Outcome) -> dict[str, Any]:
+    """The arguments of every Dataset of a stretch: of the system itself, not of the guards and states that were added to it."""
+    own = dataset_parts.guards(seen.system, seen.group)
+    count = len(system.guards)
+    names = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
+    return dict(
+        states=system.states,
+        units=seen.system.units,
+        guards=own.first(count),
+        status=[st.STATUS[int(code)][0] for code in outcome.status],
+        each={**{name: outcome.counters[:, st.COUNTERS.index(name)] for name in names}, "end_time": outcome.time},
+        end={name: outcome.state[:, i] for i, name in enumerate(system.states)},
+        forcing_period=seen.forcing_period,
+        varied=seen.group.varied,
+        batch=seen.group.batch,
+        attrs=dataset_parts.provenance(seen.system, method, dataset_parts.shared_values(seen.system, seen.group), seen.group.varied),
+    )
+
+
+def with_each(arguments: Mapping[str, Any], **each: Any) -> dict[str, Any]:
+    """The arguments with more variables that every trajectory has."""
+    return {**arguments, "each": {**arguments["each"], **each}}
+
+
+def extended(seen: Stretch, system: System) -> Stretch:
+    """The same stretch of a system with more guards or states."""
+    return replace(seen, system=system)

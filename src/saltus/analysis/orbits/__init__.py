@@ -1,0 +1,1 @@
+"""What trajectories settle to: periodic orbits, equilibria, limit cycles, aperiodic attractors - found, verified and described."""

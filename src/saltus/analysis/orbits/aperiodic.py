@@ -1,0 +1,225 @@
+"""Attractors that never repeat: quasi-periodic and chaotic ones, told apart by their largest Lyapunov exponent, known by where they go.
+
+Exponents: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980), one direction renormalised at every block.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.statistics import BOUNDED, UNCLEAR
+from saltus.flow.family import Family
+from saltus.flow.maps import Map
+
+#: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its way.
+BLOCK, BLOCKS, ALIGNING = 8, 192, 48
+#: Times that the exponent is measured at most, each time going on from where the last ended, until it says what the motion is.
+MEASURED = 4
+#: Standard errors that an exponent must be from zero.
+SURE = 4.0
+#: Exponent [per iterate] that is taken for zero whatever its error.
+FLOOR = 2e-3
+#: A trail that repeats to this, in units of the scale, is an orbit's; one whose repeats become so many times better is on its way to one.
+REPEATS, SETTLING = 1e-6, 0.05
+#: Iterates whose places are noted.
+TRAIL = 4096
+#: Boxes across the range of a state, the finest first: the first at which one half of a trail knows the places of the other is taken.
+BOXES = (64, 32, 16, 8)
+#: Share of every second place of a trail that must lie in the boxes of the others. An attractor of a higher dimension needs larger boxes.
+KNOWN = 0.9
+#: Boxes away from zero beyond which nothing is on an attractor.
+FARTHEST = 2048
+#: Share of the places of one attractor that must lie in the other's boxes for both to be one.
+ALIKE = 0.6
+
+
+@dataclass(frozen=True)
+class Wandering:
+    """An attractor that never repeats.
+
+    Attributes
+    ----------
+    kind : str
+        ``"chaotic"`` or ``"quasi_periodic"``.
+    exponent, exponent_error : float
+        Largest Lyapunov exponent of the map and its standard error [per iterate].
+    points : float64[TRAIL, D]
+        Points on it.
+    scale : float64[D]
+        Range of each state.
+    """
+
+    kind: str
+    exponent: float
+    exponent_error: float
+    points: np.ndarray
+    scale: np.ndarray
+
+    @property
+    def first(self) -> tuple[float, ...]:
+        """Its mean place, for sorting."""
+        return tuple(np.round(self.points.mean(axis=0) / self.scale, 3).tolist())
+
+    @functools.cached_property
+    def _places(self) -> tuple[int, np.ndarray]:
+        """Boxes across the range of a state, and the codes of those it visits and of their neighbours."""
+        for across in BOXES:
+            half = _around(self.points[::2], self.scale, across)
+            if _inside(self.points[None, 1::2], self.scale, across, half)[0] >= KNOWN:
+                break
+        return across, _around(self.points, self.scale, across)
+
+    def share(self, points: np.ndarray) -> np.ndarray:
+        """Share of the points of trajectories float64[k, n, D] that lie in its boxes, float64[k]."""
+        across, boxes = self._places
+        return _inside(points, self.scale, across, boxes)
+
+
+def _around(points: np.ndarray, scale: np.ndarray, across: int) -> np.ndarray:
+    """Codes of the boxes that points float64[n, D] visit and of their neighbours along each axis, ascending int64."""
+    cells = np.unique(np.floor(points / scale * across).astype(np.int64), axis=0)
+    size = cells.shape[1]
+    steps = np.concatenate([np.zeros((1, size), np.int64), np.eye(size, dtype=np.int64), -np.eye(size, dtype=np.int64)])
+    return np.unique(_codes((cells[:, None] + steps).reshape(-1, size)))
+
+
+def _inside(points: np.ndarray, scale: np.ndarray, across: int, boxes: np.ndarray) -> np.ndarray:
+    """Share of the points of trajectories float64[k, n, D] that lie in boxes, float64[k]."""
+    inside = np.isfinite(points).all(axis=2)
+    cells = np.floor(np.where(inside[:, :, None], points, 0.0) / scale * across)
+    inside &= (np.abs(cells) < FARTHEST).all(axis=2)
+    codes = _codes(np.where(inside[:, :, None], cells, 0).astype(np.int64))
+    return (inside & np.isin(codes, boxes)).mean(axis=1)
+
+
+def _codes(cells: np.ndarray) -> np.ndarray:
+    """One number for each box; boxes of more than five states may share one, which only makes the test for an attractor weaker."""
+    return cells @ (2 * FARTHEST) ** np.arange(cells.shape[-1], dtype=np.int64)
+
+
+def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) -> list[Wandering]:
+    """The attractors on which trajectories wander.
+
+    Parameters
+    ----------
+    map_ : Map
+        The map.
+    start : float64[k, D]
+        Where trajectories stand that have not settled for long.
+    points : float64[k, TRAIL, D]
+        Where they were.
+    scale : float64[D]
+        Range of each state.
+    """
+    usable = [i for i in range(len(start)) if np.isfinite(points[i]).all() and not _settles(points[i], scale)]
+    if not usable:
+        return []
+    groups: list[list[int]] = []
+    trails = [Wandering("", 0.0, 0.0, points[i], scale) for i in usable]
+    for i, trail in enumerate(trails):
+        home = next((group for group in groups if alike(trails[group[0]], trail)), None)
+        if home is None:
+            groups.append([i])
+        else:
+            home.append(i)
+    _, kinds = kinds_of(lambda _: map_, start[usable], np.broadcast_to(scale, start[usable].shape), groups)
+    return [Wandering(*kind, points[usable[group[0]]], scale) for group, kind in zip(groups, kinds, strict=True) if kind is not None]
+
+
+def _settles(trail: np.ndarray, scale: np.ndarray) -> bool:
+    """Whether a trail float64[m, D] repeats, or comes to repeat better and better: it is on an orbit, or on its way to one."""
+    part = len(trail) // 16
+    early, late = (mismatch(piece, scale) for piece in (trail[:part], trail[-part:]))
+    return late < REPEATS or late < SETTLING * early
+
+
+def mismatch(trail: np.ndarray, scale: np.ndarray) -> float:
+    """Smallest n-step difference, n up to half of the trail: the largest of it over the last quarter."""
+    last = len(trail) // 4
+    return min(float(np.abs((trail[-last:] - trail[-last - n : -n]) / scale).max()) for n in range(1, len(trail) // 2))
+
+
+def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
+    """(kind, exponent, its standard error) from growth rates per iterate, float64[blocks, members]; None if they don't say."""
+    if not np.isfinite(blocks).all():
+        return None
+    first, second = np.array_split(blocks, 2)
+    exponent, error = float(blocks.mean()), float(blocks.mean(axis=1).std(ddof=1) / math.sqrt(len(blocks)))
+    if error > UNCLEAR:
+        return None
+    if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():  # growth like t looks positive at first
+        return "chaotic", exponent, error
+    zero = max(FLOOR, min(SURE * error, BOUNDED / (len(second) * BLOCK)))
+    return ("quasi_periodic", exponent, error) if abs(second.mean()) <= zero else None
+
+
+def kinds_of(
+    part: Callable[[np.ndarray], Map | Family], start: np.ndarray, scale: np.ndarray, groups: Sequence[Sequence[int]]
+) -> tuple[np.ndarray, list[tuple[str, float, float] | None]]:
+    """What motions that never repeat are: their exponents are measured for longer while they could be zero as well as positive.
+
+    Parameters
+    ----------
+    part : callable
+        The map for some of the trajectories, by their numbers int64[m].
+    start, scale : float64[k, D]
+        Where trajectories stand, and the range of each state.
+    groups : sequence of sequence of int
+        Trajectories that are on one attractor.
+
+    Returns
+    -------
+    end : float64[k, D]
+        Where they stand then.
+    kinds : list
+        (kind, exponent, its standard error) of each group; None if they don't say even then.
+    """
+    state, blocks = growth_rates(part(np.arange(len(start))), start, scale)
+    rates = list(blocks.T)
+    kinds = [kind_of_growth(np.stack([rates[i] for i in group], axis=1)) for group in groups]
+    for _ in range(MEASURED - 1):
+        again = [n for n, kind in enumerate(kinds) if kind is None and all(np.isfinite(rates[i]).all() for i in groups[n])]
+        if not again:
+            break
+        rows = np.concatenate([groups[n] for n in again])
+        state[rows], blocks = growth_rates(part(rows), state[rows], scale[rows])
+        for i, more in zip(rows.tolist(), blocks.T, strict=True):
+            rates[i] = np.append(rates[i], more)
+        for n in again:
+            kinds[n] = kind_of_growth(np.stack([rates[i] for i in groups[n]], axis=1))
+    return state, kinds
+
+
+def growth_rates(map_: Map | Family, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction, block by block, float64[blocks, k]."""
+    k, size = start.shape
+    direction = np.zeros((k, size, size))
+    direction[:, :, 0] = scale / math.sqrt(size)
+    state, growths = start, []
+    for _ in range(BLOCKS):
+        state, image = map_.tangent(state, BLOCK, direction)
+        length = np.linalg.norm(image[:, :, 0] / scale, axis=1)
+        with np.errstate(all="ignore"):
+            growths.append(np.log(length) / BLOCK)
+            direction = np.zeros((k, size, size))
+            direction[:, :, 0] = image[:, :, 0] / length[:, None]
+    return state, np.array(growths[ALIGNING:])
+
+
+def alike(one: Wandering, other: Wandering) -> bool:
+    """Whether two trails visit the same boxes."""
+    return min(float(other.share(one.points[None])[0]), float(one.share(other.points[None])[0])) > ALIKE
+
+
+def merge(found: list[Wandering]) -> list[Wandering]:
+    """Those of a list that are different: of two that visit the same boxes the first is kept."""
+    kept: list[Wandering] = []
+    for one in found:
+        if not any(alike(one, other) for other in kept):
+            kept.append(one)
+    return kept

@@ -1,0 +1,271 @@
+"""Limit cycles of systems without forcing: periodic motions whose period is theirs, found by Newton's method on a state and the period.
+
+A motion comes back to the plane through one of its states, across the flow, near that state: state and time are the first guess. Newton's
+method then solves phi_T(x) = x with x on that plane, for x and T; the derivative is the tangent flow, jumps at contacts included. Parker &
+Chua, Practical Numerical Algorithms for Chaotic Systems (1989), chapter 5. Of the multipliers one is 1, along the flow; the
+others are those of the monodromy matrix across it, so that none is mistaken for the trivial one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.orbits.equilibria import field_of, jacobian_of
+from saltus.analysis.orbits.orbits import AMPLIFIED, MARGINAL
+from saltus.flow.engine import Schedule
+from saltus.flow.family import Family
+
+#: Samples of the motion in which a return is looked for; a window is so many times shorter or longer than the one before.
+SAMPLES, ZOOM = 4096, 8
+#: Windows tried at most, from that of the looks on.
+MOST_WINDOWS = 6
+#: Samples follow the motion where its direction turns by less than 18 degrees from one to the next, for so large a share of them.
+TURN, FOLLOWED = 0.95, 0.9
+#: A return farther than this, in units of the scale, may be none: a longer window is looked at, unless this one holds so many turns.
+FAR, ENOUGH = 0.05, 8
+#: Returns that samples can't tell apart: the error of the cubic between them, in units of the scale.
+SAMPLED = 1e-6
+#: Steps that locate the return; Newton steps, and a step that is the last one, in units of the scale.
+LOCATED, MOST_STEPS, CONVERGED = 3, 15, 1e-12
+#: Farthest that a cycle found lies from where it was looked for, in units of the scale.
+FARTHEST = 1.0
+#: Most turns of a cycle that may have been taken for one: a return is seen in SAMPLES samples, of which a turn has 20 where they follow it.
+MOST_PARTS = SAMPLES // 16
+#: Points in equal steps of time that a cycle is known by: as many as the longest orbit of a stroboscope has.
+POINTS = 64
+#: Range of the motion, in units of the scale, below which it is no cycle but rest.
+RESTS = 1e-7
+
+
+@dataclass
+class Returns:
+    """The first near return of k motions to the plane across the flow at their start.
+
+    Attributes
+    ----------
+    time : float64[k]
+        When [s]; NaN where none was seen.
+    apart : float64[k]
+        How far from the start, in units of the scale; inf where none was seen.
+    scale : float64[k, D]
+        Range of each state in the window that was looked at.
+    """
+
+    time: np.ndarray
+    apart: np.ndarray
+    scale: np.ndarray
+
+
+@dataclass
+class Cycles:
+    """Limit cycles of k rows; NaN where there is none.
+
+    Attributes
+    ----------
+    period : float64[k]
+        [s].
+    points : float64[k, POINTS, D]
+        States in equal steps of time, from where the first state that moves is least.
+    multipliers : complex128[k, D]
+        The trivial 1 first, then the others, the largest first.
+    moved : float64[k]
+        How far from the first guess Newton's method arrived, in units of the scale.
+    """
+
+    period: np.ndarray
+    points: np.ndarray
+    multipliers: np.ndarray
+    moved: np.ndarray
+
+    @property
+    def stable(self) -> np.ndarray:
+        """Which attract: all multipliers but the trivial one lie inside the unit circle by more than rounding, bool[k]."""
+        with np.errstate(invalid="ignore"):
+            return np.isfinite(self.period) & (np.abs(self.multipliers[:, 1:2]).max(axis=1, initial=0.0) < 1.0 - MARGINAL)
+
+
+# -- the first guess -----------------------------------------------------------------------------------------------------------
+def returns(family: Family, start: np.ndarray, window: float) -> Returns:
+    """The near returns of motions from float64[k, D], looked for over some ``window`` [s]: a finer or a longer one where that is needed."""
+    k, size = start.shape
+    result = Returns(np.full(k, np.nan), np.full(k, np.inf), np.ones((k, size)))
+    length, rows, refined = np.full(k, float(window)), np.arange(k), np.zeros(k, bool)
+    for _ in range(MOST_WINDOWS):
+        time, apart, scale, followed, turns = _seen(family.rows(rows), start[rows], length[rows])
+        result.scale[rows] = scale
+        done = followed & np.isfinite(apart)
+        result.time[rows[done]], result.apart[rows[done]] = time[done], apart[done]
+        longer = followed & ((turns == 0) | (turns < ENOUGH) & (apart > FAR)) & ~refined[rows]
+        refined[rows[~followed]] = True
+        length[rows] *= np.where(followed, ZOOM, 1.0 / ZOOM)
+        rows = rows[~followed | longer]
+        if not len(rows):
+            break
+    seen = np.flatnonzero(np.isfinite(result.apart))
+    if len(seen):
+        _locate(family.rows(seen), start[seen], seen, result)
+    return result
+
+
+def _seen(family: Family, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, ...]:
+    """From samples over a window each: time and distance of the return, range of the states, whether samples follow the motion, turns."""
+    k, size = start.shape
+    index = np.arange(SAMPLES)
+    samples = family.every(length).run(start, 1, Schedule(0 * index, index / SAMPLES)).samples
+    values = {name: np.repeat(column, SAMPLES) for name, column in family.values.items()}
+    rates = field_of(family.system, samples.reshape(-1, size), values).reshape(k, SAMPLES, size)
+    with np.errstate(all="ignore"):
+        ranges, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
+        scale = np.where(np.isfinite(ranges) & (ranges > 1e-9 * sizes), ranges, np.where(sizes > 0, sizes, 1.0))
+        scale = np.where(np.isfinite(scale), scale, 1.0)
+        across = rates / scale[:, None]
+        across /= np.linalg.norm(across, axis=2, keepdims=True)
+        turns = np.einsum("kij,kij->ki", across[:, 1:], across[:, :-1])
+        followed = (turns > TURN).mean(axis=1) >= FOLLOWED
+        offset = (samples - start[:, None]) / scale[:, None]
+        height = np.einsum("kij,kj->ki", offset, across[:, 0])
+        share = height[:, 1:-1] / (height[:, 1:-1] - height[:, 2:])
+        rises = (height[:, 1:-1] < 0) & (height[:, 2:] >= 0)
+        step = (length / SAMPLES)[:, None, None]
+        at = _cubic(offset[:, 1:-1], offset[:, 2:], step * rates[:, 1:-1] / scale[:, None], step * rates[:, 2:] / scale[:, None], share)
+        apart = np.where(rises, np.abs(at).max(axis=2), np.inf)
+    apart = np.where(np.isfinite(apart), apart, np.inf)
+    best = apart.min(axis=1)
+    first = np.argmax(apart <= np.maximum(4.0 * best, SAMPLED)[:, None], axis=1)
+    rows = np.arange(k)
+    time = (1 + first + np.where(np.isfinite(share[rows, first]), share[rows, first], 0.0)) * length / SAMPLES
+    return time, np.where(np.isfinite(best), apart[rows, first], np.inf), scale, followed, rises.sum(axis=1)
+
+
+def _cubic(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Cubics with these values and slopes at the ends, at a share of the way."""
+    s = share[..., None]
+    return a + s * (da + s * ((3 * (b - a) - 2 * da - db) + s * (2 * (a - b) + da + db)))
+
+
+def _locate(family: Family, start: np.ndarray, which: np.ndarray, result: Returns) -> None:
+    """Move the times of return onto the plane, and measure the distance there."""
+    time, scale = result.time[which], result.scale[which]
+    normal = field_of(family.system, start, family.values) / scale
+    for _ in range(LOCATED):
+        end = family.every(time).run(start, 1).state
+        speed = np.einsum("kj,kj->k", field_of(family.system, end, family.values) / scale, normal)
+        with np.errstate(all="ignore"):
+            step = -np.einsum("kj,kj->k", (end - start) / scale, normal) / speed
+        time = np.where(np.isfinite(step) & (np.abs(step) < 0.1 * time), time + step, time)
+    end = family.every(time).run(start, 1).state
+    with np.errstate(invalid="ignore"):
+        apart = np.abs((end - start) / scale).max(axis=1)
+    result.time[which], result.apart[which] = time, np.where(np.isfinite(apart), apart, np.inf)
+
+
+# -- Newton's method -----------------------------------------------------------------------------------------------------------
+def find_cycles(family: Family, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Cycles:
+    """The limit cycles near states float64[k, D] that nearly recur after times float64[k] [s].
+
+    Parameters
+    ----------
+    family : Family
+        k flows without forcing.
+    start, time
+        A first guess of each.
+    scale : float64[k, D]
+        Range of each state.
+    """
+    k, size = start.shape
+    result = Cycles(np.full(k, np.nan), np.full((k, POINTS, size), np.nan), np.full((k, size), np.nan + 0j), np.full(k, np.nan))
+    x, period, found = _newton(family, start, time, scale)
+    rows = np.flatnonzero(found)
+    if not len(rows):
+        return result
+    mine = family.rows(rows)
+    period = _least_period(mine, x[rows], period[rows], scale[rows])
+    first = _first(mine, x[rows], period)
+    index = np.arange(POINTS)
+    points = mine.every(period).run(first, 1, Schedule(0 * index, index / POINTS)).samples
+    moves = (np.ptp(points, axis=1) / scale[rows]).max(axis=1) > RESTS
+    multipliers = _multipliers(mine.every(period), first)
+    good = moves & np.isfinite(points).all(axis=(1, 2)) & np.isfinite(multipliers).all(axis=1)
+    moved = np.abs((x[rows] - start[rows]) / scale[rows]).max(axis=1)
+    columns = (result.period, result.points, result.multipliers, result.moved)
+    for column, values in zip(columns, (period, points, multipliers, moved), strict=True):
+        column[rows[good]] = values[good]
+    return result
+
+
+def _newton(family: Family, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States float64[k, D] and periods float64[k] [s] that solve phi_T(x) = x, and where the iteration converged, bool[k]."""
+    x, period, found = np.array(start, float), np.array(time, float), np.zeros(len(start), bool)
+    before, rows = np.full(len(start), np.inf), np.flatnonzero(np.isfinite(time))
+    size, enough = x.shape[1], np.full(len(x), CONVERGED) if family.exact else family.noise(scale)
+    for _ in range(MOST_STEPS):
+        if not len(rows):
+            break
+        mine, unit = family.rows(rows), scale[rows]
+        end, matrix = mine.every(period[rows]).tangent(x[rows], 1)
+        speed = field_of(family.system, x[rows], mine.values) / unit
+        arrival = field_of(family.system, end, mine.values) / unit * period[rows, None]
+        system = np.zeros((len(rows), size + 1, size + 1))
+        system[:, :size, :size] = matrix * unit[:, None, :] / unit[:, :, None] - np.eye(size)
+        system[:, :size, size], system[:, size, :size] = arrival, speed * period[rows, None]
+        good = np.isfinite(system).all(axis=(1, 2)) & np.isfinite(end).all(axis=1)
+        good[good] = np.linalg.cond(system[good]) < 1e15
+        rows, unit, end, system = rows[good], unit[good], end[good], system[good]
+        if not len(rows):
+            break
+        missing = np.concatenate([(x[rows] - end) / unit, np.zeros((len(rows), 1))], axis=1)
+        step = np.linalg.solve(system, missing[:, :, None])[:, :, 0]
+        x[rows] += step[:, :size] * unit
+        period[rows] *= 1.0 + np.clip(step[:, size], -0.5, 0.5)
+        length = np.abs(step).max(axis=1)
+        done = (length < enough[rows]) | ((length < AMPLIFIED) & (length > 0.5 * before[rows]))  # stiff cycles amplify rounding
+        found[rows[done]] = True
+        before[rows] = length
+        near = np.abs((x[rows] - start[rows]) / unit).max(axis=1) < FARTHEST
+        rows = rows[~done & near & (length < 1.0)]
+    return x, period, found
+
+
+def _least_period(family: Family, x: np.ndarray, period: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """The smallest part of each period after which the motion is back already."""
+    parts = np.arange(MOST_PARTS, 1, -1)
+    states = family.every(period).run(x, 1, Schedule(0 * parts, 1.0 / parts)).samples
+    with np.errstate(invalid="ignore"):
+        back = np.abs((states - x[:, None]) / scale[:, None]).max(axis=2) < 10 * AMPLIFIED
+    return period / np.where(back.any(axis=1), parts[np.argmax(back, axis=1)], 1)
+
+
+def _first(family: Family, x: np.ndarray, period: np.ndarray) -> np.ndarray:
+    """The state of each cycle at which the first state that moves is least: where its points begin, whoever found it."""
+    index = np.arange(SAMPLES)
+    samples = family.every(period).run(x, 1, Schedule(0 * index, index / SAMPLES)).samples
+    ranges = np.ptp(samples, axis=1)
+    rows, column = np.arange(len(x)), np.argmax(ranges > 1e-9 * np.abs(samples).max(axis=1), axis=1)
+    least = np.argmin(samples[rows, :, column], axis=1)
+    state = samples[rows, least]
+    for _ in range(LOCATED):  # where its rate vanishes
+        rate = field_of(family.system, state, family.values)
+        slope = np.einsum("kj,kj->k", jacobian_of(family.system, state, family.values)[rows, column], rate)
+        with np.errstate(all="ignore"):
+            step = -rate[rows, column] / slope
+        step = np.where(np.abs(step) < 2 * period / SAMPLES, step, 0.0)
+        moved = family.every(np.where(step <= 0, step + period, step)).run(state, 1).state
+        state = np.where((step != 0)[:, None], moved, state)
+    return state
+
+
+def _multipliers(family: Family, x: np.ndarray) -> np.ndarray:
+    """1, and the eigenvalues of the monodromy matrix across the flow, the largest first; complex128[k, D]."""
+    _, matrices = family.tangent(x, 1)
+    rates = field_of(family.system, x, family.values)
+    size = x.shape[1]
+    result = np.full((len(x), size), np.nan + 0j)
+    for i, (matrix, rate) in enumerate(zip(matrices, rates, strict=True)):
+        if not (np.isfinite(matrix).all() and np.isfinite(rate).all() and rate.any()):
+            continue
+        frame = np.linalg.qr(np.concatenate([rate[:, None], np.eye(size)], axis=1))[0][:, :size]
+        others = np.linalg.eigvals(frame[:, 1:].T @ matrix @ frame[:, 1:])
+        result[i] = np.concatenate([[1.0], others[np.lexsort((-others.imag, -np.round(np.abs(others), 12)))]])
+    return result

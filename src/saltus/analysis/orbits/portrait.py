@@ -1,0 +1,117 @@
+"""Portraits of attractors: size, contacts, itinerary, margin to the next graze, stability - the columns of the attractor table."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.analysis.orbits.aperiodic import Wandering
+from saltus.analysis.orbits.equilibria import autonomous, find_equilibria
+from saltus.analysis.orbits.found import Found
+from saltus.analysis.orbits.limit_cycles import LIMIT_CYCLE, cycle_of
+from saltus.analysis.orbits.noisy import Noisy
+from saltus.analysis.orbits.orbit_measures import Measures, measure, unknown
+from saltus.analysis.orbits.unforced import rest
+from saltus.flow.maps import Map, Stroboscope
+from saltus.results import AttractorTable
+
+#: Periods of an attractor that never repeats: what its numbers are taken from, and what is kept of it.
+WANDERED = 256
+#: Name of what rests; and a point of a limit cycle at which the first state doesn't turn: it is least at point 0.
+EQUILIBRIUM, ASIDE = "equilibrium", 23
+
+
+def portraits(map_: Map, found: Found) -> AttractorTable:
+    """The table of attractors, in the order of their ids.
+
+    Parameters
+    ----------
+    map_ : Map
+        The map; a flow's stroboscope shows what happens between its points, another map only the points.
+    found : Found
+        The attractors.
+    """
+    if isinstance(map_, Stroboscope) and autonomous(map_.system):
+        return _unforced(map_, found)
+    size, per_second = len(map_.states), 1.0 / map_.period
+    orbits = [*found.orbits, *(one.orbit if isinstance(one, Noisy) else None for one in found.wandering)]
+    period = np.array([0 if orbit is None else orbit.period for orbit in orbits], np.int64)
+    start = np.array([*(orbit.points[0] for orbit in found.orbits), *map(_first, found.wandering)]).reshape(-1, size)
+    points = [*(orbit.points for orbit in found.orbits), *(one.points[:WANDERED] for one in found.wandering)]
+    nothing = np.full(size, np.nan + 0j)
+    numbers = _numbers(map_, start, period, points)
+    scatter = np.array([one.scatter[0] if isinstance(one, Noisy) else np.nan for one in (*found.orbits, *found.wandering)])
+    noisy = np.flatnonzero(np.isfinite(scatter))
+    if len(noisy) and map_.exact is not None:
+        numbers.put(noisy, _numbers(map_.exact, start[noisy], period[noisy], [points[i] for i in noisy]))
+    return AttractorTable(
+        kind=[*("periodic" for _ in found.orbits), *(one.kind for one in found.wandering)],
+        period=period,
+        contacts=numbers.contacts * np.maximum(period, 1),
+        itinerary=numbers.itinerary,
+        peak=numbers.peak[:, 0],
+        rms=numbers.rms[:, 0],
+        margin=numbers.margin,
+        multipliers=np.array([nothing if orbit is None else orbit.multipliers for orbit in orbits]).reshape(-1, size),
+        exponent=per_second * np.array([*(orbit.exponent for orbit in found.orbits), *(one.exponent for one in found.wandering)]),
+        exponent_error=per_second * np.array([*(0.0 for _ in found.orbits), *(one.exponent_error for one in found.wandering)]),
+        points=points,
+        scatter=scatter if len(noisy) else None,
+    )
+
+
+def _first(one: Wandering) -> np.ndarray:
+    """A point on an attractor that is known by where it goes: of one that never repeats its last, when it has settled the most."""
+    return np.asarray(one.points[0] if isinstance(one, Noisy) else one.points[-1])
+
+
+def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
+    """The table of a system without forcing: equilibria, limit cycles, and what never repeats."""
+    size, rests = len(map_.states), len(found.orbits)
+    kind = np.array([*(EQUILIBRIUM for _ in found.orbits), *(one.kind for one in found.wandering)], dtype=np.str_)
+    start = np.array([*(orbit.points[0] for orbit in found.orbits), *(one.points[-1] for one in found.wandering)]).reshape(-1, size)
+    points = [*(orbit.points[:1] for orbit in found.orbits), *(one.points[:WANDERED] for one in found.wandering)]
+    cycle, multipliers, eigenvalues = np.full(len(kind), np.nan), *np.full((2, len(kind), size), np.nan + 0j)
+    exponent, error = np.array([(0.0, 0.0)] * rests + [(one.exponent, one.exponent_error) for one in found.wandering]).reshape(-1, 2).T
+    exponent, error = exponent / map_.period, error / map_.period
+    still = find_equilibria(map_.family(rests), start[:rests], np.ones((rests, size)))
+    for i in range(rests):
+        points[i] = start[i : i + 1] = still.place[i : i + 1] if np.isfinite(still.place[i]).all() else start[i : i + 1]
+        eigenvalues[i], exponent[i] = still.eigenvalues[i], still.eigenvalues[i, 0].real
+    for i in np.flatnonzero(kind == LIMIT_CYCLE).tolist():
+        one = cycle_of(map_, found.wandering[i - rests])
+        cycle[i], multipliers[i], points[i], start[i] = one.period[0], one.multipliers[0], one.points[0], one.points[0, ASIDE]
+    family = map_.family(len(kind)).every(np.where(np.isfinite(cycle), cycle, map_.period))
+    numbers = measure(family, start, np.isin(kind, (EQUILIBRIUM, LIMIT_CYCLE)).astype(np.int64), WANDERED)
+    rest(map_.family(rests), start[:rests], np.arange(rests), numbers)
+    return AttractorTable(
+        kind=kind.tolist(),
+        period=np.zeros(len(kind), np.int64),
+        contacts=numbers.contacts,
+        itinerary=numbers.itinerary,
+        peak=numbers.peak[:, 0],
+        rms=numbers.rms[:, 0],
+        margin=numbers.margin,
+        multipliers=multipliers,
+        exponent=exponent,
+        exponent_error=error,
+        points=points,
+        cycle=cycle,
+        eigenvalues=eigenvalues,
+    )
+
+
+def _numbers(map_: Map, start: np.ndarray, period: np.ndarray, points: list[np.ndarray]) -> Measures:
+    """The numbers of attractors from a point on each."""
+    if isinstance(map_, Stroboscope):
+        return measure(map_.family(len(start)), start, period, WANDERED)
+    return _of_points(points, start.shape[1])
+
+
+def _of_points(points: list[np.ndarray], size: int) -> Measures:
+    """The numbers of attractors of a map that has nothing between its points."""
+    result = unknown(len(points), size)
+    result.contacts[:] = 0.0
+    for i, one in enumerate(points):
+        result.maximum[i], result.minimum[i] = one.max(axis=0), one.min(axis=0)
+        result.mean[i], result.deviation[i] = one.mean(axis=0), one.std(axis=0)
+    return result

@@ -1,0 +1,232 @@
+"""What many trajectories settle to, each with parameter values of its own: the engine of frequency responses and bifurcation diagrams.
+
+A basin map asks one system of a great many starts, and capture by known attractors answers. Here every trajectory may have an attractor of
+its own: each is followed until it nearly recurs, Newton's method closes the orbit, its multipliers say that it attracts, and the
+trajectory must lie beside it. What never recurs is typed by its largest Lyapunov exponent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from saltus.analysis.orbits import unforced
+from saltus.analysis.orbits.aperiodic import kinds_of
+from saltus.analysis.orbits.equilibria import autonomous
+from saltus.analysis.orbits.polish import Closed, close
+from saltus.analysis.orbits.recurrence import LONGEST, ROUND, recurrence
+from saltus.flow.engine import Schedule
+from saltus.flow.family import Family
+from saltus.flow.threads import on_threads
+from saltus.kernels import status as st
+
+#: Kinds of motion, and why there may be none.
+PERIODIC, QUASI_PERIODIC, CHAOTIC, EQUILIBRIUM, LIMIT_CYCLE = 0, 1, 2, 3, 4
+#: Kinds that Newton's method closes.
+CLOSED = (PERIODIC, EQUILIBRIUM, LIMIT_CYCLE)
+ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
+#: States a period apart that agree so well, in units of the range of the motion, are on their way to an orbit: 1e-5 leaves the slowest
+#: transient of the rig in a few rounds, and doesn't take a neighbour for the orbit. Later, slow ones are let in from farther away.
+NEAR, NEAR_AT_LAST = 1e-5, 1e-3
+#: An orbit is that of a trajectory that lies so many times closer than its recurrence: 1/(1 - multiplier) is the ratio of the two.
+BESIDE = 30.0
+#: Trajectories that one thread follows at a time.
+PIECE = 512
+#: Periods and looks a period from which the range of a motion is taken.
+RANGED, LOOKS = 4, 32
+#: A state whose range is so small a part of its size rests.
+RESTS = 1e-9
+#: Points of a motion that never repeats that are kept.
+TRAIL = 1024
+
+
+@dataclass
+class Steady:
+    """What k trajectories settle to.
+
+    Attributes
+    ----------
+    kind : int64[k]
+        ``PERIODIC``, ``QUASI_PERIODIC``, ``CHAOTIC``; of a system without forcing ``EQUILIBRIUM``, ``LIMIT_CYCLE``; or a code below zero.
+    orbits : Closed
+        The orbits of the periodic ones, verified; elsewhere nothing.
+    exponent, exponent_error : float64[k]
+        Largest Lyapunov exponent and its standard error [per iterate].
+    settled : int64[k]
+        Iterates after which it was known; -1 if it isn't.
+    scale : float64[k, D]
+        Range of each state in the motion.
+    trail : dict of int to float64[TRAIL, D]
+        Points of those that never repeat.
+    end : float64[k, D]
+        Where the trajectory stood last.
+    """
+
+    kind: np.ndarray
+    orbits: Closed
+    exponent: np.ndarray
+    exponent_error: np.ndarray
+    settled: np.ndarray
+    scale: np.ndarray
+    trail: dict[int, np.ndarray]
+    end: np.ndarray
+
+    @classmethod
+    def empty(cls, count: int, size: int) -> Steady:
+        """Nothing computed yet."""
+        nothing = np.full(count, np.nan)
+        return cls(
+            np.full(count, NOT_COMPUTED, np.int64), Closed.none(count, LONGEST, size), nothing.copy(), nothing.copy(),
+            np.full(count, -1, np.int64), np.ones((count, size)), {}, np.full((count, size), np.nan),
+        )  # fmt: skip
+
+    def put(self, where: np.ndarray, other: Steady) -> None:
+        """Write another's results to the rows int64[m]."""
+        for name in ("kind", "exponent", "exponent_error", "settled", "scale", "end"):
+            getattr(self, name)[where] = getattr(other, name)
+        self.put_orbits(where, other.orbits)
+        self.trail.update({int(where[i]): trail for i, trail in other.trail.items()})
+
+    def put_orbits(self, where: np.ndarray, orbits: Closed) -> None:
+        """Write orbits to the rows int64[m]."""
+        for field in fields(Closed):
+            getattr(self.orbits, field.name)[where] = getattr(orbits, field.name)
+
+
+def settle_each(
+    family: Family,
+    start: np.ndarray,
+    most: int,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    result: Steady | None = None,
+) -> Steady:
+    """What each trajectory settles to: start float64[k, D], row i by row i of the family, followed for ``most`` iterates at the longest.
+
+    What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't depend on the other trajectories, nor on
+    threads.
+    """
+    result = Steady.empty(len(start), start.shape[1]) if result is None else result
+    pieces = [np.arange(first, min(first + PIECE, len(start))) for first in range(0, len(start), PIECE)]
+
+    def work(piece: np.ndarray) -> Steady:
+        part = family.rows(piece)
+        part.threads = 1
+        return _settle(part, start[piece], most)
+
+    on_threads(work, pieces, result.put, threads, progress)
+    return result
+
+
+def _settle(family: Family, start: np.ndarray, most: int) -> Steady:
+    """One piece, on one thread."""
+    result = Steady.empty(*start.shape)
+    who = _follow(family, start, np.arange(len(start)), most, result, NEAR)
+    if len(who):
+        result.scale[who] = motion_range(family.rows(who), result.end[who])
+        who = _follow(family, result.end, who, ROUND, result, NEAR_AT_LAST)
+    if len(who):
+        who = _wander(family, result.end, who, result)
+    if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
+        who = _follow(family, result.end, who, most, result, NEAR_AT_LAST)
+        result.kind[who] = UNCONVERGED
+    return result
+
+
+def _follow(family: Family, start: np.ndarray, who: np.ndarray, most: int, result: Steady, near: float) -> np.ndarray:
+    """Follow trajectories until they settle on an orbit; writes what is known, returns those that haven't."""
+    flight = family.rows(who).launch(start[who], most + ROUND)
+    while len(who) and flight.age < most:
+        points = flight.advance(ROUND)
+        going = flight.going
+        result.end[who] = flight.state
+        ended = who[~going]
+        result.kind[ended] = np.where(flight.status[~going] == st.NONFINITE, ESCAPED, FAILED)
+        stay = going.copy()
+        if going.any():
+            rows = np.flatnonzero(going)
+            if flight.age == ROUND:
+                result.scale[who[rows]] = motion_range(family.rows(who[rows]), flight.state[rows])
+            stay[rows[_settled(family, points[rows], who[rows], near, result)]] = False
+            result.settled[who[going & ~stay]] = flight.age
+        flight.keep(stay)
+        who = who[stay]
+    return who
+
+
+def _settled(family: Family, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
+    """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes the orbits."""
+    if autonomous(family.system):
+        return _settled_unforced(family.rows(who), points, who, near, result)
+    scale = result.scale[who]
+    period, apart = recurrence(points, scale)
+    done = np.zeros(len(who), bool)
+    noise = family.rows(who).noise(scale)
+    ready = np.flatnonzero(apart < np.maximum(near, noise))
+    if not len(ready):
+        return done
+    orbits = close(family.rows(who[ready]), points[ready, -1], period[ready], scale[ready], LONGEST)
+    tolerance = BESIDE * np.maximum(apart[ready], noise[ready])
+    right = orbits.stable & (orbits.distance(points[ready, -1], scale[ready]) <= tolerance)
+    done[ready[right]] = True
+    chosen = who[ready[right]]
+    result.put_orbits(chosen, orbits.rows(right))
+    result.kind[chosen], result.exponent_error[chosen] = PERIODIC, 0.0
+    with np.errstate(divide="ignore"):
+        result.exponent[chosen] = np.log(np.abs(orbits.multipliers[right, 0])) / orbits.period[right]
+    return done
+
+
+def _settled_unforced(family: Family, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
+    """As :func:`_settled` for rows of a system without forcing: which rest, or go round a limit cycle."""
+    state, window = points[:, -1], ROUND * float(family.period[0])
+    result.scale[who] = np.maximum(result.scale[who], np.ptp(points, axis=1))
+    found = unforced.attracted(family, state, result.scale[who], window, near)
+    done = found.orbits.period > 0
+    chosen = who[done]
+    result.put_orbits(chosen, found.orbits.rows(done))
+    result.scale[chosen] = found.scale[done]
+    rests = found.orbits.time[done] == 0
+    result.kind[chosen], result.exponent_error[chosen] = np.where(rests, EQUILIBRIUM, LIMIT_CYCLE), 0.0
+    leading = found.orbits.multipliers[done, 0].real * family.period[done]
+    result.exponent[chosen] = np.where(rests, leading, 0.0)  # along a limit cycle nothing grows or dies
+    return done
+
+
+def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) -> np.ndarray:
+    """Type the trajectories that don't recur by their exponents; writes what is known, returns those that stay unclear."""
+    maps = family.rows(who)
+    state, kinds = kinds_of(maps.rows, start[who], result.scale[who], [[i] for i in range(len(who))])
+    flight = maps.launch(state, TRAIL)
+    trail = flight.advance(TRAIL)
+    recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR_AT_LAST, maps.noise(result.scale[who]))  # by now
+    result.end[who] = flight.state
+    unclear = np.ones(len(who), bool)
+    if autonomous(family.system):  # a limit cycle that is reached slowly, and no torus
+        recurs |= unforced.nearly_recurs(maps, flight.state, ROUND * float(family.period[0]))
+        away = unforced.runs_away(trail)
+        result.kind[who[away]] = ESCAPED
+    for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2))):
+        kind = kinds[i]
+        if (
+            result.kind[who[i]] != ESCAPED
+            and kind is not None
+            and not (recurs[i] and (kind[0] != "chaotic" or not autonomous(family.system)))
+        ):
+            unclear[i], row = False, who[i]
+            result.kind[row] = CHAOTIC if kind[0] == "chaotic" else QUASI_PERIODIC
+            result.exponent[row], result.exponent_error[row] = kind[1:]
+            result.trail[int(row)], result.settled[row] = trail[i], -1
+    return who[unclear & (result.kind[who] != ESCAPED)]
+
+
+def motion_range(family: Family, state: np.ndarray) -> np.ndarray:
+    """Range of each state in the motion from states float64[k, D] on, float64[k, D]; its size where it rests, 1 where that is 0."""
+    index = np.arange(RANGED * LOOKS)
+    samples = family.run(state, RANGED, Schedule(index // LOOKS, (index % LOOKS) / LOOKS)).samples
+    with np.errstate(all="ignore"):
+        lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
+    scale = np.where(lengths > RESTS * sizes, lengths, sizes)
+    return np.where(np.isfinite(scale) & (scale > 0), scale, 1.0)

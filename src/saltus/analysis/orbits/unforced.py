@@ -1,0 +1,161 @@
+"""What motions without forcing come to: equilibria and limit cycles, found and verified in the same way for many trajectories at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.orbits.cycles import POINTS, Cycles, find_cycles, returns
+from saltus.analysis.orbits.equilibria import find_equilibria
+from saltus.analysis.orbits.orbit_measures import Measures
+from saltus.analysis.orbits.polish import Closed
+from saltus.analysis.orbits.recurrence import LONGEST
+from saltus.flow.family import Family
+from saltus.system.evaluate import evaluate
+
+#: A limit cycle is that of a trajectory that lies so many times closer than its return: 1/(1 - multiplier) is the ratio of the two.
+BESIDE = 30.0
+#: Distance that rounding can make.
+ROUNDING = 1e-9
+#: Parts of a trail that must each be larger than the one before, and how much the last must be larger than the first, to run away.
+EIGHTHS, GROWN = 8, 3.0
+#: Returns farther than this, in units of the range, are no sign of a limit cycle.
+TORUS = 1e-2
+
+
+@dataclass
+class Attracted:
+    """What k trajectories have come to.
+
+    Attributes
+    ----------
+    orbits : Closed
+        Their equilibria (time 0) and limit cycles (time > 0); period 0 where there is none yet.
+    scale : float64[k, D]
+        Range of each state on the limit cycle; of an equilibrium that which was given.
+    """
+
+    orbits: Closed
+    scale: np.ndarray
+
+
+def attracted(family: Family, state: np.ndarray, scale: np.ndarray, window: float, near: float) -> Attracted:
+    """Which trajectories have come to an equilibrium that captures where they are, or to an attracting limit cycle.
+
+    Parameters
+    ----------
+    family : Family
+        k flows without forcing.
+    state : float64[k, D]
+        Where each trajectory stands.
+    scale : float64[k, D]
+        Range of each state in its motion.
+    window : float
+        Time over which a return is looked for first [s].
+    near : float
+        Distance of a return, in units of the scale, that is worth a try by Newton's method.
+    """
+    result = Attracted(Closed.none(len(state), LONGEST, state.shape[1]), scale.copy())
+    rest = find_equilibria(family, state, scale)
+    here = np.flatnonzero(rest.stable & rest.holds(state))
+    _put_equilibria(result.orbits, here, rest.place[here], rest.eigenvalues[here])
+    result.scale[here] = np.maximum(scale[here], np.abs(rest.place[here]))
+    rows = np.flatnonzero(result.orbits.period == 0)
+    if not len(rows):
+        return result
+    seen = returns(family.rows(rows), state[rows], window)
+    ready = np.flatnonzero(seen.apart < np.maximum(near, family.rows(rows).noise(seen.scale)))
+    if not len(ready):
+        return result
+    rows, own = rows[ready], seen.scale[ready]
+    cycles = find_cycles(family.rows(rows), state[rows], seen.time[ready], own)
+    tolerance = BESIDE * np.maximum(np.maximum(seen.apart[ready], ROUNDING), family.rows(rows).noise(own))
+    beside = cycles.stable & (cycles.moved <= tolerance)
+    _put_cycles(result.orbits, rows, cycles, beside)
+    result.scale[rows[beside]] = own[beside]
+    return result
+
+
+def nearly_recurs(family: Family, state: np.ndarray, window: float) -> np.ndarray:
+    """Which motions come back so near to where they were that they may be on their way to a limit cycle, bool[k]."""
+    return np.asarray(returns(family, state, window).apart < TORUS)
+
+
+def runs_away(trail: np.ndarray) -> np.ndarray:
+    """Which trails float64[k, m, D] only grow: in each eighth of them more than before, and much in all, bool[k]."""
+    sizes = np.stack([np.abs(part).max(axis=(1, 2)) for part in np.array_split(trail, EIGHTHS, axis=1)])
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.diff(sizes, axis=0) > 0).all(axis=0) & (sizes[-1] > GROWN * sizes[0]))
+
+
+def rest(family: Family, place: np.ndarray, rows: np.ndarray, numbers: Measures) -> None:
+    """Fill in the rows int64[m] of equilibria float64[m, D]: the size of their states, and the distance to the nearest boundary."""
+    size = place.shape[1]
+    numbers.maximum[rows, :size] = numbers.minimum[rows, :size] = numbers.mean[rows, :size] = place
+    numbers.deviation[rows, :size], numbers.span[rows] = 0.0, 0.0
+    states, values = dict(zip(family.system.states, place.T, strict=True)), family.values
+    bits: list[np.ndarray] = []
+    nearest = np.full(len(rows), np.inf)
+    for guard in family.system.guards:
+        (gap,) = evaluate([guard.gap], states=states, values=values, bits=bits)
+        bits.append(np.broadcast_to(gap, len(rows)) > 0)
+        nearest = np.minimum(nearest, np.abs(gap))
+    numbers.margin[rows] = nearest
+    for row, one in zip(rows, place, strict=True):
+        numbers.turning[row] = one[None]
+
+
+def closed_cycles(family: Family, state: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
+    """Limit cycles near states that nearly recur after a time [s]."""
+    result = Closed.none(len(state), LONGEST, state.shape[1])
+    cycles = find_cycles(family, state, time, scale)
+    _put_cycles(result, np.arange(len(state)), cycles, np.isfinite(cycles.period))
+    return result
+
+
+def _put_cycles(result: Closed, rows: np.ndarray, cycles: Cycles, which: np.ndarray) -> None:
+    """Write some of the limit cycles, bool[m], to their rows int64[m]."""
+    chosen = rows[which]
+    result.period[chosen], result.time[chosen] = POINTS, cycles.period[which]
+    result.points[chosen], result.multipliers[chosen] = cycles.points[which], cycles.multipliers[which]
+
+
+def closed_equilibria(family: Family, state: np.ndarray, scale: np.ndarray) -> Closed:
+    """Equilibria near states."""
+    result = Closed.none(len(state), LONGEST, state.shape[1])
+    rest = find_equilibria(family, state, scale)
+    _put_equilibria(result, np.flatnonzero(np.isfinite(rest.place).all(axis=1)), *_finite(rest.place, rest.eigenvalues))
+    return result
+
+
+def multipliers_and_eigenvalues(values: np.ndarray, rests: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Floquet multipliers, and eigenvalues [1/s] of what rests, complex128[m, D]; each NaN where it is the other."""
+    return np.where(rests[:, None], np.nan + 0j, values), np.where(rests[:, None], values, np.nan + 0j)
+
+
+def _finite(place: np.ndarray, eigenvalues: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    there = np.isfinite(place).all(axis=1)
+    return place[there], eigenvalues[there]
+
+
+def _put_equilibria(result: Closed, rows: np.ndarray, place: np.ndarray, eigenvalues: np.ndarray) -> None:
+    result.period[rows], result.time[rows] = 1, 0.0
+    result.points[rows, 0], result.multipliers[rows] = place, eigenvalues
+
+
+def _put(result: Closed, rows: np.ndarray, other: Closed) -> None:
+    result.period[rows], result.points[rows], result.multipliers[rows], result.time[rows] = (
+        other.period, other.points, other.multipliers, other.time,
+    )  # fmt: skip
+
+
+def close_again(family: Family, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
+    """Equilibria (time 0) and limit cycles (their period) from those at other parameter values."""
+    result = Closed.none(len(start), LONGEST, start.shape[1])
+    rests, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)
+    if len(rests):
+        _put(result, rests, closed_equilibria(family.rows(rests), start[rests], scale[rests]))
+    if len(turns):
+        _put(result, turns, closed_cycles(family.rows(turns), start[turns], time[turns], scale[turns]))
+    return result

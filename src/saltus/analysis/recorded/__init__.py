@@ -1,0 +1,1 @@
+"""Exponents of recorded series: what a laboratory measured, without an equation."""

@@ -1,0 +1,1 @@
+"""Steady responses against parameters: grids, branches and where they end."""

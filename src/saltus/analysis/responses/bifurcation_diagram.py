@@ -1,0 +1,80 @@
+"""`bifurcation_diagram`: steady responses against one parameter, or a map of their types over two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import xarray as xr
+
+from saltus.analysis.responses.grid import grid_of
+from saltus.analysis.responses.response_table import respond
+from saltus.analysis.responses.samples import check_sample, check_unforced_sample
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError
+from saltus.flow.methods import Method, check_method
+from saltus.system.system import System
+
+
+@verb
+def bifurcation_diagram(
+    system: System,
+    vary: Mapping[str, Any],
+    start: Any = None,
+    *,
+    sample: str = "turning_points",
+    follow: bool = False,
+    box: Mapping[str, Any] | None = None,
+    values: Mapping[str, Any] | None = None,
+    outputs: Mapping[str, Any] | None = None,
+    method: Method | None = None,
+    periods: int = 2000,
+    every: float | str | None = None,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """How the steady responses change with a parameter: their turning points, periods, kinds, and what happens to them on the way.
+
+    Parameters
+    ----------
+    system : System
+        Any system; one without forcing with ``every``.
+    vary : mapping
+        One parameter, or two for a map of types: a range, such as ``{"contact_stiffness": ("1e3 N/m", "1e9 N/m", 2000, "log")}``, or a
+        list or array of values.
+    start : sequence, mapping, array or str
+        As for :func:`saltus.frequency_response`.
+    sample : str
+        What is kept of each response over one period of its own: ``"turning_points"`` (where the rate of the first state is zero),
+        ``"stroboscope"`` (at whole forcing periods) or ``"contacts"``. Not with two parameters.
+    follow : bool
+        Whether each start goes on, from the lowest value upwards, where it stood at the value before; otherwise each value starts afresh.
+    every : float or str, optional
+        Time between two looks at the motion of a system without forcing [s], about a turn of it. Equilibria, limit cycles, their periods,
+        sizes and stability don't depend on it.
+    box, values, outputs, method, periods, seed, threads, progress
+        As for :func:`saltus.frequency_response`.
+
+    Returns
+    -------
+    Dataset
+        As :func:`saltus.frequency_response` over the parameters in ``vary``, and ``sample_<state>`` on (response, sample), filled up with
+        NaN. Without forcing responses are of type ``equilibrium`` (with ``response_eigenvalue_real`` and ``_imag`` of the Jacobian [1/s]),
+        ``limit_cycle`` (with its period ``response_cycle`` [s] and multipliers, one of which is 1), ``quasi_periodic`` or ``chaotic``;
+        ``response_<state>`` then has points of a limit cycle in equal steps of its time.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset of what was finished.
+    """
+    if not isinstance(vary, Mapping):
+        raise ParameterError('vary must be a mapping, such as vary={"contact_stiffness": ("1e3 N/m", "1e9 N/m", 200, "log")}.')
+    method = check_method(method)
+    check_sample(sample, method)
+    grid = grid_of(system, vary, start, box, values, seed, follow, every)
+    check_unforced_sample(sample, grid.system)
+    return respond(grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "", outputs)

@@ -1,0 +1,97 @@
+"""`frequency_response`: all steady responses against the forcing frequency, each branch kept apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import xarray as xr
+
+from saltus.analysis.responses.grid import grid_of
+from saltus.analysis.responses.response_table import respond
+from saltus.analysis.starts import check_system
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError
+from saltus.flow.methods import Method
+from saltus.system.system import System
+
+
+@verb
+def frequency_response(
+    system: System,
+    frequency: Any,
+    start: Any = None,
+    *,
+    box: Mapping[str, Any] | None = None,
+    follow: bool = False,
+    values: Mapping[str, Any] | None = None,
+    outputs: Mapping[str, Any] | None = None,
+    method: Method | None = None,
+    periods: int = 2000,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Steady responses against the forcing frequency: which there are, and which start leads to which.
+
+    Every start is followed at every frequency until it has settled on an orbit that is closed by Newton's method and attracts by its
+    Floquet multipliers; what never repeats is typed by its largest Lyapunov exponent. Coexisting responses are told apart by their orbits,
+    not by their amplitudes, and followed from frequency to frequency as branches.
+
+    Parameters
+    ----------
+    system : System
+        A forced system.
+    frequency : (first, last, count), (first, last, count, "log"), or a list or array of values
+        Forcing frequencies: text with a unit, or numbers in the unit of the system's parameter [Hz, or rad/s where it says so].
+    start : sequence, mapping, array or str
+        Starts as for :func:`saltus.simulate`, one or many, the same at every frequency; ``"random 20"`` with ``box``; ``"sweep_up"`` or
+        ``"sweep_down"``: from rest, then at each frequency from where the last one ended, as in an experiment. Default: at rest.
+    box : mapping, optional
+        Range (low, high) of each state for random starts.
+    follow : bool
+        Whether given starts are swept upwards too.
+    values : mapping, optional
+        Other values of parameters.
+    outputs : mapping of str to callable, or to (callable, unit), optional
+        What to read off each response besides the states: functions of (t, states, parameters), their arguments found by name, such as
+        ``{"acceleration": (lambda x, v, k, c, m: -(k*x + c*v)/m, "m/s^2")}``. Comparisons that are contacts of the system read their sides.
+    method : Method
+        Default :class:`saltus.Taylor`.
+    periods : int
+        Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
+    seed : int
+        Of random starts.
+    threads : int, optional
+        Default all processors. Results don't depend on it.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds.
+
+    Returns
+    -------
+    Dataset
+        Dims: the frequency parameter, ``start``, ``response``, ``multiplier``, ``phase``, ``event``. On (frequency, start):
+        ``response_of``, ``rms``, ``peak``, ``period``, ``type``, ``contacts_per_period``. On response: ``response_<parameter>``,
+        ``response_branch``, ``response_type``, ``response_period``, ``response_rms``, ``response_peak``, ``response_margin``, multipliers,
+        exponent, stroboscopic points, and for random starts ``response_share`` with its 95 % Wilson interval. ``event_kind`` and
+        ``event_branch`` tell what happens to branches between two frequencies. On (response, output): ``output_maximum``, ``_minimum``,
+        ``_peak``, ``_peak_to_peak``, ``_mean``, ``_rms``, ``_rms_about_mean`` of every state and output, over whole responses (64 forcing
+        periods of one that never repeats), and ``output_amplitude``, ``output_phase`` [rad] of the first harmonic: A cos(2 pi f t + phase),
+        f the forcing frequency and t the time of the equations, also where the response repeats after several periods only.
+        Turning points are located and means exact: nothing comes from samples.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset of what was finished.
+    """
+    check_system(system)
+    if system.forced_at is None:
+        raise ParameterError(
+            f"{system.name} has no forcing, so no frequency to vary. Take sl.bifurcation_diagram over another parameter, with every=; "
+            "if a parameter is the frequency of a forcing, declare forced_at= in @sl.system."
+        )
+    grid = grid_of(system, {system.forced_at: frequency}, start, box, values, seed, follow)
+    return respond(grid, method, periods, threads, progress, outputs=outputs)

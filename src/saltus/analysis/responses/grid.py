@@ -1,0 +1,187 @@
+"""A grid of parameter values, and starts that are followed at each: what frequency responses and bifurcation diagrams run over."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.axes import along
+from saltus.analysis.orbits.recurrence import LONGEST
+from saltus.analysis.starts import check_system, ensemble, looks_every, single
+from saltus.errors import ParameterError, nearest, shown
+from saltus.flow.counts import whole
+from saltus.flow.family import Family
+from saltus.flow.methods import Method
+from saltus.flow.room import check_room
+from saltus.system.system import System
+from saltus.units import from_si, to_si
+
+#: Directions of a sweep by what users write.
+SWEEPS = {"sweep_up": "up", "sweep_down": "down"}
+
+
+#: Memory of what is known of one response, for each state [bytes]: the points of its orbit, twice.
+RESPONSE = 16.0 * LONGEST
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Parameter values and starts.
+
+    Attributes
+    ----------
+    system : System
+        Equations, and the values of the parameters that stay.
+    axes : mapping of str to float64[n]
+        One or two parameters and their values [SI], ascending.
+    starts : float64[s, D]
+        States at the start [SI], the same at every value; of a sweep the first one.
+    sweeps : tuple of str
+        ``"up"`` or ``"down"`` where the end at one value is the start at the next; empty otherwise.
+    drawn : bool
+        Whether the starts are random: then shares of them are shares of their box.
+    every : float or None
+        Time between two looks [s] at a system without forcing.
+    """
+
+    system: System
+    axes: Mapping[str, np.ndarray]
+    starts: np.ndarray
+    sweeps: tuple[str, ...] = ()
+    drawn: bool = False
+    every: float | None = None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Values along each axis."""
+        return tuple(len(values) for values in self.axes.values())
+
+    @property
+    def places(self) -> int:
+        """Points of the grid of parameters."""
+        return int(np.prod(self.shape))
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Parameter values at every point of the grid, float64[places, P]."""
+        names = list(self.system.values)
+        rows = np.tile(np.array(list(self.system.values.values())), (self.places, 1))
+        for name, column in zip(self.axes, np.meshgrid(*self.axes.values(), indexing="ij"), strict=True):
+            rows[:, names.index(name)] = column.ravel()
+        return rows
+
+    def family(self, method: Method, threads: int | None = None) -> Family:
+        """A map for every point of the grid."""
+        return Family(self.system, method, self.rows, self.every, threads)
+
+
+def grid_of(
+    system: System, axes: Mapping[str, Any], start: Any, box: Any, values: Any, seed: int, follow: bool | None, every: Any = None
+) -> Grid:
+    """A grid from what users write, checked.
+
+    Parameters
+    ----------
+    system : System
+        Its values, but for those in ``values``, are those of the parameters that don't vary.
+    axes : mapping
+        For each parameter a range (first, last, count) or (first, last, count, "log"), or a list or array of values.
+    start : sequence, mapping, array or str
+        As for :func:`saltus.simulate`; ``"random 20"``; ``"sweep_up"`` or ``"sweep_down"``.
+    box : mapping or None
+        Range of each state, for random starts.
+    values : mapping or None
+        Values of other parameters.
+    seed : int
+        Of random starts.
+    follow : bool or None
+        Whether each start is followed from value to value, upwards.
+    every : float, str or None
+        Time between two looks [s] at a system without forcing.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If a name is unknown, a range is empty, or the grid too large.
+    """
+    check_system(system)
+    seconds = looks_every(system, every)
+    if values is not None:
+        if not isinstance(values, Mapping):
+            raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
+        for name, value in values.items():
+            single(system, name, value)
+        system = system.with_values(**values)
+    points = {name: axis(system, name, given) for name, given in axes.items()}
+    if len(points) not in (1, 2):
+        raise ParameterError(f"one or two parameters may vary, not {len(points)}.")
+    starts, sweeps, drawn = _starts(system, start, box, seed)
+    if follow:
+        sweeps = sweeps or ("up",) * len(starts)
+    if sweeps and len(points) > 1:
+        raise ParameterError("a sweep follows one parameter; this grid has two. Leave follow= and sweeps out.")
+    grid = Grid(system, points, starts, sweeps, drawn, seconds)
+    check_room(
+        grid.places * (len(starts) * (400.0 + RESPONSE * len(system.states)) + 16.0 * len(system.values)),
+        f"{grid.places} values with {len(starts)} starts each",
+        "Take a coarser grid or fewer starts.",
+    )
+    corners = {name: np.array([column.min(), column.max()]) for name, column in points.items()}
+    ensemble(system, np.zeros(len(system.states)), corners)  # ranges and periodicity of the forcing are checked there
+    return grid
+
+
+def axis(system: System, name: str, given: Any) -> np.ndarray:
+    """Values along one parameter [SI], ascending, from (first, last, count[, scale]) or a list or array of values."""
+    if name not in system.values:
+        raise ParameterError(f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}")
+    example = f"{name}=({_text(system, name, 0.5)}, {_text(system, name, 2.0)}, 200)"
+    values = along(name, given, lambda value: single(system, name, value), "values", example)
+    if not len(values) or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
+        raise ParameterError(f"the values of {name} must ascend and be finite, such as {example}.")
+    return values
+
+
+def _text(system: System, name: str, factor: float) -> str:
+    """A multiple of a parameter's value as it is written in Python; of 1 where the value is zero."""
+    value = factor * (system.values[name] or 1.0)
+    return repr(from_si(value, system.units[name])) if system.units[name] not in ("", "1") else f"{value:g}"
+
+
+def _starts(system: System, start: Any, box: Any, seed: int) -> tuple[np.ndarray, tuple[str, ...], bool]:
+    """Starts, the directions of their sweeps, and whether they are random."""
+    if isinstance(start, str) and start in SWEEPS:
+        return np.zeros((1, len(system.states))), (SWEEPS[start],), False
+    if isinstance(start, str):
+        word, _, number = start.partition(" ")
+        if word != "random" or not re.fullmatch("0*[1-9][0-9]{0,11}", number.strip()):
+            raise ParameterError(f"start={shown(start)} isn't known. {nearest(start, (*SWEEPS, 'random 20'))} Or give states.")
+        return _random(system, int(number), box, seed), (), True
+    if box is not None:
+        raise ParameterError('box= is for random starts: start="random 20".')
+    return ensemble(system, np.zeros(len(system.states)) if start is None else start, None).start, (), False
+
+
+def _random(system: System, count: int, box: Any, seed: int) -> np.ndarray:
+    """Starts uniform in a box; states without a range start at zero."""
+    if not isinstance(box, Mapping) or not box:
+        example = ", ".join(f'"{name}": ("-1 {system.units[name]}", "1 {system.units[name]}")' for name in system.states[:2])
+        raise ParameterError(f"random starts need a box to be drawn from: box={{{example}}}.")
+    unit = np.random.default_rng(whole(seed, "seed", 0)).random((count, len(system.states)))
+    starts = np.zeros((count, len(system.states)))
+    for name, ends in box.items():
+        if name not in system.states:
+            raise ParameterError(f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}")
+        try:
+            low, high = (to_si(end, system.units[name], name) for end in ends)
+        except (TypeError, ValueError):
+            raise ParameterError(f"the range of {name} must be (low, high), not {shown(ends)}.") from None
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise ParameterError(f"the range of {name} must ascend and be finite, not {shown(ends)}.")
+        column = system.states.index(name)
+        starts[:, column] = low + (high - low) * unit[:, column]
+    return starts
