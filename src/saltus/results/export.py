@@ -55,6 +55,14 @@ def save(ds: xr.Dataset, path: Target) -> Path:
         If ``ds`` isn't a result of saltus, or the suffix is another one.
     ResultFileError
         If the file can't be written: a full disk, a missing folder.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> run = sl.simulate(sl.models.delangre("a", force="4 N"), periods=2)
+    >>> file = sl.save(run, "run.nc")
+    >>> sl.load(file).identical(run)
+    True
     """
     path = path_of(path)
     writers = {".nc": to_netcdf, ".csv": to_csv, ".mat": to_mat}
@@ -123,6 +131,14 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
         If ``ds`` isn't a result of saltus.
     ResultFileError
         If a file can't be written. None is left half-written.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> run = sl.simulate(sl.models.delangre("a", force="4 N"), periods=2)
+    >>> file = sl.to_csv(run, "run.csv")
+    >>> [line for line in file.read_text(encoding="utf-8").splitlines() if line[0] != "#"][0]
+    'time [s],period,x [m],v [m/s],mode'
     """
     try:
         _check(ds, "to_csv", (TRAJECTORY, STROBOSCOPE, RESPONSES))
@@ -182,6 +198,14 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
         If ``ds`` isn't a result of saltus, or a variable exceeds the 2 GB of this format.
     ResultFileError
         If the file can't be written.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> run = sl.simulate(sl.models.delangre("a", force="4 N"), periods=2)
+    >>> import scipy.io
+    >>> scipy.io.loadmat(sl.to_mat(run, "run.mat"))["x"].shape
+    (401, 1)
     """
     from scipy.io import savemat  # 0.2 s that only this function needs
     from scipy.io.matlab import MatWriteError

@@ -67,6 +67,14 @@ def samples(run: xr.Dataset) -> pd.DataFrame:
     ------
     ParameterError
         If ``run`` is something else.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> frame = sl.samples(sl.simulate(rig, start=("1 mm", 0), periods=10))
+    >>> list(frame.columns[:3]), len(frame)
+    (['time', 'period', 'x'], 2001)
     """
     check(run, caller="sl.samples", kinds=(TRAJECTORY, STROBOSCOPE))
     return _frame(run, tables.sample_columns(run))

@@ -38,6 +38,14 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     ------
     ResultFileError
         If the file is missing, damaged, changed since, or not a result of saltus.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> run = sl.simulate(sl.models.delangre("a", force="4 N"), periods=2)
+    >>> file = sl.save(run, "run.nc")
+    >>> sl.load(file).attrs["result_hash"] == run.attrs["result_hash"]
+    True
     """
     path = path_of(path)
     ds = _read(path)

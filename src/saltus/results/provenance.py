@@ -144,6 +144,19 @@ def describe(ds: xr.Dataset) -> str:
     -------
     str
         System, parameters, method, extent, contacts, status and hash, a line each; of attractors and basins what was found.
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is no result of saltus.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> run = sl.simulate(rig, start=("1 mm", 0), periods=10)
+    >>> print(sl.describe(run).splitlines()[0][:37])
+    delangre: mass = 3 kg, damping_ratio
     """
     check(ds, caller="describe", kinds=list(TABLES))
     lines = [f"{ds.attrs.get('system', 'system without a name')}: {_parameters(ds)}"]

@@ -9,12 +9,12 @@ import pytest
 import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.results import load
-from saltus.study.inputs import Inputs
-from saltus.study.questions.followed_tables import spectrum_table
-from saltus.study.read import parse
-from saltus.study.run import questions_of, run_study
-from saltus.study.running import Resources
-from saltus.study.status import status_tables
+from saltus.study.answers.followed_tables import spectrum_table
+from saltus.study.run.running import Resources
+from saltus.study.run.status import status_tables
+from saltus.study.run.study import questions_of, run_study
+from saltus.study.setting.inputs import Inputs
+from saltus.study.tables.read import parse
 from saltus.units import from_si
 
 HEAD = """

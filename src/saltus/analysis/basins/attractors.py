@@ -83,6 +83,18 @@ def attractors(
     ------
     ParameterError, UnitError
         If an argument can't be used.
+
+    References
+    ----------
+    Nayfeh & Balachandran, Applied Nonlinear Dynamics (1995), chapters 3, 5 and 7.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> found = sl.attractors(rig, start={"x": ["0 mm", "0.75 mm", "5 mm"], "v": 0})
+    >>> found["attractor_period"].values.tolist(), found["basin"].values.tolist()
+    ([1, 3], [0, 1, 0])
     """
     group, periods = ensemble(system, start, None), whole(periods, "periods")
     map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
@@ -137,6 +149,20 @@ def basin_fractions(
     ------
     ParameterError, UnitError
         If an argument can't be used.
+
+    References
+    ----------
+    Menck, Heitzig, Marwan & Kurths, Nature Physics 9 (2013) 89-92; Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> shares = sl.basin_fractions(rig, x=("-5 mm", "5 mm"), v=("-1 m/s", "1 m/s"), samples=200)
+    >>> shares["attractor_period"].values.tolist()
+    [1, 1, 3, 9]
+    >>> bool((shares["attractor_fraction_low"] < shares["attractor_fraction"]).all())
+    True
     """
     check_system(system)
     samples, periods, seed = whole(samples, "samples"), whole(periods, "periods"), whole(seed, "seed", 0)

@@ -76,6 +76,14 @@ def basins(
     References
     ----------
     Daza et al., Scientific Reports 6 (2016) 31416 (entropies); McDonald et al., Physica D 17 (1985) 125 (uncertainty exponent).
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> found = sl.basins(rig, x=("-5 mm", "5 mm", 20), v=("-1 m/s", "1 m/s", 20))
+    >>> found["basin"].shape, found["attractor_period"].values.tolist()
+    ((20, 20), [1, 1, 3, 9])
     """
     plan = basin_plan(system, axes, at, check_method(method), periods, every)
     show, close = reporter(progress)

@@ -65,6 +65,15 @@ def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANC
     ------
     ParameterError
         If one isn't a map of basins, or the grids differ.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> starts = {"x": ("-1 mm", "1 mm", 8), "v": ("-20 mm/s", "20 mm/s", 8)}
+    >>> exact, rough = (sl.basins(rig, method=method, **starts) for method in (sl.Taylor(), sl.Taylor(tolerance=1e-9)))
+    >>> sl.compare(exact, rough).attrs["agreement"]
+    1.0
     """
     check(map_a, caller="compare", kinds=[BASINS])
     check(map_b, caller="compare", kinds=[BASINS])

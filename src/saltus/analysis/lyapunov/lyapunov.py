@@ -110,6 +110,14 @@ def lyapunov(
     Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980) 9-30; Eckmann & Ruelle, Rev. Mod. Phys. 57 (1985) 617-656; Leine &
     Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (2004), section 7; Flyvbjerg & Petersen, J. Chem. Phys. 91 (1989)
     461-466; Wolf, Swift, Swinney & Vastano, Physica D 16 (1985) 285-317.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> spectrum = sl.lyapunov(rig, start=(0, 0), periods=400)
+    >>> str(spectrum["kind"].values[0]), spectrum["lyapunov_exponent"].values.round(4).tolist()  # -damping_ratio * omega, twice
+    ('periodic', [[-0.9425, -0.9425]])
     """
     check_system(system)
     _check_words(method, unit, system)

@@ -78,6 +78,15 @@ def compare_methods(
     ------
     ParameterError, UnitError
         If an argument can't be used.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> methods = [sl.ODE45(rtol=1e-6, atol=1e-9)]
+    >>> table = sl.compare_methods(rig, sl.frequency_response, methods, frequency=["16 Hz", "17 Hz"])
+    >>> table["method_agreement"].values.tolist()
+    [1.0, 1.0]
     """
     check_system(system)
     name: Any = analysis if isinstance(analysis, str) else getattr(analysis, "__name__", analysis)

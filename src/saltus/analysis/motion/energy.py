@@ -90,10 +90,13 @@ def energy_balance(
 
     Examples
     --------
-    Published models bring the three functions along::
+    Published models bring the three functions along.
 
-        rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
-        sl.energy_balance(rig, periods=20, transient=200, **sl.models.energy("delangre"))
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
+    >>> balance = sl.energy_balance(rig, periods=20, transient=200, **sl.models.energy("delangre"))
+    >>> bool(balance["imbalance"].max() < 1e-10)
+    True
     """
     check_system(system)
     method = check_method(method)

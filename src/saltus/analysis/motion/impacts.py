@@ -91,6 +91,14 @@ def impact_statistics(
     References
     ----------
     Standard errors: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992) 473-483, section 3.2 (batch means).
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> impacts = sl.impact_statistics(rig, start=("0.75 mm", 0), periods=30, transient=300)
+    >>> impacts.sizes["contact"]  # four in three periods
+    40
     """
     check_system(system)
     method = check_method(method)

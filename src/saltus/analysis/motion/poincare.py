@@ -87,6 +87,14 @@ def poincare(
     References
     ----------
     M. Henon, On the numerical computation of Poincare maps, Physica D 5 (1982) 412-414.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> turns = sl.poincare(rig, start=("0.75 mm", 0), surface="x turns", periods=3, transient=300)
+    >>> turns.sizes["crossing"]
+    6
     """
     check_system(system)
     method = check_method(method)

@@ -53,6 +53,14 @@ def settled(run: xr.Dataset, *, tolerance: float = TOLERANCE, last: int | None =
     ------
     ParameterError
         If the system isn't forced, or fewer than two whole periods were kept.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> run = sl.simulate(rig, start=("0.75 mm", 0), periods=400, keep=100)
+    >>> int(sl.settled(run)["response_period"])
+    3
     """
     check(run, caller="settled")
     phases = _phases(run)

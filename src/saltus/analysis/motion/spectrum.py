@@ -75,6 +75,15 @@ def spectrum(
     References
     ----------
     F. J. Harris, On the use of windows for harmonic analysis with the discrete Fourier transform, Proc. IEEE 66 (1978) 51-83.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> run = sl.simulate(rig, start=("0.75 mm", 0), periods=400, keep=100)
+    >>> lines = sl.spectrum(run, "x")
+    >>> round(float(lines["order"][int(lines["x_amplitude"].argmax("frequency"))]), 3)  # the subharmonic at a third of 17 Hz
+    0.333
     """
     schema.check(run, caller="spectrum", kinds=[schema.TRAJECTORY])
     if window is not None and not among(window, WINDOWS):

@@ -59,6 +59,19 @@ def stroboscope(
         If an argument can't be used, or the system isn't forced.
     Interrupted
         On Ctrl-C; its ``partial`` is the Dataset so far.
+
+    References
+    ----------
+    Guckenheimer & Holmes, Nonlinear Oscillations, Dynamical Systems, and Bifurcations of Vector Fields (1983), section 1.5.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> points = sl.stroboscope(rig, start=("0.75 mm", 0), periods=300)
+    >>> x = points["x"].values[0]
+    >>> bool(abs(x[300] - x[297]) < 1e-6 < abs(x[300] - x[299]))  # it repeats after three periods
+    True
     """
     method = check_method(method)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)

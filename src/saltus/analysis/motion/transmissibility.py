@@ -40,6 +40,16 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
     ------
     ParameterError
         If ``ds`` holds no responses, or no such output.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N")
+    >>> force = {"spring_force": lambda x, *, mass, natural_frequency: mass * (2 * sl.pi * natural_frequency) ** 2 * x}
+    >>> responses = sl.frequency_response(rig, frequency=["16 Hz"], outputs=force)
+    >>> ratio = sl.transmissibility(responses, "spring_force", to="x")
+    >>> round(float(ratio["transmissibility"][0]))  # a linear spring: its rate [N/m]
+    2961
     """
     check(ds, caller="transmissibility", kinds=[RESPONSES])
     known = ds["output"].values.tolist() if "output" in ds else []

@@ -131,6 +131,17 @@ def wolf(
     ----------
     Wolf, Swift, Swinney & Vastano, Physica D 16 (1985) 285-317; Fraser & Swinney, Phys. Rev. A 33 (1986) 1134-1140; Kennel, Brown &
     Abarbanel, Phys. Rev. A 45 (1992) 3403-3411.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import saltus as sl
+    >>> x = [0.3]
+    >>> for _ in range(2000):
+    ...     x.append(1 - 1.4 * x[-1] ** 2 + 0.3 * (x[-2] if len(x) > 1 else 0.0))
+    >>> exponent = sl.wolf(np.array(x[100:]), 1)  # Henon's map: 0.419 per iterate
+    >>> str(exponent["kind"].values[0]), bool(0.35 < exponent["lyapunov_exponent"].values[0, 0] < 0.5)
+    ('chaotic', True)
     """
     if not among(unit, UNITS):
         raise ParameterError(f"the exponent isn't given in {shown(unit)}. {nearest(unit, UNITS)}")

@@ -70,6 +70,19 @@ def bifurcation_diagram(
         If an argument can't be used.
     Interrupted
         On Ctrl-C; its ``partial`` is the Dataset of what was finished.
+
+    References
+    ----------
+    Nayfeh & Balachandran, Applied Nonlinear Dynamics (1995), chapters 3 and 5.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> stiffness = {"contact_stiffness": ["10 kN/m", "20 kN/m"]}
+    >>> responses = sl.bifurcation_diagram(rig, stiffness, start={"x": ["0 mm", "0.75 mm"], "v": 0})
+    >>> responses["response_period"].values.tolist()
+    [1, 3, 1, 2]
     """
     if not isinstance(vary, Mapping):
         raise ParameterError('vary must be a mapping, such as vary={"contact_stiffness": ("1e3 N/m", "1e9 N/m", 200, "log")}.')

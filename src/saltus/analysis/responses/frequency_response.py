@@ -86,6 +86,18 @@ def frequency_response(
         If an argument can't be used.
     Interrupted
         On Ctrl-C; its ``partial`` is the Dataset of what was finished.
+
+    References
+    ----------
+    Nayfeh & Balachandran, Applied Nonlinear Dynamics (1995), chapters 3 and 5; Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> responses = sl.frequency_response(rig, frequency=("15 Hz", "18 Hz", 4), start={"x": ["0 mm", "5 mm"], "v": 0})
+    >>> responses["response_frequency"].values.tolist(), responses["response_branch"].values.tolist()
+    ([15.0, 15.0, 16.0, 16.0, 17.0, 18.0], [0, 1, 0, 1, 1, 1])
     """
     check_system(system)
     if system.forced_at is None:
