@@ -87,7 +87,15 @@ def basins(
     """
     plan = basin_plan(system, axes, at, check_method(method), periods, every)
     show, close = reporter(progress)
-    result = Settling.empty(plan.cells, len(system.states))
+    try:
+        return map_of_plan(plan, threads, show)
+    finally:
+        close()
+
+
+def map_of_plan(plan: BasinPlan, threads: int | None, show: Callable[[float], None] | None) -> xr.Dataset:
+    """The Dataset of a plan. Raises Interrupted with that of what is labelled."""
+    result = Settling.empty(plan.cells, len(plan.system.states))
     found = None
     try:
         found = plan.scout(threads, _part(show, 0.0, SCOUTING))
@@ -96,8 +104,6 @@ def basins(
     except KeyboardInterrupt:
         scouted = found
         raise Interrupted(None if scouted is None else lambda: plan.dataset(result, scouted, threads)) from None
-    finally:
-        close()
 
 
 def label_all(

@@ -26,10 +26,10 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.replication.job import Show
 from saltus.results import attractors_dataset
-from saltus.study.run.maps import jobs_of
+from saltus.study.answers.basins import maps_of
 from saltus.study.setting import quantities
 from saltus.study.setting.setting import method_of, system_of
-from saltus.study.tables.parts import METHODS
+from saltus.study.tables.methods import METHODS
 from saltus.study.tables.spec import Study
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ def halved(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noq
 # -- basins --------------------------------------------------------------------------------------------------------------------
 def mapped(settings: Settings, inputs: Inputs, show: Show) -> xr.Dataset:  # noqa: ARG001
     """The basin map of the settings, a study with one map."""
-    (job,) = jobs_of(study_of(settings))
+    (job,) = maps_of(study_of(settings))
     plan = replace(job.plan, scouts=settings["scouts"])
     found = plan.scout(1, lambda share: show(SCOUTING * share))
     result = Settling.empty(plan.cells, len(plan.system.states))

@@ -8,12 +8,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from saltus.results.files import ResultFileError, replacing
+from saltus.interrupt import Interrupted
+from saltus.results import load, save
+from saltus.results.files import ResultFileError
 from saltus.results.provenance import to_json
 from saltus.study.run.running import Report, Running
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from saltus.study.answers.question import Question
 
 #: Attribute of a result that holds its identity.
 IDENTITY = "study_identity"
@@ -21,19 +25,15 @@ IDENTITY = "study_identity"
 PARTIAL = "-partial"
 
 
-def kept_or_computed(
-    stem: str, title: str, identity: Mapping[str, str], compute: Callable[[Callable[[float], None]], xr.Dataset], at: Running
-) -> xr.Dataset:
+def kept_or_computed(question: Question, found: Mapping[str, xr.Dataset], at: Running) -> xr.Dataset:
     """The result in ``STEM.nc`` if it is that of this question, else computed and kept there.
 
     Parameters
     ----------
-    stem, title : str
-        Name of the file; of the question.
-    identity : mapping of str to str
-        What must be the same for the file to be the answer.
-    compute : callable
-        Takes what is called with the share done.
+    question : Question
+        What is asked. One without an identity is answered again each time.
+    found : mapping of str to Dataset
+        The answers that it takes, by stem.
     at : Running
         Where.
 
@@ -42,18 +42,21 @@ def kept_or_computed(
     Interrupted
         On Ctrl-C; what was computed so far is kept in ``STEM-partial.nc``.
     """
-    file = at.folder / f"{stem}.nc"
+    title, identity = question.title, question.identity()
+    file = at.folder / f"{question.stem}.nc"
+    if identity is None:
+        ds = question.compute(found, at.resources.threads, lambda _: None)
+        save(ds, file)
+        return ds
     kept = _kept(file, title, identity, at.say)
     if kept is not None:
         at.report(Report(title, 100, 100, 0.0, 0, last=True, what="%"))
         return kept
-    return _computed(file, title, identity, compute, at)
+    return _computed(file, title, identity, lambda show: question.compute(found, at.resources.threads, show), at)
 
 
 def _kept(file: Path, title: str, identity: Mapping[str, str], say: Callable[[str], None]) -> xr.Dataset | None:
     """The result in a file, if it is there, sound, and of this identity."""
-    from saltus.results import load
-
     if not file.exists():
         return None
     try:
@@ -72,8 +75,6 @@ def _kept(file: Path, title: str, identity: Mapping[str, str], say: Callable[[st
 def _computed(
     file: Path, title: str, identity: Mapping[str, str], compute: Callable[[Callable[[float], None]], xr.Dataset], at: Running
 ) -> xr.Dataset:
-    from saltus.flow import Interrupted
-    from saltus.results import save
 
     begin = time.perf_counter()
 
@@ -94,16 +95,3 @@ def _computed(
     partial.unlink(missing_ok=True)
     show(1.0, last=True)
     return ds
-
-
-def save_picture(figure: Any, file: Path) -> Path:
-    """Write a figure, in full or not at all, and forget it."""
-    import matplotlib.pyplot as plt
-
-    from saltus.plot.picture import keep_drawable
-
-    keep_drawable(figure)  # a title is the user's text
-    with replacing(file) as (part,):
-        figure.savefig(part, dpi=150, format=file.suffix[1:])
-    plt.close(figure)
-    return file
