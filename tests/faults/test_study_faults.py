@@ -31,11 +31,11 @@ from saltus.cli.app import app
 from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.store import Store
-from saltus.study import maps
-from saltus.study.maps import compute, finish, jobs_of, open_store
-from saltus.study.questions.basins_table import attractor_table
-from saltus.study.read import parse
-from saltus.study.running import Resources
+from saltus.study.answers.basins_table import attractor_table
+from saltus.study.run import maps
+from saltus.study.run.maps import compute, finish, jobs_of, open_store
+from saltus.study.run.running import Resources
+from saltus.study.tables.read import parse
 from small_maps import small_maps
 from small_study import small_study
 
@@ -54,11 +54,11 @@ saltus.analysis.basins.pipeline.CHUNK = 24
 saltus.analysis.basins.pipeline.SCOUTS, saltus.analysis.basins.pipeline.CHECKED = 64, 64
 
 if __name__ == "__main__":  # a process of --workers computes chunks only
-    import saltus.plot, saltus.study.maps, saltus.study.read, saltus.study.run
+    import saltus.plot, saltus.study.run.maps, saltus.study.tables.read, saltus.study.run.study
     from saltus.cli import main
     from saltus.results.store import Store
 
-    saltus.study.maps.CHUNK = 24
+    saltus.study.run.maps.CHUNK = 24
     commit = Store.commit
 
     def slow_commit(self, index, values):
@@ -351,7 +351,7 @@ def test_ctrl_c_with_workers(server, undisturbed, tmp_path):
 MASK = """
 import signal
 from multiprocessing import resource_tracker
-from saltus.study.processes import _without_ctrl_c
+from saltus.study.run.processes import _without_ctrl_c
 with _without_ctrl_c():
     resource_tracker.getfd()  # as the start of a process does
     print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ()))

@@ -6,8 +6,8 @@ import pytest
 
 import motions_data as data
 import saltus as sl
+from saltus.cli.draw import draw
 from saltus.errors import ParameterError
-from saltus.study.draw import draw
 
 
 @pytest.fixture(autouse=True)

@@ -167,7 +167,7 @@ def test_the_hash_of_a_job_covers_all_that_its_code_calls():
     assert strangers(files, (*known, *NO_NUMBERS, *siblings)) == set()
 
 
-@pytest.mark.parametrize("changed", ["delangre.py", "setting.py", "spec_parts.py", "lyapunov_table.py", "intervals.py", "units.py"])
+@pytest.mark.parametrize("changed", ["delangre.py", "setting.py", "parts.py", "lyapunov_table.py", "intervals.py", "units.py"])
 def test_an_edit_of_a_model_or_of_the_reading_is_another_result(shelf, tmp_path, monkeypatch, changed):
     before = Job("one", {"value": 1.0}, compute).identity({})
     edited_copy(tmp_path, changed, monkeypatch)

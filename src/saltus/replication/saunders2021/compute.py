@@ -26,11 +26,11 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.replication.job import Show
 from saltus.results import attractors_dataset
-from saltus.study import quantities
-from saltus.study.maps import jobs_of
-from saltus.study.setting import method_of, system_of
-from saltus.study.spec import Study
-from saltus.study.spec_parts import METHODS
+from saltus.study.run.maps import jobs_of
+from saltus.study.setting import quantities
+from saltus.study.setting.setting import method_of, system_of
+from saltus.study.tables.parts import METHODS
+from saltus.study.tables.spec import Study
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,9 +19,9 @@ from saltus.flow import Taylor
 from saltus.replication.job import Show
 from saltus.replication.saunders2021.compute import Inputs, Settings, method_in
 from saltus.results import methods_dataset
-from saltus.study import quantities
-from saltus.study.setting import system_of
-from saltus.study.spec_parts import SystemTable
+from saltus.study.setting import quantities
+from saltus.study.setting.setting import system_of
+from saltus.study.tables.parts import SystemTable
 
 if TYPE_CHECKING:
     import xarray as xr

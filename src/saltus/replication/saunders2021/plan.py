@@ -8,8 +8,8 @@ from typing import Any
 
 from saltus.replication.job import Job
 from saltus.replication.saunders2021 import compute, compute_responses
-from saltus.study.read import read
-from saltus.study.spec import Study
+from saltus.study.tables.read import read
+from saltus.study.tables.spec import Study
 
 TAYLOR = {"name": "Taylor"}
 #: The paper's sections 4 (validation) and 5 (with and without event location).

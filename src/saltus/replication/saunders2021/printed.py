@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from saltus.replication.papers import folder_of
-from saltus.study.questions.printed import rows
+from saltus.study.answers.printed import rows
 
 
 def contacts() -> list[tuple[str, int, float]]:

@@ -13,7 +13,7 @@ from saltus.replication.saunders2021.pictures.looks import LOOKS
 from saltus.replication.saunders2021.pictures.rows import trios
 from saltus.replication.verdict import Data
 from saltus.results.schema import kind_text
-from saltus.study.questions.simulate_compare import residuals
+from saltus.study.answers.simulate_compare import residuals
 from saltus.study.table import TextTable
 
 #: A wider interval of an exponent says nothing [1/s].

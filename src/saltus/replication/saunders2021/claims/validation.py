@@ -11,7 +11,7 @@ from saltus.replication.saunders2021.claims.reading import SECTION_4, band, chec
 from saltus.replication.verdict import Claim, Data, Finding
 from saltus.results.measured import read_measured
 from saltus.results.schema import period_text
-from saltus.study.questions.simulate_compare import residuals
+from saltus.study.answers.simulate_compare import residuals
 
 #: Agreement of event times with printed ones that only the same arithmetic gives [s].
 SAME_DIGITS = 1e-12
