@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 from pathlib import Path
 
@@ -41,6 +42,18 @@ LONGEST = (
     "conformance/test_time.py",
     "faults/test_interrupted_runs.py",
 )
+
+
+def pytest_configure():
+    """Collecting makes a million objects, all of which stay: it isn't looked again and again for some that don't."""
+    gc.disable()
+
+
+def pytest_collection_finish():
+    """Nor later, while tests run."""
+    gc.collect()
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(config, items):
