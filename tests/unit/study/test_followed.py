@@ -193,6 +193,19 @@ def test_what_changed_is_computed_again(whole, tmp_path, monkeypatch, old, new, 
     assert len(calls) == 1
 
 
+@pytest.mark.parametrize("question", [SECTION, SPECTRUM, IMPACTS, ENERGY, "[lyapunov]\n"])
+def test_the_values_of_the_system_are_part_of_every_answer(question, tmp_path):
+    """They aren't hidden by the values that the question itself may have."""
+
+    def identity(text):
+        return questions_of(parse(text), None, Inputs(tmp_path))[0].identity()
+
+    before, after = identity(HEAD + question), identity(HEAD.replace("4 N", "5 N") + question)
+    assert {name for name in before if before[name] != after[name]} == {"values"}
+    varied = identity(HEAD + question + 'values.frequency = ["15 Hz", "16 Hz"]\n')
+    assert {name for name in before if before[name] != varied[name]} == {"values of the question"}
+
+
 # -- what is refused before anything is computed ---------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("text", "told"),

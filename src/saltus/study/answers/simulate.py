@@ -45,7 +45,7 @@ def questions(table: Simulate, setting: Setting) -> list[Question]:
         "t_start": quantities.number(table.t_start, "s", "simulate", "t_start"),
         "samples": table.samples,
         "keep": table.keep,
-        "varied": quantities.varied(system, table.values),
+        "values": quantities.varied(system, table.values) or None,
     }
     return [Motion(setting, arguments)]
 
@@ -94,11 +94,10 @@ class Motion(Question):
         from saltus.analysis.motion.simulate import simulate
 
         system = self.setting.base
-        call = {name: value for name, value in self.arguments.items() if name != "varied"}
 
         def compute(show: Callable[[float], None]) -> xr.Dataset:
             try:
-                return simulate(system, method=method, values=self.arguments["varied"], threads=at.resources.threads, progress=show, **call)
+                return simulate(system, method=method, threads=at.resources.threads, progress=show, **self.arguments)
             except ParameterError as error:
                 raise fault("simulate", error) from error
 
