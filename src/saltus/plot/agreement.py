@@ -18,8 +18,8 @@ from saltus.plot.basins import paint
 from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, style
-from saltus.results.reader import reader
-from saltus.results.schema import kind_text
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import kind_text
 
 _CALLER = "plot.agreement"
 #: Colour and name of each value of the agreement; differences are the news.

@@ -22,7 +22,7 @@ from saltus.plot import maps
 from saltus.plot.palette import shades
 from saltus.plot.picture import picture
 from saltus.plot.style import QUIET, Scale
-from saltus.results.reader import reader
+from saltus.results.dataset.reader import reader
 from saltus.units import from_si
 
 _CALLER = "plot.basins"

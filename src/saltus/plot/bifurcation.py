@@ -14,8 +14,8 @@ from saltus.plot import kinds, regions
 from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import QUIET, Scale
-from saltus.results.reader import reader
-from saltus.results.schema import response_name, sample_name, states_of
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import response_name, sample_name, states_of
 
 _CALLER = "plot.bifurcation_diagram"
 #: What the vertical axis shows, by what was sampled.

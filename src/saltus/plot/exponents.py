@@ -13,8 +13,8 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import EXPONENTS, check, kind_text
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import EXPONENTS, check, kind_text
 
 _CALLER = "plot.exponents"
 #: Share of the time at the beginning whose running means aren't shown: they start anywhere, with intervals beyond any frame.

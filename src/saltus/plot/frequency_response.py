@@ -17,9 +17,9 @@ from saltus.plot import kinds
 from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, Scale
-from saltus.results.measured import read_measured
-from saltus.results.reader import reader
-from saltus.results.schema import states_of
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import states_of
+from saltus.results.files.measured import read_measured
 from saltus.units import to_si
 
 _CALLER = "plot.frequency_response"

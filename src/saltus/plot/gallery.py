@@ -21,8 +21,8 @@ from saltus.plot.history import history
 from saltus.plot.phase import phase
 from saltus.plot.picture import picture
 from saltus.plot.style import display_scale, style
-from saltus.results import schema
-from saltus.results.reader import reader
+from saltus.results.dataset import schema
+from saltus.results.dataset.reader import reader
 
 _CALLER = "plot.gallery"
 #: Forcing periods in the time history of a response that doesn't repeat, and the fewest of one that does: it takes two to see a repeat.

@@ -16,8 +16,8 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import TRAJECTORY, check, contact_name, equations_of, forcing_period, states_of
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import TRAJECTORY, check, contact_name, equations_of, forcing_period, states_of
 
 _CALLER = "plot.history"
 #: Marker, face and name of each kind of contact. Hollow means undecided.

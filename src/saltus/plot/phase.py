@@ -14,8 +14,8 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import STROBOSCOPE, check, kind_of, states_of
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import STROBOSCOPE, check, kind_of, states_of
 
 _CALLER = "plot.phase"
 #: Without `periods` the last part of a forced run is shown: transients of lightly damped systems have mostly gone by then (of the rig with

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from saltus.errors import ParameterError
 from saltus.plot import kinds, maps
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.schema import event_name, parameters_of, response_name
+from saltus.results.dataset.schema import event_name, parameters_of, response_name
 
 #: What a picture of responses takes: a Dataset, or several by their names.
 Source = xr.Dataset | Mapping[str, xr.Dataset]

@@ -14,8 +14,8 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import SECTION, check, states_of
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import SECTION, check, states_of
 
 _CALLER = "plot.section"
 #: What can stand on an axis besides the states: variable and name.

@@ -15,8 +15,8 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import SPECTRUM, check, states_of
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import SPECTRUM, check, states_of
 
 _CALLER = "plot.spectrum"
 #: The picture reaches down to this share of the largest amplitude, and up to the last frequency that has so much; the rest is what

@@ -16,8 +16,8 @@ from saltus.plot import kinds, maps
 from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import Scale
-from saltus.results.reader import reader
-from saltus.results.schema import parameters_of, start_name, states_of
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import parameters_of, start_name, states_of
 from saltus.units import from_si
 
 _CALLER = "plot.type_map"
