@@ -50,9 +50,10 @@ def pytest_configure():
 
 
 def pytest_collection_finish():
-    """Nor later, while tests run."""
+    """Nor later, while tests run. What they make is looked at once there is more of it than by default."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(50_000, 10, 50)
     gc.enable()
 
 

@@ -369,7 +369,7 @@ def cache_clear(
     """Delete the compiled kernels. They are built again when they are needed.
 
     The folder also knows the checksums of the result files that saltus wrote here, so that they are loaded at once. They stay: a file
-    whose checksum is forgotten is read by another process first, which takes a second. With --all they go too.
+    whose checksum is forgotten is read by another process first, which takes some tenths of a second. With --all they go too.
 
     Example: `saltus cache clear`
     """
