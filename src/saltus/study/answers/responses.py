@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from saltus.errors import SaltusError, StudyError
-from saltus.results.measured import measured_points
+from saltus.results.files.measured import measured_points
 from saltus.study.answers.question import Found, OneVerb, first_figure
 from saltus.study.answers.responses_rows import tables
 from saltus.study.tables.wording import fault

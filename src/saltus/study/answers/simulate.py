@@ -72,7 +72,7 @@ class Motion(OneVerb):
         """Phase portrait, or time history of a system of one state; of a large batch the first trajectories."""
         from saltus import plot
         from saltus.plot.selection import MOST
-        from saltus.results.schema import states_of
+        from saltus.results.dataset.schema import states_of
 
         draw = plot.phase if len(states_of(ds)) > 1 else plot.history
         some = {"trajectory": ds["trajectory"].values[:MOST].tolist()} if "trajectory" in ds.dims else {}

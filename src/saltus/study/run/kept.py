@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.interrupt import Interrupted
 from saltus.results import load, save
-from saltus.results.files import ResultFileError
+from saltus.results.files.atomic import ResultFileError
 from saltus.results.provenance import to_json
 from saltus.study.run.running import Report, Running
 

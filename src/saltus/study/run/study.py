@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from saltus.results import save
-from saltus.results.files import remove_old_drafts
+from saltus.results.files.atomic import remove_old_drafts
 from saltus.study.answers.ask import questions_of, told_of
 from saltus.study.answers.basins import BasinMap
 from saltus.study.run.copies import keep_copy
@@ -21,7 +21,7 @@ from saltus.study.tables.spec import Study
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.results.store import Store
+    from saltus.results.store.store import Store
     from saltus.study.answers.question import Question
     from saltus.system import System
 

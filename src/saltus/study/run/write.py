@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.results import to_csv
-from saltus.results.files import replacing
+from saltus.results.files.atomic import replacing
 from saltus.study.run.running import Outcome, Running
 
 if TYPE_CHECKING:
