@@ -31,8 +31,8 @@ import numpy as np
 import xarray as xr
 
 import saltus as sl
+from saltus.cli.doctor import processor
 from saltus.codegen.module import lane_width
-from saltus.study.doctor import processor
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 

@@ -150,7 +150,7 @@ def table(repeats: int, folder: Path | None) -> None:
     """Print both tables, and keep them in a folder if there is one."""
     from benchmarks.record import Column, Record, Table
 
-    from saltus.study.doctor import processor
+    from saltus.cli.doctor import processor
 
     columns = (
         Column("equation"), Column("states"), Column("saltus, CPU [s]", ".2f"), Column("saltus, wall [s]", ".2f"),

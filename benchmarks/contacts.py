@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 
 import saltus as sl
+from saltus.cli.doctor import processor
 from saltus.codegen.module import lane_width
 from saltus.flow import engine
-from saltus.study.doctor import processor
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))

@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 import saltus as sl
+from saltus.cli.doctor import processor
 from saltus.codegen.module import lane_width
-from saltus.study.doctor import processor
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from saltus.cli.doctor import processor
 from saltus.codegen.module import lane_width
-from saltus.study.doctor import processor
 
 #: Packages whose versions matter to a measurement.
 PACKAGES = ("saltus", "numpy", "llvmlite", "numba", "scipy", "heyoka", "pynamicalsys")

@@ -23,8 +23,8 @@ from pathlib import Path
 from statistics import median
 
 import saltus as sl
+from saltus.cli.doctor import processor
 from saltus.flow import engine
-from saltus.study.doctor import processor
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 from pathlib import Path
 
@@ -41,6 +42,19 @@ LONGEST = (
     "conformance/test_time.py",
     "faults/test_interrupted_runs.py",
 )
+
+
+def pytest_configure():
+    """Collecting makes a million objects, all of which stay: it isn't looked again and again for some that don't."""
+    gc.disable()
+
+
+def pytest_collection_finish():
+    """Nor later, while tests run. What they make is looked at once there is more of it than by default."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 10, 50)
+    gc.enable()
 
 
 def pytest_collection_modifyitems(config, items):

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from saltus.analysis.basins import pipeline
-from saltus.study import maps
+from saltus.study.run import maps
 
 
 @contextmanager

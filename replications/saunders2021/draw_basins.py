@@ -89,7 +89,7 @@ def _words(one: xr.Dataset) -> str:
 
 def _panel(ax: Axes, ds: xr.Dataset, row: _Row, look: Look) -> None:
     colors = dict(enumerate(hues(max(len(row.entries), 1))))
-    pair = maps.plane(ds, "basin", "replication")
+    pair = maps.plane(ds, "basin")
     scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
     maps.draw_cells(ax, ds, pair, scales, paint(row.cells[look.label], colors))
     values = json.loads(ds.attrs["parameters"])

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from saltus import plot
 from saltus.plot import maps
 from saltus.plot.style import OKABE_ITO
-from saltus.study.questions.simulate_compare import residuals
+from saltus.study.answers.simulate_compare import residuals
 
 from . import printed
 from .looks import Data
@@ -145,7 +145,7 @@ def _multipliers(one: xr.Dataset) -> str:
 def where_a_step_leads(data: Data) -> Figure:
     """Fig. 4: which response at 17 Hz the motion at 16 Hz turns into, by where it is when the frequency changes."""
     ds, run = data["fig4/step"], data["fig4/exact"].isel(trajectory=0)
-    colors = maps.colors_of(ds, None, "figure 4")
+    colors = maps.colors_of(ds, None)
     dim = run["x"].dims[0]
     last = run.isel({dim: slice(-201, -1)})
     figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")

@@ -30,9 +30,9 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.replication import Job
 from saltus.results import attractors_dataset, methods_dataset
-from saltus.study.read import read
-from saltus.study.setting import method_of, system_of
-from saltus.study.spec import Study
+from saltus.study.setting.setting import method_of, system_of
+from saltus.study.tables.read import read
+from saltus.study.tables.spec import Study
 from saltus.system import System
 from saltus.units import to_si
 

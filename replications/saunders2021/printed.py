@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from saltus.study.questions.printed import rows
+from saltus.study.answers.printed import rows
 
 
 def contacts() -> list[tuple[str, int, float]]:

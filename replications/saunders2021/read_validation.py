@@ -11,7 +11,7 @@ import xarray as xr
 from saltus.replication import folder_of
 from saltus.results.measured import read_measured
 from saltus.results.schema import period_text
-from saltus.study.questions.simulate_compare import residuals
+from saltus.study.answers.simulate_compare import residuals
 
 from .printed import contacts
 from .reading import Data, between, either

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.results.schema import kind_text
-from saltus.study.questions.simulate_compare import residuals
+from saltus.study.answers.simulate_compare import residuals
 from saltus.study.table import TextTable
 
 from . import printed

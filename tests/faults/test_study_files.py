@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 from faults.mutated_studies import ROOT, SEEDS, mutated
 from saltus.cli.app import app
 from saltus.errors import SaltusError, StudyError
-from saltus.study.copies import keep_copy
-from saltus.study.inputs import Input, Inputs
-from saltus.study.read import parse, read
-from saltus.study.run import questions_of
+from saltus.study.run.copies import keep_copy
+from saltus.study.run.study import questions_of
+from saltus.study.setting.inputs import Input, Inputs
+from saltus.study.tables.read import parse, read
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links are POSIX")
 HEAD = '[study]\nname = "one start"\n[system]\nmodel = "delangre"\ncase = "b"\nforce = "4 N"\nfrequency = "15 Hz"\n'

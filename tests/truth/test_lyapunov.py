@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from function_maps import FunctionFlow, FunctionMap
 from jumps import jumping
-from saltus.analysis.lyapunov.segments import MapWalk
 from saltus.analysis.lyapunov.spectrum import kind_of, spectrum
 from saltus.errors import SaltusWarning
-from saltus.flow.maps import FunctionMap, Stroboscope
+from saltus.flow.maps import Stroboscope
 
 ORBITS = list(csv.DictReader((Path(__file__).parents[1] / "reference" / "orbits.csv").open()))
 #: Minus zeta omega_n, and twice that: the sum of the exponents of the rig.
@@ -22,7 +22,7 @@ CHAOTIC = {"contact_stiffness": 2.89e7, "frequency": 5.0}
 
 
 def lyapunov_of(map_, start, count=4000, transient=100):
-    return spectrum(MapWalk(map_), np.atleast_2d(np.asarray(start, float)), count, transient)
+    return spectrum(FunctionFlow(map_), np.atleast_2d(np.asarray(start, float)), count, transient)
 
 
 def drawn(count, size=1, seed=1):
@@ -211,7 +211,7 @@ def test_an_orbit_that_is_still_approached_slowly_is_recognised():
     """The logistic map at 2.998: multiplier -0.998; after 3100 iterates the distance is far above rounding."""
     logistic = FunctionMap(lambda z: 2.998 * z * (1 - z), "x", lambda z: (2.998 * (1 - 2 * z))[:, :, None])
     found = lyapunov_of(logistic, [0.3], 3000)
-    assert abs(found.growth.stretch.trail[0, -1, 0] - found.orbits[0].points[0, 0]) > 1e-5
+    assert abs(found.growth.segment.points[0, -1, 0] - found.orbits[0].points[0, 0]) > 1e-5
     assert found.kinds == ["periodic"]
     assert found.exponents[0, 0] == pytest.approx(math.log(0.998), abs=1e-12)
 

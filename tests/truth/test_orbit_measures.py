@@ -12,7 +12,7 @@ from conformance.systems import lab
 from saltus.analysis.orbits.orbit_measures import measure
 from saltus.analysis.outputs import outputs_of
 from saltus.errors import ParameterError, TraceError
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 
 LINEAR = lab.with_values(spring=1.0, damping=0.1, force=0.6, boundary=50.0)
 FREQUENCIES = np.array([0.05, 0.12, 0.159, 0.2, 0.4])
@@ -23,7 +23,7 @@ OUTPUTS = {
 
 
 def numbers(system, states, periods, method=None, outputs=None):
-    family = Family(system, method or sl.Taylor(), np.tile(list(system.values.values()), (len(states), 1)))
+    family = Stroboscope(system, method or sl.Taylor(), np.tile(list(system.values.values()), (len(states), 1)))
     return measure(family, np.array(states, float), np.array(periods), outputs=outputs_of(system, outputs))
 
 

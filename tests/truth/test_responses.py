@@ -9,7 +9,6 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.orbits.polish import close
-from saltus.flow.family import Family
 from saltus.flow.maps import Stroboscope
 
 ORBITS = {row["name"]: row for row in csv.DictReader((Path(__file__).parents[1] / "reference" / "orbits.csv").open())}
@@ -93,7 +92,7 @@ def test_many_orbits_are_closed_as_one_is():
     rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
     starts = np.array([start_of(name) for name in ("B4_15_high", "B4_15_P3", "B4_15_P4")])
     values = np.tile(np.array(list(rig.values.values())), (3, 1))
-    orbits = close(Family(rig, sl.Taylor(), values), starts * 1.0001, np.array([2, 3, 8]), np.tile([1e-3, 0.1], (3, 1)), 64)
+    orbits = close(Stroboscope(rig, sl.Taylor(), values), starts * 1.0001, np.array([2, 3, 8]), np.tile([1e-3, 0.1], (3, 1)), 64)
     assert orbits.period.tolist() == [1, 3, 4]  # the smallest period is found
     assert orbits.stable.all()
     for i, name in enumerate(("B4_15_high", "B4_15_P3", "B4_15_P4")):

@@ -9,7 +9,7 @@ import saltus as sl
 from saltus.analysis.orbits.cycles import find_cycles, returns
 from saltus.analysis.orbits.equilibria import find_equilibria
 from saltus.analysis.responses.continuation import HALVINGS
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 
 FAST = sl.Taylor(order=12, lanes=2)
 
@@ -52,7 +52,7 @@ def test_a_limit_cycle_has_the_period_size_and_multipliers_of_the_closed_form(ho
 
 @pytest.mark.parametrize("turns", [1, 2, 67, 108, 115])
 def test_a_cycle_that_was_looked_for_over_many_turns_has_its_smallest_period(turns):
-    family = Family(planar, FAST, np.array([[1.0, 2.0, 1.0]]), 1.0)
+    family = Stroboscope(planar, FAST, np.array([[1.0, 2.0, 1.0]]), 1.0)
     cycle = find_cycles(family, np.array([[1.0, 1e-3]]), np.array([turns * np.pi]), np.ones((1, 2)))
     np.testing.assert_allclose(cycle.period, np.pi, rtol=1e-12)
 
@@ -136,7 +136,7 @@ def test_van_der_pol_agrees_with_an_independent_solver(mu):
 
 
 def test_a_guess_at_several_turns_gives_one_turn():
-    family = Family(planar, FAST, np.array([[1.0, 1.0, 1.0]]), 1.0)
+    family = Stroboscope(planar, FAST, np.array([[1.0, 1.0, 1.0]]), 1.0)
     seen = returns(family, np.array([[1.0, 0.0]]), 50.0)
     assert seen.time[0] == pytest.approx(2 * np.pi, rel=1e-9)
     cycles = find_cycles(family, np.array([[0.9, 0.1]]), np.array([6 * np.pi]), np.ones((1, 2)))
@@ -144,7 +144,7 @@ def test_a_guess_at_several_turns_gives_one_turn():
 
 
 def test_an_unstable_equilibrium_is_found_and_captures_nothing():
-    family = Family(planar, FAST, np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]]), 1.0)
+    family = Stroboscope(planar, FAST, np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]]), 1.0)
     found = find_equilibria(family, np.full((2, 2), 0.01), np.ones((2, 2)))
     np.testing.assert_allclose(found.place, 0.0, atol=1e-12)
     assert found.stable.tolist() == [False, True]

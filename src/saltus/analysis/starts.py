@@ -12,7 +12,7 @@ import numpy as np
 from saltus.analysis.axes import along
 from saltus.errors import ParameterError, SaltusError, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.family import NO_PERIOD
+from saltus.flow.maps import NO_PERIOD
 from saltus.system import expression as ex
 from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System

@@ -13,9 +13,9 @@ from saltus.cli.app import app
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
-    from saltus.study.inputs import Inputs
-    from saltus.study.running import Resources
-    from saltus.study.spec import Study
+    from saltus.study.run.running import Resources
+    from saltus.study.setting.inputs import Inputs
+    from saltus.study.tables.spec import Study
     from saltus.system import System
 
 
@@ -77,9 +77,9 @@ def demo(
 
     Example: `saltus demo --case c --frequency "5 Hz"`
     """
+    from saltus.cli import demo as study
     from saltus.cli import screen
     from saltus.results import save, usable_folder
-    from saltus.study import demo as study
 
     usable_folder(out)
     if plot:
@@ -124,10 +124,10 @@ def run(
 
     Example: `saltus run replications/saunders2021/fig6b.toml --workers 2`
     """
+    from saltus.cli.own_system import own_system
     from saltus.results import usable_folder
-    from saltus.study.inputs import Inputs
-    from saltus.study.own_system import own_system
-    from saltus.study.read import read
+    from saltus.study.setting.inputs import Inputs
+    from saltus.study.tables.read import read
 
     spec, text = read(study)
     for place in inputs or []:
@@ -140,7 +140,7 @@ def run(
 
 
 def _resources(spec: Study, threads: int | None, workers: int | None, scheduler: str, shard: str) -> Resources:
-    from saltus.study.running import Resources, shard_of
+    from saltus.study.run.running import Resources, shard_of
 
     if spec.basins is None and (workers or scheduler or shard):
         raise StudyError("--workers, --scheduler and --shard are for studies of basins; this one has no [basins]. Leave them out.")
@@ -152,7 +152,7 @@ def _run(
     again: str,
 ) -> None:  # fmt: skip
     from saltus.cli import screen
-    from saltus.study.run import run_study
+    from saltus.study.run.study import run_study
 
     try:
         with screen.reporting(progress.value) as (report, say):
@@ -181,7 +181,7 @@ def status(
     Example: `saltus status saltus-runs/fig6b`
     """
     from saltus.cli import screen
-    from saltus.study.status import status_tables
+    from saltus.study.run.status import status_tables
 
     for table in status_tables(store):
         screen.show(table)
@@ -202,9 +202,9 @@ def resume(
 
     Example: `saltus resume saltus-runs/fig6b`
     """
-    from saltus.study.copies import copy_of, inputs_of
-    from saltus.study.own_system import own_system
-    from saltus.study.read import read
+    from saltus.cli.own_system import own_system
+    from saltus.study.run.copies import copy_of, inputs_of
+    from saltus.study.tables.read import read
 
     spec, text = read(copy_of(store))
     own = own_system(system) if system else None
@@ -227,7 +227,7 @@ def plot(
     Example: `saltus plot saltus-demo/demo.nc --trajectory 2 --kind phase -o phase.pdf`
     """
     from saltus.cli import screen
-    from saltus.study.draw import draw
+    from saltus.cli.draw import draw
 
     screen.files([draw(result, None if kind is None else kind.value, trajectory, out)])
 
@@ -307,8 +307,8 @@ def doctor() -> None:
 
     Example: `saltus doctor`
     """
+    from saltus.cli import doctor as study
     from saltus.cli import screen
-    from saltus.study import doctor as study
 
     screen.show(study.machine())
     with screen.working():
@@ -327,7 +327,7 @@ def schema() -> None:
     """
     import json
 
-    from saltus.study.spec import Study
+    from saltus.study.tables.spec import Study
 
     typer.echo(json.dumps(Study.model_json_schema(), indent=2, ensure_ascii=False))
 
@@ -369,7 +369,7 @@ def cache_clear(
     """Delete the compiled kernels. They are built again when they are needed.
 
     The folder also knows the checksums of the result files that saltus wrote here, so that they are loaded at once. They stay: a file
-    whose checksum is forgotten is read by another process first, which takes a second. With --all they go too.
+    whose checksum is forgotten is read by another process first, which takes some tenths of a second. With --all they go too.
 
     Example: `saltus cache clear`
     """

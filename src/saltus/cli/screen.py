@@ -18,7 +18,7 @@ from rich.table import Table
 from saltus.fence import printable
 
 if TYPE_CHECKING:
-    from saltus.study.running import Report
+    from saltus.study.run.running import Report
     from saltus.study.table import TextTable
 
 #: Columns assumed where the output isn't a terminal: a table in a log file isn't cut.

@@ -1,10 +1,9 @@
 """The compiled flow of one equation, as the engine calls it: at once with sizes that are read as it runs, and made again once it has work.
 
-Three tiers give the same bits, for they are the same operations in the same order:
+Two tiers give the same bits, for they are the same operations in the same order:
 
 generic   the templates' machine code serves all equations and is on disk; only the equation is compiled, in a fraction of a second
-shape     sizes and tables are known to the compiler; one for all equations of one shape
-full      the equation too: one piece of code
+full      sizes, tables and the equation are known to the compiler: one piece of code
 
 A flow begins generic. Once it has worked for `STEADY_AFTER` seconds another process makes it again; it is kept on disk, and exchanged
 between two calls. The next process finds it there and begins with it.
@@ -28,7 +27,7 @@ from saltus.codegen.head import Constant, Head
 from saltus.codegen.interface import Interface
 from saltus.codegen.lane_ir import constants_ir, equation_ir
 
-GENERIC, SHAPE, FULL = TIERS = ("generic", "shape", "full")
+GENERIC, FULL = TIERS = ("generic", "full")
 #: What a flow becomes.
 STEADY = FULL
 #: Seconds of work after which a flow is made again: making it costs some three seconds of another processor, and gains a tenth.

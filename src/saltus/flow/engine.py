@@ -54,6 +54,12 @@ class Schedule:
         """No samples."""
         return cls(np.zeros(0, np.int64), np.zeros(0))
 
+    @classmethod
+    def even(cls, periods: int, per_period: int, first: int = 0, beyond: int = 0) -> Schedule:
+        """So many samples in each of some periods from ``first`` on, at equal distances from its start, and some ``beyond`` them."""
+        index = first * per_period + np.arange(periods * per_period + beyond)
+        return cls(index // per_period, (index % per_period) / per_period)
+
 
 @dataclass(frozen=True)
 class Request:

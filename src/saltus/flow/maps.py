@@ -1,10 +1,10 @@
-"""Maps: what attractors and basins are asked of. The stroboscope of a flow, or any function from states to states, behind one interface."""
+"""Maps: what orbits, attractors, responses and exponents are asked of. The stroboscope of a flow, or any function of states."""
 
 from __future__ import annotations
 
+import copy
 import functools
-import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -12,15 +12,25 @@ import numpy as np
 from saltus.errors import ParameterError, shown
 from saltus.flow import engine
 from saltus.flow.engine import Request, Schedule
-from saltus.flow.family import NO_PERIOD, Family
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
+from saltus.system.overlaps import check_overlaps
 from saltus.system.system import System
 from saltus.system.tangent import tangent_system
 
-#: Looks at the mode in each period, where contacts aren't located.
-LOOKS = 32
+#: Samples of the mode in each period, where contacts aren't located.
+MODE_SAMPLES = 32
+#: What a system without forcing needs, as the end of a sentence.
+NO_PERIOD = (
+    'has no forcing period: give every=, the time between two looks at the motion, such as every="0.1 s", about a turn of it. '
+    "Answers don't depend on it."
+)
+#: The noise of a method is relative to a box of starts; a motion is some ten times smaller. Measured for ode45 at (1e-4, 1e-7) on the rig's
+#: responses: its returns scatter by 0.05 to 2 % of their range with location, by 0.3 to 4 % without.
+BOX_PER_MOTION = 10.0
+#: Share of the range of a motion beyond which a mismatch is no noise.
+MAX_NOISE = 0.03
 
 
 class Travel(Protocol):
@@ -56,30 +66,41 @@ class Travel(Protocol):
 class Map(Protocol):
     """A map of states to states. k points, D states.
 
+    A map has one row of parameter values for all points, or a row for each of them: row i of all arrays then belongs to row i.
+
     Attributes
     ----------
     states : tuple of str
         Their names.
-    period : float
+    period : float64[1 or k]
         Time of one iterate [s]; 1 for a map without time.
-    noise : float
-        Mismatch of a closed orbit, relative to the range of the states, that the map's own errors explain.
-    exact : Map or None
-        Of a map that errors of its own blur: the map without them. None where errors are rounding.
     """
 
     states: tuple[str, ...]
-    period: float
-    noise: float
+    period: np.ndarray
 
     @property
-    def exact(self) -> Map | None:
-        """See above."""
+    def noise(self) -> float:
+        """Mismatch of a closed orbit that the map's own errors explain, relative to the range of a box of starts."""
+
+    @property
+    def exact(self) -> bool:
+        """Whether these errors are rounding, so that Newton's method closes orbits."""
+
+    @property
+    def exact_map(self) -> Map | None:
+        """Of a map that isn't exact: the map without its errors. None of an exact one."""
+
+    def noise_of(self, scale: np.ndarray) -> np.ndarray:
+        """The noise relative to the ranges float64[m, D] of motions, float64[m]."""
+
+    def rows(self, which: np.ndarray) -> Map:
+        """The map of some of the rows: int64[m], with repeats if wanted, or bool[k]. A single row is repeated for each."""
 
     def launch(self, start: np.ndarray, longest: float) -> Travel:
         """Trajectories from float64[k, D]; they will be asked for ``longest`` iterates at most."""
 
-    def tangent(self, start: np.ndarray, count: int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def tangent(self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Ends float64[k, D] of ``count`` iterates, and the derivative times ``directions`` (default: identity) float64[k, D, D]."""
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -95,153 +116,112 @@ class Stroboscope:
         Equations and values.
     method : Method
         How to integrate.
-    every : float, optional
+    parameters : float64[k, P], optional
+        Values in the order of ``system.values``: one row for all points, or a row for each. Default: those of the system.
+    every : float or float64[k], optional
         Time between two looks [s]: for systems without forcing.
     threads : int, optional
-        Threads for :meth:`tangent` and :meth:`sequences`.
-    """
-
-    def __init__(self, system: System, method: Method, every: float | None = None, threads: int | None = None):
-        if (every is None) == (system.forced_at is None):
-            raise ParameterError(f"{system.name} {NO_PERIOD if every is None else 'is forced: leave every= out.'}")
-        self.system, self.method, self.states, self._threads = system, method, system.states, threads
-        self.period = float(system.period() if every is None else every)
-        if not 0 < self.period < math.inf:
-            raise ParameterError(f"every must be a positive time, not {shown(every)}.")
-        self._parameters = np.array([list(system.values.values())])
-        self._tangent = tangent_system(system)
-        self.noise = method.noise
-        self._every = every
-
-    @functools.cached_property
-    def exact(self) -> Stroboscope | None:
-        """See :class:`Map`."""
-        return None if self.method.exact else Stroboscope(self.system, self.method.companion(), self._every, self._threads)
-
-    def family(self, count: int) -> Family:
-        """The same map for so many trajectories."""
-        every = self.period if self.system.forced_at is None else None
-        return Family(self.system, self.method, np.repeat(self._parameters, count, axis=0), every, self._threads)
-
-    def launch(self, start: np.ndarray, longest: float) -> Flight:
-        """See :class:`Map`."""
-        return Flight(self.system, self.method, start, self._parameters, np.full(len(start), self.period), longest)
-
-    def tangent(self, start: np.ndarray, count: int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """See :class:`Map`."""
-        k, size = start.shape
-        first = np.broadcast_to(np.eye(size), (k, size, size)) if directions is None else directions
-        outcome = self._run(self._tangent, np.concatenate([start, first.reshape(k, size * size)], axis=1), count, None)
-        lost = ~np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED))
-        outcome.state[lost] = np.nan
-        return outcome.state[:, :size], outcome.state[:, size:].reshape(k, size, size)
-
-    def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
-        """See :class:`Map`."""
-        if not self.method.records_contacts:
-            return self._modes(start, count)
-        outcome = self._run(self.system, start, count, 0)
-        table = outcome.record_integers
-        codes = np.ravel_multi_index((table[:, st.REC_KIND], table[:, st.REC_DIRECTION] + 1, table[:, st.REC_GUARD]), (3, 3, 2**31))
-        return outcome.state, np.split(codes, np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(1, len(start))))
-
-    def _modes(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Where contacts aren't located: the modes in which the motion is seen, one after the other, stand for them."""
-        index = np.arange(count * LOOKS)
-        outcome = self._run(self.system, start, count, None, Schedule(index // LOOKS, (index % LOOKS) / LOOKS))
-        return outcome.state, [row[np.flatnonzero(np.diff(row, prepend=-1))] for row in outcome.sample_mode]
-
-    def trajectory(self, start: np.ndarray, count: int, samples: int) -> tuple[np.ndarray, engine.Outcome]:
-        """States at ``samples`` instants of each of ``count`` periods, the start included, float64[k, count * samples, D]; the outcome."""
-        index = np.arange(count * samples)
-        outcome = self._run(self.system, start, count, 0, Schedule(index // samples, (index % samples) / samples))
-        return outcome.samples, outcome
-
-    def _run(self, system: System, start: np.ndarray, count: int, record: int | None, schedule: Schedule | None = None) -> engine.Outcome:
-        k = len(start)
-        ends = np.full(k, count, np.int64)
-        request = Request(start, self._parameters, np.full(k, self.period), 0.0, ends, np.zeros(k), schedule or Schedule.none(), record)
-        return engine.run(system, self.method, request, self._threads)
-
-
-class FunctionMap:
-    """A map given as a function of arrays: ``image = function(states)`` with float64[k, D] in and out.
-
-    Parameters
-    ----------
-    function : callable
-        The map; must treat each row alone.
-    states : str
-        Names of the states, such as ``"x y"``.
-    derivative : callable
-        ``derivative(states) -> float64[k, D, D]``.
-    noise : float
-        Size of the errors that the function makes, relative to the range of the states.
-    exact : Map, optional
-        The map without these errors, where they are more than rounding.
+        Threads for everything but :meth:`launch`.
     """
 
     def __init__(
         self,
-        function: Callable[[np.ndarray], np.ndarray],
-        states: str,
-        derivative: Callable[[np.ndarray], np.ndarray],
-        noise: float = 1e-12,
-        exact: Map | None = None,
+        system: System,
+        method: Method,
+        parameters: np.ndarray | None = None,
+        every: float | np.ndarray | None = None,
+        threads: int | None = None,
     ):
-        self.states, self.period, self.noise, self.exact = tuple(states.split()), 1.0, noise, exact
-        self._function, self._derivative = function, derivative
+        if (every is None) == (system.forced_at is None):
+            raise ParameterError(f"{system.name} {NO_PERIOD if every is None else 'is forced: leave every= out.'}")
+        if every is not None and not (np.isfinite(every) & (np.asarray(every) > 0)).all():
+            raise ParameterError(f"every must be a positive time, not {shown(every)}.")
+        self.system, self.method, self.states, self.threads = system, method, system.states, threads
+        self.parameters = np.atleast_2d(np.array(list(system.values.values()) if parameters is None else parameters, float))
+        check_overlaps(system, self.values)
+        period = system.period(self.values) if every is None else every
+        self.period = np.broadcast_to(np.asarray(period, float), len(self)).copy()
 
-    def launch(self, start: np.ndarray, longest: float) -> _Iterates:  # noqa: ARG002
-        """See :class:`Map`."""
-        return _Iterates(self._function, start)
+    def __len__(self) -> int:
+        return len(self.parameters)
 
-    def tangent(self, start: np.ndarray, count: int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    @property
+    def values(self) -> Mapping[str, np.ndarray]:
+        """Parameter values by name, float64[k] each."""
+        return dict(zip(self.system.values, self.parameters.T, strict=True))
+
+    @property
+    def noise(self) -> float:
         """See :class:`Map`."""
-        state, matrix = start, np.eye(start.shape[1]) if directions is None else directions
-        with np.errstate(all="ignore"):
-            for _ in range(count):
-                matrix = self._derivative(state) @ matrix
-                state = self._function(state)
-        return state, np.broadcast_to(matrix, (*start.shape, start.shape[1]))
+        return self.method.noise
+
+    @property
+    def exact(self) -> bool:
+        """See :class:`Map`."""
+        return self.method.exact
+
+    @functools.cached_property
+    def exact_map(self) -> Stroboscope | None:
+        """See :class:`Map`."""
+        return None if self.exact else self.by(self.method.companion())
+
+    def noise_of(self, scale: np.ndarray) -> np.ndarray:
+        """See :class:`Map`."""
+        return np.minimum(BOX_PER_MOTION * self.method.noise_of(scale), MAX_NOISE)
+
+    def by(self, method: Method) -> Stroboscope:
+        """The same rows by another method."""
+        return self._with(method=method)
+
+    def rows(self, which: np.ndarray, threads: int | None = None) -> Stroboscope:
+        """See :class:`Map`; with other threads if they are given."""
+        index = np.flatnonzero(which) if which.dtype == bool else which
+        index = np.zeros_like(index) if len(self) == 1 else index
+        return self._with(parameters=self.parameters[index], period=self.period[index], threads=threads or self.threads)
+
+    def with_period(self, time: np.ndarray) -> Stroboscope:
+        """The same rows with other times between two looks [s], float64[k]: for systems without forcing."""
+        return self._with(period=np.array(time, float))
+
+    def of_system(self, system: System) -> Stroboscope:
+        """The same rows and periods for another system with the same parameters."""
+        return self._with(system=system, states=system.states)
+
+    def _with(self, **changed: object) -> Stroboscope:
+        other = copy.copy(self)  # nothing of what was checked changes
+        other.__dict__.pop("exact_map", None)
+        other.__dict__.update(changed)
+        return other
+
+    def launch(self, start: np.ndarray, longest: float) -> Flight:
+        """See :class:`Map`. On one thread."""
+        return Flight(self.system, self.method, start, self.parameters, np.broadcast_to(self.period, len(start)).copy(), longest)
+
+    def run(
+        self, start: np.ndarray, periods: np.ndarray | int, schedule: Schedule | None = None, record: int | None = None
+    ) -> engine.Outcome:
+        """Trajectories of so many periods each, with samples at a schedule; contacts from period ``record`` on are kept."""
+        k = len(start)
+        ends = np.broadcast_to(np.asarray(periods, np.int64), k).copy()
+        period = np.broadcast_to(self.period, k).copy()
+        request = Request(start, self.parameters, period, 0.0, ends, np.zeros(k), schedule or Schedule.none(), record)
+        return engine.run(self.system, self.method, request, self.threads)
+
+    def tangent(self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`Map`."""
+        k, size = start.shape
+        first = np.broadcast_to(np.eye(size), (k, size, size)) if directions is None else directions
+        extended = np.concatenate([start, first.reshape(k, size * size)], axis=1)
+        outcome = self.of_system(tangent_system(self.system)).run(extended, count)
+        outcome.state[~np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED))] = np.nan
+        return outcome.state[:, :size], outcome.state[:, size:].reshape(k, size, size)
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
         """See :class:`Map`."""
-        state = start
-        with np.errstate(all="ignore"):
-            for _ in range(count):
-                state = self._function(state)
-        return state, [np.zeros(0, np.int64)] * len(start)
-
-
-class _Iterates:
-    """Trajectories of a function map."""
-
-    def __init__(self, function: Callable[[np.ndarray], np.ndarray], start: np.ndarray):
-        self._function, self.state, self.age = function, np.array(start, float), 0
-
-    def __len__(self) -> int:
-        return len(self.state)
-
-    @property
-    def going(self) -> np.ndarray:
-        return np.isfinite(self.state).all(axis=1)
-
-    @property
-    def status(self) -> np.ndarray:
-        return np.where(self.going, st.OK, st.NONFINITE)
-
-    @property
-    def unresolved(self) -> np.ndarray:
-        return np.zeros(len(self), np.int64)
-
-    def advance(self, periods: int) -> np.ndarray:
-        points = np.empty((len(self), periods, self.state.shape[1]))
-        with np.errstate(all="ignore"):
-            for j in range(periods):
-                points[:, j] = self.state = self._function(self.state)
-        self.age += periods
-        return points
-
-    def keep(self, wanted: np.ndarray) -> None:
-        self.state = self.state[wanted]
+        if not self.method.records_contacts:  # the modes in which the motion is seen, one after the other, stand for contacts
+            outcome = self.run(start, count, Schedule.even(count, MODE_SAMPLES))
+            return outcome.state, [row[np.flatnonzero(np.diff(row, prepend=-1))] for row in outcome.sample_mode]
+        outcome = self.run(start, count, record=0)
+        table = outcome.record_integers
+        codes = np.ravel_multi_index((table[:, st.REC_KIND], table[:, st.REC_DIRECTION] + 1, table[:, st.REC_GUARD]), (3, 3, 2**31))
+        return outcome.state, np.split(codes, np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(1, len(start))))

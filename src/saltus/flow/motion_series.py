@@ -14,7 +14,7 @@ import numpy as np
 from saltus.codegen.clocks import table_data
 from saltus.codegen.plain_series import series_module
 from saltus.flow import polynomials
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.set_aside import Boundaries
 from saltus.kernels.isolation import ROUNDING
 from saltus.system.system import System
@@ -76,19 +76,19 @@ class Nodes:
 
 
 class MotionSeries:
-    """The Taylor series of a family's states, of some quantities (the last guards of ``watched``) and of its gaps."""
+    """The Taylor series of a map_'s states, of some quantities (the last guards of ``watched``) and of its gaps."""
 
-    def __init__(self, family: Family, watched: System, guards: int):
-        self._family, self._guards, self._own = family, guards, len(family.system.guards)
+    def __init__(self, map_: Stroboscope, watched: System, guards: int):
+        self._map, self._guards, self._own = map_, guards, len(map_.system.guards)
         self._asked = np.r_[guards : len(watched.guards), 0 : self._own]
         self._module: ModuleType = series_module(watched, ORDER)
-        k, module = len(family), self._module
+        k, module = len(map_), self._module
         self._tables = table_data(watched)
         self._constants, self._turns = np.zeros((max(module.NCONST, 1), k)), np.zeros((module.CLOCK_ROWS, k))
         self._drifts = np.zeros(k, bool)
-        for i, row in enumerate(family.parameters):
+        for i, row in enumerate(map_.parameters):
             module.constants(row, self._constants, i)
-            self._drifts[i] = module.turns(row, 0.0, family.period[i], 0, i, self._turns)
+            self._drifts[i] = module.turns(row, 0.0, map_.period[i], 0, i, self._turns)
 
     def none(self) -> Pieces:
         """No pieces at all."""
@@ -142,16 +142,16 @@ class MotionSeries:
         """Phase, time at phase zero, the phases of all harmonics there, what the clocks hold; and the time to the next break of one."""
         module, motion = self._module, nodes.motion
         clock = self._turns[:, motion]
-        clock[module.TAU], clock[module.BASE] = nodes.phase, nodes.period * self._family.period[motion]
+        clock[module.TAU], clock[module.BASE] = nodes.phase, nodes.period * self._map.period[motion]
         for i in np.flatnonzero(self._drifts[motion]):
             row = motion[i]
-            module.turns(self._family.parameters[row], 0.0, self._family.period[row], int(nodes.period[i]), i, clock)
+            module.turns(self._map.parameters[row], 0.0, self._map.period[row], int(nodes.period[i]), i, clock)
         room = np.full(len(motion), np.inf)
         if module.NCLOCKS:
             numbers, held = np.zeros((module.NUMBERS + 1) * module.NCLOCKS), np.zeros(module.HELD * module.NCLOCKS)
             for at, who in enumerate(motion.tolist()):
-                period, count = self._family.period[who], int(nodes.period[at])
-                module.place_clocks(self._family.parameters[who], 0.0, period, count, numbers, self._tables)
+                period, count = self._map.period[who], int(nodes.period[at])
+                module.place_clocks(self._map.parameters[who], 0.0, period, count, numbers, self._tables)
                 room[at] = module.set_clocks(nodes.phase[at], count * period, numbers, self._tables, False, held) - nodes.phase[at]
                 clock[module.CLOCK_ROW :, at] = held
         return clock, room
@@ -161,7 +161,7 @@ class MotionSeries:
     ) -> np.ndarray:
         """Steps cut down to where the right-hand side agrees with the series: a term may sleep at the node."""
         module, width = self._module, len(h)
-        period = self._family.period[nodes.motion]
+        period = self._map.period[nodes.motion]
         lanes = SimpleNamespace(
             work=work, side=side, c=constants, clock=clock, probe_y=np.zeros((module.NSTATES, width)), probe_clock=np.zeros_like(clock),
             probe_rate=np.zeros((3 * module.NSTATES, width)),

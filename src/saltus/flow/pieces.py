@@ -15,7 +15,7 @@ import numpy as np
 
 from saltus.flow import polynomials
 from saltus.flow.engine import Outcome, Schedule
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.motion_series import MotionSeries, Nodes, Pieces
 from saltus.kernels import status as st
 from saltus.system.expression import Expr
@@ -30,12 +30,14 @@ WIDTH = 2048
 SAME = 1e-9
 
 
-def pieces(family: Family, start: np.ndarray, periods: int, quantities: Sequence[Expr], guards: Sequence[Guard]) -> tuple[Pieces, Outcome]:
-    """The motions from float64[k, D] over so many periods, row i by row i of the family.
+def pieces(
+    map_: Stroboscope, start: np.ndarray, periods: int, quantities: Sequence[Expr], guards: Sequence[Guard]
+) -> tuple[Pieces, Outcome]:
+    """The motions from float64[k, D] over so many periods, row i by row i of the map.
 
     Parameters
     ----------
-    family : Family
+    map_ : Stroboscope
         The flow.
     start : float64[k, D]
         States at a whole period.
@@ -52,40 +54,39 @@ def pieces(family: Family, start: np.ndarray, periods: int, quantities: Sequence
         The quantities are the states, then those asked for, then the gaps of the system. A motion that didn't reach the end has no pieces.
     """
     asked = tuple(Guard(f"quantity {i}", quantity) for i, quantity in enumerate(quantities))
-    watched = replace(family.system, guards=(*guards, *asked))
-    whole, outcome = _pieces(family, start, periods, watched, len(guards), not family.method.records_contacts)
-    if family.method.records_contacts:
+    watched = replace(map_.system, guards=(*guards, *asked))
+    whole, outcome = _pieces(map_, start, periods, watched, len(guards), not map_.method.records_contacts)
+    if map_.method.records_contacts:
         without = np.setdiff1d(np.arange(len(start)), whole.motion[np.isfinite(whole.terms).all(axis=(0, 1))])
         bad = np.union1d(without, whole.motion[~np.isfinite(whole.terms).all(axis=(0, 1))])
         bad = bad[np.isfinite(outcome.state[bad]).all(axis=1)]
         if len(bad):  # a pole, or a law whose series isn't known where it begins
-            cubics = _pieces(family.rows(bad), start[bad], periods, watched, len(guards), True)[0]
+            cubics = _pieces(map_.rows(bad), start[bad], periods, watched, len(guards), True)[0]
             kept = whole.rows(~np.isin(whole.motion, bad))
             whole = _joined([[kept, replace(cubics, motion=bad[cubics.motion])]])
     return whole, outcome
 
 
-def nodes_of(family: Family, cubic: bool = False) -> int:
+def nodes_of(map_: Stroboscope, cubic: bool = False) -> int:
     """Samples of a period."""
-    if cubic or not family.method.records_contacts:
+    if cubic or not map_.method.records_contacts:
         return SAMPLES
-    return NODES if family.exact else NODES_INEXACT
+    return NODES if map_.exact else NODES_INEXACT
 
 
-def _pieces(family: Family, start: np.ndarray, periods: int, watched: System, guards: int, cubic: bool) -> tuple[Pieces, Outcome]:
+def _pieces(map_: Stroboscope, start: np.ndarray, periods: int, watched: System, guards: int, cubic: bool) -> tuple[Pieces, Outcome]:
     """The pieces by Taylor series, or by cubics, and what the flow computed."""
-    count = nodes_of(family, cubic)
-    index = np.arange(periods * count + cubic)
-    schedule = Schedule(index // count, (index % count) / count)
-    outcome = family.run(start, periods, schedule, record=0)
-    nodes, series = _nodes(family, outcome, periods, schedule, cubic), MotionSeries(family, watched, guards)
+    count = nodes_of(map_, cubic)
+    schedule = Schedule.even(periods, count, beyond=int(cubic))
+    outcome = map_.run(start, periods, schedule, record=0)
+    nodes, series = _nodes(map_, outcome, periods, schedule, cubic), MotionSeries(map_, watched, guards)
     parts = [series.of(nodes.rows(slice(first, first + WIDTH)), cubic) for first in range(0, len(nodes.motion), WIDTH)]
     whole = _joined(parts or [[series.none()]])
     return (_between(whole) if cubic else whole), outcome
 
 
 # -- nodes ---------------------------------------------------------------------------------------------------------------------
-def _nodes(family: Family, outcome: Outcome, periods: int, schedule: Schedule, cubic: bool) -> Nodes:
+def _nodes(map_: Stroboscope, outcome: Outcome, periods: int, schedule: Schedule, cubic: bool) -> Nodes:
     """Samples and contacts in one list, without what lies at one instant with the next."""
     k, m, size = outcome.samples.shape
     table, numbers = outcome.record_integers, outcome.record_floats
@@ -93,12 +94,12 @@ def _nodes(family: Family, outcome: Outcome, periods: int, schedule: Schedule, c
     nodes = Nodes(
         np.concatenate([np.repeat(np.arange(k), m), table[:, st.REC_TRAJECTORY]]),
         np.concatenate([np.tile(schedule.count, k), table[:, st.REC_PERIOD]]),
-        np.concatenate([(family.period[:, None] * schedule.fraction).ravel(), numbers[:, st.REC_PHASE]]),
+        np.concatenate([(map_.period[:, None] * schedule.fraction).ravel(), numbers[:, st.REC_PHASE]]),
         np.repeat([0.0, 1.0], [k * m, len(table)]),  # for now: whether it is a contact
         np.concatenate([outcome.samples.reshape(-1, size), numbers[:, st.RECORD_FLOATS : st.RECORD_FLOATS + size]]),
         np.concatenate([outcome.sample_mode.ravel(), table[:, st.REC_MODE_AFTER]]),
     )
-    period = family.period[nodes.motion]
+    period = map_.period[nodes.motion]
     order = np.lexsort((nodes.length, nodes.period * period + nodes.phase, nodes.motion))  # a sample before a contact at one instant
     nodes, period = nodes.rows(order), period[order]
     behind = np.zeros(len(order), bool)

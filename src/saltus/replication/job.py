@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.results.provenance import content_hash
 from saltus.study.identity import PACKAGE, identity
-from saltus.study.kept import kept_or_computed
-from saltus.study.names import slug
+from saltus.study.run.kept import kept_or_computed
+from saltus.study.tables.parts import slug
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.running import Running
+    from saltus.study.run.running import Running
     from saltus.system import System
 
 #: Attribute of a result: how long it took [s].

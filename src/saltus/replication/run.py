@@ -19,7 +19,7 @@ from saltus.replication.tables import claims_table
 from saltus.replication.verdict import Finding, undecided
 from saltus.results.files import ResultFileError, replacing, usable_folder
 from saltus.results.lock import WHOLE, locked
-from saltus.study.running import Report, Resources, Running
+from saltus.study.run.running import Report, Resources, Running
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -27,7 +27,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     ----------
     path : str or path
         A ``.nc`` file. One that wasn't written by this user's saltus on this machine, or by ``to_netcdf`` of xarray, is tried in another
-        process first, which takes a second: a damaged or malicious file can keep its reader busy for ever.
+        process first, which takes some tenths of a second: a damaged or malicious file can keep its reader busy for ever.
 
     Returns
     -------

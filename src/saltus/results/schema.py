@@ -41,11 +41,10 @@ METHODS, EXPONENTS = "methods", "exponents"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
-    TRAJECTORY: "simulate", STROBOSCOPE: "stroboscope", BASINS: "basins", ATTRACTORS: "attractors", AGREEMENT: "compare",
-    RESPONSES: "frequency_response or bifurcation_diagram",
-    METHODS: "compare_methods",
-    SECTION: "poincare", SPECTRUM: "spectrum", IMPACTS: "impact_statistics", ENERGY: "energy_balance",
-    EXPONENTS: "lyapunov",
+    TRAJECTORY: "sl.simulate", STROBOSCOPE: "sl.stroboscope", BASINS: "sl.basins", ATTRACTORS: "sl.attractors or sl.basin_fractions",
+    AGREEMENT: "sl.compare", RESPONSES: "sl.frequency_response or sl.bifurcation_diagram", METHODS: "sl.compare_methods",
+    SECTION: "sl.poincare", SPECTRUM: "sl.spectrum", IMPACTS: "sl.impact_statistics", ENERGY: "sl.energy_balance",
+    EXPONENTS: "sl.lyapunov or sl.wolf",
 }  # fmt: skip
 
 #: Kinds that hold the states under their own names.
@@ -304,10 +303,11 @@ def forcing_period(ds: xr.Dataset) -> float:
 
 def check(ds: Any, *, caller: str, kinds: Sequence[str] = (TRAJECTORY, STROBOSCOPE)) -> None:
     """Raise a ParameterError unless ``ds`` is a result of saltus of one of these kinds."""
-    wanted = " or ".join(MAKERS[kind] for kind in kinds)
+    *makers, last = " or ".join(MAKERS[kind] for kind in kinds).split(" or ")
+    wanted = f"{', '.join(makers)} or {last}" if makers else last
     if not isinstance(ds, xr.Dataset):
         hint = " A DataArray holds one variable: give the whole Dataset." if isinstance(ds, xr.DataArray) else ""
-        raise ParameterError(f"{caller} takes the Dataset that {wanted} returns, not a {type(ds).__name__}.{hint}")
+        raise ParameterError(f"{caller} takes the Dataset that {wanted} returns, not {a_or_an(type(ds).__name__)}.{hint}")
     kind = kind_of(ds)
     if not kind:
         raise ParameterError(
@@ -321,17 +321,23 @@ def check(ds: Any, *, caller: str, kinds: Sequence[str] = (TRAJECTORY, STROBOSCO
         raise ParameterError(f"{caller} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not some variables of it.")
 
 
+def a_or_an(word: str) -> str:
+    """The word with its article."""
+    return f"{'an' if word[0].lower() in 'aeio' else 'a'} {word}"
+
+
 def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
     """Variables without which nothing can be said about a result."""
     if kind in (TRAJECTORY, STROBOSCOPE):
         return (*states_of(ds), "status")
+    if kind == SECTION:
+        return (*states_of(ds), "crossing_time", "status")
     return {
         BASINS: ("basin", "status", "attractor_type"),
         ATTRACTORS: ("attractor_type",),
         AGREEMENT: ("agreement", "match_a"),
         RESPONSES: ("response_of", "response_type", "response_branch"),
         METHODS: ("method", "agrees"),
-        SECTION: (*states_of(ds), "crossing_time", "status"),
         SPECTRUM: ("frequency", "window"),
         IMPACTS: ("contact_speed", "contacts_per_second", "status"),
         ENERGY: ("energy", "residual", "status"),

@@ -23,11 +23,12 @@ COMPUTING = ("fence", "interrupt", "unit_table", "units", "system", "kernels", "
 
 def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[str, str]:
     """Texts that must be the same to go on with what was computed: equations, values, method, arguments, code."""
-    return {
+    own = {
         "equations": system.fingerprint(), "values": to_json(dict(system.values)), "method": method.name,
-        "method options": to_json(method.options()), **{name: to_json(_plain(value)) for name, value in arguments.items()},
-        "saltus": version("saltus"), "code": code_hash(),
+        "method options": to_json(method.options()), "saltus": version("saltus"), "code": code_hash(),
     }  # fmt: skip
+    asked = {f"{name} of the question" if name in own else name: value for name, value in arguments.items()}
+    return own | {name: to_json(_plain(value)) for name, value in asked.items()}
 
 
 def _plain(value: Any) -> Any:

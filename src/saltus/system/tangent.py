@@ -33,8 +33,10 @@ def tangent_system(system: System) -> System:
     """The system with D states extended to D + D*D: the states, then the rows of Y one after the other; the same one each time.
 
     Parameter values, guards and forcing are those of the system. Y starts as the identity; its units are those of its row over those of its
-    column.
+    column. Those of copies with other values are copies of one another too: nothing is compiled again.
     """
+    if system.origin is not system:
+        return tangent_system(system.origin).with_values(**system.values)
     names, rates, units = _extension(system.states, system.jacobian, tuple(system.units.items()))
     return replace(system, states=(*system.states, *names), field=(*system.field, *rates), units=dict(units), tangent_of=system)
 

@@ -13,7 +13,7 @@ from saltus.analysis.dataset_parts import gap_units
 from saltus.analysis.motion import time_errors
 from saltus.codegen.module import lane_width
 from saltus.flow import engine
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import FEW
 from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
@@ -123,11 +123,11 @@ def test_rows_of_a_family_are_a_family_of_these_rows():
     values = np.array([list(RIG.values.values())] * 3)
     values[:, list(RIG.values).index("frequency")] = [10.0, 15.0, 20.0]
     other = falling("m")
-    looked = Family(other, sl.Taylor(), np.array([[0.1, 1e3], [0.2, 1e3], [0.3, 2e3]]), np.array([0.1, 0.2, 0.3]))
-    for family, every in ((Family(RIG, sl.Taylor(), values), None), (looked, looked.period)):
+    looked = Stroboscope(other, sl.Taylor(), np.array([[0.1, 1e3], [0.2, 1e3], [0.3, 2e3]]), np.array([0.1, 0.2, 0.3]))
+    for family, every in ((Stroboscope(RIG, sl.Taylor(), values), None), (looked, looked.period)):
         for which in (np.array([2, 0, 2]), np.array([True, False, True])):
             rows = family.rows(which)
-            truth = Family(family.system, sl.Taylor(), family.parameters[which], every if every is None else every[which])
+            truth = Stroboscope(family.system, sl.Taylor(), family.parameters[which], every if every is None else every[which])
             np.testing.assert_array_equal(rows.parameters, truth.parameters)
             np.testing.assert_array_equal(rows.period, truth.period)
             assert len(rows) == len(truth)

@@ -96,7 +96,7 @@ def test_ctrl_c_ends_with_a_message(monkeypatch, tmp_path):
     def stopped(path):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("saltus.study.read.read", stopped)
+    monkeypatch.setattr("saltus.study.tables.read.read", stopped)
     result = saltus("run", str(tmp_path / "a.toml"))
     assert result.exit_code == 130
     assert "stopped" in result.output
@@ -107,7 +107,7 @@ def test_ctrl_c_tells_the_command_that_goes_on(monkeypatch, tmp_path):
     def stopped(*args, **kwargs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("saltus.study.run.run_study", stopped)
+    monkeypatch.setattr("saltus.study.run.study.run_study", stopped)
     (tmp_path / "rig.py").write_text('import saltus as sl\n\n@sl.system(states="x v")\ndef rig(t, x, v, *, k=2.0):\n    return v, -k * x\n')
     (tmp_path / "a.toml").write_text('[study]\nname = "a"\n[system]\n[poincare]\nsurface = "x turns"\nt_end = "1 s"\n')
     own, out = f"{tmp_path / 'rig.py'}:rig", tmp_path / "an answer"
@@ -119,7 +119,7 @@ def test_a_file_that_cannot_be_written(monkeypatch, tmp_path):
     def refused(path):
         raise PermissionError(13, "Permission denied", "/out/demo.csv")
 
-    monkeypatch.setattr("saltus.study.read.read", refused)
+    monkeypatch.setattr("saltus.study.tables.read.read", refused)
     result = saltus("run", str(tmp_path / "a.toml"))
     assert result.exit_code == 2
     assert result.output.startswith("saltus: /out/demo.csv: Permission denied.")
@@ -158,7 +158,7 @@ def test_what_cache_clear_keeps_is_said_and_goes_when_asked(monkeypatch, tmp_pat
 
 
 def test_doctor_fails_if_a_check_fails(monkeypatch):
-    from saltus.study import doctor
+    from saltus.cli import doctor
 
     monkeypatch.setattr(doctor, "checks", lambda: [doctor.Check("a case", float("nan"), 1e-14)])
     result = saltus("doctor")

@@ -271,7 +271,7 @@ def test_three_measured_points_decide_if_they_are_given(rms, verdict, tmp_path, 
 @pytest.mark.parametrize("quick", [False, True])
 def test_whatever_is_asked_for_is_computed(quick):
     from saltus.replication.papers import folder_of
-    from saltus.study.names import slug
+    from saltus.study.tables.parts import slug
 
     paper = PAPER
     jobs = paper.jobs(folder_of(paper.name), quick)

@@ -13,7 +13,7 @@ from saltus.flow import ODE45
 from saltus.replication import job as jobs
 from saltus.replication import papers
 from saltus.study import identity
-from saltus.study.running import Resources, Running
+from saltus.study.run.running import Resources, Running
 from small_paper import compute, small_job, small_result
 
 CALLS = []
@@ -94,7 +94,7 @@ def test_the_code_of_saltus_is_no_paper_s_own():
 #: Packages that take no part in numbers: messages, what kinds arguments may be of, the end of work, and pictures of what was computed.
 NO_NUMBERS = ("cache_folder", "errors", "arguments", "interrupt", "plot")
 #: What only says which system, method and arguments: these are in the identity themselves.
-SAYS_WHAT = ("replication.Job", "study.read", "study.setting", "study.spec")
+SAYS_WHAT = ("replication.Job", "study.tables", "study.setting")
 
 
 def sources(place):

@@ -214,7 +214,7 @@ def test_a_single_code_comes_back_as_a_list(engine, tmp_path):
 
 
 def test_csv_says_that_it_is_for_trajectories(tmp_path):
-    with pytest.raises(ParameterError, match=r"this Dataset is from basins\. Write \.nc or \.mat; or one table of it"):
+    with pytest.raises(ParameterError, match=r"this Dataset is from sl.basins\. Write \.nc or \.mat; or one table of it"):
         to_csv(basins(), tmp_path / "map.csv")
 
 
@@ -302,8 +302,8 @@ def test_many_attractors_are_counted():
 @pytest.mark.parametrize(
     ("thing", "message"),
     [
-        (sine_run(), "takes what basins returns; this Dataset is from simulate"),
-        (agreement(), "from compare"),
+        (sine_run(), "takes what sl.basins returns; this Dataset is from sl.simulate"),
+        (agreement(), "from sl.compare"),
         (basins()[["basin", "status"]], "misses attractor_type"),
     ],
 )

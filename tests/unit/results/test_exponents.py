@@ -57,5 +57,5 @@ def test_check_knows_the_kind():
     schema.check(made(), caller="plot.exponents", kinds=[schema.EXPONENTS])
     with pytest.raises(ParameterError, match="misses running_exponent"):
         schema.check(made().drop_vars("running_exponent"), caller="plot.exponents", kinds=[schema.EXPONENTS])
-    with pytest.raises(ParameterError, match="this Dataset is from lyapunov"):
+    with pytest.raises(ParameterError, match=r"this Dataset is from sl\.lyapunov"):
         sl.settled(made())

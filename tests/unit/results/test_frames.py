@@ -63,7 +63,7 @@ def test_no_contacts_are_an_empty_table():
 
 @pytest.mark.parametrize("function", [contacts, samples])
 def test_what_is_no_run_is_refused(function, run):
-    with pytest.raises(ParameterError, match=f"sl.{function.__name__} takes the Dataset that simulate"):
+    with pytest.raises(ParameterError, match=f"sl.{function.__name__} takes the Dataset that sl.simulate"):
         function(run["x"])
-    with pytest.raises(ParameterError, match="this Dataset is from stroboscope"):
+    with pytest.raises(ParameterError, match=r"this Dataset is from sl\.stroboscope"):
         contacts(sine_points())

@@ -102,7 +102,7 @@ def test_one_trajectory_only_without_the_dim():
         ({"x": 1}, "not a dict"),
         (xr.DataArray([1.0]), "whole Dataset"),
         (xr.Dataset({"x": ("time", [1.0])}), "saltus_result"),
-        (sine_points(), "from stroboscope"),
+        (sine_points(), "from sl.stroboscope"),
         (sine_run()[["x", "status"]], "misses v"),
     ],
 )

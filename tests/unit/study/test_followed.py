@@ -9,12 +9,12 @@ import pytest
 import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.results import load
-from saltus.study.inputs import Inputs
-from saltus.study.questions.followed_tables import spectrum_table
-from saltus.study.read import parse
-from saltus.study.run import questions_of, run_study
-from saltus.study.running import Resources
-from saltus.study.status import status_tables
+from saltus.study.answers.followed_tables import spectrum_table
+from saltus.study.run.running import Resources
+from saltus.study.run.status import status_tables
+from saltus.study.run.study import questions_of, run_study
+from saltus.study.setting.inputs import Inputs
+from saltus.study.tables.read import parse
 from saltus.units import from_si
 
 HEAD = """
@@ -191,6 +191,19 @@ def test_what_changed_is_computed_again(whole, tmp_path, monkeypatch, old, new, 
     run_study(parse(text), text, folder, None, Resources(threads=1), lambda _: None, said.append, False, only=["poincare"])
     assert told in said[0]
     assert len(calls) == 1
+
+
+@pytest.mark.parametrize("question", [SECTION, SPECTRUM, IMPACTS, ENERGY, "[lyapunov]\n"])
+def test_the_values_of_the_system_are_part_of_every_answer(question, tmp_path):
+    """They aren't hidden by the values that the question itself may have."""
+
+    def identity(text):
+        return questions_of(parse(text), None, Inputs(tmp_path))[0].identity()
+
+    before, after = identity(HEAD + question), identity(HEAD.replace("4 N", "5 N") + question)
+    assert {name for name in before if before[name] != after[name]} == {"values"}
+    varied = identity(HEAD + question + 'values.frequency = ["15 Hz", "16 Hz"]\n')
+    assert {name for name in before if before[name] != varied[name]} == {"values of the question"}
 
 
 # -- what is refused before anything is computed ---------------------------------------------------------------------------------

@@ -9,12 +9,12 @@ import pytest
 import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.results import load
-from saltus.study.copies import copy_of, inputs_of
-from saltus.study.inputs import Inputs
-from saltus.study.read import parse, read
-from saltus.study.run import questions_of, run_study
-from saltus.study.running import Resources
-from saltus.study.spec import Study
+from saltus.study.run.copies import copy_of, inputs_of
+from saltus.study.run.running import Resources
+from saltus.study.run.study import questions_of, run_study
+from saltus.study.setting.inputs import Inputs
+from saltus.study.tables.read import parse, read
+from saltus.study.tables.spec import Study
 
 RIG = """
 [study]

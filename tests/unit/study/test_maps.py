@@ -10,11 +10,11 @@ import pytest
 from edited_copy import edited_copy
 from saltus.errors import SaltusError, StudyError, UnitError
 from saltus.study import identity
-from saltus.study.inputs import Inputs
-from saltus.study.maps import MapJob, jobs_of
-from saltus.study.read import parse
-from saltus.study.run import questions_of
-from saltus.study.running import Report, Resources, shard_of
+from saltus.study.run.maps import MapJob, jobs_of
+from saltus.study.run.running import Report, Resources, shard_of
+from saltus.study.run.study import questions_of
+from saltus.study.setting.inputs import Inputs
+from saltus.study.tables.read import parse
 from small_study import small_study
 
 BASE = small_study(6, 4)
@@ -216,7 +216,7 @@ def test_time_left():
     ],
 )
 def test_dask_only_if_asked_for(resources, where, monkeypatch):
-    import saltus.study.maps as maps
+    import saltus.study.run.maps as maps
 
     monkeypatch.setattr(maps, "label_all", lambda *_: done.append("threads"))
     monkeypatch.setattr(maps, "run_on_processes", lambda *_: done.append("processes"))

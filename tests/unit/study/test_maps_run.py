@@ -11,13 +11,14 @@ from saltus.analysis.basins import pipeline
 from saltus.errors import StudyError
 from saltus.results import load
 from saltus.results.store import Store, StoreError
-from saltus.study import copies, identity, maps
-from saltus.study.copies import copy_of
-from saltus.study.maps import jobs_of
-from saltus.study.read import parse
-from saltus.study.run import run_study
-from saltus.study.running import Resources
-from saltus.study.status import status_table, status_tables, stores
+from saltus.study import identity
+from saltus.study.run import copies, maps
+from saltus.study.run.copies import copy_of
+from saltus.study.run.maps import jobs_of
+from saltus.study.run.running import Resources
+from saltus.study.run.status import status_table, status_tables, stores
+from saltus.study.run.study import run_study
+from saltus.study.tables.read import parse
 from small_maps import small_maps
 from small_study import small_study
 

@@ -13,13 +13,13 @@ import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.flow import Interrupted
 from saltus.results import load, save
-from saltus.study.copies import inputs_of
-from saltus.study.inputs import Inputs
-from saltus.study.read import parse
-from saltus.study.run import questions_of, run_study
-from saltus.study.running import Resources
-from saltus.study.spec import Study
-from saltus.study.status import status_tables
+from saltus.study.run.copies import inputs_of
+from saltus.study.run.running import Resources
+from saltus.study.run.status import status_tables
+from saltus.study.run.study import questions_of, run_study
+from saltus.study.setting.inputs import Inputs
+from saltus.study.tables.read import parse
+from saltus.study.tables.spec import Study
 
 HEAD = """
 [study]
@@ -276,7 +276,7 @@ def test_a_frequency_response_needs_forcing(tmp_path):
     (tmp_path / "free.py").write_text(
         "import saltus as sl\n@sl.system(states='x v')\ndef rig(t, x, v, *, stiffness=4.0):\n    return v, -stiffness*x\n"
     )
-    from saltus.study.own_system import own_system
+    from saltus.cli.own_system import own_system
 
     own = own_system(str(tmp_path / "free.py"))
     with pytest.raises(StudyError, match="no forcing frequency"):
@@ -312,8 +312,8 @@ def test_every_key_tells_what_it_is():
 
 
 def test_examples_of_the_schema_are_read():
-    from saltus.study.questions.responses import BifurcationDiagram, FrequencyResponse
-    from saltus.study.wording import toml
+    from saltus.study.answers.responses import BifurcationDiagram, FrequencyResponse
+    from saltus.study.tables.wording import toml
 
     for key, table in (("frequency_response", FrequencyResponse), ("bifurcation_diagram", BifurcationDiagram)):
         lines = [f"{name} = {toml(field.examples[0])}" for name, field in table.model_fields.items()]

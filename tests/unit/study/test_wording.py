@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from saltus.study.wording import in_toml, toml
+from saltus.study.tables.wording import in_toml, toml
 
 
 @pytest.mark.parametrize(

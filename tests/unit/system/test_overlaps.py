@@ -5,7 +5,7 @@ import pytest
 
 import saltus as sl
 from saltus.errors import ParameterError
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 
 
 @sl.system(states="x v")
@@ -66,4 +66,4 @@ def test_each_trajectory_is_asked():
     with pytest.raises(ParameterError, match=r"clearance = -0.2 \(trajectory 1 of 3\)"):
         sl.simulate(two_sided, (0.0, 1.0), t_end=1.0, values={"clearance": [0.1, -0.2, 0.0]})
     with pytest.raises(ParameterError, match=r"lower = 0.5, upper = -0.7 \(trajectory 1 of 2\)"):
-        Family(between, sl.Taylor(), np.array([[2.0, 0.8, -0.7], [2.0, 0.5, -0.7]]), every=1.0)
+        Stroboscope(between, sl.Taylor(), np.array([[2.0, 0.8, -0.7], [2.0, 0.5, -0.7]]), every=1.0)

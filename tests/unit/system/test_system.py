@@ -16,6 +16,7 @@ from saltus.models import aeroelastic, chain, delangre, gear_pair
 from saltus.system import system
 from saltus.system.evaluate import evaluate
 from saltus.system.system import System
+from saltus.system.tangent import tangent_system
 
 RIG = delangre()
 
@@ -184,6 +185,14 @@ def test_copies_share_what_follows_from_the_equations(monkeypatch):
     lines = other.equations()
     lines.clear()  # a list of the caller's own
     assert other.with_values(force=1.0).equations() == RIG.equations()
+
+
+def test_copies_share_their_tangent_system():
+    """Of two systems that are no copies of one another the flow is compiled, or looked up, twice."""
+    other = RIG.with_values(force="5 N")
+    assert tangent_system(other).origin is tangent_system(RIG).origin
+    assert (tangent_system(other).values, tangent_system(RIG).values) == (other.values, RIG.values)
+    assert tangent_system(other) is tangent_system(other)
 
 
 def test_importing_the_layer_is_light():

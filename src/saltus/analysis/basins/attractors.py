@@ -21,6 +21,7 @@ from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
+from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
@@ -97,7 +98,7 @@ def attractors(
     ([1, 3], [0, 1, 0])
     """
     group, periods = ensemble(system, start, None), whole(periods, "periods")
-    map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
+    map_ = Stroboscope(system, check_method(method), every=None if every is None else to_si(every, "s", "every"), threads=threads)
     scale = _spread(map_, group.start)
     show, close = reporter(progress)
     try:
@@ -169,7 +170,7 @@ def basin_fractions(
     fixed = fixed_states(system, at, box)
     ranges = _ranges(system, box)
     check_room(memory(samples, len(system.states)), f"{samples} random starts", "Draw fewer: samples=10_000 tells shares to 1 %.")
-    map_ = Stroboscope(system, check_method(method), None if every is None else to_si(every, "s", "every"), threads)
+    map_ = Stroboscope(system, check_method(method), every=None if every is None else to_si(every, "s", "every"), threads=threads)
     start = fill(system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed)
     scale = _spread(map_, start[:SPREAD_STARTS])
     show, close = reporter(progress)
@@ -212,7 +213,8 @@ def _draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[s
 def _spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
     """Range of each state over the starts, their first iterates and the time between two of them; 1 for a state that never moves."""
     iterates = map_.launch(start, SPREAD).advance(SPREAD)
-    between, _ = map_.trajectory(iterates[:WATCHED, -1][np.isfinite(iterates[:WATCHED, -1]).all(axis=1)], 1, SPREAD)
+    last = iterates[:WATCHED, -1][np.isfinite(iterates[:WATCHED, -1]).all(axis=1)]
+    between = map_.run(last, 1, Schedule.even(1, SPREAD)).samples
     points = np.concatenate([start, iterates.reshape(-1, start.shape[1]), between.reshape(-1, start.shape[1])])
     points = points[np.isfinite(points).all(axis=1)]
     wide = np.ptp(points, axis=0)

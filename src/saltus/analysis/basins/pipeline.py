@@ -91,7 +91,7 @@ class BasinPlan:
 
     def map(self, threads: int | None = None) -> Stroboscope:
         """The map whose attractors are asked for."""
-        return Stroboscope(self.system, self.method, self.every, threads)
+        return Stroboscope(self.system, self.method, every=self.every, threads=threads)
 
     @property
     def scale(self) -> np.ndarray:
@@ -158,8 +158,7 @@ class BasinPlan:
         chosen = chosen[result.label[chosen] >= 0]
         if not len(chosen):
             return {}
-        exact = Stroboscope(self.system, self.method.companion(), self.every, 1)
-        again = settle(exact, self.starts(chosen), found, 2 * self.periods)
+        again = settle(self.map(1).by(self.method.companion()), self.starts(chosen), found, 2 * self.periods)
         flips = int(np.count_nonzero(again.label != result.label[chosen]))
         low, high = wilson(flips, len(chosen))
         return {"flip_rate": flips / len(chosen), "flip_rate_low": float(low), "flip_rate_high": float(high), "flip_checked": len(chosen)}

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from saltus.flow.engine import Outcome
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.evaluate import evaluate
@@ -39,50 +39,50 @@ class Divergence:
         units = {**system.units, _INTEGRAL: ""}
         self._extended = replace(system, states=(*system.states, _INTEGRAL), field=(*system.field, self._trace), units=units)
 
-    def of_blocks(self, family: Family, start: np.ndarray) -> np.ndarray:
-        """Logarithm of the growth of volumes over one block from float64[k, D], each with its row of the family, float64[k]."""
+    def of_blocks(self, map_: Stroboscope, start: np.ndarray) -> np.ndarray:
+        """Logarithm of the growth of volumes over one block from float64[k, D], each with its row of the map, float64[k]."""
         constant = not self._moves and not self._by_mode
         if constant and not self._system.guards:
-            return self._constant(family)
-        integrated = self._moves or (self._by_mode and not family.method.records_contacts)
+            return self._constant(map_)
+        integrated = self._moves or (self._by_mode and not map_.method.records_contacts)
         if integrated:
             start = np.concatenate([start, np.zeros((len(start), 1))], axis=1)
-        outcome = _of_system(family, self._extended if integrated else self._system).run(start, 1, record=0)
-        total = outcome.state[:, -1].copy() if integrated else self._constant(family) if constant else self._dwelling(family, outcome)
-        np.add.at(total, outcome.record_integers[:, st.REC_TRAJECTORY], self._jumps(family, outcome))
+        outcome = map_.of_system(self._extended if integrated else self._system).run(start, 1, record=0)
+        total = outcome.state[:, -1].copy() if integrated else self._constant(map_) if constant else self._dwelling(map_, outcome)
+        np.add.at(total, outcome.record_integers[:, st.REC_TRAJECTORY], self._jumps(map_, outcome))
         return np.where(np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED)), total, np.nan)
 
-    def _constant(self, family: Family) -> np.ndarray:
+    def _constant(self, map_: Stroboscope) -> np.ndarray:
         """A trace of parameters only."""
-        return np.broadcast_to(evaluate([self._trace], values=family.values)[0], len(family)) * family.period
+        return np.broadcast_to(evaluate([self._trace], values=map_.values)[0], len(map_)) * map_.period
 
-    def _dwelling(self, family: Family, outcome: Outcome) -> np.ndarray:
+    def _dwelling(self, map_: Stroboscope, outcome: Outcome) -> np.ndarray:
         """A trace that is constant in each mode: its values times the times in the modes."""
         table, times = outcome.record_integers, outcome.record_floats[:, -1]
         row = table[:, st.REC_TRAJECTORY]
         first = np.diff(row, prepend=-1) != 0
         begun = np.where(first, 0.0, np.roll(times, 1))
-        total = np.zeros(len(family))
-        np.add.at(total, row, (times - begun) * self._in_mode(family, row, table[:, st.REC_MODE_BEFORE]))
-        last = np.zeros(len(family))
+        total = np.zeros(len(map_))
+        np.add.at(total, row, (times - begun) * self._in_mode(map_, row, table[:, st.REC_MODE_BEFORE]))
+        last = np.zeros(len(map_))
         last[row] = times  # sorted by time: the last one stays
-        return total + (family.period - last) * self._in_mode(family, np.arange(len(family)), outcome.mode)
+        return total + (map_.period - last) * self._in_mode(map_, np.arange(len(map_)), outcome.mode)
 
-    def _in_mode(self, family: Family, row: np.ndarray, mode: np.ndarray) -> np.ndarray:
-        values = {name: column[row] for name, column in family.values.items()}
+    def _in_mode(self, map_: Stroboscope, row: np.ndarray, mode: np.ndarray) -> np.ndarray:
+        values = {name: column[row] for name, column in map_.values.items()}
         return np.broadcast_to(evaluate([self._trace], values=values, bits=self._bits(mode))[0], len(row))
 
     def _bits(self, mode: np.ndarray) -> list[np.ndarray]:
         return [(mode >> i) & 1 == 1 for i in range(len(self._system.guards))]
 
-    def _jumps(self, family: Family, outcome: Outcome) -> np.ndarray:
+    def _jumps(self, map_: Stroboscope, outcome: Outcome) -> np.ndarray:
         """Logarithm of the determinant of the saltation matrix at each contact."""
         system, table = self._system, outcome.record_integers
         row, states = table[:, st.REC_TRAJECTORY], outcome.record_floats[:, st.RECORD_FLOATS : st.RECORD_FLOATS + len(system.states)]
         here: dict[str, Any] = {
             "t": outcome.record_floats[:, -1],
             "states": dict(zip(system.states, states.T, strict=True)),
-            "values": {name: column[row] for name, column in family.values.items()},
+            "values": {name: column[row] for name, column in map_.values.items()},
         }
         before, after = (self._bits(table[:, column]) for column in (st.REC_MODE_BEFORE, st.REC_MODE_AFTER))
         fields = [evaluate(system.field, bits=bits, **here) for bits in (before, after)]
@@ -94,12 +94,6 @@ class Divergence:
             with np.errstate(all="ignore"):
                 logarithm = np.where(mine, np.log(np.abs(rates[1] / rates[0])), logarithm)
         return logarithm
-
-
-def _of_system(family: Family, system: System) -> Family:
-    """The same rows for a system with the same parameters."""
-    every = None if system.forced_at is not None else family.period
-    return Family(system, family.method, family.parameters, every, family.threads)
 
 
 def _sum(terms: list[Expr]) -> Expr:

@@ -7,18 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from saltus.analysis.lyapunov.qr import AT_REST, GOOD, STRETCH
-from saltus.analysis.lyapunov.segments import FlowWalk
+from saltus.analysis.lyapunov.qr import AT_REST, GOOD, SEGMENT
+from saltus.analysis.lyapunov.segments import TangentFlow
 from saltus.analysis.lyapunov.spectrum import Spectrum, spectrum
 from saltus.analysis.orbits.equilibria import autonomous, find_equilibria
 from saltus.analysis.orbits.orbit_measures import measure
 from saltus.analysis.orbits.orbits import Orbit
 from saltus.analysis.orbits.recurrence import SAME
 from saltus.analysis.statistics import CONFIDENCE, running_ends
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 
-#: Numbers that the tangents of one stretch of a group may hold: 32 MB, and some copies of it.
+#: Numbers that the tangents of one segment of a group may hold: 32 MB, and some copies of it.
 GROUP = 4_000_000
 #: Growth rates of a group: 80 MB, and some copies of it.
 RATES = 10_000_000
@@ -36,7 +36,7 @@ class Exponents:
 
     Parameters
     ----------
-    family : Family
+    map_ : Stroboscope
         The flow, with a row for each trajectory.
     start : float64[k, D]
         Starts.
@@ -48,8 +48,8 @@ class Exponents:
 
     algorithm = "variational equations with saltation, QR method"
 
-    def __init__(self, family: Family, start: np.ndarray, periods: int, transient: int, every: float | None):
-        self.family, self._start, self._periods, self._transient, self._every = family, start, periods, transient, every
+    def __init__(self, map_: Stroboscope, start: np.ndarray, periods: int, transient: int, every: float | None):
+        self.map, self._start, self._periods, self._transient, self._every = map_, start, periods, transient, every
         self._ends = running_ends(periods)
         k, size, m = *start.shape, len(self._ends)
         nan = np.full
@@ -62,7 +62,7 @@ class Exponents:
     def run(self, progress: Callable[[float], None] | None = None) -> None:
         """Compute all, in groups."""
         k, size = self._start.shape
-        step = max(min(GROUP // (STRETCH * size * (size + 1)), RATES // (self._periods * size)), 1)
+        step = max(min(GROUP // (SEGMENT * size * (size + 1)), RATES // (self._periods * size)), 1)
         for first in range(0, k, step):
             rows = np.arange(first, min(first + step, k))
 
@@ -70,33 +70,33 @@ class Exponents:
                 if progress:
                     progress((first + share * count) / k)
 
-            walk = FlowWalk(self.family.rows(rows), self._every)
-            found = spectrum(walk, self._start[rows], self._periods, self._transient, self._every is None, show)
-            if self._every is not None and autonomous(self.family.system):
-                _rest(found, walk, self._start[rows], self._every)
-            self._keep(rows, walk, found)
+            flow = TangentFlow(self.map.rows(rows))
+            found = spectrum(flow, self._start[rows], self._periods, self._transient, self._every is None, show)
+            if self._every is not None and autonomous(self.map.system):
+                _rest(found, flow, self._start[rows], self._every)
+            self._keep(rows, flow, found)
 
-    def _keep(self, rows: np.ndarray, walk: FlowWalk, found: Spectrum) -> None:
+    def _keep(self, rows: np.ndarray, flow: TangentFlow, found: Spectrum) -> None:
         """Write a group to its places."""
-        stretch = found.growth.stretch
+        segment = found.growth.segment
         self._mean[rows], self._error[rows], self._half[rows] = found.exponents, found.errors, found.half_width
         self._running[rows], self._running_half[rows] = found.running.mean, found.running.half_width
         self._volume[rows], self._batches[rows], self._kind[rows] = found.volume, found.batches, found.kinds
         self._period[rows] = [
             orbit.period if orbit and kind == "periodic" else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)
         ]
-        self._status[rows] = stretch.status
-        self._grazes[rows], self._unresolved[rows], self._margin[rows] = stretch.grazes, stretch.unresolved, stretch.margin
+        self._status[rows] = segment.status
+        self._grazes[rows], self._unresolved[rows], self._margin[rows] = segment.grazes, segment.unresolved, segment.margin
         for i, orbit in enumerate(found.orbits):
             if orbit is not None:
-                self._of_orbit(rows[i], walk.of(np.array([i])), orbit)
+                self._of_orbit(rows[i], flow.rows(np.array([i])), orbit)
         self._near[rows] |= (self._grazes[rows] > 0) | (self._unresolved[rows] > 0)
 
-    def _of_orbit(self, row: int, walk: FlowWalk, orbit: Orbit) -> None:
+    def _of_orbit(self, row: int, flow: TangentFlow, orbit: Orbit) -> None:
         """Grazes and margin of the orbit alone, in place of those on the way to it."""
-        stretch = walk.move(orbit.points[:1], orbit.period)
-        self._grazes[row], self._unresolved[row] = stretch.grazes[0], stretch.unresolved[0]
-        numbers = measure(walk.family, orbit.points[:1], np.array([orbit.period]))
+        segment = flow.advance(orbit.points[:1], orbit.period)
+        self._grazes[row], self._unresolved[row] = segment.grazes[0], segment.unresolved[0]
+        numbers = measure(flow.map, orbit.points[:1], np.array([orbit.period]))
         self._margin[row] = numbers.margin[0]
         self._near[row] = numbers.margin[0] < NEAR_GRAZE * numbers.span[0]
 
@@ -122,9 +122,9 @@ class Exponents:
             "grazes": self._grazes,
             "grazes_unresolved": self._unresolved,
             "smallest_gap_margin": self._margin,
-            "block_time": self.family.period,
+            "block_time": self.map.period,
             "status": [st.STATUS[code][0] for code in self._status.tolist()],
-            "running_time": self.family.period[:, None] * self._ends,
+            "running_time": self.map.period[:, None] * self._ends,
             "running_exponent": running,
             "running_low": running - running_half,
             "running_high": running + running_half,
@@ -141,27 +141,27 @@ class Exponents:
         }
 
 
-def _rest(found: Spectrum, walk: FlowWalk, start: np.ndarray, every: float) -> None:
+def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -> None:
     """Where a motion has come to an equilibrium, its exponents: the real parts of the eigenvalues of the Jacobian, exact but for rounding.
 
     Means of growth lag behind: those of a pair of complex eigenvalues swing about its real part.
     """
-    trail = found.growth.stretch.trail
+    trail = found.growth.segment.points
     state, whole = trail[:, -1], np.ptp(np.concatenate([start[:, None], trail], axis=1), axis=1)
     widest = whole.max(axis=1, keepdims=True)  # in place of the range of a state that began at rest and has come to rest
     scale = np.where(whole > AT_REST * widest, whole, np.where((widest > 0) & np.isfinite(widest), widest, 1.0))
-    still = find_equilibria(walk.family, state, scale, captures=False)
+    still = find_equilibria(flow.map, state, scale, captures=False)
     with np.errstate(invalid="ignore"):
         attracts = (still.eigenvalues.real < 0).all(axis=1)
         near = (np.abs(state - still.place) <= SAME * scale).all(axis=1)
-    arrived = np.flatnonzero(attracts & near & np.isin(found.growth.stretch.status, GOOD))
+    arrived = np.flatnonzero(attracts & near & np.isin(found.growth.segment.status, GOOD))
     rounding = 64 * np.finfo(float).eps
     for i in arrived:
         own = still.eigenvalues[i]
         found.exponents[i] = own.real * every
         found.errors[i] = found.half_width[i] = rounding * np.abs(own).max() * every
         found.batches[i], found.kinds[i] = 0, "equilibrium"
-        found.volume[i] = walk.of(np.array([i])).divergences(still.place[[i]][:, None])[0, 0]
+        found.volume[i] = flow.rows(np.array([i])).divergences(still.place[[i]][:, None])[0, 0]
 
 
 def _with_phase(exponents: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from saltus.analysis.starts import Ensemble, check_system, ensemble
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.interrupt import Interrupted
@@ -126,11 +126,9 @@ def lyapunov(
     periods, transient = whole(periods, "periods", LEAST_PERIODS), whole(transient, "transient", 0)
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))
     block = None if every is None else to_si(every, "s", "every")
-    if block is not None and not 0 < block < math.inf:
-        raise ParameterError(f"every must be a positive time, not {shown(every)}.")
-    family = Family(system, flow, rows, block, threads)
+    map_ = Stroboscope(system, flow, rows, block, threads)
     show, close = reporter(progress)
-    work = (Exponents if method == "variational" else NeighbourExponents)(family, group.start, periods, transient, block)
+    work = (Exponents if method == "variational" else NeighbourExponents)(map_, group.start, periods, transient, block)
 
     def dataset() -> xr.Dataset:
         return _dataset(system, flow, group, work, unit)
@@ -164,7 +162,7 @@ def _check_words(method: Any, unit: Any, system: System) -> None:
 def _dataset(system: System, flow: Method, group: Ensemble, work: Exponents | NeighbourExponents, unit: str) -> xr.Dataset:
     """Everything under its name and in its unit."""
     per_period, logarithm = UNITS[unit]
-    factor = (1.0 if per_period else 1.0 / work.family.period) / logarithm
+    factor = (1.0 if per_period else 1.0 / work.map.period) / logarithm
     attrs = provenance(system, flow, shared_values(system, group), group.varied) | work.settings() | {"unit": unit}
     return exponents_dataset(
         columns=work.columns(np.broadcast_to(factor, group.size)),

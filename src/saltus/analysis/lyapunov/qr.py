@@ -1,6 +1,6 @@
 """How small deviations grow along trajectories, block by block and in all directions: the QR method.
 
-The derivatives of all blocks of a stretch are computed in one batch, as the states at which they begin are known from the trajectory
+The derivatives of all blocks of a segment are computed in one batch, as the states at which they begin are known from the trajectory
 itself. Then an orthogonal frame is carried through them: block by block M Q = Q' R, and the logarithms of the diagonal of R are the growth
 of the frame's axes; their means are the Lyapunov exponents. Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980) 9-20 and 21-30;
 Eckmann & Ruelle, Reviews of Modern Physics 57 (1985) 617-656, section V.
@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.lyapunov.segments import Stretch, Walk
+from saltus.analysis.lyapunov.segments import Segment, TangentFlow
 from saltus.kernels import status as st
 
-#: Blocks of a stretch. A trajectory starts afresh after each, so this number is part of the result and never depends on the batch.
-STRETCH = 1024
+#: Blocks of a segment. A trajectory starts afresh after each, so this number is part of the result and never depends on the batch.
+SEGMENT = 1024
 #: Blocks at most in which the frame finds its way before growth counts, taken from the transient.
 ALIGNING = 128
 #: Share of the distance from its start below which a motion is taken to be at rest.
@@ -38,18 +38,18 @@ class Growth:
         Logarithm of the growth of volumes, found without the tangent.
     scale : float64[k, D]
         Range of each state.
-    stretch : Stretch
-        Status and grazes after the transient; the trail holds the last STRETCH blocks, or all if they are fewer.
+    segment : Segment
+        Status and grazes after the transient; its points are those of the last SEGMENT blocks, or all if they are fewer.
     """
 
     rates: np.ndarray
     volume: np.ndarray
     scale: np.ndarray
-    stretch: Stretch
+    segment: Segment
 
 
 def grow(
-    walk: Walk,
+    flow: TangentFlow,
     start: np.ndarray,
     count: int,
     transient: int,
@@ -59,7 +59,7 @@ def grow(
 
     Parameters
     ----------
-    walk : Walk
+    flow : TangentFlow
         The trajectories.
     start : float64[k, D]
         Their starts.
@@ -70,23 +70,23 @@ def grow(
     """
     k, size = start.shape
     aligning = min(ALIGNING, transient)
-    before = walk.move(start, transient, transient - aligning)
-    scale = _scale(start, np.concatenate([before.trail, walk.look(before.trail[:, -1])], axis=1))
+    before = flow.advance(start, transient, transient - aligning)
+    scale = _scale(start, np.concatenate([before.points, flow.sample(before.points[:, -1])], axis=1))
     frame = np.broadcast_to(np.eye(size), (k, size, size))
     if aligning:
-        _, frame = carry(walk.matrices(before.trail[:, :-1]), frame, scale)
-    rates, volume, stretches, state = np.full((k, count, size), np.nan), np.full((k, count), np.nan), [before], before.trail[:, -1]
-    for first in range(0, count, STRETCH):
-        last = min(first + STRETCH, count)
-        stretch = walk.move(state, last - first)
-        blocks = stretch.trail[:, :-1]
-        rates[:, first:last], frame = carry(walk.matrices(blocks), frame, scale)
-        volume[:, first:last] = walk.divergences(blocks)
-        stretches.append(stretch)
-        state = stretch.trail[:, -1]
+        _, frame = carry(flow.derivatives(before.points[:, :-1]), frame, scale)
+    rates, volume, segments, state = np.full((k, count, size), np.nan), np.full((k, count), np.nan), [before], before.points[:, -1]
+    for first in range(0, count, SEGMENT):
+        last = min(first + SEGMENT, count)
+        segment = flow.advance(state, last - first)
+        blocks = segment.points[:, :-1]
+        rates[:, first:last], frame = carry(flow.derivatives(blocks), frame, scale)
+        volume[:, first:last] = flow.divergences(blocks)
+        segments.append(segment)
+        state = segment.points[:, -1]
         if progress:
             progress(last / count)
-    return Growth(rates, volume, scale, _joined(stretches))
+    return Growth(rates, volume, scale, _joined(segments))
 
 
 def _scale(start: np.ndarray, motion: np.ndarray) -> np.ndarray:
@@ -111,17 +111,17 @@ def carry(matrices: np.ndarray, frame: np.ndarray, scale: np.ndarray) -> tuple[n
         return np.log(np.abs(diagonal)), frame
 
 
-def _joined(stretches: list[Stretch]) -> Stretch:
+def _joined(segments: list[Segment]) -> Segment:
     """Sums and minima after the transient, the first status that isn't a success, and the last part of the trail."""
-    after = stretches[1:]
-    status = stretches[0].status
-    for stretch in after:
-        status = np.where(np.isin(status, GOOD), np.maximum(status, stretch.status), status)
-    trail = np.concatenate([*(stretch.trail[:, :-1] for stretch in after[-2:]), after[-1].trail[:, -1:]], axis=1)
-    return Stretch(
-        trail[:, -STRETCH - 1 :],
+    after = segments[1:]
+    status = segments[0].status
+    for segment in after:
+        status = np.where(np.isin(status, GOOD), np.maximum(status, segment.status), status)
+    points = np.concatenate([*(segment.points[:, :-1] for segment in after[-2:]), after[-1].points[:, -1:]], axis=1)
+    return Segment(
+        points[:, -SEGMENT - 1 :],
         status,
-        np.sum([stretch.grazes for stretch in after], axis=0),
-        np.sum([stretch.unresolved for stretch in after], axis=0),
-        np.min([stretch.margin for stretch in after], axis=0),
+        np.sum([segment.grazes for segment in after], axis=0),
+        np.sum([segment.unresolved for segment in after], axis=0),
+        np.min([segment.margin for segment in after], axis=0),
     )

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.lyapunov.qr import GOOD, Growth, carry, grow
-from saltus.analysis.lyapunov.segments import Walk
+from saltus.analysis.lyapunov.segments import TangentFlow
 from saltus.analysis.orbits.aperiodic import SURE
 from saltus.analysis.orbits.orbits import Orbit, polish
 from saltus.analysis.orbits.recurrence import NEAR, ROUND, SAME, recurrence
@@ -23,7 +23,7 @@ from saltus.flow.maps import Map
 LOST = 29.0
 #: Factor on the rounding of a monodromy matrix beyond which a multiplier is lost, and blocks of the round trips that find it then.
 AMPLIFIED, TRIPS = 1e6, 256
-#: What a slow approach to an orbit must at least have gained over half of the last stretch.
+#: What a slow approach to an orbit must at least have gained over half of the last segment.
 GAINED = 0.5
 
 
@@ -64,7 +64,7 @@ class Spectrum:
 
 
 def spectrum(
-    walk: Walk,
+    flow: TangentFlow,
     start: np.ndarray,
     count: int,
     transient: int,
@@ -75,22 +75,22 @@ def spectrum(
 
     Without forcing a motion that repeats has an exponent of zero along itself; that makes a difference to what it is called.
     """
-    growth = grow(walk, start, count, transient, progress)
+    growth = grow(flow, start, count, transient, progress)
     rates = _told(np.take_along_axis(growth.rates, np.argsort(-growth.rates.mean(axis=1), axis=1, kind="stable")[:, None], axis=2))
     ends = running_ends(count)
     running = batch_means(np.swapaxes(rates, 1, 2), ends)
     exponents, errors, half_width = (part[..., -1].copy() for part in (running.mean, running.error, running.half_width))
     batches, volume = running.batches[:, 0, -1].copy(), growth.volume.mean(axis=1)
-    orbits = _orbits(walk, growth)
+    orbits = _orbits(flow, growth)
     kinds = []
     for i, orbit in enumerate(orbits):
         if orbit is None:
             kinds.append(kind_of(rates[i], errors[i], forced))
             continue
         kinds.append("periodic" if forced else "equilibrium")
-        exponents[i], errors[i] = _of_orbit(walk, i, orbit, growth.scale[i])
+        exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i])
         half_width[i], batches[i] = errors[i], 0
-        volume[i] = _volume(walk, i, orbit)
+        volume[i] = _volume(flow, i, orbit)
     return Spectrum(exponents, errors, half_width, volume, batches, orbits, kinds, ends, running, growth)
 
 
@@ -102,15 +102,15 @@ def _told(rates: np.ndarray) -> np.ndarray:
 
 
 # -- orbits --------------------------------------------------------------------------------------------------------------------
-def _orbits(walk: Walk, growth: Growth) -> list[Orbit | None]:
+def _orbits(flow: TangentFlow, growth: Growth) -> list[Orbit | None]:
     """The stable periodic orbit to which each trajectory has come, None for the others."""
-    trail, found = growth.stretch.trail, []
+    trail, found = growth.segment.points, []
     with np.errstate(invalid="ignore"):  # those that ran away
         period, apart = recurrence(trail[:, -ROUND - 1 :], growth.scale)
     for i, one in enumerate(trail):
-        map_ = walk.map_of(i)
+        map_ = flow.map.rows(np.array([i]))
         near = max(NEAR, 4.0 * map_.noise)
-        good = growth.stretch.status[i] in GOOD and apart[i] <= near
+        good = growth.segment.status[i] in GOOD and apart[i] <= near
         orbit = polish(map_, one[-1], int(period[i]), growth.scale[i]) if good else None
         found.append(orbit if orbit is not None and orbit.stable and _arrives(one, orbit, growth.scale[i], map_, near) else None)
     return found
@@ -124,12 +124,12 @@ def _arrives(trail: np.ndarray, orbit: Orbit, scale: np.ndarray, map_: Map, near
     return bool(late <= max(SAME, 4.0 * map_.noise) or (late <= near and late < GAINED * early))
 
 
-def _of_orbit(walk: Walk, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _of_orbit(flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Exponents of an orbit per block, and what the map's own errors make of them (Bauer & Fike: times the condition of the eigenvectors).
 
     Multipliers that are lost in the rounding of the largest are found as growth round the orbit, block by block.
     """
-    noise, n = walk.map_of(i).noise, orbit.period
+    noise, n = flow.map.rows(np.array([i])).noise, orbit.period
     monodromy = orbit.monodromy[0] * scale / scale[:, None]
     condition = min(np.linalg.cond(np.linalg.eig(monodromy)[1]), 1.0 / noise)
     magnitudes = -np.sort(-np.abs(orbit.multipliers))
@@ -138,23 +138,23 @@ def _of_orbit(walk: Walk, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.n
         errors = noise * amplified / n
     lost = amplified > AMPLIFIED
     if lost.any():
-        exponents[lost], errors[lost] = (part[lost] for part in _round_trips(walk, i, orbit, scale))
+        exponents[lost], errors[lost] = (part[lost] for part in _round_trips(flow, i, orbit, scale))
     return exponents, errors
 
 
-def _round_trips(walk: Walk, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _round_trips(flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean growth per block over the later half of many round trips of an orbit, and how far that of its two halves lies apart."""
     n, size = orbit.points.shape
-    blocks = walk.of(np.full(n, i)).matrices(orbit.points[:, None])[:, 0]
+    blocks = flow.rows(np.full(n, i)).derivatives(orbit.points[:, None])[:, 0]
     trips = max(-(-TRIPS // n), 8) // 4 * 4
     rates, _ = carry(np.tile(blocks, (trips, 1, 1))[None], np.eye(size)[None], scale[None])
     early, late = rates[0, trips // 2 * n :].reshape(2, -1, size).mean(axis=1)
-    return 0.5 * (early + late), np.abs(late - early) + walk.map_of(i).noise
+    return 0.5 * (early + late), np.abs(late - early) + flow.map.rows(np.array([i])).noise
 
 
-def _volume(walk: Walk, i: int, orbit: Orbit) -> float:
+def _volume(flow: TangentFlow, i: int, orbit: Orbit) -> float:
     """Mean growth of volumes over an orbit."""
-    return float(walk.of(np.full(orbit.period, i)).divergences(orbit.points[:, None]).mean())
+    return float(flow.rows(np.full(orbit.period, i)).divergences(orbit.points[:, None]).mean())
 
 
 # -- kinds ---------------------------------------------------------------------------------------------------------------------

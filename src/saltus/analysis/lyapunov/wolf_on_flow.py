@@ -12,7 +12,7 @@ from saltus.analysis.lyapunov.qr import GOOD
 from saltus.analysis.recorded.wolf import NOTHING, Growing, default_search, measure, replaced
 from saltus.analysis.statistics import CONFIDENCE, RUNNING
 from saltus.flow.engine import Schedule
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 
 #: Samples of a block: neighbours on an orbit then lie closer than the widest distance.
@@ -26,29 +26,28 @@ class NeighbourExponents:
 
     Parameters
     ----------
-    family, start, periods, transient, every
+    map_, start, periods, transient, every
         As there.
     """
 
     algorithm = "Wolf et al. (1985), fixed evolution time"
 
-    def __init__(self, family: Family, start: np.ndarray, periods: int, transient: int, every: float | None):
-        self.family, self._start, self._periods, self._transient, self._every = family, start, periods, transient, every
+    def __init__(self, map_: Stroboscope, start: np.ndarray, periods: int, transient: int, every: float | None):
+        self.map, self._start, self._periods, self._transient, self._every = map_, start, periods, transient, every
         self._found = [NOTHING] * len(start)
         self._status = np.full(len(start), st.NOT_COMPUTED)
 
     def run(self, progress: Callable[[float], None] | None = None) -> None:
         """Compute all, in groups."""
         k, size = self._start.shape
-        index = self._transient * SAMPLES + np.arange(self._periods * SAMPLES)
-        schedule = Schedule(index // SAMPLES, (index % SAMPLES) / SAMPLES)
-        step = max(GROUP // (len(index) * size), 1)
+        schedule = Schedule.even(self._periods, SAMPLES, first=self._transient)
+        step = max(GROUP // (self._periods * SAMPLES * size), 1)
         for first in range(0, k, step):
             rows = np.arange(first, min(first + step, k))
-            outcome = self.family.rows(rows).run(self._start[rows], self._transient + self._periods, schedule)
+            outcome = self.map.rows(rows).run(self._start[rows], self._transient + self._periods, schedule)
             for i, states in zip(rows, outcome.samples, strict=True):
                 if outcome.status[i - first] in GOOD:
-                    self._found[i] = self._measure(states, float(self.family.period[i]))
+                    self._found[i] = self._measure(states, float(self.map.period[i]))
                 self._status[i] = outcome.status[i - first]
                 if progress:
                     progress((i + 1) / k)
@@ -63,7 +62,7 @@ class NeighbourExponents:
 
     def columns(self, factor: np.ndarray) -> dict[str, Any]:
         """The columns of the result; exponents, which come per second, are turned to those times a factor of a block."""
-        per_second = factor * self.family.period
+        per_second = factor * self.map.period
         k = len(self._found)
         mean, error, half = (self._each(name, per_second)[:, None] for name in ("exponent", "error", "half_width"))
         times, running, running_half = (np.full((k, RUNNING), np.nan) for _ in range(3))
@@ -78,7 +77,7 @@ class NeighbourExponents:
             "lyapunov_low": mean - half,
             "lyapunov_high": mean + half,
             "independent_batches": [one.batches for one in self._found],
-            "block_time": self.family.period,
+            "block_time": self.map.period,
             "status": [st.STATUS[code][0] for code in self._status.tolist()],
             "running_time": times,
             "running_exponent": running[:, None],

@@ -18,7 +18,7 @@ from saltus.analysis.responses.frequency_response import frequency_response
 from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, shown
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
 from saltus.results import methods_dataset
 from saltus.results.intervals import wilson
@@ -127,10 +127,9 @@ def method_label(method: Method) -> str:
 
 def _timed(system: System, name: str, method: Method, arguments: Mapping[str, Any]) -> tuple[xr.Dataset, float]:
     """The analysis by one method, and its processor time [s] without that of compiling."""
-    row = np.array([list(system.values.values())])
-    every = 1.0 if system.forced_at is None else None
-    Family(system, method, row, every).tangent(np.zeros((1, len(system.states))), 1)
-    Family(system, method, row, every).run(np.zeros((1, len(system.states))), 1)
+    map_, start = Stroboscope(system, method, every=1.0 if system.forced_at is None else None), np.zeros((1, len(system.states)))
+    map_.tangent(start, 1)
+    map_.run(start, 1)
     begin = time.process_time()
     ds = _ANALYSES[name](system, method=method, **arguments)
     return ds, time.process_time() - begin

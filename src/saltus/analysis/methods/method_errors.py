@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.orbits.steady import motion_range
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.results.schema import parameters_of, response_name, states_of
@@ -69,7 +69,7 @@ def _apart(a: xr.Dataset, first: np.ndarray, i: int, b: xr.Dataset, second: np.n
 def response_noise(system: System, method: Method, exact: xr.Dataset) -> np.ndarray:
     """Noise of a method in units of the exact response of each start, float64[places..., s]; 0 where there is none."""
     peaks = exact["response_peak"].values[:, None]
-    noise = Family(system, method, np.tile(list(system.values.values()), (len(peaks), 1))).noise(peaks)
+    noise = Stroboscope(system, method).noise_of(peaks)
     return np.append(noise, 0.0)[exact["response_of"].values.clip(-1)]
 
 
@@ -108,7 +108,7 @@ def one_period_errors(
         rows[:, names.index(name)] = column
         where[:, a] = np.abs(exact[name].values[None, :] - column[:, None]).argmin(axis=1)
     flat = np.ravel_multi_index(tuple(where.T), tuple(places)) if len(start) else np.zeros(0, np.int64)
-    right, wrong = (Family(system, one, rows, threads=threads) for one in (reference, method))
+    right, wrong = (Stroboscope(system, one, rows, threads=threads) for one in (reference, method))
     scale = motion_range(right, start)
     outcome = wrong.run(start, 1)
     apart = np.abs((outcome.state - right.run(start, 1).state) / scale)

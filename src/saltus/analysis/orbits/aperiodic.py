@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.statistics import BOUNDED, UNCLEAR
-from saltus.flow.family import Family
-from saltus.flow.maps import Map
+from saltus.flow.maps import Map, Stroboscope
 
 #: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its way.
 BLOCK, BLOCKS, ALIGNING = 8, 192, 48
@@ -159,7 +158,7 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
 
 
 def kinds_of(
-    part: Callable[[np.ndarray], Map | Family], start: np.ndarray, scale: np.ndarray, groups: Sequence[Sequence[int]]
+    part: Callable[[np.ndarray], Map | Stroboscope], start: np.ndarray, scale: np.ndarray, groups: Sequence[Sequence[int]]
 ) -> tuple[np.ndarray, list[tuple[str, float, float] | None]]:
     """What motions that never repeat are: their exponents are measured for longer while they could be zero as well as positive.
 
@@ -195,7 +194,7 @@ def kinds_of(
     return state, kinds
 
 
-def growth_rates(map_: Map | Family, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def growth_rates(map_: Map | Stroboscope, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction, block by block, float64[blocks, k]."""
     k, size = start.shape
     direction = np.zeros((k, size, size))

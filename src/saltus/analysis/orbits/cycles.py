@@ -15,7 +15,7 @@ import numpy as np
 from saltus.analysis.orbits.equilibria import field_of, jacobian_of
 from saltus.analysis.orbits.orbits import AMPLIFIED, MARGINAL
 from saltus.flow.engine import Schedule
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 
 #: Samples of the motion in which a return is looked for; a window is so many times shorter or longer than the one before.
 SAMPLES, ZOOM = 4096, 8
@@ -87,13 +87,13 @@ class Cycles:
 
 
 # -- the first guess -----------------------------------------------------------------------------------------------------------
-def returns(family: Family, start: np.ndarray, window: float) -> Returns:
+def returns(map_: Stroboscope, start: np.ndarray, window: float) -> Returns:
     """The near returns of motions from float64[k, D], looked for over some ``window`` [s]: a finer or a longer one where that is needed."""
     k, size = start.shape
     result = Returns(np.full(k, np.nan), np.full(k, np.inf), np.ones((k, size)))
     length, rows, refined = np.full(k, float(window)), np.arange(k), np.zeros(k, bool)
     for _ in range(MOST_WINDOWS):
-        time, apart, scale, followed, turns = _seen(family.rows(rows), start[rows], length[rows])
+        time, apart, scale, followed, turns = _seen(map_.rows(rows), start[rows], length[rows])
         result.scale[rows] = scale
         done = followed & np.isfinite(apart)
         result.time[rows[done]], result.apart[rows[done]] = time[done], apart[done]
@@ -105,17 +105,16 @@ def returns(family: Family, start: np.ndarray, window: float) -> Returns:
             break
     seen = np.flatnonzero(np.isfinite(result.apart))
     if len(seen):
-        _locate(family.rows(seen), start[seen], seen, result)
+        _locate(map_.rows(seen), start[seen], seen, result)
     return result
 
 
-def _seen(family: Family, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, ...]:
+def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, ...]:
     """From samples over a window each: time and distance of the return, range of the states, whether samples follow the motion, turns."""
     k, size = start.shape
-    index = np.arange(SAMPLES)
-    samples = family.every(length).run(start, 1, Schedule(0 * index, index / SAMPLES)).samples
-    values = {name: np.repeat(column, SAMPLES) for name, column in family.values.items()}
-    rates = field_of(family.system, samples.reshape(-1, size), values).reshape(k, SAMPLES, size)
+    samples = map_.with_period(length).run(start, 1, Schedule.even(1, SAMPLES)).samples
+    values = {name: np.repeat(column, SAMPLES) for name, column in map_.values.items()}
+    rates = field_of(map_.system, samples.reshape(-1, size), values).reshape(k, SAMPLES, size)
     with np.errstate(all="ignore"):
         ranges, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
         scale = np.where(np.isfinite(ranges) & (ranges > 1e-9 * sizes), ranges, np.where(sizes > 0, sizes, 1.0))
@@ -145,29 +144,29 @@ def _cubic(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray, share: 
     return a + s * (da + s * ((3 * (b - a) - 2 * da - db) + s * (2 * (a - b) + da + db)))
 
 
-def _locate(family: Family, start: np.ndarray, which: np.ndarray, result: Returns) -> None:
+def _locate(map_: Stroboscope, start: np.ndarray, which: np.ndarray, result: Returns) -> None:
     """Move the times of return onto the plane, and measure the distance there."""
     time, scale = result.time[which], result.scale[which]
-    normal = field_of(family.system, start, family.values) / scale
+    normal = field_of(map_.system, start, map_.values) / scale
     for _ in range(LOCATED):
-        end = family.every(time).run(start, 1).state
-        speed = np.einsum("kj,kj->k", field_of(family.system, end, family.values) / scale, normal)
+        end = map_.with_period(time).run(start, 1).state
+        speed = np.einsum("kj,kj->k", field_of(map_.system, end, map_.values) / scale, normal)
         with np.errstate(all="ignore"):
             step = -np.einsum("kj,kj->k", (end - start) / scale, normal) / speed
         time = np.where(np.isfinite(step) & (np.abs(step) < 0.1 * time), time + step, time)
-    end = family.every(time).run(start, 1).state
+    end = map_.with_period(time).run(start, 1).state
     with np.errstate(invalid="ignore"):
         apart = np.abs((end - start) / scale).max(axis=1)
     result.time[which], result.apart[which] = time, np.where(np.isfinite(apart), apart, np.inf)
 
 
 # -- Newton's method -----------------------------------------------------------------------------------------------------------
-def find_cycles(family: Family, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Cycles:
+def find_cycles(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Cycles:
     """The limit cycles near states float64[k, D] that nearly recur after times float64[k] [s].
 
     Parameters
     ----------
-    family : Family
+    map_ : Stroboscope
         k flows without forcing.
     start, time
         A first guess of each.
@@ -176,17 +175,16 @@ def find_cycles(family: Family, start: np.ndarray, time: np.ndarray, scale: np.n
     """
     k, size = start.shape
     result = Cycles(np.full(k, np.nan), np.full((k, POINTS, size), np.nan), np.full((k, size), np.nan + 0j), np.full(k, np.nan))
-    x, period, found = _newton(family, start, time, scale)
+    x, period, found = _newton(map_, start, time, scale)
     rows = np.flatnonzero(found)
     if not len(rows):
         return result
-    mine = family.rows(rows)
+    mine = map_.rows(rows)
     period = _least_period(mine, x[rows], period[rows], scale[rows])
     first = _first(mine, x[rows], period)
-    index = np.arange(POINTS)
-    points = mine.every(period).run(first, 1, Schedule(0 * index, index / POINTS)).samples
+    points = mine.with_period(period).run(first, 1, Schedule.even(1, POINTS)).samples
     moves = (np.ptp(points, axis=1) / scale[rows]).max(axis=1) > RESTS
-    multipliers = _multipliers(mine.every(period), first)
+    multipliers = _multipliers(mine.with_period(period), first)
     good = moves & np.isfinite(points).all(axis=(1, 2)) & np.isfinite(multipliers).all(axis=1)
     moved = np.abs((x[rows] - start[rows]) / scale[rows]).max(axis=1)
     columns = (result.period, result.points, result.multipliers, result.moved)
@@ -195,18 +193,18 @@ def find_cycles(family: Family, start: np.ndarray, time: np.ndarray, scale: np.n
     return result
 
 
-def _newton(family: Family, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _newton(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """States float64[k, D] and periods float64[k] [s] that solve phi_T(x) = x, and where the iteration converged, bool[k]."""
     x, period, found = np.array(start, float), np.array(time, float), np.zeros(len(start), bool)
     before, rows = np.full(len(start), np.inf), np.flatnonzero(np.isfinite(time))
-    size, enough = x.shape[1], np.full(len(x), CONVERGED) if family.exact else family.noise(scale)
+    size, enough = x.shape[1], np.full(len(x), CONVERGED) if map_.exact else map_.noise_of(scale)
     for _ in range(MOST_STEPS):
         if not len(rows):
             break
-        mine, unit = family.rows(rows), scale[rows]
-        end, matrix = mine.every(period[rows]).tangent(x[rows], 1)
-        speed = field_of(family.system, x[rows], mine.values) / unit
-        arrival = field_of(family.system, end, mine.values) / unit * period[rows, None]
+        mine, unit = map_.rows(rows), scale[rows]
+        end, matrix = mine.with_period(period[rows]).tangent(x[rows], 1)
+        speed = field_of(map_.system, x[rows], mine.values) / unit
+        arrival = field_of(map_.system, end, mine.values) / unit * period[rows, None]
         system = np.zeros((len(rows), size + 1, size + 1))
         system[:, :size, :size] = matrix * unit[:, None, :] / unit[:, :, None] - np.eye(size)
         system[:, :size, size], system[:, size, :size] = arrival, speed * period[rows, None]
@@ -228,38 +226,37 @@ def _newton(family: Family, start: np.ndarray, time: np.ndarray, scale: np.ndarr
     return x, period, found
 
 
-def _least_period(family: Family, x: np.ndarray, period: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def _least_period(map_: Stroboscope, x: np.ndarray, period: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """The smallest part of each period after which the motion is back already."""
     parts = np.arange(MOST_PARTS, 1, -1)
-    states = family.every(period).run(x, 1, Schedule(0 * parts, 1.0 / parts)).samples
+    states = map_.with_period(period).run(x, 1, Schedule(0 * parts, 1.0 / parts)).samples
     with np.errstate(invalid="ignore"):
         back = np.abs((states - x[:, None]) / scale[:, None]).max(axis=2) < 10 * AMPLIFIED
     return period / np.where(back.any(axis=1), parts[np.argmax(back, axis=1)], 1)
 
 
-def _first(family: Family, x: np.ndarray, period: np.ndarray) -> np.ndarray:
+def _first(map_: Stroboscope, x: np.ndarray, period: np.ndarray) -> np.ndarray:
     """The state of each cycle at which the first state that moves is least: where its points begin, whoever found it."""
-    index = np.arange(SAMPLES)
-    samples = family.every(period).run(x, 1, Schedule(0 * index, index / SAMPLES)).samples
+    samples = map_.with_period(period).run(x, 1, Schedule.even(1, SAMPLES)).samples
     ranges = np.ptp(samples, axis=1)
     rows, column = np.arange(len(x)), np.argmax(ranges > 1e-9 * np.abs(samples).max(axis=1), axis=1)
     least = np.argmin(samples[rows, :, column], axis=1)
     state = samples[rows, least]
     for _ in range(LOCATED):  # where its rate vanishes
-        rate = field_of(family.system, state, family.values)
-        slope = np.einsum("kj,kj->k", jacobian_of(family.system, state, family.values)[rows, column], rate)
+        rate = field_of(map_.system, state, map_.values)
+        slope = np.einsum("kj,kj->k", jacobian_of(map_.system, state, map_.values)[rows, column], rate)
         with np.errstate(all="ignore"):
             step = -rate[rows, column] / slope
         step = np.where(np.abs(step) < 2 * period / SAMPLES, step, 0.0)
-        moved = family.every(np.where(step <= 0, step + period, step)).run(state, 1).state
+        moved = map_.with_period(np.where(step <= 0, step + period, step)).run(state, 1).state
         state = np.where((step != 0)[:, None], moved, state)
     return state
 
 
-def _multipliers(family: Family, x: np.ndarray) -> np.ndarray:
+def _multipliers(map_: Stroboscope, x: np.ndarray) -> np.ndarray:
     """1, and the eigenvalues of the monodromy matrix across the flow, the largest first; complex128[k, D]."""
-    _, matrices = family.tangent(x, 1)
-    rates = field_of(family.system, x, family.values)
+    _, matrices = map_.tangent(x, 1)
+    rates = field_of(map_.system, x, map_.values)
     size = x.shape[1]
     result = np.full((len(x), size), np.nan + 0j)
     for i, (matrix, rate) in enumerate(zip(matrices, rates, strict=True)):

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
 from saltus.analysis.orbits.capture import RADII, SAFETY, sphere
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import depends_on
 from saltus.system.system import System
@@ -84,12 +84,12 @@ def _evaluated(system: System, entries: tuple, states: np.ndarray, values: Mappi
     return np.stack([np.broadcast_to(np.asarray(column, float), len(states)) for column in columns], axis=1)
 
 
-def find_equilibria(family: Family, start: np.ndarray, scale: np.ndarray, captures: bool = True) -> Equilibria:
+def find_equilibria(map_: Stroboscope, start: np.ndarray, scale: np.ndarray, captures: bool = True) -> Equilibria:
     """The equilibria near states float64[k, D] at the parameter values of each row; float64[k, D] is the range of each state.
 
     ``captures``: whether to ask where they capture.
     """
-    system, values = family.system, family.values
+    system, values = map_.system, map_.values
     x, found = _newton(system, values, np.array(start, float), scale)
     place = np.where(found[:, None], x, np.nan)
     eigenvalues = np.full(x.shape, np.nan + 0j)

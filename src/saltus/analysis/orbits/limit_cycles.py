@@ -37,23 +37,22 @@ def limit_cycles(map_: Stroboscope, state: np.ndarray, window: float, scale: np.
     rows = np.flatnonzero(cycles.stable & near)
     if not len(rows):
         return []
-    index = np.arange(TRAIL)
-    once = map_.family(len(rows)).every(cycles.period[rows])
-    points = once.run(cycles.points[rows, 0], 1, Schedule(0 * index, index / TRAIL)).samples
+    once = map_.rows(rows).with_period(cycles.period[rows])
+    points = once.run(cycles.points[rows, 0], 1, Schedule.even(1, TRAIL)).samples
     return [Wandering(LIMIT_CYCLE, 0.0, 0.0, one, scale) for one in points]
 
 
 def cycle_of(map_: Stroboscope, one: Wandering) -> Cycles:
     """Period, points and multipliers of a limit cycle that is known by its places: its first one is where it begins."""
-    return _closed(map_, one.points[:1], ROUND * map_.period)[0]
+    return _closed(map_, one.points[:1], ROUND * float(map_.period[0]))[0]
 
 
 def _closed(map_: Stroboscope, state: np.ndarray, window: float) -> tuple[Cycles, np.ndarray]:
     """What Newton's method makes of the returns of trajectories, and whether each lies beside its cycle, bool[k]."""
-    family = map_.family(len(state))
-    seen = returns(family, state, window)
-    tried = np.where(seen.apart < np.maximum(NEAR, family.noise(seen.scale)), seen.time, np.nan)
-    cycles = find_cycles(family, state, tried, seen.scale)
+    map_ = map_.rows(np.arange(len(state)))
+    seen = returns(map_, state, window)
+    tried = np.where(seen.apart < np.maximum(NEAR, map_.noise_of(seen.scale)), seen.time, np.nan)
+    cycles = find_cycles(map_, state, tried, seen.scale)
     with np.errstate(invalid="ignore"):
-        near = cycles.moved <= BESIDE * np.maximum(np.maximum(seen.apart, ROUNDING), family.noise(seen.scale))
+        near = cycles.moved <= BESIDE * np.maximum(np.maximum(seen.apart, ROUNDING), map_.noise_of(seen.scale))
     return cycles, near

@@ -14,6 +14,7 @@ import numpy as np
 
 from saltus.analysis.orbits.aperiodic import TRAIL, Wandering
 from saltus.analysis.orbits.orbits import Orbit
+from saltus.flow.engine import Schedule
 from saltus.flow.maps import Map, Stroboscope
 from saltus.results.schema import NOISY, period_text
 
@@ -100,7 +101,7 @@ def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
     map_ : Map
         An inexact map.
     orbit : Orbit
-        Of ``map_.exact``; it attracts.
+        Of ``map_.exact_map``; it attracts.
     scale : float64[D]
         Range of each state in all motions.
     """
@@ -117,8 +118,9 @@ def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
 
 def motion_size(map_: Map, orbit: Orbit, scale: np.ndarray) -> np.ndarray:
     """Range of each state in the exact motion on an orbit, float64[D]; where a state rests, that of all motions."""
-    exact = map_.exact
-    between = exact.trajectory(orbit.points[:1], orbit.period, BETWEEN)[0][0] if isinstance(exact, Stroboscope) else orbit.points
+    exact, between = map_.exact_map, orbit.points
+    if isinstance(exact, Stroboscope):
+        between = exact.run(orbit.points[:1], orbit.period, Schedule.even(orbit.period, BETWEEN)).samples[0]
     wide = np.ptp(between, axis=0)
     return np.where(wide > 0, wide, scale)
 

@@ -14,7 +14,7 @@ import numpy as np
 from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.flow import polynomials
 from saltus.flow.engine import Outcome
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.motion_series import Pieces
 from saltus.flow.pieces import nodes_of, pieces
 from saltus.flow.threads import on_threads
@@ -103,12 +103,12 @@ def unknown(m: int, size: int, outputs: int | None = None) -> Measures:
     return Measures(maximum, minimum, mean, deviation, harmonic, margin, span, contacts, [""] * m, turning)
 
 
-def measure(family: Family, start: np.ndarray, periods: np.ndarray, window: int = WANDERED, outputs: Outputs | None = None) -> Measures:
-    """The numbers of the motions from states float64[m, D], row i by row i of the family.
+def measure(map_: Stroboscope, start: np.ndarray, periods: np.ndarray, window: int = WANDERED, outputs: Outputs | None = None) -> Measures:
+    """The numbers of the motions from states float64[m, D], row i by row i of the map.
 
     Parameters
     ----------
-    family : Family
+    map_ : Stroboscope
         The flow.
     start : float64[m, D]
         A point at a whole period on each.
@@ -119,44 +119,43 @@ def measure(family: Family, start: np.ndarray, periods: np.ndarray, window: int 
     outputs : Outputs, optional
         What is asked about; default the states.
     """
-    wanted = outputs or outputs_of(family.system)
+    wanted = outputs or outputs_of(map_.system)
     result, parts = unknown(len(start), start.shape[1], len(wanted)), []
     for n in np.unique(periods):
         rows = np.flatnonzero(periods == n)
-        step = max(1, HELD // (nodes_of(family) * int(n or window)))
+        step = max(1, HELD // (nodes_of(map_) * int(n or window)))
         parts += [rows[first : first + step] for first in range(0, len(rows), step)]
 
     def work(part: np.ndarray) -> Measures:
-        n, some = int(periods[part[0]]), family.rows(part)
-        some.threads = 1
-        return _measured(some, start[part], n or window, n > 0, wanted)
+        n = int(periods[part[0]])
+        return _measured(map_.rows(part, threads=1), start[part], n or window, n > 0, wanted)
 
-    on_threads(work, parts, result.put, family.threads)
+    on_threads(work, parts, result.put, map_.threads)
     return result
 
 
-def _measured(family: Family, start: np.ndarray, span: int, closed: bool, outputs: Outputs) -> Measures:
+def _measured(map_: Stroboscope, start: np.ndarray, span: int, closed: bool, outputs: Outputs) -> Measures:
     """The numbers of some motions over so many periods, after which they repeat or don't."""
     size, wide = start.shape[1], len(outputs)
-    whole, outcome = pieces(family, start, span, outputs.formulas, outputs.guards)
+    whole, outcome = pieces(map_, start, span, outputs.formulas, outputs.guards)
     result = unknown(len(start), size, wide)
-    if family.method.records_contacts:
+    if map_.method.records_contacts:
         result.contacts[:] = outcome.counters[:, st.EVENTS] / span
         if closed:
-            result.itinerary[:] = _itineraries([guard.name for guard in family.system.guards], outcome)
+            result.itinerary[:] = _itineraries([guard.name for guard in map_.system.guards], outcome)
     known = np.unique(whole.motion)
     if len(known):
         first = np.flatnonzero(np.diff(whole.motion, prepend=-1))
         turns = [_Turns.of(whole, first, quantity, closed) for quantity in range(whole.terms.shape[1])]
         for output in range(wide):
             result.maximum[known, output], result.minimum[known, output] = _extremes(whole, first, turns[output], output)
-            _means(family, whole, first, output, result)
+            _means(map_, whole, first, output, result)
         gaps = range(wide, whole.terms.shape[1])
         margins = [_margin(whole, first, turns[gap], gap) for gap in gaps]
         ranges = [np.subtract(*_extremes(whole, first, turns[gap], gap)) for gap in gaps]
         result.margin[known] = np.min(margins, axis=0, initial=np.inf) if margins else np.inf
         result.span[known] = np.max(ranges, axis=0) if ranges else 0.0
-        for motion, points in zip(known, turns[0].states(family, whole, first, size), strict=True):
+        for motion, points in zip(known, turns[0].states(map_, whole, first, size), strict=True):
             result.turning[motion] = points
     return result
 
@@ -187,9 +186,9 @@ class _Turns:
         """The quantity there, float64[r]."""
         return polynomials.value(whole.terms[:, quantity, self.piece], self.place)
 
-    def states(self, family: Family, whole: Pieces, first: np.ndarray, size: int) -> list[np.ndarray]:
+    def states(self, map_: Stroboscope, whole: Pieces, first: np.ndarray, size: int) -> list[np.ndarray]:
         """All states there, float64[n, D] for each motion, each turn once."""
-        period, motion = family.period[whole.motion[self.piece]], whole.motion[self.piece]
+        period, motion = map_.period[whole.motion[self.piece]], whole.motion[self.piece]
         time = whole.period[self.piece] * period + whole.phase[self.piece] + self.place * whole.length[self.piece]
         again = np.append(False, (np.diff(motion) == 0) & (np.diff(time) < SAME * period[1:]))[: len(motion)]
         points = polynomials.value(whole.terms[:, :size][:, :, self.piece], self.place).T[~again]
@@ -214,7 +213,7 @@ def _margin(whole: Pieces, first: np.ndarray, turns: _Turns, gap: int) -> np.nda
     return np.minimum.reduceat(least, first)
 
 
-def _means(family: Family, whole: Pieces, first: np.ndarray, output: int, result: Measures) -> None:
+def _means(map_: Stroboscope, whole: Pieces, first: np.ndarray, output: int, result: Measures) -> None:
     """Mean, root mean square about it and first harmonic of an output, over the whole of each motion."""
     motion, count = whole.motion, np.diff(np.append(first, len(whole.motion)))
     places, weights = polynomials.gauss(PLACES)
@@ -224,11 +223,11 @@ def _means(family: Family, whole: Pieces, first: np.ndarray, output: int, result
     origin = np.repeat(whole.terms[0, output, first], count)  # a small motion about a large mean keeps its digits
     mean = np.add.reduceat((share * (values - origin)).sum(axis=0), first)
     values -= origin + np.repeat(mean, count)
-    angle = 2.0 * np.pi * (whole.phase + places[:, None] * whole.length) / family.period[motion]
+    angle = 2.0 * np.pi * (whole.phase + places[:, None] * whole.length) / map_.period[motion]
     known = motion[first]
     result.mean[known, output] = whole.terms[0, output, first] + mean
     result.deviation[known, output] = np.sqrt(np.add.reduceat((share * values**2).sum(axis=0), first))
-    if family.system.forced_at is not None:
+    if map_.system.forced_at is not None:
         result.harmonic[known, output] = 2.0 * np.add.reduceat((share * values * np.exp(-1j * angle)).sum(axis=0), first)
 
 

@@ -19,8 +19,6 @@ MOST_STEPS = 30
 MARGINAL = 1e-7
 #: Mismatch up to which a stiff orbit may amplify rounding.
 AMPLIFIED = 1e-9
-#: Noise up to which a map is exact but for rounding; Newton's method is for such maps.
-EXACT = 1e-9
 #: Iterates after which a trajectory of an inexact map has settled, and returns whose mean is taken then.
 FOLLOWED, LAST = 400, 8
 #: Scatter of the returns to one place, in units of the map's noise, that its errors may make; places lie so many scatters apart.
@@ -87,7 +85,7 @@ def polish(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | N
     -------
     Orbit or None
     """
-    if map_.noise > EXACT:
+    if not map_.exact:
         return _followed(map_, start, n, scale)
     x = np.array(start, float)
     for _ in range(MOST_STEPS):

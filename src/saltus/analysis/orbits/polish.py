@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.orbits.orbits import AMPLIFIED, FOLLOWED, LAST, MARGINAL, mean_orbit
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 
 #: Newton steps: quadratic convergence from 1e-5 needs three.
 MOST_STEPS = 12
@@ -66,12 +66,12 @@ class Closed:
         return np.where(np.isnan(apart), np.inf, apart).min(axis=1)
 
 
-def close(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, longest: int, nearby: bool = False) -> Closed:
+def close(map_: Stroboscope, start: np.ndarray, n: np.ndarray, scale: np.ndarray, longest: int, nearby: bool = False) -> Closed:
     """The periodic orbits near states that nearly recur.
 
     Parameters
     ----------
-    family : Family
+    map_ : Stroboscope
         k maps.
     start : float64[k, D]
         A point near each orbit.
@@ -88,19 +88,19 @@ def close(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, l
     result = Closed.none(len(start), longest, start.shape[1])
     if not len(start):
         return result
-    if not family.exact:
-        return _followed(family, start, n, scale, result)
-    x, found = _newton(family, start, n, scale, 1 if nearby else MOST_STEPS)
+    if not map_.exact:
+        return _followed(map_, start, n, scale, result)
+    x, found = _newton(map_, start, n, scale, 1 if nearby else MOST_STEPS)
     rows = np.flatnonzero(found)
     if not len(rows):
         return result
-    points = family.rows(rows).launch(x[rows], longest).advance(int(n[rows].max()))
-    period = _smallest_period(points, x[rows], n[rows], scale[rows], family.noise(scale[rows]))
+    points = map_.rows(rows).launch(x[rows], longest).advance(int(n[rows].max()))
+    period = _smallest_period(points, x[rows], n[rows], scale[rows], map_.noise_of(scale[rows]))
     orbits = np.concatenate([x[rows][:, None], points], axis=1)
-    return _completed(family, rows, period, [orbit[:m] for orbit, m in zip(orbits, period, strict=True)], result)
+    return _completed(map_, rows, period, [orbit[:m] for orbit, m in zip(orbits, period, strict=True)], result)
 
 
-def _newton(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, most_slow: int) -> tuple[np.ndarray, np.ndarray]:
+def _newton(map_: Stroboscope, start: np.ndarray, n: np.ndarray, scale: np.ndarray, most_slow: int) -> tuple[np.ndarray, np.ndarray]:
     """Fixed points of the n-th iterates, float64[k, D], and where the iteration converged, bool[k].
 
     So many of its steps may be slow.
@@ -109,7 +109,7 @@ def _newton(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray,
     before, slow = np.full(len(start), np.inf), np.zeros(len(start), np.int64)
     rows = np.arange(len(start))
     for _ in range(MOST_STEPS):
-        end, matrix = family.rows(rows).tangent(x[rows], n[rows])
+        end, matrix = map_.rows(rows).tangent(x[rows], n[rows])
         residual = np.eye(x.shape[1]) - matrix
         good = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(end).all(axis=1)
         good[good] = np.abs(np.linalg.det(residual[good])) > 0
@@ -138,26 +138,26 @@ def _smallest_period(points: np.ndarray, x: np.ndarray, n: np.ndarray, scale: np
     return np.where(np.isfinite(last) & (last < AMPLIFIED), period, 0)
 
 
-def _followed(family: Family, start: np.ndarray, n: np.ndarray, scale: np.ndarray, result: Closed) -> Closed:
+def _followed(map_: Stroboscope, start: np.ndarray, n: np.ndarray, scale: np.ndarray, result: Closed) -> Closed:
     """The orbits that trajectories of inexact maps settle on: means of their last returns (see orbits.py)."""
     longest = result.points.shape[1]
-    last = family.launch(start, 2 * FOLLOWED + longest).advance(max(FOLLOWED, 2 * LAST * int(n.max())))
-    noise = family.noise(scale)
+    last = map_.launch(start, 2 * FOLLOWED + longest).advance(max(FOLLOWED, 2 * LAST * int(n.max())))
+    noise = map_.noise_of(scale)
     means = [mean_orbit(trail, int(m), one, float(mine)) for trail, m, one, mine in zip(last, n, scale, noise, strict=True)]
     rows = np.array([i for i, mean in enumerate(means) if mean is not None and len(mean[0]) <= longest], np.int64)
     if not len(rows):
         return result
     points = [means[i][0] for i in rows]
-    return _completed(family, rows, np.array([len(one) for one in points], np.int64), points, result)
+    return _completed(map_, rows, np.array([len(one) for one in points], np.int64), points, result)
 
 
-def _completed(family: Family, rows: np.ndarray, period: np.ndarray, points: list[np.ndarray], result: Closed) -> Closed:
+def _completed(map_: Stroboscope, rows: np.ndarray, period: np.ndarray, points: list[np.ndarray], result: Closed) -> Closed:
     """Write orbits into the result, each from its first point on, with its multipliers."""
     points = [np.roll(one, -int(np.lexsort(one.T[::-1])[0]), axis=0) if len(one) else one for one in points]
     closed = np.flatnonzero(period > 0)
     if not len(closed):
         return result
-    _, matrix = family.rows(rows[closed]).tangent(np.array([points[i][0] for i in closed]), period[closed])
+    _, matrix = map_.rows(rows[closed]).tangent(np.array([points[i][0] for i in closed]), period[closed])
     for i, monodromy in zip(closed, matrix, strict=True):
         if np.isfinite(monodromy).all():
             values = np.linalg.eigvals(monodromy)

@@ -32,7 +32,7 @@ def portraits(map_: Map, found: Found) -> AttractorTable:
     """
     if isinstance(map_, Stroboscope) and autonomous(map_.system):
         return _unforced(map_, found)
-    size, per_second = len(map_.states), 1.0 / map_.period
+    size, per_second = len(map_.states), 1.0 / float(map_.period[0])
     orbits = [*found.orbits, *(one.orbit if isinstance(one, Noisy) else None for one in found.wandering)]
     period = np.array([0 if orbit is None else orbit.period for orbit in orbits], np.int64)
     start = np.array([*(orbit.points[0] for orbit in found.orbits), *map(_first, found.wandering)]).reshape(-1, size)
@@ -41,8 +41,8 @@ def portraits(map_: Map, found: Found) -> AttractorTable:
     numbers = _numbers(map_, start, period, points)
     scatter = np.array([one.scatter[0] if isinstance(one, Noisy) else np.nan for one in (*found.orbits, *found.wandering)])
     noisy = np.flatnonzero(np.isfinite(scatter))
-    if len(noisy) and map_.exact is not None:
-        numbers.put(noisy, _numbers(map_.exact, start[noisy], period[noisy], [points[i] for i in noisy]))
+    if len(noisy) and map_.exact_map is not None:
+        numbers.put(noisy, _numbers(map_.exact_map, start[noisy], period[noisy], [points[i] for i in noisy]))
     return AttractorTable(
         kind=[*("periodic" for _ in found.orbits), *(one.kind for one in found.wandering)],
         period=period,
@@ -73,16 +73,16 @@ def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
     cycle, multipliers, eigenvalues = np.full(len(kind), np.nan), *np.full((2, len(kind), size), np.nan + 0j)
     exponent, error = np.array([(0.0, 0.0)] * rests + [(one.exponent, one.exponent_error) for one in found.wandering]).reshape(-1, 2).T
     exponent, error = exponent / map_.period, error / map_.period
-    still = find_equilibria(map_.family(rests), start[:rests], np.ones((rests, size)))
+    still = find_equilibria(map_.rows(np.arange(rests)), start[:rests], np.ones((rests, size)))
     for i in range(rests):
         points[i] = start[i : i + 1] = still.place[i : i + 1] if np.isfinite(still.place[i]).all() else start[i : i + 1]
         eigenvalues[i], exponent[i] = still.eigenvalues[i], still.eigenvalues[i, 0].real
     for i in np.flatnonzero(kind == LIMIT_CYCLE).tolist():
         one = cycle_of(map_, found.wandering[i - rests])
         cycle[i], multipliers[i], points[i], start[i] = one.period[0], one.multipliers[0], one.points[0], one.points[0, ASIDE]
-    family = map_.family(len(kind)).every(np.where(np.isfinite(cycle), cycle, map_.period))
-    numbers = measure(family, start, np.isin(kind, (EQUILIBRIUM, LIMIT_CYCLE)).astype(np.int64), WANDERED)
-    rest(map_.family(rests), start[:rests], np.arange(rests), numbers)
+    own = map_.rows(np.arange(len(kind))).with_period(np.where(np.isfinite(cycle), cycle, map_.period))
+    numbers = measure(own, start, np.isin(kind, (EQUILIBRIUM, LIMIT_CYCLE)).astype(np.int64), WANDERED)
+    rest(map_.rows(np.arange(rests)), start[:rests], np.arange(rests), numbers)
     return AttractorTable(
         kind=kind.tolist(),
         period=np.zeros(len(kind), np.int64),
@@ -103,7 +103,7 @@ def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
 def _numbers(map_: Map, start: np.ndarray, period: np.ndarray, points: list[np.ndarray]) -> Measures:
     """The numbers of attractors from a point on each."""
     if isinstance(map_, Stroboscope):
-        return measure(map_.family(len(start)), start, period, WANDERED)
+        return measure(map_.rows(np.arange(len(start))), start, period, WANDERED)
     return _of_points(points, start.shape[1])
 
 

@@ -154,13 +154,13 @@ def _behind(map_: Map, orbit: Orbit, scale: np.ndarray, most: int) -> Noisy | No
 
 def _blurs(map_: Map) -> bool:
     """Whether errors of a map are more than rounding, and periods are there to be blurred."""
-    return map_.exact is not None and not (isinstance(map_, Stroboscope) and autonomous(map_.system))
+    return map_.exact_map is not None and not (isinstance(map_, Stroboscope) and autonomous(map_.system))
 
 
 def _exactly(map_: Map, state: np.ndarray, scale: np.ndarray, most: int) -> list[Orbit | None]:
     """The orbits to which the exact map settles from float64[k, D]."""
-    assert map_.exact is not None
-    exact, label, _ = find(map_.exact, state, scale, most)
+    assert map_.exact_map is not None
+    exact, label, _ = find(map_.exact_map, state, scale, most)
     return [exact.orbits[i] if 0 <= i < len(exact.orbits) else None for i in label]
 
 
@@ -193,7 +193,7 @@ def _on_cycles(
     some = alone[np.unique(np.linspace(0, len(alone) - 1, min(TRIES, len(alone))).astype(int))] if len(alone) else alone
     some = some[travel.going[rows[some]]]
     if len(some) and isinstance(map_, Stroboscope):
-        fresh = limit_cycles(map_, points[some, -1], ROUND * map_.period, scale)
+        fresh = limit_cycles(map_, points[some, -1], ROUND * float(map_.period[0]), scale)
         found.wandering = merge([*found.wandering, *fresh])
     return _keeping(found, LIMIT_CYCLE, points, who, travel.age, owner, settled)
 

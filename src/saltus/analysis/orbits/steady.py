@@ -18,7 +18,7 @@ from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.orbits.polish import Closed, close
 from saltus.analysis.orbits.recurrence import LONGEST, ROUND, recurrence
 from saltus.flow.engine import Schedule
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 
@@ -96,14 +96,14 @@ class Steady:
 
 
 def settle_each(
-    family: Family,
+    map_: Stroboscope,
     start: np.ndarray,
     most: int,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
     result: Steady | None = None,
 ) -> Steady:
-    """What each trajectory settles to: start float64[k, D], row i by row i of the family, followed for ``most`` iterates at the longest.
+    """What each trajectory settles to: start float64[k, D], row i by row i of the map, followed for ``most`` iterates at the longest.
 
     What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't depend on the other trajectories, nor on
     threads.
@@ -112,32 +112,30 @@ def settle_each(
     pieces = [np.arange(first, min(first + PIECE, len(start))) for first in range(0, len(start), PIECE)]
 
     def work(piece: np.ndarray) -> Steady:
-        part = family.rows(piece)
-        part.threads = 1
-        return _settle(part, start[piece], most)
+        return _settle(map_.rows(piece, threads=1), start[piece], most)
 
     on_threads(work, pieces, result.put, threads, progress)
     return result
 
 
-def _settle(family: Family, start: np.ndarray, most: int) -> Steady:
+def _settle(map_: Stroboscope, start: np.ndarray, most: int) -> Steady:
     """One piece, on one thread."""
     result = Steady.empty(*start.shape)
-    who = _follow(family, start, np.arange(len(start)), most, result, NEAR)
+    who = _follow(map_, start, np.arange(len(start)), most, result, NEAR)
     if len(who):
-        result.scale[who] = motion_range(family.rows(who), result.end[who])
-        who = _follow(family, result.end, who, ROUND, result, NEAR_AT_LAST)
+        result.scale[who] = motion_range(map_.rows(who), result.end[who])
+        who = _follow(map_, result.end, who, ROUND, result, NEAR_AT_LAST)
     if len(who):
-        who = _wander(family, result.end, who, result)
+        who = _wander(map_, result.end, who, result)
     if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
-        who = _follow(family, result.end, who, most, result, NEAR_AT_LAST)
+        who = _follow(map_, result.end, who, most, result, NEAR_AT_LAST)
         result.kind[who] = UNCONVERGED
     return result
 
 
-def _follow(family: Family, start: np.ndarray, who: np.ndarray, most: int, result: Steady, near: float) -> np.ndarray:
+def _follow(map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, result: Steady, near: float) -> np.ndarray:
     """Follow trajectories until they settle on an orbit; writes what is known, returns those that haven't."""
-    flight = family.rows(who).launch(start[who], most + ROUND)
+    flight = map_.rows(who).launch(start[who], most + ROUND)
     while len(who) and flight.age < most:
         points = flight.advance(ROUND)
         going = flight.going
@@ -148,26 +146,26 @@ def _follow(family: Family, start: np.ndarray, who: np.ndarray, most: int, resul
         if going.any():
             rows = np.flatnonzero(going)
             if flight.age == ROUND:
-                result.scale[who[rows]] = motion_range(family.rows(who[rows]), flight.state[rows])
-            stay[rows[_settled(family, points[rows], who[rows], near, result)]] = False
+                result.scale[who[rows]] = motion_range(map_.rows(who[rows]), flight.state[rows])
+            stay[rows[_settled(map_, points[rows], who[rows], near, result)]] = False
             result.settled[who[going & ~stay]] = flight.age
         flight.keep(stay)
         who = who[stay]
     return who
 
 
-def _settled(family: Family, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
+def _settled(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
     """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes the orbits."""
-    if autonomous(family.system):
-        return _settled_unforced(family.rows(who), points, who, near, result)
+    if autonomous(map_.system):
+        return _settled_unforced(map_.rows(who), points, who, near, result)
     scale = result.scale[who]
     period, apart = recurrence(points, scale)
     done = np.zeros(len(who), bool)
-    noise = family.rows(who).noise(scale)
+    noise = map_.rows(who).noise_of(scale)
     ready = np.flatnonzero(apart < np.maximum(near, noise))
     if not len(ready):
         return done
-    orbits = close(family.rows(who[ready]), points[ready, -1], period[ready], scale[ready], LONGEST)
+    orbits = close(map_.rows(who[ready]), points[ready, -1], period[ready], scale[ready], LONGEST)
     tolerance = BESIDE * np.maximum(apart[ready], noise[ready])
     right = orbits.stable & (orbits.distance(points[ready, -1], scale[ready]) <= tolerance)
     done[ready[right]] = True
@@ -179,33 +177,33 @@ def _settled(family: Family, points: np.ndarray, who: np.ndarray, near: float, r
     return done
 
 
-def _settled_unforced(family: Family, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
+def _settled_unforced(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
     """As :func:`_settled` for rows of a system without forcing: which rest, or go round a limit cycle."""
-    state, window = points[:, -1], ROUND * float(family.period[0])
+    state, window = points[:, -1], ROUND * float(map_.period[0])
     result.scale[who] = np.maximum(result.scale[who], np.ptp(points, axis=1))
-    found = unforced.attracted(family, state, result.scale[who], window, near)
+    found = unforced.attracted(map_, state, result.scale[who], window, near)
     done = found.orbits.period > 0
     chosen = who[done]
     result.put_orbits(chosen, found.orbits.rows(done))
     result.scale[chosen] = found.scale[done]
     rests = found.orbits.time[done] == 0
     result.kind[chosen], result.exponent_error[chosen] = np.where(rests, EQUILIBRIUM, LIMIT_CYCLE), 0.0
-    leading = found.orbits.multipliers[done, 0].real * family.period[done]
+    leading = found.orbits.multipliers[done, 0].real * map_.period[done]
     result.exponent[chosen] = np.where(rests, leading, 0.0)  # along a limit cycle nothing grows or dies
     return done
 
 
-def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) -> np.ndarray:
+def _wander(map_: Stroboscope, start: np.ndarray, who: np.ndarray, result: Steady) -> np.ndarray:
     """Type the trajectories that don't recur by their exponents; writes what is known, returns those that stay unclear."""
-    maps = family.rows(who)
+    maps = map_.rows(who)
     state, kinds = kinds_of(maps.rows, start[who], result.scale[who], [[i] for i in range(len(who))])
     flight = maps.launch(state, TRAIL)
     trail = flight.advance(TRAIL)
-    recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR_AT_LAST, maps.noise(result.scale[who]))  # by now
+    recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR_AT_LAST, maps.noise_of(result.scale[who]))  # by now
     result.end[who] = flight.state
     unclear = np.ones(len(who), bool)
-    if autonomous(family.system):  # a limit cycle that is reached slowly, and no torus
-        recurs |= unforced.nearly_recurs(maps, flight.state, ROUND * float(family.period[0]))
+    if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
+        recurs |= unforced.nearly_recurs(maps, flight.state, ROUND * float(map_.period[0]))
         away = unforced.runs_away(trail)
         result.kind[who[away]] = ESCAPED
     for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2))):
@@ -213,7 +211,7 @@ def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) 
         if (
             result.kind[who[i]] != ESCAPED
             and kind is not None
-            and not (recurs[i] and (kind[0] != "chaotic" or not autonomous(family.system)))
+            and not (recurs[i] and (kind[0] != "chaotic" or not autonomous(map_.system)))
         ):
             unclear[i], row = False, who[i]
             result.kind[row] = CHAOTIC if kind[0] == "chaotic" else QUASI_PERIODIC
@@ -222,10 +220,9 @@ def _wander(family: Family, start: np.ndarray, who: np.ndarray, result: Steady) 
     return who[unclear & (result.kind[who] != ESCAPED)]
 
 
-def motion_range(family: Family, state: np.ndarray) -> np.ndarray:
+def motion_range(map_: Stroboscope, state: np.ndarray) -> np.ndarray:
     """Range of each state in the motion from states float64[k, D] on, float64[k, D]; its size where it rests, 1 where that is 0."""
-    index = np.arange(RANGED * LOOKS)
-    samples = family.run(state, RANGED, Schedule(index // LOOKS, (index % LOOKS) / LOOKS)).samples
+    samples = map_.run(state, RANGED, Schedule.even(RANGED, LOOKS)).samples
     with np.errstate(all="ignore"):
         lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
     scale = np.where(lengths > RESTS * sizes, lengths, sizes)

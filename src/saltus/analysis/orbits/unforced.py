@@ -11,7 +11,7 @@ from saltus.analysis.orbits.equilibria import find_equilibria
 from saltus.analysis.orbits.orbit_measures import Measures
 from saltus.analysis.orbits.polish import Closed
 from saltus.analysis.orbits.recurrence import LONGEST
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.system.evaluate import evaluate
 
 #: A limit cycle is that of a trajectory that lies so many times closer than its return: 1/(1 - multiplier) is the ratio of the two.
@@ -40,12 +40,12 @@ class Attracted:
     scale: np.ndarray
 
 
-def attracted(family: Family, state: np.ndarray, scale: np.ndarray, window: float, near: float) -> Attracted:
+def attracted(map_: Stroboscope, state: np.ndarray, scale: np.ndarray, window: float, near: float) -> Attracted:
     """Which trajectories have come to an equilibrium that captures where they are, or to an attracting limit cycle.
 
     Parameters
     ----------
-    family : Family
+    map_ : Stroboscope
         k flows without forcing.
     state : float64[k, D]
         Where each trajectory stands.
@@ -57,29 +57,29 @@ def attracted(family: Family, state: np.ndarray, scale: np.ndarray, window: floa
         Distance of a return, in units of the scale, that is worth a try by Newton's method.
     """
     result = Attracted(Closed.none(len(state), LONGEST, state.shape[1]), scale.copy())
-    rest = find_equilibria(family, state, scale)
+    rest = find_equilibria(map_, state, scale)
     here = np.flatnonzero(rest.stable & rest.holds(state))
     _put_equilibria(result.orbits, here, rest.place[here], rest.eigenvalues[here])
     result.scale[here] = np.maximum(scale[here], np.abs(rest.place[here]))
     rows = np.flatnonzero(result.orbits.period == 0)
     if not len(rows):
         return result
-    seen = returns(family.rows(rows), state[rows], window)
-    ready = np.flatnonzero(seen.apart < np.maximum(near, family.rows(rows).noise(seen.scale)))
+    seen = returns(map_.rows(rows), state[rows], window)
+    ready = np.flatnonzero(seen.apart < np.maximum(near, map_.rows(rows).noise_of(seen.scale)))
     if not len(ready):
         return result
     rows, own = rows[ready], seen.scale[ready]
-    cycles = find_cycles(family.rows(rows), state[rows], seen.time[ready], own)
-    tolerance = BESIDE * np.maximum(np.maximum(seen.apart[ready], ROUNDING), family.rows(rows).noise(own))
+    cycles = find_cycles(map_.rows(rows), state[rows], seen.time[ready], own)
+    tolerance = BESIDE * np.maximum(np.maximum(seen.apart[ready], ROUNDING), map_.rows(rows).noise_of(own))
     beside = cycles.stable & (cycles.moved <= tolerance)
     _put_cycles(result.orbits, rows, cycles, beside)
     result.scale[rows[beside]] = own[beside]
     return result
 
 
-def nearly_recurs(family: Family, state: np.ndarray, window: float) -> np.ndarray:
+def nearly_recurs(map_: Stroboscope, state: np.ndarray, window: float) -> np.ndarray:
     """Which motions come back so near to where they were that they may be on their way to a limit cycle, bool[k]."""
-    return np.asarray(returns(family, state, window).apart < TORUS)
+    return np.asarray(returns(map_, state, window).apart < TORUS)
 
 
 def runs_away(trail: np.ndarray) -> np.ndarray:
@@ -89,15 +89,15 @@ def runs_away(trail: np.ndarray) -> np.ndarray:
         return np.asarray((np.diff(sizes, axis=0) > 0).all(axis=0) & (sizes[-1] > GROWN * sizes[0]))
 
 
-def rest(family: Family, place: np.ndarray, rows: np.ndarray, numbers: Measures) -> None:
+def rest(map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measures) -> None:
     """Fill in the rows int64[m] of equilibria float64[m, D]: the size of their states, and the distance to the nearest boundary."""
     size = place.shape[1]
     numbers.maximum[rows, :size] = numbers.minimum[rows, :size] = numbers.mean[rows, :size] = place
     numbers.deviation[rows, :size], numbers.span[rows] = 0.0, 0.0
-    states, values = dict(zip(family.system.states, place.T, strict=True)), family.values
+    states, values = dict(zip(map_.system.states, place.T, strict=True)), map_.values
     bits: list[np.ndarray] = []
     nearest = np.full(len(rows), np.inf)
-    for guard in family.system.guards:
+    for guard in map_.system.guards:
         (gap,) = evaluate([guard.gap], states=states, values=values, bits=bits)
         bits.append(np.broadcast_to(gap, len(rows)) > 0)
         nearest = np.minimum(nearest, np.abs(gap))
@@ -106,10 +106,10 @@ def rest(family: Family, place: np.ndarray, rows: np.ndarray, numbers: Measures)
         numbers.turning[row] = one[None]
 
 
-def closed_cycles(family: Family, state: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
+def closed_cycles(map_: Stroboscope, state: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
     """Limit cycles near states that nearly recur after a time [s]."""
     result = Closed.none(len(state), LONGEST, state.shape[1])
-    cycles = find_cycles(family, state, time, scale)
+    cycles = find_cycles(map_, state, time, scale)
     _put_cycles(result, np.arange(len(state)), cycles, np.isfinite(cycles.period))
     return result
 
@@ -121,10 +121,10 @@ def _put_cycles(result: Closed, rows: np.ndarray, cycles: Cycles, which: np.ndar
     result.points[chosen], result.multipliers[chosen] = cycles.points[which], cycles.multipliers[which]
 
 
-def closed_equilibria(family: Family, state: np.ndarray, scale: np.ndarray) -> Closed:
+def closed_equilibria(map_: Stroboscope, state: np.ndarray, scale: np.ndarray) -> Closed:
     """Equilibria near states."""
     result = Closed.none(len(state), LONGEST, state.shape[1])
-    rest = find_equilibria(family, state, scale)
+    rest = find_equilibria(map_, state, scale)
     _put_equilibria(result, np.flatnonzero(np.isfinite(rest.place).all(axis=1)), *_finite(rest.place, rest.eigenvalues))
     return result
 
@@ -150,12 +150,12 @@ def _put(result: Closed, rows: np.ndarray, other: Closed) -> None:
     )  # fmt: skip
 
 
-def close_again(family: Family, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
+def close_again(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
     """Equilibria (time 0) and limit cycles (their period) from those at other parameter values."""
     result = Closed.none(len(start), LONGEST, start.shape[1])
     rests, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)
     if len(rests):
-        _put(result, rests, closed_equilibria(family.rows(rests), start[rests], scale[rests]))
+        _put(result, rests, closed_equilibria(map_.rows(rests), start[rests], scale[rests]))
     if len(turns):
-        _put(result, turns, closed_cycles(family.rows(turns), start[turns], time[turns], scale[turns]))
+        _put(result, turns, closed_cycles(map_.rows(turns), start[turns], time[turns], scale[turns]))
     return result

@@ -18,7 +18,7 @@ from saltus.analysis.orbits.steady import motion_range
 from saltus.analysis.orbits.unforced import close_again
 from saltus.analysis.responses.grid import Grid
 from saltus.analysis.responses.responses import Found
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 
 #: Farthest that an orbit moves in one step, in units of its own range.
@@ -33,11 +33,11 @@ HALVINGS, STEPS = 14, 400
 INEXACT = 0.05
 
 
-def closed_near(family: Family, start: np.ndarray, period: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
-    """Orbits of the stroboscope (time NaN), limit cycles and equilibria (time 0) near states float64[k, D], as a family has them."""
+def closed_near(map_: Stroboscope, start: np.ndarray, period: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
+    """Orbits of the stroboscope (time NaN), limit cycles and equilibria (time 0) near states float64[k, D], as a map_ has them."""
     if np.isnan(time).all():
-        return close(family, start, period, scale, LONGEST, nearby=True)
-    return close_again(family, start, time, scale)
+        return close(map_, start, period, scale, LONGEST, nearby=True)
+    return close_again(map_, start, time, scale)
 
 
 def orbit_distance(p: np.ndarray, q: np.ndarray, scale: np.ndarray) -> float:
@@ -91,7 +91,7 @@ class Follower:
     def __init__(self, found: Found, grid: Grid, method: Method, rows: np.ndarray, threads: int | None = None):
         ((name, values),) = grid.axes.items()
         self._column = list(grid.system.values).index(name)
-        self._family = Family(
+        self._map = Stroboscope(
             grid.system, method if method.exact else method.companion(), grid.rows[found.place[rows]], grid.every, threads
         )
         self._every = grid.every
@@ -142,11 +142,11 @@ class Follower:
         arrived = closed_near(self._at(rows, value), orbits.points[:, 0], orbits.period, orbits.time, scale)
         return arrived, _in_phase(arrived, orbits, scale)
 
-    def _at(self, rows: np.ndarray, value: np.ndarray) -> Family:
+    def _at(self, rows: np.ndarray, value: np.ndarray) -> Stroboscope:
         """The maps of some rows at other values of the parameter."""
-        parameters = self._family.parameters[rows]
+        parameters = self._map.parameters[rows]
         parameters[:, self._column] = value
-        return Family(self._family.system, self._family.method, parameters, self._every, self._family.threads)
+        return Stroboscope(self._map.system, self._map.method, parameters, self._every, self._map.threads)
 
     def _try(self, rows: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Go on to values float64[m] where the step counts; where it did, bool[m]."""

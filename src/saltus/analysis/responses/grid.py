@@ -14,7 +14,7 @@ from saltus.analysis.orbits.recurrence import LONGEST
 from saltus.analysis.starts import check_system, ensemble, looks_every, single
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.room import check_room
 from saltus.system.system import System
@@ -74,9 +74,9 @@ class Grid:
             rows[:, names.index(name)] = column.ravel()
         return rows
 
-    def family(self, method: Method, threads: int | None = None) -> Family:
+    def map(self, method: Method, threads: int | None = None) -> Stroboscope:
         """A map for every point of the grid."""
-        return Family(self.system, method, self.rows, self.every, threads)
+        return Stroboscope(self.system, method, self.rows, self.every, threads)
 
 
 def grid_of(

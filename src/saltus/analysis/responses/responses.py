@@ -14,7 +14,7 @@ from saltus.analysis.orbits.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CY
 from saltus.analysis.orbits.unforced import multipliers_and_eigenvalues, rest
 from saltus.analysis.outputs import Outputs
 from saltus.analysis.responses.grid import Grid
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.results import AttractorTable
 from saltus.results.intervals import wilson
@@ -83,21 +83,21 @@ class Found:
 
 def find(grid: Grid, method: Method, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
     """The responses of a grid; on Ctrl-C those that are known, with ``complete`` False."""
-    family, count = grid.family(method, threads), len(grid.starts)
+    map_, count = grid.map(method, threads), len(grid.starts)
     result = Steady.empty(grid.places * count, grid.starts.shape[1])
     complete = True
     try:
         if grid.sweeps:
-            _sweep(grid, family, most, result, threads, progress)
+            _sweep(grid, map_, most, result, threads, progress)
         else:
-            settle_each(family.rows(np.repeat(np.arange(grid.places), count)), np.tile(grid.starts, (grid.places, 1)), most,
+            settle_each(map_.rows(np.repeat(np.arange(grid.places), count)), np.tile(grid.starts, (grid.places, 1)), most,
                         threads, progress, result)  # fmt: skip
     except KeyboardInterrupt:
         complete = False
-    return _gathered(result, grid.places, count, 4.0 * family.noise(result.scale), complete)
+    return _gathered(result, grid.places, count, 4.0 * map_.noise_of(result.scale), complete)
 
 
-def _sweep(grid: Grid, family: Family, most: int, result: Steady, threads: int | None, progress: Callable[[float], None] | None) -> None:
+def _sweep(grid: Grid, map_: Stroboscope, most: int, result: Steady, threads: int | None, progress: Callable[[float], None] | None) -> None:
     """Each start along the axis: where it stands at one value is where it starts at the next."""
     count = len(grid.starts)
     for k in range(grid.places):
@@ -106,7 +106,7 @@ def _sweep(grid: Grid, family: Family, most: int, result: Steady, threads: int |
             place, before = (k, k - 1) if way == "up" else (grid.places - 1 - k, grid.places - k)
             start = result.end[before * count + who] if k else grid.starts[who]
             rows = place * count + who
-            result.put(rows, settle_each(family.rows(np.full(len(who), place)), np.where(np.isfinite(start), start, 0.0), most, threads))
+            result.put(rows, settle_each(map_.rows(np.full(len(who), place)), np.where(np.isfinite(start), start, 0.0), most, threads))
         if progress:
             progress((k + 1) / grid.places)
 
@@ -153,17 +153,17 @@ def _order(result: Steady, row: int) -> tuple[float, ...]:
 
 def numbers_of(found: Found, outputs: Outputs, grid: Grid, method: Method, threads: int | None = None) -> Measures:
     """The numbers of each response."""
-    family, times = grid.family(method, threads).rows(found.place), own_times(found, grid)
-    numbers = measure(family if times is None else family.every(times), found.start(aside=True), spans_of(found), outputs=outputs)
+    map_, times = grid.map(method, threads).rows(found.place), own_times(found, grid)
+    numbers = measure(map_ if times is None else map_.with_period(times), found.start(aside=True), spans_of(found), outputs=outputs)
     rests = np.flatnonzero(found.kind == EQUILIBRIUM)
     if len(rests):
-        rest(family.rows(rests), found.start()[rests], rests, numbers)
+        rest(map_.rows(rests), found.start()[rests], rests, numbers)
     return numbers
 
 
 def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
     """What is known of each response."""
-    family = grid.family(method).rows(found.place)
+    map_ = grid.map(method).rows(found.place)
     kind, s = found.kind, found.steady
     period = np.where(kind == PERIODIC, found.period, 0)
     multipliers, eigenvalues = multipliers_and_eigenvalues(s.orbits.multipliers[found.row], kind == EQUILIBRIUM)
@@ -179,8 +179,8 @@ def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> Att
         rms=numbers.rms[:, 0],
         margin=numbers.margin,
         multipliers=multipliers,
-        exponent=s.exponent[found.row] / family.period,
-        exponent_error=s.exponent_error[found.row] / family.period,
+        exponent=s.exponent[found.row] / map_.period,
+        exponent_error=s.exponent_error[found.row] / map_.period,
         points=[found.points(i)[: int(known)] for i, known in enumerate(np.where(found.period > 0, found.period, WANDERED))],
         fractions=shares,
         **({} if grid.every is None else {"cycle": np.where(kind == LIMIT_CYCLE, found.time, np.nan), "eigenvalues": eigenvalues}),

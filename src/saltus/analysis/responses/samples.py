@@ -9,7 +9,7 @@ from saltus.analysis.responses.grid import Grid
 from saltus.analysis.responses.responses import WANDERED, Found, own_times, spans_of
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome
-from saltus.flow.family import Family
+from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.system.system import System
@@ -43,7 +43,7 @@ def sampled(sample: str, numbers: Measures, grid: Grid, method: Method, found: F
     if sample == "turning_points":
         return numbers.turning
     start, result = found.start(), [np.zeros((0, len(grid.system.states)))] * len(found)
-    everything = Family(grid.system, method, grid.rows[found.place], own_times(found, grid), threads)
+    everything = Stroboscope(grid.system, method, grid.rows[found.place], own_times(found, grid), threads)
     for span in np.unique(spans):
         rows = np.flatnonzero(spans == span)
         for first in range(0, len(rows), PIECE):

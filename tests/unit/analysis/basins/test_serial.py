@@ -9,6 +9,7 @@ import struct
 import numpy as np
 import pytest
 
+from function_maps import FunctionMap
 from saltus.analysis.basins.labels import Settling, settle
 from saltus.analysis.basins.serial import cell_types, found_data, found_from, settling_arrays, settling_from
 from saltus.analysis.orbits.aperiodic import Wandering
@@ -17,7 +18,6 @@ from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.orbits import Orbit
 from saltus.analysis.orbits.recurrence import find
 from saltus.errors import SaltusError
-from saltus.flow.maps import FunctionMap
 from saltus.results.durable import seal, unseal
 
 SCALE = np.array([3.0, 1.0])

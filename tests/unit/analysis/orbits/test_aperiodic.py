@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from function_maps import FunctionMap
 from saltus.analysis.basins.labels import complete, settle
 from saltus.analysis.orbits.aperiodic import Wandering, growth_rates, kind_of_growth, kinds_of, merge
 from saltus.analysis.orbits.recurrence import find, recurrence
-from saltus.flow.maps import FunctionMap
 
 GOLDEN = math.pi * (math.sqrt(5) - 1)
 

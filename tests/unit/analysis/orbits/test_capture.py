@@ -5,12 +5,12 @@ import warnings
 import numpy as np
 import pytest
 
+from function_maps import FunctionMap
 from saltus.analysis.basins.labels import settle
 from saltus.analysis.orbits.capture import Neighbourhoods, _alike, neighbourhoods, sphere
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.orbits import polish
 from saltus.analysis.orbits.recurrence import find
-from saltus.flow.maps import FunctionMap
 
 
 def linear(matrix) -> FunctionMap:

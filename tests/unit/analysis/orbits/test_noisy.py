@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from function_maps import FunctionMap
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
 from saltus.analysis.basins.serial import found_data, found_from
 from saltus.analysis.orbits.capture import Neighbourhoods
@@ -14,7 +15,6 @@ from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.noisy import NARROW, NOISY, ROOM, Noisy, apart, blurred
 from saltus.analysis.orbits.orbits import polish
 from saltus.analysis.orbits.recurrence import find
-from saltus.flow.maps import FunctionMap
 
 WIDE = np.array([1.0])
 SCALE = np.array([3.0, 1.0])
@@ -53,7 +53,7 @@ def starts(count=12, size=1):
 @pytest.fixture(scope="module")
 def cycle():
     """The exact 4-cycle."""
-    exact = henon(0.0).exact
+    exact = henon(0.0).exact_map
     found, _, _ = find(exact, starts(size=2), SCALE, 256)
     assert [orbit.period for orbit in found.orbits] == [4]
     return found.orbits[0]
@@ -99,7 +99,7 @@ def test_starts_are_labelled_by_it(cycle, searched):
     map_, found, _ = searched
     result = settle(map_, starts(200, 2), found, 512)
     assert set(result.label) == {0}
-    exact = settle(map_.exact, starts(200, 2), found, 512)  # the check by an exact method knows it too
+    exact = settle(map_.exact_map, starts(200, 2), found, 512)  # the check by an exact method knows it too
     assert set(exact.label) == {0}
     assert np.abs(exact.end[:, None] - cycle.points).max(axis=2).min(axis=1).max() < 1e-4
 
@@ -189,7 +189,7 @@ def test_orbits_beside_a_noisy_one_become_it(cycle):
     elsewhere = FunctionMap(lambda z: 0.5 * z + 5.0, "x y", lambda z: np.tile(0.5 * np.eye(2), (len(z), 1, 1)))
     found = Found(Neighbourhoods.none(2))
     far = polish(elsewhere, np.full(2, 9.9), 1, SCALE)
-    found.add(henon(0.0).exact, cycle, SCALE)
+    found.add(henon(0.0).exact_map, cycle, SCALE)
     found.add(elsewhere, far, SCALE)
     found.add_wandering(noisy_cycle(cycle))
     assert found.orbits == [far]

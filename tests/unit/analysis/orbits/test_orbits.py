@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from function_maps import FunctionMap
 from saltus.analysis.orbits.orbits import Orbit, polish, same
-from saltus.flow.maps import FunctionMap
 
 UNIT = np.array([1.0, 1.0])
 

@@ -1,0 +1,1 @@
+"""The questions of a study: what each computes, tabulates and draws."""

@@ -1,0 +1,109 @@
+"""Results that are one file: kept when they are computed, and not computed again while they are what the study asks for."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from saltus.results.files import ResultFileError, replacing
+from saltus.results.provenance import to_json
+from saltus.study.run.running import Report, Running
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Attribute of a result that holds its identity.
+IDENTITY = "study_identity"
+#: End of the name of a file that holds what was computed before a stop.
+PARTIAL = "-partial"
+
+
+def kept_or_computed(
+    stem: str, title: str, identity: Mapping[str, str], compute: Callable[[Callable[[float], None]], xr.Dataset], at: Running
+) -> xr.Dataset:
+    """The result in ``STEM.nc`` if it is that of this question, else computed and kept there.
+
+    Parameters
+    ----------
+    stem, title : str
+        Name of the file; of the question.
+    identity : mapping of str to str
+        What must be the same for the file to be the answer.
+    compute : callable
+        Takes what is called with the share done.
+    at : Running
+        Where.
+
+    Raises
+    ------
+    Interrupted
+        On Ctrl-C; what was computed so far is kept in ``STEM-partial.nc``.
+    """
+    file = at.folder / f"{stem}.nc"
+    kept = _kept(file, title, identity, at.say)
+    if kept is not None:
+        at.report(Report(title, 100, 100, 0.0, 0, last=True, what="%"))
+        return kept
+    return _computed(file, title, identity, compute, at)
+
+
+def _kept(file: Path, title: str, identity: Mapping[str, str], say: Callable[[str], None]) -> xr.Dataset | None:
+    """The result in a file, if it is there, sound, and of this identity."""
+    from saltus.results import load
+
+    if not file.exists():
+        return None
+    try:
+        ds = load(file)
+        before = json.loads(ds.attrs.get(IDENTITY, "{}"))
+    except (ResultFileError, json.JSONDecodeError) as error:
+        say(f"{title}: computed again, as {error}")
+        return None
+    changed = [name for name in {**before, **identity} if before.get(name) != identity.get(name)]
+    if changed:
+        say(f"{title}: computed again, as the {', '.join(changed)} changed since {file.name} was written.")
+        return None
+    return ds
+
+
+def _computed(
+    file: Path, title: str, identity: Mapping[str, str], compute: Callable[[Callable[[float], None]], xr.Dataset], at: Running
+) -> xr.Dataset:
+    from saltus.flow import Interrupted
+    from saltus.results import save
+
+    begin = time.perf_counter()
+
+    def show(share: float, last: bool = False) -> None:
+        done = 100 if last else min(round(100 * share), 99)
+        at.report(Report(title, done, 100, time.perf_counter() - begin, done, last, "%"))
+
+    labels: dict[str, Any] = {"study": at.text, "title": title, IDENTITY: to_json(dict(identity))}
+    partial = file.with_stem(f"{file.stem}{PARTIAL}")
+    try:
+        ds = compute(show).assign_attrs(labels)
+    except Interrupted as stopped:
+        if stopped.has_partial:
+            at.say(f"{title}: what was computed so far goes to {partial}")
+            save(stopped.partial.assign_attrs(labels), partial)
+        raise
+    save(ds, file)
+    partial.unlink(missing_ok=True)
+    show(1.0, last=True)
+    return ds
+
+
+def save_picture(figure: Any, file: Path) -> Path:
+    """Write a figure, in full or not at all, and forget it."""
+    import matplotlib.pyplot as plt
+
+    from saltus.plot.picture import keep_drawable
+
+    keep_drawable(figure)  # a title is the user's text
+    with replacing(file) as (part,):
+        figure.savefig(part, dpi=150, format=file.suffix[1:])
+    plt.close(figure)
+    return file

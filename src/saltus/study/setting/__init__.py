@@ -1,0 +1,1 @@
+"""What all questions of a study share: its system, its units, the files that it names."""

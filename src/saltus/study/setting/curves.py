@@ -1,0 +1,27 @@
+"""Curves of a study: measured points from a file as a table that formulas call."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.errors import SaltusError, StudyError
+from saltus.results.measured import columns
+from saltus.study.setting.inputs import Input
+from saltus.study.tables.parts import Curve
+from saltus.system.tables import Table, curve
+
+
+def curve_of(file: Input, how: Curve, name: str) -> Table:
+    """The curve through the points of a file: its first two columns, in SI by the units of their headings.
+
+    Raises
+    ------
+    StudyError
+        If the file holds something else, or the points can't be those of a curve. What it holds isn't repeated.
+    """
+    place = f"[system.tables.{name}]"
+    try:
+        points, values = columns(file.data, file.path)
+        return curve(np.array(points), np.array(values), how.kind, how.outside, name)
+    except SaltusError as error:
+        raise StudyError(f"{place} {str(error).replace('sl.table', file.name)}") from None

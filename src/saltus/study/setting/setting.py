@@ -1,0 +1,167 @@
+"""What all questions of a study share: its system, its method, the files that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from inspect import signature
+from typing import TYPE_CHECKING, Any
+
+from saltus.errors import ParameterError, SaltusError, StudyError, nearest
+from saltus.study.setting import quantities
+from saltus.study.tables.wording import fault
+from saltus.system.formula import Equations, Formula, Formulas
+
+if TYPE_CHECKING:
+    from saltus.study.setting.inputs import Inputs
+    from saltus.study.tables.parts import Header, Output, Quantity, SystemTable
+    from saltus.study.tables.parts import Table as SpecTable
+    from saltus.study.tables.spec import Study
+    from saltus.system import System
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What the questions of one study share.
+
+    Attributes
+    ----------
+    study : Study
+    base : System
+        With the values of [system].
+    inputs : Inputs
+        The files that the study names.
+    formulas : Formulas
+        The terms and tables that its formulas share.
+    """
+
+    study: Study
+    base: System
+    inputs: Inputs
+    formulas: Formulas = field(default_factory=Formulas)
+
+    def system(self, values: Any, place: str) -> System:
+        """The system with the values of one question."""
+        return _with_values(self.base, values, place) if values else self.base
+
+    def formula(self, text: str, place: str) -> Formula:
+        """A formula of the study. Raises StudyError if it can't be read."""
+        try:
+            return self.formulas.formula(text)
+        except SaltusError as error:
+            raise fault(place, error) from None
+
+    def outputs(self, system: System, given: Mapping[str, Output], place: str) -> dict[str, Any] | None:
+        """Outputs as the analyses take them, looked at now, so that a fault is told before anything is computed."""
+        from saltus.analysis.outputs import outputs_of
+
+        place = f"{place}.outputs"
+        outputs = {name: (self.formula(one.formula, place), one.unit) for name, one in given.items()}
+        try:
+            outputs_of(system, outputs)
+        except SaltusError as error:
+            raise fault(place, error) from None
+        return outputs or None
+
+    def method(self, own: SpecTable | None = None) -> Any:
+        """The method of one question: its own, or the study's."""
+        return method_of(own or self.study.method)
+
+
+def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
+    """The setting of a study: its system, and what its formulas share, with the files that they take part in.
+
+    Raises
+    ------
+    StudyError, UnitError, ParameterError
+        If the system can't be made, or a file can't be read.
+    """
+    formulas = formulas_of(study.system, inputs)
+    return Setting(study, system_of(study.system, own, formulas, study.study), inputs, formulas)
+
+
+def formulas_of(table: SystemTable, inputs: Inputs) -> Formulas:
+    """The terms and tables of [system]. Raises StudyError if one can't be read."""
+    from saltus.study.setting.curves import curve_of
+
+    tables = {name: curve_of(inputs.read(one.file, f"system.tables.{name}"), one, name) for name, one in table.tables.items()}
+    try:
+        return Formulas(table.terms, tables)
+    except SaltusError as error:
+        raise fault("system", error) from None
+
+
+def system_of(table: SystemTable, own: System | None = None, formulas: Formulas | None = None, header: Header | None = None) -> System:
+    """The system that [system] names or writes out, with its values.
+
+    Raises
+    ------
+    StudyError
+        If there is none, or more than one, or a value lacks its unit.
+    ParameterError, UnitError
+        If the model, the case or a value is refused.
+    """
+    from saltus import models
+
+    kinds = {"a model": table.model or table.case, "rates": table.rates, "--system": own}
+    if len(given := [kind for kind, one in kinds.items() if one]) > 1:
+        raise StudyError(f"[system] {' and '.join(given)}: these are several systems. Keep one.")
+    own_keys = [key for key in ("units", "guards", "forced_at", "check_units") if key in table.model_fields_set]
+    if not table.rates and own_keys:
+        raise StudyError(f"[system] {', '.join(own_keys)}: this is for equations of your own. Give rates, or leave it out.")
+    if own is not None:
+        base = own
+    elif table.rates:
+        base = _written(table, formulas or Formulas(), header)
+    elif table.model is None:
+        raise StudyError(
+            '[system] names no model. Write model = "delangre" (`saltus models` lists them), give rates, or --system my_rig.py:rig.'
+        )
+    else:
+        try:
+            model = models.find(table.model)
+            if table.case is not None and "case" not in signature(model).parameters:
+                raise StudyError(f"[system] case: {table.model} has no cases.")
+            base = model() if table.case is None else model(table.case)
+        except ParameterError as error:
+            raise fault("system", error) from None
+    return _with_values(base, table.values, "system")
+
+
+def _with_values(system: System, values: Mapping[str, Quantity], place: str) -> System:
+    """The system with values as a table gives them. Raises StudyError or UnitError if one is refused."""
+    given = quantities.parameters(system, values, place)
+    try:
+        return system.with_values(**given)
+    except ParameterError as error:
+        raise fault(place, error) from None
+
+
+def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> System:
+    """The system whose equations stand in [system]."""
+    from saltus.system import system
+
+    try:
+        rates = {name: formulas.formula(text) for name, text in table.rates.items()}
+        used = {name for rate in rates.values() for name in rate.names} | ({table.forced_at} if table.forced_at else set())
+        if unused := [name for name in table.values if name not in used]:
+            raise StudyError(f"[system] {unused[0]!r} stands in no rate. {nearest(unused[0], sorted(used))}")
+        equations = Equations(rates, table.values, header.description if header else "")
+        title, source = (header.name, header.source) if header else ("system", "")
+        guards = {name: formulas.formula(text) for name, text in table.guards.items()}
+        return system(
+            states=list(rates), units=table.units, forced_at=table.forced_at, guards=guards, check_units=table.check_units, name=title,
+            source=source,
+        )(equations)  # fmt: skip
+    except StudyError:
+        raise
+    except SaltusError as error:
+        raise fault("system", error) from None
+
+
+def method_of(table: SpecTable) -> Any:
+    """The method that a [method] table describes."""
+    from saltus import flow
+
+    options = table.model_dump(exclude_unset=True)
+    return getattr(flow, options.pop("name"))(**options)

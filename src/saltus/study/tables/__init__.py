@@ -1,0 +1,1 @@
+"""What a study file may hold, read strictly: no more than texts and numbers, nothing computed."""

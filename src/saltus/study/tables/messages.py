@@ -1,0 +1,132 @@
+"""What is wrong with a study file, said so that it can be mended: place, fault, what to write."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from tomllib import TOMLDecodeError
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from saltus.errors import nearest
+from saltus.fence import SHOWN, shown
+from saltus.study.tables.basins import Axis, Basins, Map
+from saltus.study.tables.lyapunov import Lyapunov
+from saltus.study.tables.motions import Compare, Energy, Impacts, Poincare, Simulate, Spectrum
+from saltus.study.tables.parts import METHODS, Curve, Header, Output, Range, SystemTable
+from saltus.study.tables.responses import BifurcationDiagram, FrequencyResponse
+from saltus.study.tables.spec import Study
+from saltus.study.tables.wording import toml
+
+TABLES: dict[str, type[BaseModel]] = {
+    "study": Header, "system": SystemTable, "simulate": Simulate, "compare": Compare, "basins": Basins, "map": Map, "axes": Axis,
+    "lyapunov": Lyapunov, "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram, "frequency": Range,
+    "vary": Range, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts, "energy": Energy,
+    "outputs": Output, "tables": Curve,
+}  # fmt: skip
+#: Parts of a place that name the branch of a union, not a key.
+_BRANCHES = re.compile(r"float|str|(list|dict)\[.*\]|function-.*")
+_BARE_QUANTITY = re.compile(r"\s*([\w.-]+)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[A-Za-zµ][^#\"']*?)\s*(?:#.*)?")
+_EXPECTED = {
+    "int_type": "a whole number",
+    "float_type": "a number",
+    "string_type": "text in quotes",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "finite_number": "a finite number",
+}
+
+
+def _given(value: Any) -> str:
+    """A value as a message repeats it: as TOML would write it, cut if it is long."""
+    whole = toml(value)
+    return whole if len(whole) <= SHOWN else f"{whole[:SHOWN]}…"
+
+
+def syntax_fault(error: TOMLDecodeError, text: str) -> str:
+    """A sentence on text that isn't TOML: the line, and what to write if the fault is a common one."""
+    place = re.search(r"line (\d+)", str(error))
+    number = int(place[1]) if place else text.rstrip().count("\n") + 1
+    lines = text.split("\n")
+    line = shown(lines[min(number, len(lines)) - 1].strip())
+    if re.match(r"Cannot (overwrite|declare|mutate)|Duplicate", str(error)):
+        return f"line {number}: {line!r} gives again what stands in the file already. Keep one of the two."
+    quantity = _BARE_QUANTITY.fullmatch(line)
+    if quantity:
+        return f'line {number}: {line!r} needs quotes. Write {quantity[1]} = "{quantity[2]}".'
+    return f"line {number}: {line!r} isn't TOML: {str(error).split(' (at')[0]}."
+
+
+def content_faults(error: ValidationError, data: Any = None) -> list[str]:
+    """A sentence for each fault of a study that is TOML, but not a study; ``data`` is what the TOML holds."""
+    faults: dict[tuple, list[dict]] = {}
+    for detail in error.errors():
+        place = tuple(part for part in detail["loc"] if not (isinstance(part, str) and _BRANCHES.fullmatch(part)))
+        faults.setdefault(place, []).append(dict(detail))
+    return [_fault(place, details, data) for place, details in faults.items()]
+
+
+def _path(place: tuple, data: Any) -> list[str]:
+    """The place as words: tables of an array are counted from 1, ``lyapunov 2``; one that stands alone isn't."""
+    path: list[str] = []
+    for part in place:
+        if isinstance(part, int):
+            if isinstance(data, list) and path:
+                path[-1] += f" {part + 1}"
+                data = data[part] if part < len(data) else None
+        elif part not in METHODS:
+            path.append(str(part))
+            data = data.get(part) if isinstance(data, dict) else None
+    return path
+
+
+def _fault(place: tuple, details: list[dict], data: Any) -> str:
+    first, kind = details[0], details[0]["type"]
+    path = _path(place, data)
+    *tables, key = path or [""]
+    where = f"[{'.'.join(tables)}] " if tables else ""
+    if kind == "extra_forbidden":
+        return f"{where or 'the file '}has no {'key' if tables else 'table'} {key!r}. {nearest(key, _known(place[:-1]))}"
+    if kind == "missing":
+        return f"{where}needs {key!r}." + _example(place) if tables else f"a table [{key}] is missing."
+    if kind == "union_tag_invalid":
+        given = str(first["ctx"]["tag"])
+        alike = [name for name in METHODS if name.lower() == given.lower()]
+        return f"[{'.'.join(path)}] name = {_given(given)} is no method. {nearest(alike[0] if alike else given, METHODS)}"
+    if kind == "union_tag_not_found":
+        return f'[{".".join(path)}] needs \'name\'. Write name = "Taylor" or name = "ODE45".'
+    if kind == "value_error":
+        return f"[{'.'.join(path)}] {first['ctx']['error']}." if path else f"{first['ctx']['error']}."
+    if len(details) > 1:
+        finite = any(detail["type"] == "finite_number" for detail in details)
+        expected = "a finite number" if finite else 'a plain number, or text with a unit, such as "0.4 mm"'
+    elif kind in ("too_short", "too_long"):
+        return f"{where}{key} = {_given(first['input'])} must have {first['msg'].split('have ')[1].split(' after')[0]}." + _example(place)
+    elif kind == "list_type" and len(place) == 1:
+        expected = "a table"
+    else:
+        expected = _EXPECTED.get(kind, first["msg"].removeprefix("Input should be "))
+    return f"{where}{key} = {_given(first['input'])} must be {expected}." + _example(place)
+
+
+def _table(place: tuple) -> type[BaseModel] | None:
+    """The class of the table at a place in a study."""
+    table: type[BaseModel] | None = Study
+    for part in place:
+        nested = part in ("method", "flow", "reference") or isinstance(part, int) or table in (Axis, Range, Output, Curve)
+        table = METHODS.get(part) or TABLES.get(part) or (table if nested else None)
+    return table
+
+
+def _known(place: tuple) -> Iterator[str]:
+    table = _table(place)
+    yield from table.model_fields if table else ()
+
+
+def _example(place: tuple) -> str:
+    table = _table(place[:-1])
+    field = table.model_fields.get(str(place[-1])) if table else None
+    return f" For example: {place[-1]} = {toml(field.examples[0])}" if field is not None and field.examples else ""

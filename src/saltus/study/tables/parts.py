@@ -1,0 +1,253 @@
+"""What the tables of a study file are made of: the strict base, quantities as written, systems, methods, ranges.
+
+Quantities stay as written here ("4 N"); :mod:`saltus.study.setting.quantities` turns them into SI once the system is known.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+
+from saltus.fence import MOST_COUNT, MOST_PERIODS, has_control
+
+#: A quantity as written: a bare number if it has no dimension, else text with its unit.
+Quantity = float | str
+Start = Quantity | list[Quantity]
+#: A formula as written: ``"k*(x - gap)"``.
+Formula = str
+#: Lower and upper end.
+Interval = Annotated[list[Quantity], Field(min_length=2, max_length=2)]
+
+
+def slug(name: str) -> str:
+    """A name as a file name: nothing that leads out of the folder."""
+    return re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-.") or "map"
+
+
+def _title(name: str) -> str:
+    if has_control(name) or len(name.splitlines()) != 1 or not name.strip():
+        raise ValueError("must be one line of plain text")
+    return name
+
+
+def _file_name(name: str) -> str:
+    if len(slug(name)) > LONGEST:
+        raise ValueError(f"gives a file name of {len(slug(name))} characters; at most {LONGEST} fit beside the others")
+    return name
+
+
+#: Most characters of a name that names files too.
+LONGEST = 100
+#: What something is called in tables and pictures; and in the names of files as well.
+Title = Annotated[str, Field(min_length=1), AfterValidator(_title)]
+FileTitle = Annotated[Title, AfterValidator(_file_name)]
+
+
+class Table(BaseModel):
+    """A table of a study file: strict types, no unknown keys, never changed after reading."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Header(Table):
+    """[study]: what it is, for people."""
+
+    name: FileTitle = Field(description="A title.", examples=["Rig b4 at 15 Hz"])
+    description: str = Field("", description="What the study shows.", examples=["Four starts, four responses"])
+    source: str = Field("", description="Where the setting comes from.", examples=["Saunders et al. (2021), Table 2"])
+
+
+class Curve(Table):
+    """[system.tables.<name>]: measured points from a file, which formulas call by their name: ``stop(x)``, ``drive(t)``."""
+
+    file: str = Field(
+        description="CSV beside the study: two columns, units in the headings. Where the curve is known, ascending; its values there.",
+        examples=["stop.csv"],
+    )
+    kind: Literal["linear", "pchip", "spline"] = Field(
+        "linear", description="Straight between the points, cubics without overshoot, or a cubic spline.", examples=["pchip"]
+    )
+    outside: Literal["hold", "extend", "periodic"] = Field(
+        "hold",
+        description="Before and after the points: the values at the ends, the polynomials there, or the curve again.",
+        examples=["extend"],
+    )
+
+
+class SystemTable(Table):
+    """[system]: a model that comes with saltus, or equations of your own, and values of the parameters."""
+
+    model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, Quantity] = Field(init=False)
+
+    model: str | None = Field(None, description="A published system; `saltus models` lists them.", examples=["delangre"])
+    case: str | None = Field(None, description="A named set of values of the model.", examples=["b"])
+
+    rates: dict[str, Formula] = Field(
+        default_factory=dict,
+        description="A system of your own: its states, and the formula of the time derivative of each. Every other key is a parameter.",
+        examples=[{"x": "v", "v": "(force*cos(2*pi*frequency*t) - k*x)/mass"}],
+    )
+    units: dict[str, str] = Field(
+        default_factory=dict, description="Units of states and parameters of a system of your own.", examples=[{"x": "m", "v": "m/s"}]
+    )
+    guards: dict[str, Formula] = Field(
+        default_factory=dict,
+        description="Names for the boundaries of a system of your own, each with its comparison.",
+        examples=[{"teeth": "x2 - x1 > gap"}],
+    )
+    forced_at: str | None = Field(
+        None, description="The parameter of a system of your own that is the forcing frequency.", examples=["frequency"]
+    )
+    check_units: bool = Field(
+        True, description="Whether units of what a formula of the rates adds or compares must be the same.", examples=[False]
+    )
+    terms: dict[str, Formula] = Field(
+        default_factory=dict,
+        description="Formulas by name, for all other formulas of the study. One may use those before it.",
+        examples=[{"contact": "k*(x - gap) if x > gap else 0"}],
+    )
+    tables: dict[str, Curve] = Field(
+        default_factory=dict, description="Curves by name, for formulas to call.", examples=[{"stop": {"file": "stop.csv"}}]
+    )
+
+    @property
+    def values(self) -> dict[str, Quantity]:
+        """Parameter values as written."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+# -- methods -------------------------------------------------------------------------------------------------------------------
+class Taylor(Table):
+    """[method] name = "Taylor": machine precision, every contact."""
+
+    name: Literal["Taylor"]
+    order: int | None = Field(None, ge=6, le=40, description="Order of the series; by default chosen for speed.", examples=[20])
+    tolerance: float | None = Field(None, gt=0, description="Relative local error; by default machine precision.", examples=[1e-12])
+
+
+class ODE45(Table):
+    """[method] name = "ODE45": MATLAB's ode45, to the digit."""
+
+    name: Literal["ODE45"]
+    rtol: float = Field(1e-3, gt=0, description="RelTol.", examples=[1e-4])
+    atol: float = Field(1e-6, gt=0, description="AbsTol, in SI.", examples=[1e-7])
+    events: Literal["locate", "ignore"] = Field("locate", description="Restart at contacts, or step over them.", examples=["locate"])
+
+
+Method = Annotated[Taylor | ODE45, Field(discriminator="name")]
+METHODS: dict[str, type[Table]] = {"Taylor": Taylor, "ODE45": ODE45}
+
+
+# -- questions -----------------------------------------------------------------------------------------------------------------
+class Range(Table):
+    """Values of a parameter: from one to another, ends included, or given one by one."""
+
+    first: Quantity | None = Field(None, description="The first value.", examples=["2 Hz"])
+    last: Quantity | None = Field(None, description="The last value.", examples=["30 Hz"])
+    count: int | None = Field(None, ge=1, le=MOST_COUNT, description="How many values.", examples=[281])
+    scale: Literal["linear", "log"] = Field("linear", description="Evenly spaced in the values, or in their logarithms.", examples=["log"])
+    values: list[Quantity] | None = Field(None, min_length=1, description="The values themselves, ascending.", examples=[["5 Hz", "17 Hz"]])
+
+    @model_validator(mode="before")
+    @classmethod
+    def _listed(cls, given: Any) -> Any:
+        """An array holds the values: ``frequency = ["5 Hz", "17 Hz"]``."""
+        return {"values": given} if isinstance(given, list) else given
+
+    @model_validator(mode="after")
+    def _either(self) -> Range:
+        ends = (self.first, self.last, self.count)
+        if self.values is None and None in ends:
+            raise ValueError(
+                'needs first, last and count, such as { first = "2 Hz", last = "30 Hz", count = 281 }, '
+                'or an array of values, such as ["5 Hz", "17 Hz"]'
+            )
+        if self.values is not None and (ends != (None, None, None) or self.scale != "linear"):
+            raise ValueError("has values one by one: leave first, last, count and scale out")
+        return self
+
+
+class Named(Table):
+    """What questions have in common that may be asked several times."""
+
+    #: What one without a name is called.
+    called: ClassVar[str]
+
+    name: FileTitle | None = Field(None, description="What it is called in tables, pictures and files.", examples=["stiff stop"])
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        return self.name or self.called
+
+    @property
+    def stem(self) -> str:
+        """Stem of the names of its files."""
+        return slug(self.title)
+
+
+#: States at the start for analyses that follow many starts, or how starts are found.
+Starts = Annotated[
+    Annotated[dict[str, Start], Tag("dict[str]")] | Annotated[str, Tag("str")],
+    Discriminator(lambda given: "dict[str]" if isinstance(given, dict) else "str"),
+]
+
+
+class Output(Table):
+    """An output: a formula, and the unit that it is in."""
+
+    formula: Formula = Field(description="What is read off the motion.", examples=["k*(x - gap)"])
+    unit: str = Field("", description="Its unit; by default what the formula comes to.", examples=["N"])
+
+
+def _alone(given: Any) -> Any:
+    """A formula alone: ``"spring force" = "k*x"``."""
+    if not isinstance(given, str | dict | Output):
+        raise ValueError('must be a formula, such as "k*x", or a table of a formula and its unit')
+    return {"formula": given} if isinstance(given, str) else given
+
+
+Outputs = dict[str, Annotated[Output, BeforeValidator(_alone, json_schema_input_type=str | Output)]]
+OUTPUTS: Any = Field(
+    default_factory=dict,
+    description="What to read off each response besides its states, by name: formulas.",
+    examples=[{"spring force": "k*x", "power": {"formula": "c*v**2", "unit": "W"}}],
+)
+VALUES: Any = Field(
+    default_factory=dict,
+    description="Values that differ from [system], for this question only.",
+    examples=[{"contact_stiffness": "25.5 kN/m"}],
+)
+METHOD = Field(None, description="How to integrate; the study's [method] by default.", examples=[{"name": "Taylor"}])
+START = Field(
+    None,
+    description='Every state at the start, the same at every value; "sweep_up", "sweep_down", "random 20" with box. At rest by default.',
+    examples=[{"x": ["0 mm", "2 mm"], "v": "0 m/s"}, "sweep_up"],
+)
+BOX = Field(None, description="Range of each state for random starts.", examples=[{"x": ["-5 mm", "5 mm"], "v": ["-1 m/s", "1 m/s"]}])
+PERIODS = Field(2000, ge=1, le=MOST_PERIODS, description="Forcing periods that a start is followed at most.", examples=[2000])
+SEED = Field(1, ge=0, description="Of random starts.", examples=[1])
+
+T = TypeVar("T", bound=Table)
+
+
+def _as_list(given: Any) -> Any:
+    return [given] if isinstance(given, dict) else given
+
+
+def one_or_many(table: type[T]) -> Any:
+    """The type of a question that may be asked once, as a table, or several times, as an array of tables: always a tuple."""
+    return Annotated[list[table], BeforeValidator(_as_list, json_schema_input_type=table | list[table])]  # type: ignore[valid-type]
+
+
+def distinct_names(tables: Sequence[Any], key: str) -> None:
+    """Raise a ValueError unless several tables have names, no two the same."""
+    names = [one.name for one in tables]
+    if len(names) > 1 and None in names:
+        raise ValueError(f"each of several [[{key}]] needs a name of its own")
+    if len(set(names)) < len(names):
+        raise ValueError(f"two [[{key}]] have the same name")

@@ -1,0 +1,65 @@
+"""What a study file may hold: one class a table, every key typed, unknown keys refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pydantic import Field, model_validator
+
+from saltus.study.tables.basins import Basins
+from saltus.study.tables.lyapunov import Lyapunov
+from saltus.study.tables.motions import REFERENCE, RUN, Compare, Energy, Impacts, Poincare, Simulate, Spectrum
+from saltus.study.tables.parts import Header, Method, Named, SystemTable, Table, Taylor, distinct_names, one_or_many
+from saltus.study.tables.responses import BifurcationDiagram, FrequencyResponse
+
+#: Tables that ask something, in the order in which they are answered: the quick ones first.
+QUESTIONS = ("simulate", "poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram", "basins")
+#: Those that may be asked several times, as arrays of tables.
+SEVERAL = ("poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram")
+
+
+class Study(Table):
+    """A study file: one system, a method, and any number of questions."""
+
+    study: Header
+    system: SystemTable = SystemTable()
+    method: Method = Taylor(name="Taylor")
+    simulate: Simulate | None = None
+    compare: Compare | None = None
+    poincare: one_or_many(Poincare) = Field(default_factory=list)  # type: ignore[valid-type]
+    spectrum: one_or_many(Spectrum) = Field(default_factory=list)  # type: ignore[valid-type]
+    impacts: one_or_many(Impacts) = Field(default_factory=list)  # type: ignore[valid-type]
+    energy: one_or_many(Energy) = Field(default_factory=list)  # type: ignore[valid-type]
+    lyapunov: one_or_many(Lyapunov) = Field(default_factory=list)  # type: ignore[valid-type]
+    frequency_response: one_or_many(FrequencyResponse) = Field(default_factory=list)  # type: ignore[valid-type]
+    bifurcation_diagram: one_or_many(BifurcationDiagram) = Field(default_factory=list)  # type: ignore[valid-type]
+    basins: Basins | None = None
+
+    @model_validator(mode="after")
+    def _fits(self) -> Study:
+        if not list(self.questions()):
+            *most, last = (f"[{name}]" for name in QUESTIONS)
+            raise ValueError(f"a study asks something: it has a table {', '.join(most)} or {last}")
+        if self.compare is not None and self.simulate is None:
+            raise ValueError("[compare] goes with [simulate]; maps are compared with compare = in [[basins.map]]")
+        for name in SEVERAL:
+            distinct_names(getattr(self, name), name)
+        return self
+
+    def questions(self) -> Iterator[tuple[str, Table]]:
+        """Name and table of every question, in the order in which they are answered."""
+        for name in QUESTIONS:
+            tables = getattr(self, name)
+            for table in tables if isinstance(tables, list) else [tables]:
+                if table is not None:
+                    yield name, table
+
+    def answers(self) -> Iterator[tuple[str, str]]:
+        """Title and stem of the file of every question whose answer is one Dataset."""
+        for _, table in self.questions():
+            if isinstance(table, Named):
+                yield table.title, table.stem
+            elif table is self.simulate:
+                yield self.study.name, RUN
+                if self.compare is not None and self.compare.reference is not None:
+                    yield f"{self.study.name}, reference", REFERENCE
