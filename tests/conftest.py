@@ -20,7 +20,7 @@ LONGEST = (
     "unit/study/test_questions.py",
     "unit/study/test_maps_run.py",
     "truth/test_responses.py",
-    "unit/results/test_files.py",
+    "unit/results/files/test_files.py",
     "faults/test_result_files.py",
     "truth/test_order.py",
     "unit/analysis/test_wandering.py",

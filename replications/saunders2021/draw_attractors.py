@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from saltus.analysis.basins.compare import compare
 from saltus.plot import maps
 from saltus.plot.style import display_scale
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import kind_text
 
 from .looks import EXACT, LOOKS, OFF, ON, Data, Look, lag, periods_of, strobe
 

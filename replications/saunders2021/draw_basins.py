@@ -18,7 +18,7 @@ from saltus.analysis.basins.compare import compare
 from saltus.plot import maps
 from saltus.plot.basins import paint
 from saltus.plot.palette import hues
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import kind_text
 
 from .looks import EXACT, OFF, ON, Data, Look
 

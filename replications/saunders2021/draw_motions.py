@@ -85,7 +85,7 @@ def four_starts(data: Data) -> Figure:
 def _rows(run: xr.Dataset, titles: Sequence[str], shown: Sequence[int]) -> Figure:
     """A row for each trajectory: time history, and phase portrait with Poincaré points."""
     from saltus.analysis.motion.settled import settled
-    from saltus.results.schema import period_text
+    from saltus.results.dataset.schema import period_text
 
     found = settled(run)["response_period"].values
     figure, grid = plt.subplots(len(titles), 2, figsize=(9.0, 1.9 * len(titles) + 0.3), width_ratios=(2.4, 1), layout="constrained")

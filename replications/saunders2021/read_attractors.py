@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import kind_text
 
 from .draw_attractors import Trio, deviations, trios
 from .looks import LOOKS, strobe

@@ -10,7 +10,7 @@ import xarray as xr
 
 from saltus.analysis.basins.compare import compare
 from saltus.plot.maps import share_text
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
 
 from .reading import Data, by_peak, certainty, count, counted, listed, names, parameter, place_of, three, unmatched
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 from saltus.analysis.motion.settled import settled
 from saltus.plot.maps import share_text
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
 
 from .reading import Data, by_peak, certainty, count, counted, listed, multipliers, names, three
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 from saltus.plot.maps import share_text
 from saltus.replication.claims import power
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
 
 from .reading import Data, count, parameter, three
 from .sameness import SAME, SAME_ONE, classes, share_other

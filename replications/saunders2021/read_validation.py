@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from saltus.replication import folder_of
-from saltus.results.measured import read_measured
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
+from saltus.results.files.measured import read_measured
 from saltus.study.answers.simulate_compare import residuals
 
 from .printed import contacts

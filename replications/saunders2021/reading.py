@@ -11,7 +11,7 @@ import xarray as xr
 
 from saltus.analysis.basins.compare import compare
 from saltus.plot.maps import share_text
-from saltus.results.schema import kind_text, period_text
+from saltus.results.dataset.schema import kind_text, period_text
 
 Data = Mapping[str, xr.Dataset]
 #: What claims call the three ways of integrating: the ends of the names of their jobs.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import kind_text
 from saltus.study.answers.simulate_compare import residuals
 from saltus.study.table import TextTable
 

@@ -30,7 +30,7 @@ from saltus.analysis.basins.serial import found_data
 from saltus.cli.app import app
 from saltus.kernels import status as st
 from saltus.results import load
-from saltus.results.store import Store
+from saltus.results.store.store import Store
 from saltus.study.answers.basins_table import attractor_table
 from saltus.study.run import maps
 from saltus.study.run.maps import compute, finish, jobs_of, open_store
@@ -56,7 +56,7 @@ saltus.analysis.basins.pipeline.SCOUTS, saltus.analysis.basins.pipeline.CHECKED 
 if __name__ == "__main__":  # a process of --workers computes chunks only
     import saltus.plot, saltus.study.run.maps, saltus.study.tables.read, saltus.study.run.study
     from saltus.cli import main
-    from saltus.results.store import Store
+    from saltus.results.store.store import Store
 
     saltus.study.run.maps.CHUNK = 24
     saltus.study.run.maps.LARGE = 100  # nobody asks how long it will take

@@ -375,7 +375,7 @@ def cache_clear(
     """
     from saltus.cli import screen
     from saltus.codegen import cache as kernels
-    from saltus.results import known
+    from saltus.results.files import known
 
     count = kernels.clear()
     screen.say(f"deleted {count} {'entry' if count == 1 else 'entries'} from {kernels.folder()}")

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from saltus.errors import ParameterError, shown
 from saltus.plot.palette import hues
 from saltus.plot.style import Scale, display_scale
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import kind_text
 from saltus.units import from_si
 
 

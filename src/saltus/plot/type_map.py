@@ -16,7 +16,7 @@ from saltus.plot import kinds, maps
 from saltus.plot import response_points as points
 from saltus.plot.picture import caller, picture
 from saltus.plot.style import Scale
-from saltus.results.schema import RESPONSES, parameters_of, start_name, states_of
+from saltus.results.dataset.schema import RESPONSES, parameters_of, start_name, states_of
 from saltus.units import from_si
 
 #: Where a start settles to nothing: white and pale greys, as chaos is dark.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.plot.maps import share_text
 from saltus.replication.verdict import Check, Finding, passed
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,8 +17,8 @@ from saltus.replication.job import SECONDS, Job
 from saltus.replication.papers import Claim, Numbers, Paper, Picture, folder_of
 from saltus.replication.tables import claims_table
 from saltus.replication.verdict import Finding, undecided
-from saltus.results.files import ResultFileError, replacing, usable_folder
-from saltus.results.lock import WHOLE, locked
+from saltus.results.files.atomic import ResultFileError, replacing, usable_folder
+from saltus.results.store.lock import WHOLE, locked
 from saltus.study.run.running import Report, Resources, Running
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from saltus.cli import commands
 from saltus.cli.app import app
 from saltus.codegen import entry
-from saltus.results import known
+from saltus.results.files import known
 
 COMMANDS = ["demo", "run", "status", "resume", "plot", "reproduce", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
 

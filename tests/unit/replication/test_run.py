@@ -17,9 +17,9 @@ from saltus.errors import ParameterError
 from saltus.interrupt import Interrupted
 from saltus.replication import Check, Finding, claims_table, reproduce
 from saltus.replication.verdict import HOLDS, UNDECIDED
-from saltus.results.durable import StoreError
-from saltus.results.files import ResultFileError
-from saltus.results.lock import WHOLE, locked
+from saltus.results.files.atomic import ResultFileError
+from saltus.results.store.durable import StoreError
+from saltus.results.store.lock import WHOLE, locked
 from small_paper import compute, draw, small_paper, small_result
 
 

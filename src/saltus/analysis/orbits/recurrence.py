@@ -14,7 +14,7 @@ from saltus.analysis.orbits.limit_cycles import LIMIT_CYCLE, limit_cycles
 from saltus.analysis.orbits.noisy import Noisy, Stray, blurred, keep_to, stray_of
 from saltus.analysis.orbits.orbits import Orbit, polish, same
 from saltus.flow.maps import Map, Stroboscope, Travel
-from saltus.results.schema import NOISY
+from saltus.results.dataset.schema import NOISY
 
 #: Longest period looked for [iterates].
 LONGEST = 64
