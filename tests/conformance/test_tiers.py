@@ -87,6 +87,25 @@ def test_an_exchange_between_two_calls_changes_nothing(monkeypatch):
     assert set(called) == set(TIERS)
 
 
+@pytest.mark.parametrize("case", ["walls", "tangent", "ode45"])
+def test_nothing_is_left_to_the_next_call_in_the_memory_of_a_thread(monkeypatch, case):
+    """All calls of a thread work in it, those of another run between two slices of this one too."""
+    system, spread, method = CASES[case]
+    whole = bits(engine.run(system, method, request(system, spread), threads=1))
+    plain, called = Kernels.propagate, []
+
+    def soiled(self, *values):
+        for array in self.workspace():
+            array[...] = np.nan if array.dtype.kind == "f" else -7
+        called.append(plain(self, *values))
+        return called[-1]
+
+    monkeypatch.setattr(Kernels, "propagate", soiled)
+    monkeypatch.setattr(engine, "slice_of", lambda states: 40)
+    assert bits(engine.run(system, method, request(system, spread), threads=1)) == whole
+    assert called.count(st.PAUSED) > 3
+
+
 def test_a_flow_that_has_worked_becomes_steady_by_itself(monkeypatch):
     from saltus.codegen import kernels
 

@@ -100,6 +100,7 @@ class Kernels:
         self._lanes = int(head.constants.get("LANES", 1))  # type: ignore[arg-type]
         self._call = Call(interface.arguments)
         self._worked, self._asked = 0.0, threading.Lock()
+        self._memory = threading.local()
         self._kept: list[machine.Loaded] = []  # what has been called once may be running
         self.tier = ""
         order = self._order(STEADY)
@@ -107,11 +108,17 @@ class Kernels:
         self._begin(STEADY, [found]) if found is not None else self.exchange(GENERIC)
 
     def __getattr__(self, name: str) -> Any:
-        """What the layout says: CARRY, STEP_RECORDS, workspace()."""
+        """What the layout says: CARRY, STEP_RECORDS."""
         try:
             return self.__dict__["_layout"][name]
         except KeyError:
             raise AttributeError(f"{type(self).__name__} has no {name!r}") from None
+
+    def workspace(self) -> tuple:
+        """The memory that one call works in; one set for each thread, made once: many a call takes no longer than making it."""
+        if not hasattr(self._memory, "arrays"):
+            self._memory.arrays = self._layout["workspace"]()
+        return self._memory.arrays
 
     def propagate(self, *values: Any) -> int:
         """Call the kernel; kernels/batch.py says what its arrays are. Other threads go on meanwhile."""
