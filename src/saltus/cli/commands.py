@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from saltus.cli.app import app
+from saltus.cli.app import app as app
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:

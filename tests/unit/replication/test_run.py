@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import pytest
 from typer.testing import CliRunner
 
-from saltus.cli.app import app
+from saltus.cli.commands import app
 from saltus.errors import ParameterError
 from saltus.interrupt import Interrupted
 from saltus.replication import Check, Finding, claims_table, reproduce
