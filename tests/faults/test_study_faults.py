@@ -27,7 +27,7 @@ import saltus as sl
 from saltus.analysis.basins import pipeline
 from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.basins.serial import found_data
-from saltus.cli.app import app
+from saltus.cli.commands import app
 from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.store.store import Store

@@ -85,16 +85,12 @@ def basins(
     >>> found["basin"].shape, found["attractor_period"].values.tolist()
     ((20, 20), [1, 1, 3, 9])
     """
-    plan = basin_plan(system, axes, at, check_method(method), periods, every)
+    return map_of(basin_plan(system, axes, at, check_method(method), periods, every), threads, progress)
+
+
+def map_of(plan: BasinPlan, threads: int | None, progress: bool | Callable[[float], None] | None) -> xr.Dataset:
+    """The Dataset of a planned map, as :func:`basins` returns it. Raises Interrupted on Ctrl-C."""
     show, close = reporter(progress)
-    try:
-        return map_of_plan(plan, threads, show)
-    finally:
-        close()
-
-
-def map_of_plan(plan: BasinPlan, threads: int | None, show: Callable[[float], None] | None) -> xr.Dataset:
-    """The Dataset of a plan. Raises Interrupted with that of what is labelled."""
     result = Settling.empty(plan.cells, len(plan.system.states))
     found = None
     try:
@@ -104,6 +100,8 @@ def map_of_plan(plan: BasinPlan, threads: int | None, show: Callable[[float], No
     except KeyboardInterrupt:
         scouted = found
         raise Interrupted(None if scouted is None else lambda: plan.dataset(result, scouted, threads)) from None
+    finally:
+        close()
 
 
 def label_all(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from saltus.analysis.basins.basins import map_of_plan
+from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.study.answers.basins_rows import agreement_table, attractor_table
 from saltus.study.answers.question import Found, Question, Show
@@ -89,7 +89,7 @@ class BasinMap(Question):
 
     def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
         """The map, all at once: nothing is kept of it before it is done."""
-        return map_of_plan(self.plan, threads, progress)
+        return map_of(self.plan, threads, progress)
 
     def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
         """A row for each attractor."""

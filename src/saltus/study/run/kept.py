@@ -17,23 +17,25 @@ from saltus.study.run.running import Report, Running
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.answers.question import Question
-
 #: Attribute of a result that holds its identity.
 IDENTITY = "study_identity"
 #: End of the name of a file that holds what was computed before a stop.
 PARTIAL = "-partial"
 
 
-def kept_or_computed(question: Question, found: Mapping[str, xr.Dataset], at: Running) -> xr.Dataset:
+def kept_or_computed(
+    stem: str, title: str, identity: Mapping[str, str], compute: Callable[[Callable[[float], None]], xr.Dataset], at: Running
+) -> xr.Dataset:
     """The result in ``STEM.nc`` if it is that of this question, else computed and kept there.
 
     Parameters
     ----------
-    question : Question
-        What is asked. One without an identity is answered again each time.
-    found : mapping of str to Dataset
-        The answers that it takes, by stem.
+    stem, title : str
+        Name of the file; of the question.
+    identity : mapping of str to str
+        What must be the same for the file to be the answer.
+    compute : callable
+        Takes what is called with the share done.
     at : Running
         Where.
 
@@ -42,17 +44,12 @@ def kept_or_computed(question: Question, found: Mapping[str, xr.Dataset], at: Ru
     Interrupted
         On Ctrl-C; what was computed so far is kept in ``STEM-partial.nc``.
     """
-    title, identity = question.title, question.identity()
-    file = at.folder / f"{question.stem}.nc"
-    if identity is None:
-        ds = question.compute(found, at.resources.threads, lambda _: None)
-        save(ds, file)
-        return ds
+    file = at.folder / f"{stem}.nc"
     kept = _kept(file, title, identity, at.say)
     if kept is not None:
         at.report(Report(title, 100, 100, 0.0, 0, last=True, what="%"))
         return kept
-    return _computed(file, title, identity, lambda show: question.compute(found, at.resources.threads, show), at)
+    return _computed(file, title, identity, compute, at)
 
 
 def _kept(file: Path, title: str, identity: Mapping[str, str], say: Callable[[str], None]) -> xr.Dataset | None:

@@ -95,8 +95,14 @@ def run_study(
 
 def _answer(question: Question, found: Mapping[str, xr.Dataset], at: Running, stores: Mapping[str, Store]) -> xr.Dataset | None:
     """The answer, kept or computed; None if other shards have still to work on it."""
+    if (identity := question.identity()) is None:
+        ds = question.compute(found, at.resources.threads, lambda _: None)
+        save(ds, at.folder / f"{question.stem}.nc")
+        return ds
     if not isinstance(question, BasinMap):
-        return kept_or_computed(question, found, at)
+        return kept_or_computed(
+            question.stem, question.title, identity, lambda show: question.compute(found, at.resources.threads, show), at
+        )
     store = stores[question.stem]
     if not compute(question, store, at.resources, at.report, at.say):
         return None
