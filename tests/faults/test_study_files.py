@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from faults.mutated_studies import ROOT, SEEDS, mutated
-from saltus.cli.app import app
+from saltus.cli.commands import app
 from saltus.errors import SaltusError, StudyError
 from saltus.study.run.copies import keep_copy
 from saltus.study.run.study import questions_of

@@ -62,7 +62,7 @@ def brief(monkeypatch):
     monkeypatch.setattr("saltus.analysis.orbits.recurrence.WATCHED", 256)
     monkeypatch.setattr("saltus.analysis.orbits.aperiodic.BLOCKS", 64)
     for module in ("recurrence", "noisy", "steady"):
-        monkeypatch.setattr(f"saltus.analysis.{module}.TRAIL", 256)
+        monkeypatch.setattr(f"saltus.analysis.orbits.{module}.TRAIL", 256)
 
 
 def test_all_figures_are_here():

@@ -62,9 +62,12 @@ def cells(ds, count, seed=4):
 
 @pytest.fixture(autouse=True, scope="module")
 def few_checks():
-    """Cells that are computed again by a tighter method, for a number that nothing here looks at."""
+    """Few cells are computed again by a tighter method, for a number that nothing here looks at; and few scouts go before the others, since
+    labels don't depend on what they saw, as one of these tests shows.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plans, "CHECKED", 16)
+        patch.setattr(plans, "SCOUTS", 256)
         yield
 
 
@@ -321,7 +324,9 @@ def test_c_at_17_hz_doubles_its_period():
 @pytest.mark.parametrize(("events", "count"), [("locate", 3), ("ignore", 2)])
 def test_ode45_sees_the_third_attractor_only_if_it_locates_contacts(three, events, count):
     """The paper's claim, at its tolerances. In exact arithmetic there are three."""
-    ds = sl.basins(GRAZED, method=sl.ODE45(1e-4, 1e-7, events=events), **box(60))
+    i, _ = np.nonzero(three.basin.values == rare_one(three))
+    columns = three.x.values[np.unique([0, *i, three.sizes["x"] - 1])]  # those in which the third has starts, and the outer ones
+    ds = sl.basins(GRAZED, method=sl.ODE45(1e-4, 1e-7, events=events), **(box(200) | {"x": columns}))
     assert ds.attractor_type.values.tolist() == ["periodic"] * count
     assert ds.attractor_period.values.tolist() == [1] * count
     exact = np.stack([orbit_points(three, i)[0] for i in range(3)])

@@ -18,10 +18,8 @@ from saltus.plot.basins import paint
 from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, style
-from saltus.results.reader import reader
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import AGREEMENT, kind_text
 
-_CALLER = "plot.agreement"
 #: Colour and name of each value of the agreement; differences are the news.
 _LOOKS = {
     1: ("#E4E4E4", "agree"),
@@ -33,8 +31,10 @@ _WHERE = {(True, True): "in both", (True, False): "left only", (False, True): "r
 _NAMED = 8
 
 
-@picture
-@reader
+_NEEDS = ("agreement", "basin_a", "basin_b", "match_a", "match_b", "match_type", "match_period")
+
+
+@picture(AGREEMENT, needs=_NEEDS)
 def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     """Two maps of basins side by side, and where they differ; with one Axes only where they differ.
 
@@ -58,15 +58,14 @@ def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     ParameterError
         If ``ds`` is not from ``sl.compare``, or ``ax`` holds neither one nor three Axes.
     """
-    maps.check(ds, _CALLER, ["agreement"], ["agreement", "basin_a", "basin_b", "match_a", "match_b", "match_type", "match_period"])
-    pair = maps.plane(ds, "agreement", _CALLER)
+    pair = maps.plane(ds, "agreement")
     if ax is None:
         with style():
             _, panels = plt.subplots(1, 3, figsize=(9.0, 3.3), sharex=True, sharey=True)
             return _three(panels, ds, pair)
     panels = np.ravel(np.asarray(ax, dtype=object))
     if panels.size not in (1, 3) or not all(isinstance(one, Axes) for one in panels):
-        raise ParameterError(f"{_CALLER}: ax={type(ax).__name__}. Give one Axes, or three, such as plt.subplots(1, 3) makes.")
+        raise ParameterError(f"ax={type(ax).__name__}. Give one Axes, or three, such as plt.subplots(1, 3) makes.")
     if panels.size == 1:
         _difference(panels[0], ds, pair)
         return panels[0]

@@ -32,10 +32,10 @@ _NAME = 0.45
 
 
 @contextmanager
-def panels(ax: Any, count: int, size: tuple[float, float], caller: str) -> Iterator[list[Axes]]:
+def panels(ax: Any, count: int, size: tuple[float, float]) -> Iterator[list[Axes]]:
     """The Axes to draw into: those that the user handed over, or a new figure of panels, one above the other, in saltus's style."""
     if ax is not None:
-        given = _given(ax, count, caller)
+        given = _given(ax, count)
         with style() if all(styled(one.get_figure(root=True)) for one in given) else nullcontext():
             yield given
         return
@@ -44,14 +44,14 @@ def panels(ax: Any, count: int, size: tuple[float, float], caller: str) -> Itera
         yield list(grid[:, 0])
 
 
-def _given(ax: Any, count: int, caller: str) -> list[Axes]:
+def _given(ax: Any, count: int) -> list[Axes]:
     """The Axes that the user handed over, one for each panel."""
     several = isinstance(ax, list | tuple | np.ndarray)
     axes = list(np.ravel(np.asarray(ax, dtype=object))) if several else [ax]
     if not all(isinstance(one, Axes) for one in axes):
-        raise ParameterError(f"{caller}: ax={type(ax).__name__}. Give matplotlib Axes, such as plt.subplots() makes.")
+        raise ParameterError(f"ax={type(ax).__name__}. Give matplotlib Axes, such as plt.subplots() makes.")
     if len(axes) != count:
-        raise ParameterError(f"{caller}: {count} trajectories need {count} Axes, not {len(axes)}. Choose one with trajectory=.")
+        raise ParameterError(f"{count} trajectories need {count} Axes, not {len(axes)}. Choose one with trajectory=.")
     return axes
 
 
@@ -70,9 +70,9 @@ def _join(pieces: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate([part for piece in pieces for part in (piece, [np.nan])][:-1])
 
 
-def draw_points(ax: Axes, x: np.ndarray, y: np.ndarray, **look: Any) -> None:
+def draw_points(ax: Axes, x: np.ndarray, y: np.ndarray, **marks: Any) -> None:
     """Markers, whole ones at the limits of the Axes too; many of them become pixels in vector files."""
-    (points,) = ax.plot(x, y, ls="none", rasterized=x.size > RASTERISE_ABOVE, **look)
+    (points,) = ax.plot(x, y, ls="none", rasterized=x.size > RASTERISE_ABOVE, **marks)
     points.set_clip_box(_Around(ax, points.get_markersize() / 2 + points.get_markeredgewidth()))
 
 

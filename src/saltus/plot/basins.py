@@ -20,24 +20,23 @@ from matplotlib.text import Text
 from saltus.plot import axes as draw
 from saltus.plot import maps
 from saltus.plot.palette import shades
-from saltus.plot.picture import picture
+from saltus.plot.picture import check, picture
 from saltus.plot.style import QUIET, Scale
-from saltus.results.reader import reader
+from saltus.results.dataset.schema import BASINS
 from saltus.units import from_si
 
-_CALLER = "plot.basins"
 #: Shades of a hue; the middle one is the hue itself.
 _LEVELS = 65
-#: Share of the settled starts that may be lighter or darker than the ends of the scale: a few late ones would make all others look alike.
+#: Share of the settled starts that may be lighter or darker than the ends of the scale. Without it, a few late ones would make all
+#: others equally light.
 _BEYOND = 0.02
 #: Width of a digit, in font sizes.
 _DIGIT = 0.64
-#: A legend of more entries is set smaller, to stay beside its map.
+#: A legend of more entries is set smaller, so that it fits next to its map.
 _LONG_LEGEND = 14
 
 
-@picture
-@reader
+@picture()
 def basins(
     ds: xr.Dataset,
     ax: Any = None,
@@ -58,7 +57,7 @@ def basins(
     ax : Axes, optional
         Where to draw; a new figure by default.
     legend : bool
-        Whether to name the attractors, beside the map.
+        Whether to draw the legend of the attractors.
     order : sequence of int, optional
         Ids of the attractors in the order of their colours, to give an attractor the same hue in several maps; those left out follow. By
         default the order of the ids: by period, then by amplitude.
@@ -76,13 +75,12 @@ def basins(
     ParameterError
         If ``ds`` is not from ``sl.basins``, or an argument doesn't fit it.
     """
-    needs = ["basin", "attractor", *(["periods_to_settle"] if shade else [])]
-    maps.check(ds, _CALLER, ["basins"], needs)
-    pair = maps.plane(ds, "basin", _CALLER)
-    colors = maps.colors_of(ds, order, _CALLER)
+    check(ds, [BASINS], ["basin", "attractor", *(["periods_to_settle"] if shade else [])])
+    pair = maps.plane(ds, "basin")
+    colors = maps.colors_of(ds, order)
     settling = _settling(ds) if shade else None
     scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
-    with draw.panels(ax, 1, (6.3, 3.9), _CALLER) as (panel,):
+    with draw.panels(ax, 1, (6.3, 3.9)) as (panel,):
         maps.draw_cells(panel, ds, pair, scales, paint(ds["basin"].values, colors, settling.level(ds) if settling else None))
         if points:
             _points(panel, ds, pair, scales, colors)
@@ -247,7 +245,7 @@ def _apart(values: Sequence[float], places: Sequence[float], width: float) -> li
 
 def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int, np.ndarray], settling: Settling | None,
             points: bool) -> None:  # fmt: skip
-    """Name the hues, the shades and the codes that occur, beside the map."""
+    """Legend of the hues, the shades and the codes that occur."""
     codes, counts = np.unique(np.nan_to_num(ds["basin"].values, nan=-4).astype(np.int64), return_counts=True)
     shares = dict(zip(codes.tolist(), (counts / ds["basin"].size).tolist(), strict=True))
     if "attractor_fraction" in ds:
@@ -260,10 +258,10 @@ def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int
         shares_of_ticks, every = settling.share(np.array(ticks)).tolist(), ds.attrs.get("every")
         handles.append(_Ruler(ticks if every is None else [float(f"{tick * every:.3g}") for tick in ticks], shares_of_ticks))
         texts.append("periods to settle" if every is None else "s to settle")
-    for code, look in maps.UNSETTLED.items():
+    for code, unsettled in maps.UNSETTLED.items():
         if code in shares:
-            handles.append(_Ramp(np.array([to_rgb(look.color)])))
-            texts.append(f"{look.label}, {maps.share_text(shares[code])}")
+            handles.append(_Ramp(np.array([to_rgb(unsettled.color)])))
+            texts.append(f"{unsettled.label}, {maps.share_text(shares[code])}")
     if points and colors and any(len(_stroboscopic(ds, pair, key)) for key in colors):
         handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="#BBBBBB", mec="#222222", mew=0.7))
         texts.append("points of the attractors" if "attractor_cycle" in ds else "Poincaré points of the attractors")
@@ -280,7 +278,7 @@ def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int
 
 
 def _texts(ds: xr.Dataset, pair: tuple[str, str], ids: Sequence[int], shares: Mapping[int, float]) -> list[str]:
-    """Each attractor in words, with its share of the cells; alike ones are told apart by their peaks."""
+    """Each attractor in words, with its share of the cells; equal ones with their peaks."""
     names = [maps.describe(ds.sel(attractor=key)) for key in ids]
     texts = []
     for key, name in zip(ids, names, strict=True):
@@ -294,7 +292,7 @@ def _texts(ds: xr.Dataset, pair: tuple[str, str], ids: Sequence[int], shares: Ma
 
 
 def _inside(ds: xr.Dataset, pair: tuple[str, str], key: int) -> bool:
-    """Whether a point of the attractor lies in the map, where a reader looks for it."""
+    """Whether a point of the attractor lies in the map, where it can be drawn."""
     cloud = _stroboscopic(ds, pair, key)
     limits = [maps.edges(ds[name].values) for name in pair]
     return bool(np.logical_and.reduce([(cloud[:, i] >= edge.min()) & (cloud[:, i] <= edge.max()) for i, edge in enumerate(limits)]).any())

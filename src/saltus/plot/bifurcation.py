@@ -12,24 +12,21 @@ from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import kinds, regions
 from saltus.plot import response_points as points
-from saltus.plot.picture import picture
+from saltus.plot.picture import caller, picture
 from saltus.plot.style import QUIET, Scale
-from saltus.results.reader import reader
-from saltus.results.schema import response_name, sample_name, states_of
+from saltus.results.dataset.schema import response_name, sample_name, states_of
 
-_CALLER = "plot.bifurcation_diagram"
 #: What the vertical axis shows, by what was sampled.
 _SHOWN = {
     "turning_points": "{} at turning points", "contacts": "{} at the contacts", "stroboscope": "{} at the Poincaré points",
 }  # fmt: skip
 #: Diameter of the smallest dots [pt]: more than a pixel of a screen.
 _SMALLEST = 0.6
-#: Where the legend begins, in widths of the Axes, if the names of the gaps stand beside it.
+#: Where the legend begins, in widths of the Axes, if the names of the gaps stand there.
 _BESIDE_GAPS = 1.16
 
 
-@picture
-@reader
+@picture()
 def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: bool = True, legend: bool = True, ax: Any = None) -> Axes:
     """Sampled values of every response against a parameter: a colour for each period, chaos in small dark dots, gaps dashed.
 
@@ -45,7 +42,7 @@ def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: 
     events : bool
         Whether to mark grazes, period doublings and the onset of chaos above the picture.
     legend : bool
-        Whether to name the colours, beside the picture.
+        Whether to draw the legend.
     ax : Axes, optional
         Where to draw; a new figure by default.
 
@@ -58,14 +55,14 @@ def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: 
     ParameterError
         If ``ds`` holds no responses over one parameter, or has no such state.
     """
-    datasets = points.shown(ds, _CALLER, [])
+    datasets = points.shown(ds, [])
     names = states_of(datasets[0].ds)
     state = names[0] if state is None else state
     if any(state not in states_of(one.ds) for one in datasets):
-        raise ParameterError(f"{_CALLER}: there is no state {shown(state)}. {nearest(state, names)}")
+        raise ParameterError(f"there is no state {shown(state)}. {nearest(state, names)}")
     variables = [_variable(one, state) for one in datasets]
     scale = points.state_scale([one.ds[name] for one, name in zip(datasets, variables, strict=True)])
-    with draw.panels(ax, 1, (6.3, 3.6), _CALLER) as (panel,):
+    with draw.panels(ax, 1, (6.3, 3.6)) as (panel,):
         across = points.parameter_axis(panel, datasets)
         named: dict[str, Any] = {}
         for one, name in zip(datasets, variables, strict=True):
@@ -82,7 +79,7 @@ def _variable(one: points.Shown, state: str) -> str:
     """The sampled values; where there are none, the points at whole periods."""
     name = sample_name(state) if sample_name(state) in one.ds else response_name(state)
     if name not in one.ds:
-        raise ParameterError(f"{_CALLER} misses {name} in this Dataset. Give it the whole Dataset, not some variables of it.")
+        raise ParameterError(f"{caller()} misses {name} in this Dataset. Give it the whole Dataset, not some variables of it.")
     return name
 
 
@@ -105,17 +102,17 @@ def _kinds(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> di
         x, y = _flat(one, values, of == code, across)
         wandering = not kinds.repeats(code)
         size = _size(x.size) * (0.5 if wandering else 1.0)
-        look = {"marker": "o", "ms": max(size, _SMALLEST), "mfc": kinds.color(code), "mec": "none", "gid": f"kind {code}"}
-        draw.draw_points(ax, x, y, zorder=2 if wandering else 3, **look)
+        marks = {"marker": "o", "ms": max(size, _SMALLEST), "mfc": kinds.color(code), "mec": "none", "gid": f"kind {code}"}
+        draw.draw_points(ax, x, y, zorder=2 if wandering else 3, **marks)
     return points.kind_handles(one, of)
 
 
 def _compare(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> dict[str, Any]:
-    """One colour for a Dataset among several; the first lies below in larger dots, so that each is seen beside the others."""
+    """One colour for a Dataset among several; the first lies below in larger dots, so that all are seen."""
     x, y = _flat(one, values, np.ones(len(values), dtype=bool), across)
     color = points.dataset_color(one)
-    size = _size(x.size) * (1.8 if one.look == 0 else 1.0)
-    draw.draw_points(ax, x, y, marker="o", ms=size, mfc=color, mec="none", zorder=2 + 0.1 * one.look, gid=f"dataset {one.name}")
+    size = _size(x.size) * (1.8 if one.rank == 0 else 1.0)
+    draw.draw_points(ax, x, y, marker="o", ms=size, mfc=color, mec="none", zorder=2 + 0.1 * one.rank, gid=f"dataset {one.name}")
     return {one.name: points.dot(color)}
 
 

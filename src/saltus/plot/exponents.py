@@ -13,16 +13,13 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import EXPONENTS, check, kind_text
+from saltus.results.dataset.schema import EXPONENTS, kind_text
 
-_CALLER = "plot.exponents"
 #: Share of the time at the beginning whose running means aren't shown: they start anywhere, with intervals beyond any frame.
 _EARLY = 0.1
 
 
-@picture
-@reader
+@picture(EXPONENTS)
 def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax: Any = None, *, legend: bool = True) -> Any:
     """Lyapunov exponents as they converge: mean so far and its 95 % interval, against the time since the transient.
 
@@ -50,9 +47,8 @@ def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax:
     ParameterError
         If ``ds`` is not from ``lyapunov`` or ``wolf``, or an argument doesn't fit it.
     """
-    check(ds, caller=_CALLER, kinds=[EXPONENTS])
-    labels = selection.chosen(ds, trajectory, _CALLER)
-    with draw.panels(ax, len(labels), (6.3, 2.5), _CALLER) as panels:
+    labels = selection.chosen(ds, trajectory)
+    with draw.panels(ax, len(labels), (6.3, 2.5)) as panels:
         for label, panel in zip(labels, panels, strict=True):
             one = ds.sel(trajectory=label)
             _panel(panel, one, legend)

@@ -17,12 +17,10 @@ from saltus.plot import kinds
 from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, Scale
-from saltus.results.measured import read_measured
-from saltus.results.reader import reader
-from saltus.results.schema import states_of
+from saltus.results.dataset.schema import states_of
+from saltus.results.files.measured import read_measured
 from saltus.units import to_si
 
-_CALLER = "plot.frequency_response"
 Quantity = Literal[
     "rms", "peak", "maximum", "minimum", "peak_to_peak", "mean", "rms_about_mean", "amplitude", "phase", "transmissibility"
 ]  # fmt: skip
@@ -36,8 +34,7 @@ _SIZES = ("rms", "peak", "peak_to_peak", "rms_about_mean", "amplitude", "transmi
 Measured = str | os.PathLike[str] | xr.Dataset | None
 
 
-@picture
-@reader
+@picture()
 def frequency_response(
     ds: points.Source,
     *,
@@ -67,7 +64,7 @@ def frequency_response(
     events : bool
         Whether to mark grazes, period doublings and folds above the picture.
     legend : bool
-        Whether to name the colours, beside the picture.
+        Whether to draw the legend.
     ax : Axes, optional
         Where to draw; a new figure by default.
 
@@ -83,11 +80,11 @@ def frequency_response(
         If the measured points can't be read.
     """
     if not among(quantity, get_args(Quantity)):
-        raise ParameterError(f"{_CALLER}: quantity={shown(quantity)}. Known: {', '.join(get_args(Quantity))}.")
-    datasets = [_chosen(one, quantity, output) for one in points.shown(ds, _CALLER, [])]
+        raise ParameterError(f"quantity={shown(quantity)}. Known: {', '.join(get_args(Quantity))}.")
+    datasets = [_chosen(one, quantity, output) for one in points.shown(ds, [])]
     variable = "drawn"
     marks = None if measured is None else _measured(measured, datasets[0], variable)
-    with draw.panels(ax, 1, (6.3, 3.4), _CALLER) as (panel,):
+    with draw.panels(ax, 1, (6.3, 3.4)) as (panel,):
         across, up = points.parameter_axis(panel, datasets), points.state_scale([one.ds[variable] for one in datasets])
         named: dict[str, Any] = {}
         for one in datasets:
@@ -115,14 +112,14 @@ def _chosen(one: points.Shown, quantity: str, output: str | None) -> points.Show
     first = states_of(ds)[0]
     if quantity == "transmissibility":
         if quantity not in ds:
-            raise ParameterError(f'{_CALLER}: there is no transmissibility yet. Add it: ds = sl.transmissibility(ds, "{first}", "base").')
+            raise ParameterError(f'there is no transmissibility yet. Add it: ds = sl.transmissibility(ds, "{first}", "base").')
         return replace(one, ds=ds.assign(drawn=ds[quantity]))
     if f"response_{quantity}" in ds and output in (None, first):
         return replace(one, ds=ds.assign(drawn=ds[f"response_{quantity}"].assign_attrs(long_name=first)))
     known = ds["output"].values.tolist() if "output" in ds else []
     name = first if output is None else output
     if name not in known:
-        raise ParameterError(f"{_CALLER}: the Dataset has no output {shown(name)}. {nearest(name, known)}")
+        raise ParameterError(f"the Dataset has no output {shown(name)}. {nearest(name, known)}")
     chosen = ds.sel(output=name)
     unit = "1" if quantity == "phase" else chosen["output_units"].item()
     values = np.rad2deg(chosen["output_phase"].values) if quantity == "phase" else chosen[f"output_{quantity}"].values
@@ -143,20 +140,20 @@ def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[st
             line = points.branch_lines(one, y, mine)
             ax.plot(line[0] * across.factor, line[1], color=color, lw=0.8, zorder=2, gid=f"branches {code}")
         size = _size(mine.sum()) * (1.2 if code == kinds.CHAOTIC else 1.0)  # of its marker half is seen
-        look = {"marker": kinds.marker(code), "mfc": color, "mec": "none"}
-        draw.draw_points(ax, one.values[mine] * across.factor, y[mine], ms=size, zorder=3, gid=f"kind {code}", **look)
+        marks = {"marker": kinds.marker(code), "mfc": color, "mec": "none"}
+        draw.draw_points(ax, one.values[mine] * across.factor, y[mine], ms=size, zorder=3, gid=f"kind {code}", **marks)
     return points.kind_handles(one, of, markers=True)
 
 
 def _compare(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[str, Any]:
     """One colour and marker for a Dataset among several; the first is drawn largest, so that none hides another."""
-    color, marker = points.dataset_color(one), points.MARKERS[one.look]
-    size = _size(y.size) * (1.9 if one.look == 0 else 1.0)
+    color, marker = points.dataset_color(one), points.MARKERS[one.rank]
+    size = _size(y.size) * (1.9 if one.rank == 0 else 1.0)
     draw.draw_points(
-        ax, one.values * across.factor, y, marker=marker, ms=size, mfc="none" if one.look == 0 else color, mec=color,
-        mew=0.6 if one.look == 0 else 0.0, zorder=3, gid=f"dataset {one.name}",
+        ax, one.values * across.factor, y, marker=marker, ms=size, mfc="none" if one.rank == 0 else color, mec=color,
+        mew=0.6 if one.rank == 0 else 0.0, zorder=3, gid=f"dataset {one.name}",
     )  # fmt: skip
-    return {one.name: points.dot(color, marker, hollow=one.look == 0)}
+    return {one.name: points.dot(color, marker, hollow=one.rank == 0)}
 
 
 # -- measured points -----------------------------------------------------------------------------------------------------------
@@ -167,21 +164,21 @@ def _measured(measured: Measured, one: points.Shown, variable: str) -> xr.Datase
         return read_measured(measured, one.axis, *units.values())  # type: ignore[arg-type]
     lacking = [name for name in units if name not in measured.variables]
     if lacking:
-        raise ParameterError(f"{_CALLER}: measured has no {lacking[0]!r}. It needs {' and '.join(units)}, each with the attribute units.")
+        raise ParameterError(f"measured has no {lacking[0]!r}. It needs {' and '.join(units)}, each with the attribute units.")
     return xr.Dataset({name: ("point", _in_si(measured[name], unit)) for name, unit in units.items()})
 
 
 def _draw_measured(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
     """Open circles above all that was computed."""
-    look = {"ms": 4.5, "mfc": "none", "mec": OKABE_ITO["black"], "mew": 0.9}
-    draw.draw_points(ax, x, y, marker="o", zorder=4, label="measured", gid="measured", **look)
+    marks = {"ms": 4.5, "mfc": "none", "mec": OKABE_ITO["black"], "mew": 0.9}
+    draw.draw_points(ax, x, y, marker="o", zorder=4, label="measured", gid="measured", **marks)
 
 
 def _in_si(values: xr.DataArray, unit: str) -> np.ndarray:
     given = values.attrs.get("units", "")
     if not given and unit not in ("", "1"):
-        raise ParameterError(f"{_CALLER}: measured {values.name} has no attribute units. Write it, such as units='{unit}'.")
+        raise ParameterError(f"measured {values.name} has no attribute units. Write it, such as units='{unit}'.")
     try:
         return np.array([to_si(f"{float(value)!r} {given}", unit, str(values.name)) for value in np.ravel(values.values)])
     except UnitError as error:
-        raise ParameterError(f"{_CALLER}: {error}") from None
+        raise ParameterError(f"{error}") from None

@@ -19,12 +19,10 @@ from saltus.plot import axes as draw
 from saltus.plot import maps, selection
 from saltus.plot.history import history
 from saltus.plot.phase import phase
-from saltus.plot.picture import picture
+from saltus.plot.picture import caller, check, picture
 from saltus.plot.style import display_scale, style
-from saltus.results import schema
-from saltus.results.reader import reader
+from saltus.results.dataset import schema
 
-_CALLER = "plot.gallery"
 #: Forcing periods in the time history of a response that doesn't repeat, and the fewest of one that does: it takes two to see a repeat.
 _SHOWN_IF_APERIODIC, _FEWEST = 12, 2
 #: The most rows that fit a figure.
@@ -34,8 +32,7 @@ _ELSEWHERE = "#D2D2D2"
 _NARROWEST = 0.25
 
 
-@picture
-@reader
+@picture(schema.BASINS, schema.ATTRACTORS, needs=("attractor", "attractor_period", "attractor_contacts"))
 def gallery(ds: xr.Dataset, runs: xr.Dataset, attractors: Sequence[int] | None = None, *, order: Sequence[int] | None = None) -> Figure:
     """A row for each attractor: time history over its period, phase portrait, Poincare points in the hue that it has in the map.
 
@@ -61,9 +58,8 @@ def gallery(ds: xr.Dataset, runs: xr.Dataset, attractors: Sequence[int] | None =
     ParameterError
         If ``ds`` or ``runs`` is something else, they don't fit one another, or there is nothing to show.
     """
-    maps.check(ds, _CALLER, ["basins", "attractors"], ["attractor", "attractor_period", "attractor_contacts"])
-    schema.check(runs, caller=_CALLER, kinds=[schema.TRAJECTORY])
-    colors = maps.colors_of(ds, order, _CALLER)
+    check(runs, [schema.TRAJECTORY])
+    colors = maps.colors_of(ds, order)
     ids = _chosen(runs, list(colors), attractors)
     pair = _pair(runs)
     columns = 3 if len(pair) == 2 and all(f"attractor_{name}" in ds for name in pair) else 2 if len(pair) == 2 else 1
@@ -90,15 +86,15 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
     chosen = ids if attractors is None else [int(one) for one in np.atleast_1d(attractors).tolist()]
     strange = [one for one in chosen if one not in ids]
     if strange:
-        raise ParameterError(f"{_CALLER}: there is no attractor {strange[0]}. Known: {', '.join(map(str, ids)) or 'none'}.")
+        raise ParameterError(f"there is no attractor {strange[0]}. Known: {', '.join(map(str, ids)) or 'none'}.")
     if not 0 < len(chosen) <= _MOST:
         some = " Choose, such as attractors=[0, 1]." if ids else " Nothing settled in this Dataset."
-        raise ParameterError(f"{_CALLER} shows 1 to {_MOST} attractors, not {len(chosen)}.{some}")
+        raise ParameterError(f"{caller()} shows 1 to {_MOST} attractors, not {len(chosen)}.{some}")
     held = runs["trajectory"].values.tolist() if "trajectory" in runs.dims else [0]
     lacking = [one for one in chosen if one not in held]
     if lacking:
         raise ParameterError(
-            f"{_CALLER}: runs holds {len(held)} trajectories, none for attractor {lacking[0]} of {len(ids)}. Simulate a batch whose "
+            f"runs holds {len(held)} trajectories, none for attractor {lacking[0]} of {len(ids)}. Simulate a batch whose "
             f"trajectory i starts on attractor i: from ds.attractor_{schema.states_of(runs)[0]}[:, 0] and so on."
         )
     return chosen
@@ -125,8 +121,8 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
         names = [name for name in schema.states_of(runs) if f"attractor_{name}" in ds]
         places = [ds[f"attractor_{name}"].sel(attractor=key).values.ravel()[0] for name in names]
         scales = [display_scale(runs[name].attrs.get("units", ""), abs(place)) for name, place in zip(names, places, strict=True)]
-        told = [f"{name} = {scale.text(place)}" for name, place, scale in zip(names, places, scales, strict=True)]
-        draw.say(row[1], "\n".join(["At rest at", *told]))
+        places_text = [f"{name} = {scale.text(place)}" for name, place, scale in zip(names, places, scales, strict=True)]
+        draw.say(row[1], "\n".join(["At rest at", *places_text]))
     elif len(row) > 1:
         phase(runs, label, periods=in_phase, ax=row[1], legend=False)
         for names in [one for one in row[1].child_axes if one.get_gid() == draw.GAP_NAMES.format("x")]:
@@ -150,7 +146,7 @@ def _poincare(ax: Axes, ds: xr.Dataset, runs: xr.Dataset, key: int, color: np.nd
     draw.few_ticks(ax)
     mine, others = (cloud * [scale.factor for scale in scales] for cloud in (mine, others))
     size = 5.0 if len(mine) <= 12 else 3.6 if len(mine) <= 60 else 1.8
-    look: dict[str, Any] = {
+    marks: dict[str, Any] = {
         "marker": "o",
         "ms": size,
         "mfc": color,
@@ -160,11 +156,11 @@ def _poincare(ax: Axes, ds: xr.Dataset, runs: xr.Dataset, key: int, color: np.nd
     }
     if len(others):
         draw.draw_points(ax, *others.T, marker="o", ms=2.4, mfc=_ELSEWHERE, mec="none", zorder=1, label="other attractors", gid="others")
-    draw.draw_points(ax, *mine.T, zorder=3, **look)
+    draw.draw_points(ax, *mine.T, zorder=3, **marks)
 
 
 def _window(points: np.ndarray, orbit: np.ndarray) -> tuple[float, float]:
-    """Limits around the points, wide enough to be read beside the orbit."""
+    """Limits around the points, at least as wide as the labels of an axis need."""
     ends = [points.min(), points.max()] if points.size else [np.nanmin(orbit), np.nanmax(orbit)]
     middle = 0.5 * (ends[0] + ends[1])
     half = max(0.5 * (ends[1] - ends[0]), 0.5 * _NARROWEST * float(np.nanmax(orbit) - np.nanmin(orbit)))

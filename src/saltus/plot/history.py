@@ -16,10 +16,8 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import TRAJECTORY, check, contact_name, equations_of, forcing_period, states_of
+from saltus.results.dataset.schema import TRAJECTORY, contact_name, equations_of, forcing_period, states_of
 
-_CALLER = "plot.history"
 #: Marker, face and name of each kind of contact. Hollow means undecided.
 _MARKERS: dict[str, dict[str, Any]] = {
     "crossing": {"marker": "o", "mfc": OKABE_ITO["black"], "label": "contact"},
@@ -28,8 +26,7 @@ _MARKERS: dict[str, dict[str, Any]] = {
 }
 
 
-@picture
-@reader
+@picture(TRAJECTORY)
 def history(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,
@@ -55,7 +52,7 @@ def history(
     state : str, optional
         Name of the state; the first one by default.
     periods : int, float or pair, optional
-        The last so many forcing periods, or from one to another; the whole run by default.
+        Number of forcing periods at the end, or (first, last) period; the whole run by default.
     ax : Axes or array of Axes, optional
         Where to draw, one for each trajectory; a new figure by default.
     time : {"both", "s", "T"}
@@ -75,15 +72,14 @@ def history(
     ParameterError
         If ``run`` is not from ``simulate``, or an argument doesn't fit it.
     """
-    check(run, caller=_CALLER, kinds=[TRAJECTORY])
     if not among(time, ("s", "T", "both")):
-        raise ParameterError(f"{_CALLER}: time={shown(time)}. Known: 'both', 's', 'T'.")
-    state = states_of(run)[0] if state is None else selection.state_named(run, state, _CALLER)
-    wanted = selection.units_of_states(run, units, _CALLER).get(state)
-    labels = selection.chosen(run, trajectory, _CALLER)
+        raise ParameterError(f"time={shown(time)}. Known: 'both', 's', 'T'.")
+    state = states_of(run)[0] if state is None else selection.state_named(run, state)
+    wanted = selection.units_of_states(run, units).get(state)
+    labels = selection.chosen(run, trajectory)
     singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
-    windows = [selection.window(one, periods, _CALLER) for one in singles]
-    with draw.panels(ax, len(singles), (6.3, 2.5), _CALLER) as panels:
+    windows = [selection.window(one, periods) for one in singles]
+    with draw.panels(ax, len(singles), (6.3, 2.5)) as panels:
         for i, (panel, one, part) in enumerate(zip(panels, singles, windows, strict=True)):
             _panel(panel, one, state, part, time, wanted)
             if len(labels) > 1:
@@ -156,9 +152,9 @@ def _mark_contacts(ax: Axes, table: xr.Dataset, state: str, x: Scale, y: Scale) 
     """A marker for each contact, by its kind; smaller where they are many."""
     kinds = table["contact_kind"].values.astype(str)
     size = 3.4 if kinds.size <= 40 else 2.4 if kinds.size <= 150 else 1.5
-    for kind, look in _MARKERS.items():
+    for kind, marker in _MARKERS.items():
         rows = np.flatnonzero(kinds == kind)
         if rows.size:
             grow = 1.0 if kind == "crossing" else 1.5
             at = table["contact_time"].values[rows] * x.factor, table[contact_name(state)].values[rows] * y.factor
-            draw.draw_points(ax, *at, ms=size * grow, mec=OKABE_ITO["black"], mew=0.5, zorder=3, **look)
+            draw.draw_points(ax, *at, ms=size * grow, mec=OKABE_ITO["black"], mew=0.5, zorder=3, **marker)

@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 
 from saltus.plot.palette import hues, shades
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
 
-#: Periods with a hue of their own; longer ones share the next. More hues than these can't be told apart as small dots.
+#: Periods with a hue of their own; longer ones share the next. More hues than these can't be distinguished as small dots.
 OWN_HUES = 8
 #: Codes of the kinds: the period itself up to :data:`OWN_HUES`, then these.
 LONG, QUASI_PERIODIC, CHAOTIC = OWN_HUES + 1, OWN_HUES + 2, OWN_HUES + 3
@@ -23,7 +23,7 @@ _OWN = {"quasi_periodic": QUASI_PERIODIC, "limit_cycle": LIMIT_CYCLE, "equilibri
 _GREYS = {QUASI_PERIODIC: (0.70, 0.70, 0.70), CHAOTIC: (0.20, 0.20, 0.20)}
 #: Markers of the periods 1, 2, ..., and of longer ones.
 _MARKERS = dict(enumerate("osD^vPX*p", start=1))
-#: The shade of a hue that small dots and thin lines have on white, among so many; the hue itself is for areas.
+#: The shade of a hue for small dots and thin lines on white; the hue itself is for areas.
 _DOT, _SHADES = 4, 7
 
 

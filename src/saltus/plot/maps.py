@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,14 +14,8 @@ from matplotlib.axes import Axes
 from saltus.errors import ParameterError, shown
 from saltus.plot.palette import hues
 from saltus.plot.style import Scale, display_scale
-from saltus.results.schema import kind_of, kind_text
+from saltus.results.dataset.schema import kind_text
 from saltus.units import from_si
-
-#: Kinds of Dataset, and what returns them.
-SOURCES = {
-    "basins": "sl.basins", "attractors": "sl.attractors or sl.basin_fractions", "agreement": "sl.compare",
-    "responses": "sl.frequency_response or sl.bifurcation_diagram",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -42,35 +35,8 @@ UNSETTLED = {
 }
 
 
-#: What draws other kinds of results.
-_BETTER = {
-    "basins": "plot.basins", "agreement": "plot.agreement", "trajectory": "plot.history or plot.phase", "stroboscope": "plot.phase",
-    "responses": "plot.frequency_response, plot.bifurcation_diagram or plot.type_map",
-}  # fmt: skip
-
-
 # -- the Dataset ---------------------------------------------------------------------------------------------------------------
-def check(ds: Any, caller: str, kinds: Sequence[str], needs: Sequence[str]) -> None:
-    """Raise a ParameterError unless ``ds`` is a Dataset of one of these kinds and holds these variables."""
-    wanted = ", or ".join(SOURCES[kind] for kind in kinds)
-    if not isinstance(ds, xr.Dataset):
-        hint = " A DataArray holds one variable: give the whole Dataset." if isinstance(ds, xr.DataArray) else ""
-        raise ParameterError(f"{caller} takes the Dataset that {wanted} returns, not a {type(ds).__name__}.{hint}")
-    kind = kind_of(ds)
-    if not kind:
-        raise ParameterError(
-            f"{caller} takes the Dataset that {wanted} returns. This one has no attribute 'saltus_result': it is from elsewhere, or its "
-            f"attributes were dropped on the way (xarray.set_options(keep_attrs=True) keeps them)."
-        )
-    if kind not in kinds:
-        better = f" Draw it with {_BETTER[kind]}." if kind in _BETTER else ""
-        raise ParameterError(f"{caller} takes what {wanted} returns; this Dataset is of the kind {shown(kind)}.{better}")
-    missing = [name for name in needs if name not in ds.variables]
-    if missing:
-        raise ParameterError(f"{caller} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not some variables of it.")
-
-
-def ranked(ds: xr.Dataset, order: Sequence[int] | None, caller: str) -> list[int]:
+def ranked(ds: xr.Dataset, order: Sequence[int] | None) -> list[int]:
     """Ids of the attractors in the order of their colours: those of ``order``, then the others.
 
     Raises
@@ -82,17 +48,17 @@ def ranked(ds: xr.Dataset, order: Sequence[int] | None, caller: str) -> list[int
     try:
         first = [] if order is None else [int(one) for one in np.atleast_1d(order).tolist()]
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{caller}: order must hold numbers of attractors, not {shown(order)}.") from None
+        raise ParameterError(f"order must hold numbers of attractors, not {shown(order)}.") from None
     strange = [one for one in first if one not in known]
     if strange or len(set(first)) < len(first):
         what = f"there is no attractor {strange[0]}" if strange else "an attractor occurs twice"
-        raise ParameterError(f"{caller}: order={first}, but {what}. Known: {', '.join(map(str, known)) or 'none'}.")
+        raise ParameterError(f"order={first}, but {what}. Known: {', '.join(map(str, known)) or 'none'}.")
     return first + [one for one in known if one not in first]
 
 
-def colors_of(ds: xr.Dataset, order: Sequence[int] | None, caller: str) -> dict[int, np.ndarray]:
+def colors_of(ds: xr.Dataset, order: Sequence[int] | None) -> dict[int, np.ndarray]:
     """The hue of each attractor, by id, in the order of the legend."""
-    ids = ranked(ds, order, caller)
+    ids = ranked(ds, order)
     return dict(zip(ids, hues(len(ids)), strict=True))
 
 
@@ -129,9 +95,9 @@ def method_text(ds: xr.Dataset, suffix: str = "") -> str:
         options = dict(json.loads(ds.attrs.get(f"method_options{suffix}", "{}")))
     except (ValueError, TypeError):  # of another program
         options = {}
-    told = [f"{key} {float(options[key]):g}" for key in ("rtol", "atol") if key in options]
+    tolerances = [f"{key} {float(options[key]):g}" for key in ("rtol", "atol") if key in options]
     ignored = ["contacts not located"] if options.get("events") == "ignore" else []
-    return ", ".join([name.lower(), *told, *ignored])
+    return ", ".join([name.lower(), *tolerances, *ignored])
 
 
 def share_text(fraction: float) -> str:
@@ -154,16 +120,16 @@ def peak_text(one: xr.Dataset) -> str:
 
 
 # -- the starts ----------------------------------------------------------------------------------------------------------------
-def plane(ds: xr.Dataset, variable: str, caller: str) -> tuple[str, str]:
+def plane(ds: xr.Dataset, variable: str) -> tuple[str, str]:
     """Names of the two states on the axes of a map."""
     dims = ds[variable].dims
     if len(dims) != 2 or any(dim not in ds.coords for dim in dims):
         raise ParameterError(
-            f"{caller}: {variable} has the dims {dims}; a map needs two states with their starts as coordinates. "
+            f"{variable} has the dims {dims}; a map needs two states with their starts as coordinates. "
             f"Of more states choose a section first, such as ds.isel({dims[-1] if dims else 'x'}=0)."
         )
     if 0 in ds[variable].shape:
-        raise ParameterError(f"{caller}: this map holds no starts (its shape is {ds[variable].shape}).")
+        raise ParameterError(f"this map holds no starts (its shape is {ds[variable].shape}).")
     return str(dims[0]), str(dims[1])
 
 
@@ -186,7 +152,7 @@ def edges(starts: np.ndarray) -> np.ndarray:
 def draw_cells(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], scales: tuple[Scale, Scale], colors: np.ndarray) -> None:
     """Colour every cell, uint8, shape (A, B, 3), and name the axes.
 
-    No colours are mixed, however small the cells: a mixture of two hues looks like a third attractor.
+    No colours are mixed, however small the cells: a mixture of two hues would be taken for a third attractor.
     """
     x, y = (edges(ds[name].values * scale.factor) for name, scale in zip(pair, scales, strict=True))
     image = np.ascontiguousarray(colors.swapaxes(0, 1))

@@ -14,18 +14,16 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import ENERGY, IMPACTS, check
+from saltus.results.dataset.schema import ENERGY, IMPACTS
 
 #: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a motion that repeats, and how often each
 #: must be seen.
 _SAME, _MOST_SPEEDS, _REPEATED = 1e-7, 6, 3
-#: Characters that fit beside each other in a picture of words.
+#: Characters of a line in a picture of words.
 _LINE = 60
 
 
-@picture
-@reader
+@picture(IMPACTS)
 def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Histogram of the speeds at contact, a colour for each guard. Where they repeat, or there are none, it is said in words.
 
@@ -49,21 +47,19 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
     ParameterError
         If ``ds`` is not from ``impact_statistics``, or there is no such trajectory.
     """
-    caller = "plot.impacts"
-    check(ds, caller=caller, kinds=[IMPACTS])
     counts = ds["speed_histogram"]
     labels: np.ndarray | None = None
     if "trajectory" in counts.dims:
-        labels = np.asarray(selection.chosen(ds, trajectory, caller)) if trajectory is not None else ds["trajectory"].values
+        labels = np.asarray(selection.chosen(ds, trajectory)) if trajectory is not None else ds["trajectory"].values
         counts = counts.sel(trajectory=labels).sum("trajectory")
     low, high = ds["speed_low"].values, ds["speed_high"].values
     scale = display_scale(ds["speed_low"].attrs.get("units", ""), float(np.abs(high).max()))
     names = ds["guard"].values.tolist()
     width = (high - low) * scale.factor / len(names)
-    told = _in_words(ds, labels, counts, scale)
-    with draw.panels(ax, 1, (5.2, 2.8), caller) as (panel,):
-        if told:
-            draw.say(panel, told, ds if labels is None else ds.sel(trajectory=labels))
+    sentence = _in_words(ds, labels, counts, scale)
+    with draw.panels(ax, 1, (5.2, 2.8)) as (panel,):
+        if sentence:
+            draw.say(panel, sentence, ds if labels is None else ds.sel(trajectory=labels))
             return panel
         for i, name in enumerate(names):
             panel.bar(
@@ -84,7 +80,7 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
 def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, scale: Scale) -> str:
     """What there is to say of contacts that make no histogram: there are none, or their speeds come again and again."""
     if not counts.values.sum():
-        return "No contact in the time that was looked at."
+        return "No contact in the observed time."
     mine = slice(None) if labels is None else np.isin(ds["contact_trajectory"].values, labels)
     speeds, guards = ds["contact_speed"].values[mine], ds["contact_guard"].values[mine].astype(str)
     lines = []
@@ -99,8 +95,7 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
     return "\n".join(["The speeds at contact repeat.", *lines])
 
 
-@picture
-@reader
+@picture(ENERGY)
 def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
     """Energy supplied, dissipated and stored, interval by interval; the largest imbalance is in the title.
 
@@ -124,11 +119,9 @@ def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, leg
     ParameterError
         If ``ds`` is not from ``energy_balance``, or there is no such trajectory.
     """
-    caller = "plot.energy"
-    check(ds, caller=caller, kinds=[ENERGY])
     if "trajectory" in ds.dims:
         first = int(ds["trajectory"].values[0])
-        ds = ds.sel(trajectory=selection.chosen(ds, first if trajectory is None else trajectory, caller)[0])
+        ds = ds.sel(trajectory=selection.chosen(ds, first if trajectory is None else trajectory)[0])
     dim = str(ds["residual"].dims[0])
     curves = {
         "supplied": (OKABE_ITO["blue"], "-"),
@@ -137,7 +130,7 @@ def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, leg
         "energy": (OKABE_ITO["black"], (0, (4, 2))),
     }
     scale = display_scale("J", max(float(np.abs(ds[name].values).max(initial=0.0)) for name in curves))
-    with draw.panels(ax, 1, (6.0, 2.8), caller) as (panel,):
+    with draw.panels(ax, 1, (6.0, 2.8)) as (panel,):
         if not np.isfinite(ds["residual"].values).any():
             draw.say(panel, "There is no balance: the motion stopped before the first interval had passed.", ds)
             return panel

@@ -10,23 +10,20 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatter
 
 from saltus.errors import ParameterError
+from saltus.intervals import wilson
 from saltus.plot import axes as draw
-from saltus.plot.picture import picture
+from saltus.plot.picture import caller, picture
 from saltus.plot.response_points import is_log, parameter_scale
 from saltus.plot.style import CYCLE
-from saltus.results.intervals import wilson
-from saltus.results.reader import reader
-from saltus.results.schema import METHODS, check
+from saltus.results.dataset.schema import METHODS
 
-_CALLER = "plot.methods"
 #: Pieces of the axis over which medians and shares are taken: the eye can't follow 2000 values, and a share needs some dozen.
 PIECES = 30
-#: So many values, or fewer, are drawn as dots that are seen alone; so many pieces, or fewer, as steps over them.
+#: Up to this number of values they are drawn as dots; up to this number of pieces their means as steps.
 FEW, STEPS = 100, 8
 
 
-@picture
-@reader
+@picture(METHODS)
 def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
     """What a method does to steady responses, against one parameter: three panels, the first method of ``ds`` being the reference.
 
@@ -50,17 +47,16 @@ def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
     ParameterError
         If ``ds`` is something else.
     """
-    check(ds, caller=_CALLER, kinds=(METHODS,))
     if "step_error" not in ds or ds["step_error"].ndim != 2:
         raise ParameterError(
-            f"{_CALLER} draws responses over one parameter. For basins draw plot.agreement, for two parameters select one."
+            f"{caller()} draws responses over one parameter. For basins draw plot.agreement, for two parameters select one."
         )
     axis = str(ds["step_error"].dims[1])
     values, unit = ds[axis].values, ds[axis].attrs.get("units", "")
     log = is_log(values)
     scale = parameter_scale(values, unit, log)
     x, bins = values * scale.factor, _pieces(values, log) * scale.factor
-    with draw.panels(ax, 3, (6.3, 1.9), _CALLER) as panels:
+    with draw.panels(ax, 3, (6.3, 1.9)) as panels:
         for i, name in enumerate(ds["method"].values.astype(str)):
             color = CYCLE[i % len(CYCLE)]
             _draw_cost(panels[2], ds.isel(method=i), x, name, color)

@@ -19,7 +19,7 @@ _PROTANOPIA = np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.
 
 #: The first two colours, near Okabe and Ito's blue and orange; the rest follow from them.
 _SEEDS = ("#4C94D8", "#F2B046")
-#: Where the others are looked for: no colour so dark that its shades get lost in black, none so light or vivid that it glares.
+#: Range of the others: no colour so dark that its shades get lost in black, none so light or vivid that it glares.
 _LIGHTNESS = np.linspace(0.56, 0.86, 13)
 _CHROMA = np.array([0.06, 0.09, 0.115, 0.14])
 _HUE = np.deg2rad(np.arange(0.0, 360.0, 6.0))

@@ -14,17 +14,14 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import STROBOSCOPE, check, kind_of, states_of
+from saltus.results.dataset.schema import STROBOSCOPE, TRAJECTORY, kind_of, states_of
 
-_CALLER = "plot.phase"
 #: Without `periods` the last part of a forced run is shown: transients of lightly damped systems have mostly gone by then (of the rig with
 #: 3 % damping after 40 periods, at 15 Hz), and subharmonic orbits still show several of their periods.
 SETTLED_SHARE = 0.3
 
 
-@picture
-@reader
+@picture(TRAJECTORY, STROBOSCOPE)
 def phase(
     run: xr.Dataset,
     trajectory: int | Sequence[int] | None = None,
@@ -50,7 +47,7 @@ def phase(
     states : pair of str, optional
         On the horizontal and the vertical axis; by default the first one and the state that is its rate, else the second one.
     periods : int, float or pair, optional
-        The last so many forcing periods, or from one to another. By default the last 30 % of a forced run,
+        Number of forcing periods at the end, or (first, last) period. By default the last 30 % of a forced run,
         as the picture says, and all of a run without forcing.
     ax : Axes, optional
         Where to draw; a new figure by default.
@@ -70,15 +67,14 @@ def phase(
     ParameterError
         If ``run`` is not a result of saltus, or an argument doesn't fit it.
     """
-    check(run, caller=_CALLER)
     pair = _pair(run, states)
-    labels = selection.chosen(run, trajectory, _CALLER)
+    labels = selection.chosen(run, trajectory)
     singles = [selection.single(run, label) for label in labels] or [selection.single(run, None)]
     share = SETTLED_SHARE if "period" in run else 1.0
-    windows = [selection.window(one, periods, _CALLER, share) for one in singles]
+    windows = [selection.window(one, periods, share) for one in singles]
     curves = [_values(one, pair, shown) for one, shown in zip(singles, windows, strict=True)]
-    scales = _scales(run, pair, np.concatenate(curves), selection.units_of_states(run, units, _CALLER))
-    with draw.panels(ax, 1, (4.6, 3.1), _CALLER) as (panel,):
+    scales = _scales(run, pair, np.concatenate(curves), selection.units_of_states(run, units))
+    with draw.panels(ax, 1, (4.6, 3.1)) as (panel,):
         if kind_of(run) != STROBOSCOPE and all(begin == end for begin, end in windows):
             draw.say(panel, "It stopped where it began: there is no motion to draw.", *singles)
             return panel
@@ -93,8 +89,8 @@ def phase(
             draw.note_status(panel, one)
         _frame(panel, singles[0], pair, np.concatenate(curves), scales)
         if legend:
-            beside = 1.25 if any(text.get_position()[0] > 1.0 for text in panel.texts) else 1.02  # the names of gaps
-            draw.legend(panel, regions.find(singles[0], pair), loc="upper left", bbox_to_anchor=(beside, 1))
+            right = 1.25 if any(text.get_position()[0] > 1.0 for text in panel.texts) else 1.02  # the names of gaps
+            draw.legend(panel, regions.find(singles[0], pair), loc="upper left", bbox_to_anchor=(right, 1))
     return panel
 
 
@@ -103,11 +99,11 @@ def _pair(run: xr.Dataset, states: Any) -> tuple[str, str]:
     known = states_of(run)
     if states is None:
         if len(known) < 2:
-            raise ParameterError(f"{_CALLER}: a phase portrait needs two states, this system has only {known[0]!r}. See plot.history.")
+            raise ParameterError(f"a phase portrait needs two states, this system has only {known[0]!r}. See plot.history.")
         return known[0], selection.rate_of(run, known[0]) or known[1]
     if not isinstance(states, list | tuple | np.ndarray) or getattr(states, "shape", None) == () or len(states) != 2:
-        raise ParameterError(f"{_CALLER}: states={shown(states)}. Give two names, such as states={known[:2]!r}.")
-    first, second = (selection.state_named(run, name, _CALLER) for name in states)
+        raise ParameterError(f"states={shown(states)}. Give two names, such as states={known[:2]!r}.")
+    first, second = (selection.state_named(run, name) for name in states)
     return first, second
 
 
@@ -142,11 +138,11 @@ def _dots(ax: Axes, points: np.ndarray, scales: tuple[Scale, Scale], color: str 
     """The Poincare points; smaller where they are many."""
     size = 4.5 if len(points) <= 60 else 2.5 if len(points) <= 500 else 1.2
     label = name if color is None or name not in ax.get_legend_handles_labels()[1] else None
-    look = {"marker": "o", "ms": size, "mfc": color or OKABE_ITO["black"], "mec": "white", "mew": 0.4 if size > 2 else 0.0}
+    marks = {"marker": "o", "ms": size, "mfc": color or OKABE_ITO["black"], "mec": "white", "mew": 0.4 if size > 2 else 0.0}
     if color is None and size > 4:  # open circles: filled ones are contacts, in time histories
-        look |= {"ms": 4.2, "mfc": "white", "mec": OKABE_ITO["black"], "mew": 1.1}
+        marks |= {"ms": 4.2, "mfc": "white", "mec": OKABE_ITO["black"], "mew": 1.1}
     if len(points):
-        draw.draw_points(ax, points[:, 0] * scales[0].factor, points[:, 1] * scales[1].factor, zorder=4, label=label, **look)
+        draw.draw_points(ax, points[:, 0] * scales[0].factor, points[:, 1] * scales[1].factor, zorder=4, label=label, **marks)
 
 
 def _frame(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], values: np.ndarray, scales: tuple[Scale, Scale]) -> None:

@@ -159,7 +159,7 @@ def _by_mode(ds: xr.Dataset) -> Regions:
 
 
 def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:
-    """Where modes look like those of a freeplay: the places of the free one, and of those below and above it.
+    """Where the modes are those of a freeplay: the places of the free one, and of those below and above it.
 
     Two gaps of a freeplay give the modes none, one, both positive if they point the same way, and none, one, the other if they don't.
     """
@@ -171,7 +171,7 @@ def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:
 
 
 def _mode_colors(codes: Sequence[int]) -> list[str]:
-    """The colours of a freeplay where the modes look like one, so that green is free there too; else a colour each."""
+    """The colours of a freeplay where the modes are those of one, so that green is free there too; else a colour each."""
     places = _freeplay(codes)
     if places:
         return [color for _, color in sorted(zip(places, (_FREE, _BELOW[0], _ABOVE[0]), strict=True))]

@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from saltus.errors import ParameterError
-from saltus.plot import kinds, maps
+from saltus.plot import kinds
+from saltus.plot.picture import caller, check
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.schema import event_name, parameters_of, response_name
+from saltus.results.dataset.schema import RESPONSES, event_name, parameters_of, response_name
 
 #: What a picture of responses takes: a Dataset, or several by their names.
 Source = xr.Dataset | Mapping[str, xr.Dataset]
@@ -33,9 +34,9 @@ _EVENTS_AT = 1.025
 _ROOM = "saltus-room-of-events"
 #: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
 _EVEN = 1e-6
-#: More marks than these on an axis are drawn smaller; so many, or fewer, stand on a line through the picture, to where it happens.
+#: Up to this number, marks of bifurcations stand on a line through the picture; more are drawn smaller, without it.
 _MANY_EVENTS, _FEW_EVENTS = 40, 12
-#: A legend of more entries is set smaller, to stay beside its picture.
+#: A legend of more entries is set smaller, so that it fits next to its picture.
 _LONG_LEGEND = 14
 
 
@@ -53,7 +54,7 @@ class Shown:
         Index of the response's value among the values of that parameter.
     name : str
         What the Dataset is called where several are drawn; else empty.
-    look : int
+    rank : int
         Its number among them.
     """
 
@@ -61,7 +62,7 @@ class Shown:
     axis: str
     place: np.ndarray
     name: str = ""
-    look: int = 0
+    rank: int = 0
 
     @property
     def values(self) -> np.ndarray:
@@ -70,7 +71,7 @@ class Shown:
 
 
 # -- which responses -----------------------------------------------------------------------------------------------------------
-def shown(source: Any, caller: str, needs: Sequence[str]) -> list[Shown]:
+def shown(source: Any, needs: Sequence[str]) -> list[Shown]:
     """The Datasets to draw, each with the responses that are left in it.
 
     Raises
@@ -81,28 +82,26 @@ def shown(source: Any, caller: str, needs: Sequence[str]) -> list[Shown]:
     several = isinstance(source, Mapping) and not isinstance(source, xr.Dataset)
     named = dict(source) if several else {"": source}
     if not named:
-        raise ParameterError(f"{caller}: there is nothing to draw. Give a Dataset, or several by name: {{'exact': a, 'ode45': b}}.")
+        raise ParameterError("there is nothing to draw. Give a Dataset, or several by name: {'exact': a, 'ode45': b}.")
     if len(named) > len(MARKERS):
-        raise ParameterError(f"{caller} tells {len(MARKERS)} Datasets apart, not {len(named)}. Draw them in several pictures.")
-    found = [_of(ds, str(name), i, caller, needs) for i, (name, ds) in enumerate(named.items())]
+        raise ParameterError(f"{caller()} tells {len(MARKERS)} Datasets apart, not {len(named)}. Draw them in several pictures.")
+    found = [_of(ds, str(name), i, needs) for i, (name, ds) in enumerate(named.items())]
     if len({one.axis for one in found}) > 1:
-        raise ParameterError(
-            f"{caller}: these are over {', '.join(sorted({one.axis for one in found}))}. Draw each in a picture of its own."
-        )
+        raise ParameterError(f"these are over {', '.join(sorted({one.axis for one in found}))}. Draw each in a picture of its own.")
     return found
 
 
-def _of(ds: Any, name: str, look: int, caller: str, needs: Sequence[str]) -> Shown:
-    maps.check(ds, caller, ["responses"], [*NEEDS, *needs])
+def _of(ds: Any, name: str, rank: int, needs: Sequence[str]) -> Shown:
+    check(ds, [RESPONSES], [*NEEDS, *needs])
     axes = parameters_of(ds)
     if len(axes) != 1:
-        told = f"{' and '.join(axes)}: choose one value, such as ds.isel({axes[-1]}=0), or draw plot.type_map" if axes else "no parameter"
-        raise ParameterError(f"{caller} draws responses over one parameter; this Dataset has {told}.")
+        over = f"{' and '.join(axes)}: choose one value, such as ds.isel({axes[-1]}=0), or draw plot.type_map" if axes else "no parameter"
+        raise ParameterError(f"{caller()} draws responses over one parameter; this Dataset has {over}.")
     left = select(ds)
     values = ds[axes[0]].values
     order = np.argsort(values, kind="stable")
     place = np.searchsorted(values[order], left[response_name(axes[0])].values)
-    return Shown(left, axes[0], place, name, look)
+    return Shown(left, axes[0], place, name, rank)
 
 
 def select(ds: xr.Dataset) -> xr.Dataset:
@@ -173,7 +172,7 @@ def state_scale(arrays: Sequence[xr.DataArray]) -> Scale:
 # -- colours and legend --------------------------------------------------------------------------------------------------------
 def dataset_color(one: Shown) -> str:
     """The colour of a Dataset where several are drawn."""
-    return CYCLE[one.look % len(CYCLE)]
+    return CYCLE[one.rank % len(CYCLE)]
 
 
 def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str, Line2D]:
@@ -221,7 +220,7 @@ def _raise_titles(ax: Axes) -> None:
 
 
 def legend(ax: Axes, named: Mapping[str, Any], left: float = 1.02) -> None:
-    """Name the colours, then the marks above it, beside the picture; ``left``: how far, in widths of the Axes."""
+    """Legend of the colours; above it that of the marks; ``left``: how far, in widths of the Axes."""
     known = dict(named)
     for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):
         known.setdefault(text, handle)

@@ -14,18 +14,15 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import SECTION, check, states_of
+from saltus.results.dataset.schema import SECTION, states_of
 
-_CALLER = "plot.section"
 #: What can stand on an axis besides the states: variable and name.
 _OTHERS = {"phase": ("crossing_phase", "phase of the forcing, t/T mod 1"), "time": ("crossing_time", "time")}
 #: Colour and name of the two directions of a crossing.
 _DIRECTIONS = {1: (OKABE_ITO["blue"], "upwards"), -1: (OKABE_ITO["vermillion"], "downwards")}
 
 
-@picture
-@reader
+@picture(SECTION)
 def section(
     ds: xr.Dataset,
     x: str | None = None,
@@ -65,16 +62,15 @@ def section(
     ParameterError
         If ``ds`` is not from ``poincare``, or an argument doesn't fit it.
     """
-    check(ds, caller=_CALLER, kinds=[SECTION])
-    labels = selection.chosen(ds, trajectory, _CALLER)
+    labels = selection.chosen(ds, trajectory)
     names = _axes(ds, x, y)
-    wanted = selection.units_of_states(ds, units, _CALLER)
+    wanted = selection.units_of_states(ds, units)
     rows = np.isin(ds["crossing_trajectory"].values, labels) if labels else np.ones(ds.sizes["crossing"], dtype=bool)
     points = [_values(ds, name) for name in names]
     scales = [_scale(ds, name, values[rows], wanted.get(name)) for name, values in zip(names, points, strict=True)]
-    with draw.panels(ax, 1, (4.6, 3.4), _CALLER) as (panel,):
+    with draw.panels(ax, 1, (4.6, 3.4)) as (panel,):
         if not rows.any():
-            draw.say(panel, f"Section {ds.attrs.get('surface', '')}: no crossing in the time that was looked at.", ds)
+            draw.say(panel, f"Section {ds.attrs.get('surface', '')}: no crossing in the observed time.", ds)
             return panel
         for mask, color, name in _groups(ds, labels, rows):
             _draw(panel, ds, mask, points, scales, color, name)
@@ -92,7 +88,7 @@ def _axes(ds: xr.Dataset, x: str | None, y: str | None) -> tuple[str, str]:
     known = [*states_of(ds), *(["phase"] if forced else []), "time"]
     for name in (x, y):
         if name is not None and name not in known:
-            raise ParameterError(f"{_CALLER}: this section has no {shown(name)} to draw. {nearest(name, known)}")
+            raise ParameterError(f"this section has no {shown(name)} to draw. {nearest(name, known)}")
     moving = [name for name in states_of(ds) if np.ptp(ds[name].values) > 0] if ds.sizes["crossing"] else list(states_of(ds))
     free = [name for name in (*moving, *known[len(states_of(ds)) :]) if name not in (x, y)]
     first = x if x is not None else free.pop(0)
@@ -116,7 +112,7 @@ def _groups(ds: xr.Dataset, labels: Sequence[int], rows: np.ndarray) -> list[tup
         names = [selection.named(ds, ds.sel(trajectory=label), label) for label in labels]
         return [(who == label, CYCLE[i % len(CYCLE)], name) for i, (label, name) in enumerate(zip(labels, names, strict=True))]
     directions = ds["crossing_direction"].values
-    return [(rows & (directions == way), *look) for way, look in _DIRECTIONS.items()]
+    return [(rows & (directions == way), *marks) for way, marks in _DIRECTIONS.items()]
 
 
 def _draw(ax: Axes, ds: xr.Dataset, mask: np.ndarray, points: Sequence[np.ndarray], scales: Sequence[Scale], color: str, name: str) -> None:

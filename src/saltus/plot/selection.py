@@ -13,18 +13,19 @@ import numpy as np
 import xarray as xr
 
 from saltus.errors import ParameterError, among, nearest, shown
-from saltus.results.schema import contact_name, equations_of, forcing_period, sample_dim, states_of
+from saltus.plot.picture import caller
+from saltus.results.dataset.schema import contact_name, equations_of, forcing_period, sample_dim, states_of
 from saltus.units import from_si
 
 Periods = int | float | tuple[float, float] | None
-#: The most trajectories that one picture can tell apart: the colours of the palette.
+#: Most trajectories in one picture: the colours of the palette.
 MOST = 8
-#: States at the start that tell trajectories apart in a legend.
+#: Most states at the start that a legend names a trajectory by.
 MOST_STATES = 2
 
 
 # -- trajectory ----------------------------------------------------------------------------------------------------------------
-def chosen(run: xr.Dataset, trajectory: Any, caller: str) -> list[int]:
+def chosen(run: xr.Dataset, trajectory: Any) -> list[int]:
     """Labels of the trajectories to show; an empty list for a run of a single one.
 
     Raises
@@ -34,7 +35,7 @@ def chosen(run: xr.Dataset, trajectory: Any, caller: str) -> list[int]:
     """
     if "trajectory" not in run.dims:
         if trajectory not in (None, 0):
-            raise ParameterError(f"{caller}: trajectory={shown(trajectory)}, but this run holds a single trajectory. Leave trajectory out.")
+            raise ParameterError(f"trajectory={shown(trajectory)}, but this run holds a single trajectory. Leave trajectory out.")
         return []
     known = run["trajectory"].values.tolist()
     if trajectory is None:
@@ -43,9 +44,9 @@ def chosen(run: xr.Dataset, trajectory: Any, caller: str) -> list[int]:
         labels = [int(one) if isinstance(one, numbers.Integral) else one for one in np.atleast_1d(trajectory).tolist()]
     strange = [label for label in labels if label not in known]
     if strange:
-        raise ParameterError(f"{caller}: there is no trajectory {shown(strange[0])}; this run has {_span(known)}.")
+        raise ParameterError(f"there is no trajectory {shown(strange[0])}; this run has {_span(known)}.")
     if not 0 < len(labels) <= MOST:
-        raise ParameterError(f"{caller} shows 1 to {MOST} trajectories, not {len(labels)}. Choose, such as trajectory=[{known[0]}].")
+        raise ParameterError(f"{caller()} shows 1 to {MOST} trajectories, not {len(labels)}. Choose, such as trajectory=[{known[0]}].")
     return labels
 
 
@@ -92,20 +93,20 @@ def rate_of(ds: xr.Dataset, state: str) -> str:
     return next((name for name in states_of(ds) if f"d{state}/dt = {name}" in equations_of(ds)), "")
 
 
-def state_named(run: xr.Dataset, name: str, caller: str) -> str:
+def state_named(run: xr.Dataset, name: str) -> str:
     """The name, if it is that of a state; else a ParameterError with the nearest one."""
     if not among(name, states_of(run)):
-        raise ParameterError(f"{caller}: this run has no state {shown(name)}. {nearest(name, states_of(run))}")
+        raise ParameterError(f"this run has no state {shown(name)}. {nearest(name, states_of(run))}")
     return name
 
 
-def units_of_states(run: xr.Dataset, units: Mapping[str, str] | None, caller: str) -> dict[str, str]:
+def units_of_states(run: xr.Dataset, units: Mapping[str, str] | None) -> dict[str, str]:
     """Display units that the user chose, every name checked."""
-    return {state_named(run, name, caller): unit for name, unit in (units or {}).items()}
+    return {state_named(run, name): unit for name, unit in (units or {}).items()}
 
 
 # -- window --------------------------------------------------------------------------------------------------------------------
-def window(ds: xr.Dataset, periods: Periods, caller: str, default_share: float = 1.0) -> tuple[float, float]:
+def window(ds: xr.Dataset, periods: Periods, default_share: float = 1.0) -> tuple[float, float]:
     """Begin and end of what is shown, in the run's own coordinate: periods if it is forced, else seconds.
 
     Parameters
@@ -113,9 +114,7 @@ def window(ds: xr.Dataset, periods: Periods, caller: str, default_share: float =
     ds : Dataset
         One trajectory.
     periods : int, float or pair of float, optional
-        The last so many periods, or from one to another.
-    caller : str
-        Used in messages.
+        Number of periods at the end, or (first, last) period.
     default_share : float
         The last share of the run that is shown without ``periods``; of a forced run a whole number of periods, at least one.
 
@@ -126,7 +125,7 @@ def window(ds: xr.Dataset, periods: Periods, caller: str, default_share: float =
     """
     axis = sample_axis(ds)
     if not axis.size:
-        raise ParameterError(f"{caller}: this run holds no samples.")
+        raise ParameterError("this run holds no samples.")
     there = np.isfinite(np.stack([ds[name].values for name in states_of(ds)])).all(axis=0)
     first, last = float(axis[0]), float(axis[there][-1] if there.any() else axis[0])  # one that stopped early has no more
     if there.sum() < 2:
@@ -137,25 +136,21 @@ def window(ds: xr.Dataset, periods: Periods, caller: str, default_share: float =
             length = max(1.0, math.ceil(length - 1e-9))
         return max(first, last - length), last
     if "period" not in ds:
-        raise ParameterError(
-            f"{caller}: periods={shown(periods)}, but this system isn't forced. Select by time: run.sel(time=slice(1, 2))."
-        )
-    begin, end = _interval(periods, last, caller)
+        raise ParameterError(f"periods={shown(periods)}, but this system isn't forced. Select by time: run.sel(time=slice(1, 2)).")
+    begin, end = _interval(periods, last)
     if begin >= last or end <= first:
-        raise ParameterError(f"{caller}: periods={shown(periods)} is outside this run, which holds periods {first:g} to {last:g}.")
+        raise ParameterError(f"periods={shown(periods)} is outside this run, which holds periods {first:g} to {last:g}.")
     return max(begin, first), min(end, last)
 
 
-def _interval(periods: Any, last: float, caller: str) -> tuple[float, float]:
+def _interval(periods: Any, last: float) -> tuple[float, float]:
     """``periods`` as begin and end."""
     if isinstance(periods, numbers.Real) and not isinstance(periods, bool):
         if float(periods) > 0:
             return last - float(periods), last
     elif isinstance(periods, tuple | list) and len(periods) == 2 and float(periods[0]) < float(periods[1]):
         return float(periods[0]), float(periods[1])
-    raise ParameterError(
-        f"{caller}: periods={shown(periods)}. Give the number of last periods, such as 5, or begin and end, such as (10, 15)."
-    )
+    raise ParameterError(f"periods={shown(periods)}. Give the number of last periods, such as 5, or begin and end, such as (10, 15).")
 
 
 def sample_axis(ds: xr.Dataset) -> np.ndarray:

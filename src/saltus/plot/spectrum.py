@@ -15,10 +15,8 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.reader import reader
-from saltus.results.schema import SPECTRUM, check, states_of
+from saltus.results.dataset.schema import SPECTRUM, states_of
 
-_CALLER = "plot.spectrum"
 #: The picture reaches down to this share of the largest amplitude, and up to the last frequency that has so much; the rest is what
 #: sampling folds back.
 _SHOWN = 1e-5
@@ -26,8 +24,7 @@ _SHOWN = 1e-5
 _ORDERS = 5.0
 
 
-@picture
-@reader
+@picture(SPECTRUM)
 def spectrum(
     ds: xr.Dataset,
     state: str | None = None,
@@ -68,19 +65,16 @@ def spectrum(
     ParameterError
         If ``ds`` is not from ``spectrum``, or an argument doesn't fit it.
     """
-    check(ds, caller=_CALLER, kinds=[SPECTRUM])
     known = states_of(ds)
     state = known[0] if state is None else state
     if state not in known:
-        raise ParameterError(f"{_CALLER}: this spectrum has no state {shown(state)}. {nearest(state, known)}")
-    labels = selection.chosen(ds, trajectory, _CALLER)
+        raise ParameterError(f"this spectrum has no state {shown(state)}. {nearest(state, known)}")
+    labels = selection.chosen(ds, trajectory)
     singles = [ds.sel(trajectory=label) for label in labels] or [ds]
     curves = [np.asarray(one[f"{state}_amplitude"].values, dtype=float) for one in singles]
     largest = max((float(np.nanmax(curve, initial=0.0)) for curve in curves), default=0.0) or 1.0
-    scale = display_scale(
-        ds[f"{state}_amplitude"].attrs.get("units", ""), largest, selection.units_of_states(ds, units, _CALLER).get(state)
-    )
-    with draw.panels(ax, 1, (6.0, 2.8), _CALLER) as (panel,):
+    scale = display_scale(ds[f"{state}_amplitude"].attrs.get("units", ""), largest, selection.units_of_states(ds, units).get(state))
+    with draw.panels(ax, 1, (6.0, 2.8)) as (panel,):
         if not any(np.isfinite(curve).any() for curve in curves):
             draw.say(panel, "There is no spectrum: the motion stopped before its end.", *singles)
             return panel

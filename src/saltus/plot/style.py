@@ -1,4 +1,4 @@
-"""The look of saltus's pictures: a style file, a palette, and units that suit the numbers."""
+"""Style of saltus's pictures: a style file, a palette, and units that suit the numbers."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _STYLE_FILE = Path(__file__).with_name("saltus.mplstyle")
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Context in which figures get saltus's look: ``with sl.plot.style(): fig, axes = plt.subplots(2, 2)``.
+    """Context in which figures get saltus's style: ``with sl.plot.style(): fig, axes = plt.subplots(2, 2)``.
 
     The functions of this package use it themselves when they make the figure. A figure keeps its fonts and sizes when it is drawn or
     saved after the context has ended.
@@ -79,11 +79,11 @@ def _keep_ticks(figure: Figure) -> None:
         for one in (ax, *ax.child_axes):
             for direction, axis in (("x", one.xaxis), ("y", one.yaxis)):
                 for which in ("major", "minor"):
-                    look = {name: now[f"{direction}tick.{name}"] for name in ("labelsize", "direction", "color")}
-                    look |= {name: now[f"{direction}tick.{which}.{name}"] for name in ("width", "pad")}
-                    look |= {"length": now[f"{direction}tick.{which}.size"], "labelfontfamily": now["font.family"]}
+                    settings = {name: now[f"{direction}tick.{name}"] for name in ("labelsize", "direction", "color")}
+                    settings |= {name: now[f"{direction}tick.{which}.{name}"] for name in ("width", "pad")}
+                    settings |= {"length": now[f"{direction}tick.{which}.size"], "labelfontfamily": now["font.family"]}
                     chosen = axis.get_tick_params(which=which)
-                    axis.set_tick_params(which=which, **{name: value for name, value in look.items() if name not in chosen})
+                    axis.set_tick_params(which=which, **{name: value for name, value in settings.items() if name not in chosen})
 
 
 # -- display units -------------------------------------------------------------------------------------------------------------

@@ -14,19 +14,16 @@ from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
 from saltus.plot import kinds, maps
 from saltus.plot import response_points as points
-from saltus.plot.picture import picture
+from saltus.plot.picture import caller, picture
 from saltus.plot.style import Scale
-from saltus.results.reader import reader
-from saltus.results.schema import parameters_of, start_name, states_of
+from saltus.results.dataset.schema import RESPONSES, parameters_of, start_name, states_of
 from saltus.units import from_si
 
-_CALLER = "plot.type_map"
 #: Where a start settles to nothing: white and pale greys, as chaos is dark.
 _UNSETTLED = {-1: ("escaped", "#FFFFFF"), -2: ("not settled", "#D2D2D2"), -3: ("failed", "#B9A9A0"), -4: ("not computed", "#F3F3F3")}
 
 
-@picture
-@reader
+@picture(RESPONSES, needs=("type", "period", "response_of"))
 def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = None) -> Axes:
     """Kind of motion over two parameters: a hue for each period, grey for motion that never repeats, chaos dark.
 
@@ -39,7 +36,7 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
     start : int
         Which start, by its number: each leads to a map of its own.
     legend : bool
-        Whether to name the colours with their shares, beside the map.
+        Whether to draw the legend of the colours, with their shares.
     ax : Axes, optional
         Where to draw; a new figure by default.
 
@@ -52,13 +49,14 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
     ParameterError
         If ``ds`` isn't over two parameters, or there is no such start.
     """
-    maps.check(ds, _CALLER, ["responses"], ["type", "period", "response_of"])
     pair = parameters_of(ds)
     if len(pair) != 2:
-        raise ParameterError(f"{_CALLER} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See plot.bifurcation_diagram.")
+        raise ParameterError(
+            f"{caller()} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See plot.bifurcation_diagram."
+        )
     one = _of_start(ds, start)
     code = np.where(one["response_of"].values < 0, one["response_of"].values, kinds.codes(one["type"].values, one["period"].values))
-    with draw.panels(ax, 1, (5.8, 3.9), _CALLER) as (panel,):
+    with draw.panels(ax, 1, (5.8, 3.9)) as (panel,):
         _cells(panel, ds, (pair[0], pair[1]), code)
         panel.set_title(_title(ds, start))
         if legend:
@@ -71,7 +69,7 @@ def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
     if "start" not in ds.dims:
         return ds
     if start not in ds["start"].values.tolist():
-        raise ParameterError(f"{_CALLER}: there is no start {shown(start)}; this Dataset has {ds.sizes['start']}, counted from 0.")
+        raise ParameterError(f"there is no start {shown(start)}; this Dataset has {ds.sizes['start']}, counted from 0.")
     return ds.sel(start=start)
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import SaltusError
 from saltus.results import load, save
-from saltus.results.files import ResultFileError, replacing
+from saltus.results.files.atomic import ResultFileError, replacing
 from saltus.results.provenance import content_hash, to_json, version
 from saltus.study.identity import code_hash
 

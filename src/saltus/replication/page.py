@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from saltus.flow.threads import usable_processors
 from saltus.replication.verdict import FAILS, HOLDS, IN_PART, RULE_OF_ALL, UNDECIDED, VERDICTS, Claim, Finding
-from saltus.results.files import replacing
+from saltus.results.files.atomic import replacing
 from saltus.results.provenance import versions
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from saltus.replication.papers import Numbers, Paper, Picture
 from saltus.replication.tables import claims_table
 from saltus.replication.verdict import Claim, Finding, undecided
 from saltus.replication.workers import Progress, Workers, cause
-from saltus.results.files import ResultFileError, replacing, usable_folder
-from saltus.results.lock import WHOLE, locked
+from saltus.results.files.atomic import ResultFileError, replacing, usable_folder
+from saltus.results.store.lock import WHOLE, locked
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,7 @@ from saltus.errors import SaltusError
 from saltus.interrupt import Stop
 from saltus.replication.job import Job, JobError, Shelf
 from saltus.replication.papers import Paper, folder_of
-from saltus.results.files import ResultFileError
+from saltus.results.files.atomic import ResultFileError
 
 if TYPE_CHECKING:
     import xarray as xr

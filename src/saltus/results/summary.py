@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import (
+from saltus.results.dataset.schema import (
     AGREEMENT,
     BASINS,
     EXPONENTS,

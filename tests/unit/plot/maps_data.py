@@ -47,7 +47,8 @@ def basins_map(basin, periods_to_settle=None, x=None, v=None, known=None):
                            fraction=[(basin == i).mean() for i in range(m)])  # fmt: skip
     settle = np.where(basin >= 0, 10, -1) if periods_to_settle is None else periods_to_settle
     data = {"basin": (("x", "v"), basin.astype("i2") if basin.dtype.kind != "f" else basin, CODES),
-            "periods_to_settle": (("x", "v"), np.asarray(settle).astype("i4"))}  # fmt: skip
+            "periods_to_settle": (("x", "v"), np.asarray(settle).astype("i4")),
+            "status": (("x", "v"), np.zeros(basin.shape, dtype="i1"))}  # fmt: skip
     axes = {"x": ("x", x, {"units": "m"}), "v": ("v", v, {"units": "m/s"})}
     return known.assign(data).assign_coords(axes).assign_attrs(saltus_result="basins")
 

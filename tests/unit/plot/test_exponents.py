@@ -69,7 +69,7 @@ def test_exponents_that_are_not_known():
 
 
 def test_what_can_not_be_drawn(run):
-    with pytest.raises(ParameterError, match="takes what lyapunov returns"):
+    with pytest.raises(ParameterError, match=r"takes what sl\.lyapunov or sl\.wolf returns"):
         exponents(run)
     with pytest.raises(ParameterError, match="no trajectory 4"):
         exponents(converging(), trajectory=4)

@@ -79,9 +79,9 @@ def test_without_stroboscopic_points_two_columns_remain(known, batch):
 @pytest.mark.parametrize(
     ("which", "message"),
     [
-        ("map", "plot.gallery takes what sl.basins, or sl.attractors"),
-        ("runs", "plot.gallery takes what simulate returns"),
-        ("points", "takes what simulate returns"),
+        ("map", "plot.gallery takes what sl.basins, sl.attractors or sl.basin_fractions"),
+        ("runs", "plot.gallery takes what sl.simulate returns"),
+        ("points", "takes what sl.simulate returns"),
         ("few", r"runs holds 2 trajectories, none for attractor 2 of 4.*trajectory i starts on attractor i"),
         ("id", "no attractor 7. Known: 0, 1, 2, 3"),
         ("none", "shows 1 to 20 attractors, not 0. Nothing settled"),

@@ -206,12 +206,12 @@ def test_axes_must_fit_the_trajectories(batch):
 
 @pytest.mark.parametrize("thing", [None, {"x": [1.0]}, np.zeros(3)])
 def test_only_runs_are_drawn(thing):
-    with pytest.raises(ParameterError, match="takes the Dataset that simulate returns"):
+    with pytest.raises(ParameterError, match=r"takes the Dataset that sl\.simulate returns"):
         history(thing)
 
 
 def test_stroboscopic_points_have_no_history(points):
-    with pytest.raises(ParameterError, match="from stroboscope"):
+    with pytest.raises(ParameterError, match=r"from sl\.stroboscope"):
         history(points)
 
 

@@ -74,7 +74,7 @@ def with_speeds(speeds):
 @pytest.mark.parametrize(
     ("speeds", "says"),
     [
-        ([], "No contact in the time that was looked at."),
+        ([], "No contact in the observed time."),
         ([0.2, 0.1 * (1 + 1e-12), 0.1] * 4, "The speeds at contact repeat.\nlower gap: 12 contacts, at 0.1 m/s, 0.2 m/s"),
         (np.linspace(0.1, 0.2, 12), None),
         ([0.1, 0.2], None),  # seen once each: nothing repeats
@@ -94,7 +94,7 @@ def test_what_holds_nothing_says_so_in_place_of_an_empty_frame():
     for axes, says in (
         (sl.plot.energy(stopped), "There is no balance: the motion stopped before the first interval had passed."),
         (sl.plot.spectrum(empty), "There is no spectrum: the motion stopped before its end."),
-        (sl.plot.section(data.section().isel(crossing=[])), "Section x = 0.3 mm: no crossing in the time that was looked at."),
+        (sl.plot.section(data.section().isel(crossing=[])), "Section x = 0.3 mm: no crossing in the observed time."),
     ):
         assert axes.texts[0].get_text() == says
         assert not axes.axison

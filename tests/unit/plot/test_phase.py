@@ -124,7 +124,7 @@ def test_too_many_to_tell_apart(batch):
 
 
 def test_only_results_are_drawn():
-    with pytest.raises(ParameterError, match="simulate or stroboscope"):
+    with pytest.raises(ParameterError, match=r"sl\.simulate or sl\.stroboscope"):
         phase([1, 2])
 
 

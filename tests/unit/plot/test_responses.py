@@ -292,7 +292,7 @@ def test_two_parameters_want_a_choice(draw):
         (lambda: frequency_response(resonance(5), quantity="size"), "Known: rms, peak"),
         (lambda: frequency_response(resonance(5).drop_vars("response_rms")), "no output 'x'"),
         (lambda: frequency_response(xr.Dataset()), "saltus_result"),
-        (lambda: bifurcation_diagram(3), "not a int"),
+        (lambda: bifurcation_diagram(3), "not an int"),
     ],
 )
 def test_what_does_not_fit_is_refused(call, message):

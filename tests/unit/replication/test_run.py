@@ -14,14 +14,14 @@ import matplotlib.pyplot as plt
 import pytest
 from typer.testing import CliRunner
 
-from saltus.cli.app import app
+from saltus.cli.commands import app
 from saltus.errors import ParameterError
 from saltus.replication import Check, Finding, claims_table, reproduce, run
 from saltus.replication.job import JobError
 from saltus.replication.verdict import HOLDS, UNDECIDED
-from saltus.results.durable import StoreError
-from saltus.results.files import ResultFileError
-from saltus.results.lock import WHOLE, locked
+from saltus.results.files.atomic import ResultFileError
+from saltus.results.store.durable import StoreError
+from saltus.results.store.lock import WHOLE, locked
 from small_paper import compute, draw, small_paper
 
 

@@ -10,7 +10,7 @@ import saltus as sl
 from saltus.analysis.basins import pipeline
 from saltus.errors import StudyError
 from saltus.results import load
-from saltus.results.store import Store, StoreError
+from saltus.results.store.store import Store, StoreError
 from saltus.study import identity
 from saltus.study.run import copies, maps
 from saltus.study.run.copies import copy_of

@@ -12,10 +12,10 @@ from scipy.optimize import linear_sum_assignment
 
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
-from saltus.results.basins import agreement_dataset
-from saltus.results.intervals import wilson
-from saltus.results.reader import reader
-from saltus.results.schema import BASINS, NOISY, attractor_name, axes_of, check, states_of
+from saltus.intervals import wilson
+from saltus.results.dataset.basins import agreement_dataset
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import BASINS, NOISY, attractor_name, axes_of, check, states_of
 
 #: Largest distance of two orbits that count as one, in units of the axis ranges: far above what methods differ by on one attractor,
 #: below what tells neighbours on the rig apart.

@@ -28,9 +28,9 @@ from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.room import check_room
+from saltus.intervals import wilson
 from saltus.kernels import status as st
 from saltus.results import basins_dataset
-from saltus.results.intervals import wilson
 from saltus.results.provenance import to_json
 from saltus.system.system import System
 from saltus.units import to_si

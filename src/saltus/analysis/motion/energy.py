@@ -18,7 +18,8 @@ from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.room import check_room
-from saltus.results import motion_dataset, schema
+from saltus.results import motion_dataset
+from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Expr
 from saltus.system.quantity import Quantity, quantity, with_integrals

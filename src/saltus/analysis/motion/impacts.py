@@ -17,7 +17,8 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
-from saltus.results import motion_dataset, schema
+from saltus.results import motion_dataset
+from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate
 from saltus.system.quantity import Quantity, with_integrals
 from saltus.system.system import System

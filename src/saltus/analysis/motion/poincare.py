@@ -18,7 +18,8 @@ from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.kernels import status as st
-from saltus.results import motion_dataset, schema
+from saltus.results import motion_dataset
+from saltus.results.dataset import schema
 from saltus.system.guards import equation_of
 from saltus.system.quantity import Quantity, acting_guards, turning_surface, with_level, with_surface
 from saltus.system.system import System

@@ -16,8 +16,8 @@ from saltus.analysis.outputs import Outputs
 from saltus.analysis.responses.grid import Grid
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
+from saltus.intervals import wilson
 from saltus.results import AttractorTable
-from saltus.results.intervals import wilson
 
 #: Words for the kinds of motion.
 KINDS = {

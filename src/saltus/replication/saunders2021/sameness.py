@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from saltus.results.intervals import wilson
+from saltus.intervals import wilson
 
 #: Largest relative difference of the rms of responses that count as the same.
 SAME = 0.05

@@ -12,7 +12,7 @@ from saltus.replication.saunders2021 import printed
 from saltus.replication.saunders2021.pictures.looks import LOOKS
 from saltus.replication.saunders2021.pictures.rows import trios
 from saltus.replication.verdict import Data
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import kind_text
 from saltus.study.answers.simulate_compare import residuals
 from saltus.study.table import TextTable
 

@@ -13,7 +13,7 @@ from saltus.study.tables.basins import Basins
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.results.store import Store
+    from saltus.results.store.store import Store
     from saltus.study.run.maps import MapJob
     from saltus.study.setting.setting import Setting
 

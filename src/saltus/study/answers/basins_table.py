@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.results.schema import axes_of, kind_text
+from saltus.results.dataset.schema import axes_of, kind_text
 from saltus.results.summary import own_errors
 from saltus.study.table import Column, TextTable, number, quantity, table, with_error, words
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.results.schema import states_of
+from saltus.results.dataset.schema import states_of
 from saltus.study.table import ROWS, Column, TextTable, number, quantity, table, varied, with_error, words
 
 if TYPE_CHECKING:

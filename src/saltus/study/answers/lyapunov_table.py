@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import kind_text
 from saltus.study.table import ROWS, TextTable, interval, number, table, varied, words
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import SaltusError, StudyError
-from saltus.results.measured import measured_points
+from saltus.results.files.measured import measured_points
 from saltus.study.answers.question import OneDataset, Question
 from saltus.study.setting import quantities
 from saltus.study.tables.responses import BifurcationDiagram, FrequencyResponse

@@ -108,7 +108,7 @@ class Motion(Question):
         """Phase portrait, or time history of a system of one state; of a large batch the first trajectories."""
         from saltus import plot
         from saltus.plot.selection import MOST
-        from saltus.results.schema import states_of
+        from saltus.results.dataset.schema import states_of
 
         draw = plot.phase if len(states_of(run)) > 1 else plot.history
         some = {"trajectory": run["trajectory"].values[:MOST].tolist()} if "trajectory" in run.dims else {}

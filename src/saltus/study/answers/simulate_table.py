@@ -9,7 +9,7 @@ import numpy as np
 from saltus.analysis.motion.settled import settled
 from saltus.errors import ParameterError
 from saltus.kernels.status import STATUS
-from saltus.results.schema import end_name, period_text, states_of
+from saltus.results.dataset.schema import end_name, period_text, states_of
 from saltus.study.table import ROWS, TextTable, quantity, table, varied, words
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from saltus.results.files import ResultFileError, replacing
+from saltus.results.files.atomic import ResultFileError, replacing
 from saltus.results.provenance import to_json
 from saltus.study.run.running import Report, Running
 

@@ -15,7 +15,7 @@ from saltus.analysis.basins.labels import Settling, settle
 from saltus.analysis.basins.pipeline import CHUNK, BasinPlan, basin_plan, memory
 from saltus.analysis.basins.serial import cell_types, found_data, found_from, settling_arrays, settling_from
 from saltus.flow.threads import usable_processors
-from saltus.results.store import Store
+from saltus.results.store.store import Store
 from saltus.study.identity import identity
 from saltus.study.run.processes import run_on_processes
 from saltus.study.run.running import Report, Resources

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, StudyError, TraceError, UnitError, nearest
-from saltus.results.files import remove_old_drafts
+from saltus.results.files.atomic import remove_old_drafts
 from saltus.study.answers import basins, lyapunov, responses, simulate
 from saltus.study.answers.energy import Balance
 from saltus.study.answers.impacts import Statistics

@@ -18,7 +18,7 @@ from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.orbits import Orbit
 from saltus.analysis.orbits.recurrence import find
 from saltus.errors import SaltusError
-from saltus.results.durable import seal, unseal
+from saltus.results.store.durable import seal, unseal
 
 SCALE = np.array([3.0, 1.0])
 

@@ -12,7 +12,7 @@ from saltus.replication.saunders2021.claims.reading import EXACT, OFF, ON, SECTI
 from saltus.replication.saunders2021.pictures.looks import strobe
 from saltus.replication.saunders2021.pictures.rows import Trio, deviations, trios
 from saltus.replication.verdict import Check, Claim, Data, Finding
-from saltus.results.schema import kind_text, period_text
+from saltus.results.dataset.schema import kind_text, period_text
 
 #: Deviation from the exact orbit, in units of the motion's range, that is "excellent agreement".
 EXCELLENT = 0.02

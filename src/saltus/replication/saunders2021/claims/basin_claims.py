@@ -24,7 +24,7 @@ from saltus.replication.saunders2021.claims.reading import (
     parameter,
 )
 from saltus.replication.verdict import Claim, Data, Finding
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
 
 BEFORE, AFTER = "25.5 kN per m", "23.2 kN per m"
 T_BEFORE, T_AFTER = "7694 N per m", "8833 N per m"

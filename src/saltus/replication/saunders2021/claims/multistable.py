@@ -22,7 +22,7 @@ from saltus.replication.saunders2021.claims.reading import (
     names,
 )
 from saltus.replication.verdict import Check, Claim, Data, Finding
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
 
 #: Periods that the paper reads off Fig. 5, by start [mm].
 PRINTED = {"1.0": 3, "0.2": 5, "0.4": 12, "2.0": 4}

@@ -10,7 +10,7 @@ import xarray as xr
 
 from saltus.plot.maps import share_text
 from saltus.replication.verdict import Check
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import kind_text
 
 #: Ends of the names of the jobs of one setting: exact, and the paper's two ways.
 EXACT, ON, OFF = "exact", "ode45 located", "ode45 not located"

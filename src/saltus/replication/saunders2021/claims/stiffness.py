@@ -10,7 +10,7 @@ from saltus.replication.saunders2021.claims.basin_claims import NEAR_GRAZE
 from saltus.replication.saunders2021.claims.reading import EXACT, OFF, ON, SECTION_5, check, count, micrometres, number, parameter
 from saltus.replication.saunders2021.sameness import SAME, SAME_ONE, classes, share_other
 from saltus.replication.verdict import Check, Claim, Data, Finding
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
 
 #: Soft contact ends, hard contact begins [N/m]: the decades in which the paper sees the responses converge.
 SOFT, HARD = 1e4, 1e8

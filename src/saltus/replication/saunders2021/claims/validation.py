@@ -9,8 +9,8 @@ from saltus.replication.papers import folder_of
 from saltus.replication.saunders2021 import printed
 from saltus.replication.saunders2021.claims.reading import SECTION_4, band, check, where
 from saltus.replication.verdict import Claim, Data, Finding
-from saltus.results.measured import read_measured
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
+from saltus.results.files.measured import read_measured
 from saltus.study.answers.simulate_compare import residuals
 
 #: Agreement of event times with printed ones that only the same arithmetic gives [s].

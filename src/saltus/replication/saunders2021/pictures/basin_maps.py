@@ -19,7 +19,7 @@ from saltus.plot import maps
 from saltus.plot.basins import paint
 from saltus.plot.palette import hues
 from saltus.replication.saunders2021.pictures.looks import EXACT, OFF, ON, Data, Look
-from saltus.results.schema import kind_text
+from saltus.results.dataset.schema import kind_text
 
 #: Columns: the paper's two ways, then the exact one.
 COLUMNS = (ON, OFF, EXACT)
@@ -88,7 +88,7 @@ def _words(one: xr.Dataset) -> str:
 
 def _panel(ax: Axes, ds: xr.Dataset, row: _Row, look: Look) -> None:
     colors = dict(enumerate(hues(max(len(row.entries), 1))))
-    pair = maps.plane(ds, "basin", "replication")
+    pair = maps.plane(ds, "basin")
     scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
     maps.draw_cells(ax, ds, pair, scales, paint(row.cells[look.label], colors))
     values = json.loads(ds.attrs["parameters"])

@@ -84,7 +84,7 @@ def four_starts(data: Data) -> Figure:
 def _rows(run: xr.Dataset, titles: Sequence[str], shown: Sequence[int]) -> Figure:
     """A row for each trajectory: time history, and phase portrait with Poincaré points."""
     from saltus.analysis.motion.settled import settled
-    from saltus.results.schema import period_text
+    from saltus.results.dataset.schema import period_text
 
     found = settled(run)["response_period"].values
     figure, grid = plt.subplots(len(titles), 2, figsize=(9.0, 1.9 * len(titles) + 0.3), width_ratios=(2.4, 1), layout="constrained")
@@ -144,7 +144,7 @@ def _multipliers(one: xr.Dataset) -> str:
 def where_a_step_leads(data: Data) -> Figure:
     """Fig. 4: which response at 17 Hz the motion at 16 Hz turns into, by where it is when the frequency changes."""
     ds, run = data["fig4/step"], data["fig4/exact"].isel(trajectory=0)
-    colors = maps.colors_of(ds, None, "figure 4")
+    colors = maps.colors_of(ds, None)
     dim = run["x"].dims[0]
     last = run.isel({dim: slice(-201, -1)})
     figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
