@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from function_maps import FunctionMap, attracts, orbit_near
-from saltus.analysis.orbits.orbits import Orbit, same
+from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
 
 UNIT = np.array([1.0, 1.0])
 
@@ -105,3 +105,14 @@ def test_same_orbits_whatever_their_first_point_and_twins_that_are_not():
     assert same(a, shifted, UNIT, 1e-9)
     assert not same(a, twin, UNIT, 1e-9)  # of equal amplitude
     assert not same(a, Orbit(points[:1], np.zeros(2) + 0j, 0.0), UNIT, 1e-9)
+
+
+def test_an_orbit_of_an_inexact_map_does_not_depend_on_the_others_of_its_batch():
+    """Errors that the place decides: means over other iterates would be others."""
+    exact = FunctionMap(lambda z: 0.5 * z, "x", lambda z: np.full((len(z), 1, 1), 0.5))
+    map_ = FunctionMap(lambda z: 0.5 * z + 1e-6 * np.sin(1e9 * z), "x", lambda z: np.full((len(z), 1, 1), 0.5), 1e-5, exact)
+    start, scale = np.full((2, 1), 0.1), np.ones((2, 1))
+    both = find_orbits(map_, start, np.array([1, 48]), scale, np.full(2, map_.noise))
+    alone = find_orbits(map_, start[:1], np.array([1]), scale[:1], np.full(1, map_.noise))
+    assert both.period[0] == alone.period[0] == 1
+    assert both.points[0, 0] == alone.points[0, 0]
