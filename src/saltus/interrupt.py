@@ -13,6 +13,9 @@ from functools import cache
 from types import FrameType
 from typing import Any
 
+#: Exit code of a command that Ctrl-C stopped: 128 + SIGINT, as shells expect.
+EXIT_CODE = 130
+
 
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a computation. ``partial`` holds what was finished; the rest has status ``interrupted`` or ``not_computed``.

@@ -27,13 +27,14 @@ import saltus as sl
 from saltus.analysis.basins import pipeline
 from saltus.analysis.basins.pipeline import BasinPlan
 from saltus.analysis.basins.serial import found_data
-from saltus.cli.app import app
+from saltus.cli.commands import app
 from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.store.store import Store
-from saltus.study.answers.basins_table import attractor_table
+from saltus.study.answers.basins import maps_of
+from saltus.study.answers.basins_rows import attractor_table
 from saltus.study.run import maps
-from saltus.study.run.maps import compute, finish, jobs_of, open_store
+from saltus.study.run.maps import compute, finish, open_store
 from saltus.study.run.running import Resources
 from saltus.study.tables.read import parse
 from small_maps import small_maps
@@ -516,7 +517,7 @@ def small_chunks():
 @pytest.fixture(scope="module")
 def mapped(small_chunks, tmp_path_factory):
     """A function that computes the map by a method, in the same chunks and with the same attractors each time."""
-    (job,) = jobs_of(parse(STUDY.replace("count = 24", "count = 12")))
+    (job,) = maps_of(parse(STUDY.replace("count = 24", "count = 12")))
     found = job.plan.scout(1)
 
     def run(method):

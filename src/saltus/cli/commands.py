@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from saltus.cli.app import app
+from saltus.cli.app import app as app
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
@@ -269,8 +269,8 @@ def reproduce(
     folder = out or Path("saltus-runs") / (f"{paper}-quick" if quick else paper)
     matplotlib.use("Agg")  # no window, and none needed
     try:
-        with screen.replicating() as progress:
-            result = replication.reproduce(chosen, folder, figure or (), quick, threads, progress, screen.say)
+        with screen.reporting("bar") as (report, say):
+            result = replication.reproduce(chosen, folder, figure or (), quick, threads, report, say)
     except KeyboardInterrupt:
         screen.fail(f"stopped; what is computed is kept in {folder}. Go on with the same command.")
         raise

@@ -55,9 +55,9 @@ def impact_statistics(
     system, start, t_start, method, values, threads, progress
         As for :func:`saltus.simulate`. The method must locate contacts.
     periods : int
-        Whole forcing periods to look at, after the transient; or
+        Whole forcing periods to look at, after the transient.
     t_end : float or str
-        the time at the end [s].
+        Time at the end [s], in place of periods.
     transient : int, or float or str
         Whole forcing periods before; of an unforced system a time [s].
     force : mapping of str to callable, optional

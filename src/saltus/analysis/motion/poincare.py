@@ -60,9 +60,9 @@ def poincare(
     direction : {0, 1, -1}
         Keep all crossings, or only those where the function rises (1) or falls (-1).
     periods : int
-        Whole forcing periods to look at, after the transient; or
+        Whole forcing periods to look at, after the transient.
     t_end : float or str
-        the time at the end [s].
+        Time at the end [s], in place of periods.
     transient : int, or float or str
         Whole forcing periods before the first crossing is kept; of an unforced system a time [s].
 

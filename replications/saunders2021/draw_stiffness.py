@@ -15,8 +15,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from saltus import plot
 from saltus.replication.papers import folder_of
-from saltus.replication.saunders2021.pictures.looks import OFF, ON, Data
-from saltus.replication.saunders2021.sameness import UNSETTLED, classes, running_median, running_share
+
+from .looks import OFF, ON, Data
+from .sameness import UNSETTLED, classes, running_median, running_share
 
 CASES = ("a1.5", "a4", "b1.5", "b4", "c1.5", "c4")
 PANELS = {"d": "5 Hz", "e": "17 Hz", "f": "23 Hz"}

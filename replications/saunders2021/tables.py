@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import xarray as xr
 
-from saltus.replication.papers import Numbers
-from saltus.replication.saunders2021 import printed
-from saltus.replication.saunders2021.pictures.looks import LOOKS
-from saltus.replication.saunders2021.pictures.rows import trios
-from saltus.replication.verdict import Data
 from saltus.results.dataset.schema import kind_text
-from saltus.study.answers.simulate_compare import residuals
+from saltus.study.answers.compare import residuals
 from saltus.study.table import TextTable
+
+from . import printed
+from .draw_attractors import trios
+from .looks import LOOKS, Data
 
 #: A wider interval of an exponent says nothing [1/s].
 WIDEST = 100.0
@@ -65,19 +62,3 @@ def _interval(one: xr.Dataset) -> str:
     value, low, high = (float(one[f"lyapunov_{part}"][0]) for part in ("exponent", "low", "high"))
     told = [f"{round(number, 3) + 0.0:.3f}" for number in (value, low, high)]
     return f"{told[0]} [{told[1]}, {told[2]}]" if high - low < WIDEST else f"{told[0]} [unknown]"
-
-
-def _exponents(figure: str, of: str, setting: str, name: str) -> Numbers:
-    maps = tuple(f"{of}/{setting}, {look.end}" for look in LOOKS)
-    needs = (*maps, *(f"{one}, {by}" for one in maps for by in ("variational", "wolf")))
-    return Numbers(figure, name, needs, partial(exponents, of=of, setting=setting))
-
-
-TABLES = (
-    Numbers("2", "table2", ("fig2/ode45", "fig2/exact"), table2),
-    _exponents("9", "fig8", "25.5 kN per m", "exponents-fig9"),
-    _exponents("10", "fig8", "23.2 kN per m", "exponents-fig10"),
-    _exponents("12", "fig11", "7694 N per m", "exponents-fig12-before"),
-    _exponents("12", "fig11", "8833 N per m", "exponents-fig12-after"),
-    _exponents("14", "fig13", "18.4 MN per m", "exponents-fig14"),
-)
