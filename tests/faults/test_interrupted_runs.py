@@ -222,9 +222,10 @@ def test_ctrl_c_waits_for_a_single_piece_and_asks_it_to_stop(around):
         seen.extend(stop.is_set() for _ in range(100))
         return "whole"
 
-    with around(), pytest.raises(KeyboardInterrupt):
+    with around():
         stop = Stop()
-        on_threads(piece, [1], lambda *_: pytest.fail("it was told to stop"), stop=stop)
+        with pytest.raises(KeyboardInterrupt):
+            on_threads(piece, [1], lambda *_: pytest.fail("it was told to stop"), stop=stop)
     assert seen[-1]
     assert len(seen) == 100
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
