@@ -21,7 +21,7 @@ from saltus.analysis.motion.simulate import simulate
 from saltus.analysis.motion.stroboscope import stroboscope
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.found import Found
-from saltus.analysis.orbits.orbits import Orbit, polish, same
+from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
 from saltus.analysis.orbits.portrait import portraits
 from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
 from saltus.analysis.responses.frequency_response import frequency_response
@@ -250,14 +250,16 @@ def halved(system: System, found: xr.Dataset, *, method: Method, threads: int | 
     map_ = Stroboscope(system, method, threads=threads)
     points = np.stack([found[f"attractor_{name}"].values for name in system.states], axis=-1)
     scale = np.nanmax(points, axis=(0, 1)) - np.nanmin(points, axis=(0, 1))
-    orbits: list[Orbit] = []
+    near: list[tuple[np.ndarray, int]] = []
     for i, n in enumerate(found["attractor_period"].values.tolist()):
-        if n < 2 or n % 2:
-            continue
-        middle = 0.5 * (points[i, 0] + points[i, n // 2])
-        for orbit in (polish(map_, points[i, 0], n, scale), polish(map_, middle, n // 2, scale)):
-            if orbit is not None and not any(same(orbit, one, scale, SAME) and orbit.period == one.period for one in orbits):
-                orbits.append(orbit)
+        if n >= 2 and n % 2 == 0:
+            near += [(points[i, 0], n), (0.5 * (points[i, 0] + points[i, n // 2]), n // 2)]
+    start, period = np.array([one for one, _ in near]).reshape(-1, len(scale)), np.array([n for _, n in near], np.int64)
+    closed = find_orbits(map_, start, period, np.broadcast_to(scale, start.shape), np.full(len(near), map_.noise))
+    orbits: list[Orbit] = []
+    for orbit in closed.rows(closed.period > 0):
+        if not any(same(orbit, one, scale, SAME) and orbit.period == one.period for one in orbits):
+            orbits.append(orbit)
     table = portraits(map_, Found(Neighbourhoods.none(len(system.states)), orbits))
     return attractors_dataset(
         states=system.states, units=system.units, attractors=table, gap_unit=gap_unit(system),

@@ -13,7 +13,7 @@ from saltus.analysis.lyapunov.spectrum import Spectrum, spectrum
 from saltus.analysis.orbits.equilibria import autonomous, find_equilibria
 from saltus.analysis.orbits.orbit_measures import measure
 from saltus.analysis.orbits.orbits import Orbit
-from saltus.analysis.orbits.recurrence import SAME
+from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.statistics import CONFIDENCE, running_ends
 from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st

@@ -79,7 +79,7 @@ def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
         eigenvalues[i], exponent[i] = still.eigenvalues[i], still.eigenvalues[i, 0].real
     for i in np.flatnonzero(kind == LIMIT_CYCLE).tolist():
         one = cycle_of(map_, found.wandering[i - rests])
-        cycle[i], multipliers[i], points[i], start[i] = one.period[0], one.multipliers[0], one.points[0], one.points[0, ASIDE]
+        cycle[i], multipliers[i], points[i], start[i] = one.time[0], one.multipliers[0], one.points[0], one.points[0, ASIDE]
     own = map_.rows(np.arange(len(kind))).with_period(np.where(np.isfinite(cycle), cycle, map_.period))
     numbers = measure(own, start, np.isin(kind, (EQUILIBRIUM, LIMIT_CYCLE)).astype(np.int64), WANDERED)
     rest(map_.rows(np.arange(rests)), start[:rests], np.arange(rests), numbers)

@@ -12,18 +12,11 @@ from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.orbits.found import INSIDE, Found, is_about
 from saltus.analysis.orbits.limit_cycles import LIMIT_CYCLE, limit_cycles
 from saltus.analysis.orbits.noisy import Noisy, Stray, blurred, keep_to, stray_of
-from saltus.analysis.orbits.orbits import Orbit, polish, same
+from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
+from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
 from saltus.flow.maps import Map, Stroboscope, Travel
 from saltus.results.dataset.schema import NOISY
 
-#: Longest period looked for [iterates].
-LONGEST = 64
-#: Iterates between two looks: two of the longest periods.
-ROUND = 2 * LONGEST
-#: States a period apart that agree so well, in units of the scale, are worth a try by Newton.
-NEAR = 1e-3
-#: Largest distance between equal orbits, in units of the scale.
-SAME = 1e-6
 #: Orbits tried in one round; what isn't tried has its turn in the next.
 TRIES = 12
 #: Trajectories that never recur whose motion is surveyed.
@@ -76,16 +69,9 @@ def find(
         points = travel.advance(ROUND)
         here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
         here = here[~_keeping(found, NOISY, points[here], going[here], travel.age, owner, settled)]
-        while len(here):
-            fresh = _new_orbit(map_, points[here], scale, found, most)
-            if fresh is None:
-                break
-            if isinstance(fresh, Noisy):
-                found.add_wandering(fresh)
-                here = here[~_keeping(found, NOISY, points[here], going[here], travel.age, owner, settled)]
-            else:
-                found.add(map_, fresh, scale)
-                here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
+        while len(here) and _add_orbits(map_, points[here], scale, found, most):
+            here = here[~_keeping(found, NOISY, points[here], going[here], travel.age, owner, settled)]
+            here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
         if turns and len(here):
             here = here[~_on_cycles(map_, found, points[here], going[here], travel, here, scale, owner, settled)]
         stay = np.zeros(len(going), bool)
@@ -119,30 +105,38 @@ def _keeping(found: Found, kind: str, points: np.ndarray, who: np.ndarray, age: 
     return on >= 0
 
 
-def _new_orbit(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, most: int) -> Orbit | Noisy | None:
-    """An attracting orbit not known yet that one of the trajectories float64[k, ROUND, D] follows, if there is one."""
+def _add_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, most: int) -> bool:
+    """Add the attracting orbits not known yet that some of the trajectories float64[k, ROUND, D] follow; whether there are any."""
     period, apart = recurrence(points, scale)
     near = max(NEAR, map_.noise)
-    tries = [i for i in np.argsort(apart, kind="stable") if apart[i] < near]
-    seen: list[np.ndarray] = []
-    for i in tries:
-        place = points[i, -1]
-        if any(_lies_on(place, orbit, scale, 10 * apart[i]) for orbit in found.unstable) or any(
-            np.abs((place - other) / scale).max() < near for other in seen
-        ):
-            continue
-        if len(seen) >= TRIES:
+    tried: list[int] = []
+    for i in np.argsort(apart, kind="stable")[: np.count_nonzero(apart < near)]:
+        known = any(_lies_on(points[i, -1], orbit, scale, 10 * apart[i]) for orbit in found.unstable)
+        if not known and not any(np.abs((points[i, -1] - points[j, -1]) / scale).max() < near for j in tried):
+            tried.append(i)
+        if len(tried) == TRIES:
             break
-        seen.append(place)
-        orbit = polish(map_, place, int(period[i]), scale)
-        if orbit is None or not _lies_on(place, orbit, scale, 100 * near) or any(is_about(one, orbit) for one in found.wandering):
+    place, k = points[tried, -1], len(tried)
+    orbits = find_orbits(map_, place, period[tried], np.broadcast_to(scale, place.shape), np.full(k, map_.noise))
+    right = (orbits.period > 0) & (orbits.distance(place, np.broadcast_to(scale, place.shape)) < 100 * near)
+    added = False
+    for i in np.flatnonzero(right).tolist():
+        orbit = orbits[i]
+        if any(is_about(one, orbit) for one in found.wandering):
             continue
-        if not orbit.stable:
+        known_ones = found.orbits if orbits.stable[i] else found.unstable
+        if any(same(orbit, one, scale, max(SAME, 4 * map_.noise)) for one in known_ones):
+            continue
+        if not orbits.stable[i]:
             found.unstable.append(orbit)
-        elif not any(same(orbit, one, scale, max(SAME, 4 * map_.noise)) for one in found.orbits):
-            noisy = _behind(map_, orbit, scale, most)
-            return orbit if noisy is None else noisy
-    return None
+            continue
+        noisy = _behind(map_, orbit, scale, most)
+        if noisy is None:
+            found.add(map_, orbit, scale)
+        else:
+            found.add_wandering(noisy)
+        added = True
+    return added
 
 
 def _behind(map_: Map, orbit: Orbit, scale: np.ndarray, most: int) -> Noisy | None:

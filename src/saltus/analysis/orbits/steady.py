@@ -8,15 +8,16 @@ trajectory must lie beside it. What never recurs is typed by its largest Lyapuno
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.analysis.orbits import unforced
 from saltus.analysis.orbits.aperiodic import kinds_of
 from saltus.analysis.orbits.equilibria import autonomous
-from saltus.analysis.orbits.polish import Closed, close
-from saltus.analysis.orbits.recurrence import LONGEST, ROUND, recurrence
+from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits
+from saltus.analysis.orbits.recurrence import recurrence
+from saltus.analysis.orbits.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
@@ -27,17 +28,10 @@ PERIODIC, QUASI_PERIODIC, CHAOTIC, EQUILIBRIUM, LIMIT_CYCLE = 0, 1, 2, 3, 4
 #: Kinds that Newton's method closes.
 CLOSED = (PERIODIC, EQUILIBRIUM, LIMIT_CYCLE)
 ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
-#: States a period apart that agree so well, in units of the range of the motion, are on their way to an orbit: 1e-5 leaves the slowest
-#: transient of the rig in a few rounds, and doesn't take a neighbour for the orbit. Later, slow ones are let in from farther away.
-NEAR, NEAR_AT_LAST = 1e-5, 1e-3
-#: An orbit is that of a trajectory that lies so many times closer than its recurrence: 1/(1 - multiplier) is the ratio of the two.
-BESIDE = 30.0
 #: Trajectories that one thread follows at a time.
 PIECE = 512
 #: Periods and looks a period from which the range of a motion is taken.
 RANGED, LOOKS = 4, 32
-#: A state whose range is so small a part of its size rests.
-RESTS = 1e-9
 #: Points of a motion that never repeats that are kept.
 TRAIL = 1024
 
@@ -50,7 +44,7 @@ class Steady:
     ----------
     kind : int64[k]
         ``PERIODIC``, ``QUASI_PERIODIC``, ``CHAOTIC``; of a system without forcing ``EQUILIBRIUM``, ``LIMIT_CYCLE``; or a code below zero.
-    orbits : Closed
+    orbits : OrbitBatch
         The orbits of the periodic ones, verified; elsewhere nothing.
     exponent, exponent_error : float64[k]
         Largest Lyapunov exponent and its standard error [per iterate].
@@ -65,7 +59,7 @@ class Steady:
     """
 
     kind: np.ndarray
-    orbits: Closed
+    orbits: OrbitBatch
     exponent: np.ndarray
     exponent_error: np.ndarray
     settled: np.ndarray
@@ -78,7 +72,7 @@ class Steady:
         """Nothing computed yet."""
         nothing = np.full(count, np.nan)
         return cls(
-            np.full(count, NOT_COMPUTED, np.int64), Closed.none(count, LONGEST, size), nothing.copy(), nothing.copy(),
+            np.full(count, NOT_COMPUTED, np.int64), OrbitBatch.none(count, size), nothing.copy(), nothing.copy(),
             np.full(count, -1, np.int64), np.ones((count, size)), {}, np.full((count, size), np.nan),
         )  # fmt: skip
 
@@ -86,13 +80,8 @@ class Steady:
         """Write another's results to the rows int64[m]."""
         for name in ("kind", "exponent", "exponent_error", "settled", "scale", "end"):
             getattr(self, name)[where] = getattr(other, name)
-        self.put_orbits(where, other.orbits)
+        self.orbits.put(where, other.orbits)
         self.trail.update({int(where[i]): trail for i, trail in other.trail.items()})
-
-    def put_orbits(self, where: np.ndarray, orbits: Closed) -> None:
-        """Write orbits to the rows int64[m]."""
-        for field in fields(Closed):
-            getattr(self.orbits, field.name)[where] = getattr(orbits, field.name)
 
 
 def settle_each(
@@ -121,14 +110,14 @@ def settle_each(
 def _settle(map_: Stroboscope, start: np.ndarray, most: int) -> Steady:
     """One piece, on one thread."""
     result = Steady.empty(*start.shape)
-    who = _follow(map_, start, np.arange(len(start)), most, result, NEAR)
+    who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED)
     if len(who):
         result.scale[who] = motion_range(map_.rows(who), result.end[who])
-        who = _follow(map_, result.end, who, ROUND, result, NEAR_AT_LAST)
+        who = _follow(map_, result.end, who, ROUND, result, NEAR)
     if len(who):
         who = _wander(map_, result.end, who, result)
     if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
-        who = _follow(map_, result.end, who, most, result, NEAR_AT_LAST)
+        who = _follow(map_, result.end, who, most, result, NEAR)
         result.kind[who] = UNCONVERGED
     return result
 
@@ -165,12 +154,12 @@ def _settled(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float
     ready = np.flatnonzero(apart < np.maximum(near, noise))
     if not len(ready):
         return done
-    orbits = close(map_.rows(who[ready]), points[ready, -1], period[ready], scale[ready], LONGEST)
+    orbits = find_orbits(map_.rows(who[ready]), points[ready, -1], period[ready], scale[ready], noise[ready])
     tolerance = BESIDE * np.maximum(apart[ready], noise[ready])
     right = orbits.stable & (orbits.distance(points[ready, -1], scale[ready]) <= tolerance)
     done[ready[right]] = True
     chosen = who[ready[right]]
-    result.put_orbits(chosen, orbits.rows(right))
+    result.orbits.put(chosen, orbits.rows(right))
     result.kind[chosen], result.exponent_error[chosen] = PERIODIC, 0.0
     with np.errstate(divide="ignore"):
         result.exponent[chosen] = np.log(np.abs(orbits.multipliers[right, 0])) / orbits.period[right]
@@ -184,7 +173,7 @@ def _settled_unforced(map_: Stroboscope, points: np.ndarray, who: np.ndarray, ne
     found = unforced.attracted(map_, state, result.scale[who], window, near)
     done = found.orbits.period > 0
     chosen = who[done]
-    result.put_orbits(chosen, found.orbits.rows(done))
+    result.orbits.put(chosen, found.orbits.rows(done))
     result.scale[chosen] = found.scale[done]
     rests = found.orbits.time[done] == 0
     result.kind[chosen], result.exponent_error[chosen] = np.where(rests, EQUILIBRIUM, LIMIT_CYCLE), 0.0
@@ -196,10 +185,10 @@ def _settled_unforced(map_: Stroboscope, points: np.ndarray, who: np.ndarray, ne
 def _wander(map_: Stroboscope, start: np.ndarray, who: np.ndarray, result: Steady) -> np.ndarray:
     """Type the trajectories that don't recur by their exponents; writes what is known, returns those that stay unclear."""
     maps = map_.rows(who)
-    state, kinds = kinds_of(maps.rows, start[who], result.scale[who], [[i] for i in range(len(who))])
+    state, kinds = kinds_of(maps, start[who], result.scale[who], [[i] for i in range(len(who))])
     flight = maps.launch(state, TRAIL)
     trail = flight.advance(TRAIL)
-    recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR_AT_LAST, maps.noise_of(result.scale[who]))  # by now
+    recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR, maps.noise_of(result.scale[who]))  # by now
     result.end[who] = flight.state
     unclear = np.ones(len(who), bool)
     if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus

@@ -245,5 +245,5 @@ def test_rounding_of_the_grid_is_forgiven():
 
 
 def test_only_maps_can_be_compared():
-    with pytest.raises(ParameterError, match="this Dataset is from compare"):
+    with pytest.raises(ParameterError, match=r"this Dataset is from sl\.compare"):
         compare(basins(), compare(basins(), basins()))

@@ -5,11 +5,10 @@ import warnings
 import numpy as np
 import pytest
 
-from function_maps import FunctionMap
+from function_maps import FunctionMap, orbit_near
 from saltus.analysis.basins.labels import settle
 from saltus.analysis.orbits.capture import Neighbourhoods, _alike, neighbourhoods, sphere
 from saltus.analysis.orbits.found import Found
-from saltus.analysis.orbits.orbits import polish
 from saltus.analysis.orbits.recurrence import find
 
 
@@ -88,7 +87,7 @@ def test_nothing_captures_nothing():
 # -- what is verified ----------------------------------------------------------------------------------------------------------
 def test_a_linear_contraction_is_verified_at_the_largest_radius():
     map_ = linear([[0.5, 0.4], [-0.4, 0.5]])
-    orbit = polish(map_, np.array([0.1, 0.1]), 1, np.ones(2))
+    orbit = orbit_near(map_, np.array([0.1, 0.1]), 1, np.ones(2))
     near = neighbourhoods(map_, orbit, 0, np.ones(2))
     assert near.capture(np.array([[[0.15, 0.15]]]))[0].tolist() == [0]
 
@@ -97,14 +96,14 @@ def test_a_linear_contraction_is_verified_at_the_largest_radius():
 def test_a_slow_attractor_has_a_neighbourhood_too(multiplier):
     """A linear map contracts everywhere, however slowly: its neighbourhood is limited by what is tried, not by the rate."""
     map_ = linear([[multiplier, 0.0], [0.0, 0.5]])
-    orbit = polish(map_, np.array([0.1, 0.1]), 1, np.ones(2))
+    orbit = orbit_near(map_, np.array([0.1, 0.1]), 1, np.ones(2))
     assert neighbourhoods(map_, orbit, 0, np.ones(2)).capture(np.array([[[1e-3, 1e-3]]]))[0].tolist() == [0]
 
 
 def test_a_strongly_sheared_contraction_is_verified():
     """It stretches by 20 before it contracts: the norm must be its own."""
     map_ = linear([[0.6, 20.0], [0.0, 0.6]])
-    orbit = polish(map_, np.array([0.1, 0.0]), 1, np.ones(2))
+    orbit = orbit_near(map_, np.array([0.1, 0.0]), 1, np.ones(2))
     near = neighbourhoods(map_, orbit, 0, np.ones(2))
     points = inside(near, 0, 500)
     assert np.ptp(points[:, 0]) > 1e-2
@@ -125,7 +124,7 @@ class Touching(FunctionMap):
 def test_a_neighbourhood_ends_where_the_contacts_change():
     plain = linear([[0.5, 0.0], [0.0, 0.5]])
     map_ = Touching(plain._function, "x y", plain._derivative)
-    orbit = polish(map_, np.array([0.1, 0.1]), 1, np.ones(2))
+    orbit = orbit_near(map_, np.array([0.1, 0.1]), 1, np.ones(2))
     edge = inside(neighbourhoods(map_, orbit, 0, np.ones(2)), 0, 2000)[:, 0]
     assert 0.002 < np.abs(edge).max() <= 0.01
     assert np.abs(inside(neighbourhoods(plain, orbit, 0, np.ones(2)), 0, 2000)[:, 0]).max() > 0.1
@@ -149,7 +148,7 @@ def test_every_point_of_the_shell_is_followed(point):
     plain = linear([[0.5, 0.0], [0.0, 0.5]])
     map_ = TouchingInAWedge(plain._function, "x y", plain._derivative)
     map_.direction = point * np.pi / 16
-    orbit = polish(plain, np.array([0.1, 0.1]), 1, np.ones(2))
+    orbit = orbit_near(plain, np.array([0.1, 0.1]), 1, np.ones(2))
     edge = inside(neighbourhoods(map_, orbit, 0, np.ones(2)), 0, 500)
     assert 0.002 < np.linalg.norm(edge, axis=1).max() <= 0.01
 
@@ -237,7 +236,7 @@ def test_starts_that_escape_are_told_and_no_warning_is_given():
 def test_settling_takes_the_first_visit():
     """x -> x/2 from 1024: captured at the first iterate inside, whatever the size of the blocks."""
     map_ = linear([[0.5]])
-    orbit = polish(map_, np.array([0.1]), 1, np.array([1.0]))
+    orbit = orbit_near(map_, np.array([0.1]), 1, np.array([1.0]))
     found = Found(Neighbourhoods(np.zeros((1, 1)), np.array([[[1.0]]]), np.array([0])), [orbit])
     result = settle(map_, np.array([[1024.0], [1.5], [0.1], [-(2.0**20)]]), found, 100)
     assert result.label.tolist() == [0, 0, 0, 0]

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from function_maps import FunctionMap
+from function_maps import FunctionMap, orbit_near
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
 from saltus.analysis.basins.serial import found_data, found_from
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.noisy import NARROW, NOISY, ROOM, Noisy, apart, blurred
-from saltus.analysis.orbits.orbits import polish
 from saltus.analysis.orbits.recurrence import find
 
 WIDE = np.array([1.0])
@@ -166,7 +165,7 @@ def test_loops_that_errors_make_are_scatter_about_the_exact_orbit():
     error, derivative = 1e-3, lambda z: np.full((len(z), 1, 1), -0.5)
     exact = FunctionMap(lambda z: -0.5 * z, "x", derivative)
     map_ = FunctionMap(lambda z: -0.5 * z - error * np.where(z < 0, -1.0, 1.0), "x", derivative, 1e-5, exact)
-    assert polish(map_, np.array([2.1 * error]), 2, WIDE).period == 2
+    assert orbit_near(map_, np.array([2.1 * error]), 2, WIDE).period == 2
     found, label, _ = find(map_, starts(), WIDE, 256)
     assert [(one.kind, one.orbit.period) for one in found.wandering] == [(NOISY, 1)]
     assert found.wandering[0].scatter.item() == pytest.approx(2 * error, rel=1e-3)
@@ -188,7 +187,7 @@ def test_orbits_beside_a_noisy_one_become_it(cycle):
     """Labels that were given before follow."""
     elsewhere = FunctionMap(lambda z: 0.5 * z + 5.0, "x y", lambda z: np.tile(0.5 * np.eye(2), (len(z), 1, 1)))
     found = Found(Neighbourhoods.none(2))
-    far = polish(elsewhere, np.full(2, 9.9), 1, SCALE)
+    far = orbit_near(elsewhere, np.full(2, 9.9), 1, SCALE)
     found.add(henon(0.0).exact_map, cycle, SCALE)
     found.add(elsewhere, far, SCALE)
     found.add_wandering(noisy_cycle(cycle))
@@ -228,5 +227,5 @@ def test_a_store_keeps_it_to_the_last_bit(cycle):
     for name in ("points", "scale", "size", "scatter"):
         assert getattr(again, name).tobytes() == getattr(one, name).tobytes(), name
     assert (again.kind, again.exponent, again.stray) == (one.kind, one.exponent, one.stray)
-    assert again.orbit.monodromy.tobytes() == one.orbit.monodromy.tobytes()
+    assert again.orbit.multipliers.tobytes() == one.orbit.multipliers.tobytes()
     assert json.dumps(found_data(found_from(data, 2))) == json.dumps(data)
