@@ -18,7 +18,7 @@ from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
 from saltus.interrupt import Stop, check_stop, ctrl_c_waits, no_ctrl_c_is_lost
-from saltus.results.dataset.schema import NOT_COMPUTED
+from saltus.results.dataset.attractors import NOT_COMPUTED
 
 START = {"x": np.linspace(-4e-3, 4e-3, 24), "v": np.linspace(-0.5, 0.5, 24)}
 

@@ -8,19 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.results.dataset.schema import (
-    AGREEMENT,
-    BASINS,
-    EXPONENTS,
-    NOISY,
-    RESPONSES,
-    UNCONVERGED,
-    axes_of,
-    kind_of,
-    kind_text,
-    parameters_of,
-    states_of,
-)
+from saltus.results.dataset.attractors import NOISY, UNCONVERGED
+from saltus.results.dataset.schema import AGREEMENT, BASINS, EXPONENTS, RESPONSES, axes_of, kind_of, kind_text, parameters_of, states_of
 from saltus.results.summary_motions import WRITERS
 
 #: Attractors that get a line of their own; the others are counted.

@@ -12,7 +12,8 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.intervals import wilson
-from saltus.results.dataset.schema import BASINS, NOT_COMPUTED, check
+from saltus.results.dataset.attractors import NOT_COMPUTED
+from saltus.results.dataset.schema import BASINS, check
 
 #: -ln(0.05): a share p stays unseen in N random cells with probability (1-p)^N < 5 % if p > 3/N.
 RULE_OF_THREE = 3.0

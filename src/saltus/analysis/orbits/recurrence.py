@@ -15,7 +15,7 @@ from saltus.analysis.orbits.noisy import Noisy, Stray, blurred, keep_to, stray_o
 from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
 from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
 from saltus.flow.maps import Map, Stroboscope, Travel
-from saltus.results.dataset.schema import NOISY
+from saltus.results.dataset.attractors import NOISY
 
 #: Orbits tried in one round; what isn't tried has its turn in the next.
 TRIES = 12

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.results.dataset.schema import NO_BASIN, event_name, kind_text, parameters_of, response_name, states_of
+from saltus.results.dataset.attractors import NO_BASIN
+from saltus.results.dataset.schema import event_name, kind_text, parameters_of, response_name, states_of
 from saltus.study.table import ROWS, Column, TextTable, interval, number, quantity, table, words
 from saltus.units import from_si
 
