@@ -14,9 +14,9 @@ from saltus.analysis.basins.halton import halton
 from saltus.analysis.basins.labels import UNCONVERGED, complete, settle_all
 from saltus.analysis.basins.pipeline import SCOUTS, memory
 from saltus.analysis.dataset_parts import gap_unit, provenance
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
-from saltus.analysis.orbits.recurrence import find
 from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, shown
@@ -102,7 +102,7 @@ def attractors(
     scale = _spread(map_, group.start)
     show, close = reporter(progress)
     try:
-        found, label, settled = find(map_, group.start, scale, periods, progress=show)
+        found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
     finally:
         close()
     return attractors_dataset(
@@ -176,7 +176,7 @@ def basin_fractions(
     show, close = reporter(progress)
     try:
         scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
-        found = find(map_, scouts, scale, periods)[0]
+        found = find_attractors(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
     finally:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.analysis.orbits.find_attractors import find_attractors, wanders_on
 from saltus.analysis.orbits.found import Found
-from saltus.analysis.orbits.recurrence import find, wanders_on
 from saltus.flow.maps import Map, Travel
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
@@ -113,7 +113,7 @@ def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most:
     if not len(opened):
         return found
     sample = np.sort(np.random.default_rng(0).choice(opened, min(SAMPLE, len(opened)), replace=False))
-    wider, _, _ = find(map_, result.end[sample], scale, most, found)
+    wider, _, _ = find_attractors(map_, result.end[sample], scale, most, found)
     _renumber(result.label, found, wider)
     more = settle_all(map_, result.end[opened], wider, most, threads)
     more.periods[more.periods >= 0] += most

@@ -18,10 +18,10 @@ from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.halton import halton
 from saltus.analysis.basins.labels import OPEN, UNCONVERGED, Settling, complete, settle
 from saltus.analysis.dataset_parts import gap_unit, provenance
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
-from saltus.analysis.orbits.recurrence import find
 from saltus.analysis.starts import check_system, fill, fixed_states
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
@@ -116,7 +116,7 @@ class BasinPlan:
         unit = halton(self.scouts, 2)
         low, high = (np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max))
         drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
-        return find(self.map(threads), fill(self.system, drawn, self.fixed), self.scale, self.periods, progress=progress)[0]
+        return find_attractors(self.map(threads), fill(self.system, drawn, self.fixed), self.scale, self.periods, progress=progress)[0]
 
     def sample(self, count: int) -> np.ndarray:
         """Some of the cells, drawn at random, always the same ones: int64[count at most], ascending."""

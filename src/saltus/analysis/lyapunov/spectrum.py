@@ -14,8 +14,8 @@ import numpy as np
 from saltus.analysis.lyapunov.qr import GOOD, Growth, carry, grow
 from saltus.analysis.lyapunov.segments import TangentFlow
 from saltus.analysis.orbits.aperiodic import SURE
-from saltus.analysis.orbits.orbits import Orbit, find_orbits
-from saltus.analysis.orbits.recurrence import recurrence
+from saltus.analysis.orbits.orbits import Orbit
+from saltus.analysis.orbits.recurrence import recurring_orbits
 from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
 from saltus.analysis.statistics import BOUNDED, UNCLEAR, Means, batch_means, running_ends
 
@@ -104,25 +104,22 @@ def _told(rates: np.ndarray) -> np.ndarray:
 # -- orbits --------------------------------------------------------------------------------------------------------------------
 def _orbits(flow: TangentFlow, growth: Growth) -> list[Orbit | None]:
     """The stable periodic orbit to which each trajectory has come, None for the others."""
-    points, scale, noise = growth.segment.points, growth.scale, flow.map.noise_of(growth.scale)
-    near = np.maximum(NEAR, 4.0 * noise)
-    with np.errstate(invalid="ignore"):  # those that ran away
-        period, apart = recurrence(points[:, -ROUND - 1 :], scale)
+    points, scale = growth.segment.points, growth.scale
+    orbits, _, noise = recurring_orbits(flow.map, points[:, -ROUND - 1 :], scale, NEAR)
+    good = orbits.stable & np.isin(growth.segment.status, GOOD)
     found: list[Orbit | None] = [None] * len(points)
-    rows = np.flatnonzero(np.isin(growth.segment.status, GOOD) & (apart <= near))
-    orbits = find_orbits(flow.map.rows(rows), points[rows, -1], period[rows], scale[rows], noise[rows])
-    for row, orbit, stable in zip(rows, orbits, orbits.stable, strict=True):
-        if stable and _arrives(points[row], orbit, scale[row], float(noise[row]), float(near[row])):
-            found[row] = orbit
+    for row in np.flatnonzero(good).tolist():
+        if _arrives(points[row], orbits[row], scale[row], float(noise[row])):
+            found[row] = orbits[row]
     return found
 
 
-def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float, near: float) -> bool:
+def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float) -> bool:
     """Whether a trajectory float64[m, D] lies on an orbit at its end, or comes closer to it all the time."""
     n, half = orbit.period, len(points) // 2
     distance = np.abs((points[:, None] - orbit.points[None]) / scale).max(axis=2).min(axis=1)
     early, late = distance[max(half - n, 0) : half + 1].max(), distance[-n:].max()
-    return bool(late <= max(SAME, 4.0 * noise) or (late <= near and late < GAINED * early))
+    return bool(late <= max(SAME, 4.0 * noise) or (late <= max(NEAR, 4.0 * noise) and late < GAINED * early))
 
 
 def _of_orbit(flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.orbits.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE
+from saltus.analysis.orbits.find_responses import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE
 from saltus.analysis.responses.continuation import LINK, Follower, orbit_distance
 from saltus.analysis.responses.followed import Followed
 from saltus.analysis.responses.responses import Found

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from saltus.analysis.orbits.steady import CLOSED
+from saltus.analysis.orbits.find_responses import CLOSED
 from saltus.analysis.responses.bifurcations import Event, middle, why_they_end
 from saltus.analysis.responses.continuation import LINK
 from saltus.analysis.responses.followed import Followed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.analysis.orbits.steady import CLOSED
+from saltus.analysis.orbits.find_responses import CLOSED
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.responses.continuation import HALVINGS, INEXACT, Follower
 from saltus.analysis.responses.grid import Grid

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.orbits.aperiodic import Wandering, alike
+from saltus.analysis.orbits.find_responses import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE, PERIODIC, QUASI_PERIODIC, Steady, settle_each
 from saltus.analysis.orbits.orbit_measures import Measures, measure
-from saltus.analysis.orbits.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE, PERIODIC, QUASI_PERIODIC, Steady, settle_each
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.orbits.unforced import multipliers_and_eigenvalues, rest
 from saltus.analysis.outputs import Outputs

@@ -15,8 +15,8 @@ import numpy as np
 from saltus.analysis.orbits import unforced
 from saltus.analysis.orbits.aperiodic import kinds_of
 from saltus.analysis.orbits.equilibria import autonomous
-from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits
-from saltus.analysis.orbits.recurrence import recurrence
+from saltus.analysis.orbits.orbits import OrbitBatch
+from saltus.analysis.orbits.recurrence import recurrence, recurring_orbits
 from saltus.analysis.orbits.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
@@ -147,22 +147,13 @@ def _settled(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float
     """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes the orbits."""
     if autonomous(map_.system):
         return _settled_unforced(map_.rows(who), points, who, near, result)
-    scale = result.scale[who]
-    period, apart = recurrence(points, scale)
-    done = np.zeros(len(who), bool)
-    noise = map_.rows(who).noise_of(scale)
-    ready = np.flatnonzero(apart < np.maximum(near, noise))
-    if not len(ready):
-        return done
-    orbits = find_orbits(map_.rows(who[ready]), points[ready, -1], period[ready], scale[ready], noise[ready])
-    tolerance = BESIDE * np.maximum(apart[ready], noise[ready])
-    right = orbits.stable & (orbits.distance(points[ready, -1], scale[ready]) <= tolerance)
-    done[ready[right]] = True
-    chosen = who[ready[right]]
-    result.orbits.put(chosen, orbits.rows(right))
-    result.kind[chosen], result.exponent_error[chosen] = PERIODIC, 0.0
+    orbits, apart, noise = recurring_orbits(map_.rows(who), points, result.scale[who], near)
+    beside = orbits.distance(points[:, -1], result.scale[who]) <= BESIDE * np.maximum(apart, noise)
+    done = orbits.stable & beside
+    result.orbits.put(who[done], orbits.rows(done))
+    result.kind[who[done]], result.exponent_error[who[done]] = PERIODIC, 0.0
     with np.errstate(divide="ignore"):
-        result.exponent[chosen] = np.log(np.abs(orbits.multipliers[right, 0])) / orbits.period[right]
+        result.exponent[who[done]] = np.log(np.abs(orbits.multipliers[done, 0])) / orbits.period[done]
     return done
 
 

@@ -13,6 +13,7 @@ from saltus.analysis.orbits.found import INSIDE, Found, is_about
 from saltus.analysis.orbits.limit_cycles import LIMIT_CYCLE, limit_cycles
 from saltus.analysis.orbits.noisy import Noisy, Stray, blurred, keep_to, stray_of
 from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
+from saltus.analysis.orbits.recurrence import recurrence
 from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
 from saltus.flow.maps import Map, Stroboscope, Travel
 from saltus.results.dataset.schema import NOISY
@@ -25,7 +26,7 @@ SURVEYED = 24
 WATCHED, ARRIVED = 32 * 1024, 1e-5
 
 
-def find(
+def find_attractors(
     map_: Map,
     start: np.ndarray,
     scale: np.ndarray,
@@ -154,23 +155,8 @@ def _blurs(map_: Map) -> bool:
 def _exactly(map_: Map, state: np.ndarray, scale: np.ndarray, most: int) -> list[Orbit | None]:
     """The orbits to which the exact map settles from float64[k, D]."""
     assert map_.exact_map is not None
-    exact, label, _ = find(map_.exact_map, state, scale, most)
+    exact, label, _ = find_attractors(map_.exact_map, state, scale, most)
     return [exact.orbits[i] if 0 <= i < len(exact.orbits) else None for i in label]
-
-
-def recurrence(points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For trajectories float64[k, m, D]: the smallest n that repeats nearly as well as the best, and how well, in units of the scale."""
-    last = points[:, -1]
-    candidates = []
-    for n in range(1, points.shape[1] // 2 + 1):
-        now = np.abs((points[:, -1] - points[:, -1 - n]) / scale).max(axis=1)
-        before = np.abs((points[:, -1 - n // 2] - points[:, -1 - n - n // 2]) / scale).max(axis=1)
-        candidates.append(np.maximum(now, before))
-    apart = np.stack(candidates, axis=1)
-    apart = np.where(np.isfinite(apart), apart, np.inf)
-    best = apart.min(axis=1)
-    period = 1 + np.argmax(apart <= np.maximum(4.0 * best, 1e-12)[:, None], axis=1)
-    return period, np.where(np.isfinite(last).all(axis=1), apart[np.arange(len(points)), period - 1], np.inf)
 
 
 def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: float) -> bool:
