@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -65,7 +65,7 @@ class Row:
     ----------
     read : callable
         From the Datasets to quantities.
-    checks : tuple of mapping
+    checks : sequence of mapping
         Each with ``text``, ``of``, and a rule with its limit; see :func:`saltus.replication.verdict.passed`. ``each`` names a list of
         tables: then there is a check for each of them.
     own, exact, sure : str
@@ -77,7 +77,7 @@ class Row:
     """
 
     read: Callable[[Data], Quantities]
-    checks: tuple[Mapping[str, Any], ...]
+    checks: Sequence[Mapping[str, Any]]
     own: str
     exact: str
     sure: str

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.results.provenance import content_hash
-from saltus.study.identity import PACKAGE, identity
+from saltus.study.identity import identity
 from saltus.study.run.kept import kept_or_computed
 from saltus.study.tables.parts import slug
 
@@ -77,5 +77,4 @@ class Job:
 @cache
 def _own_code(module: str) -> str:
     """SHA-256 of the file of a module that isn't saltus's; the code of saltus counts in every identity."""
-    file = Path(str(sys.modules[module].__file__))
-    return "" if file.is_relative_to(PACKAGE) and "replications" not in file.parts else hashlib.sha256(file.read_bytes()).hexdigest()
+    return "" if module.startswith("saltus.") else hashlib.sha256(Path(str(sys.modules[module].__file__)).read_bytes()).hexdigest()

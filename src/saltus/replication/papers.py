@@ -158,38 +158,36 @@ def find(name: str) -> Paper:
     """
     folder = folder_of(name)
     paper, claims = (tomllib.loads((folder / file).read_text(encoding="utf-8")) for file in ("paper.toml", "claims.toml"))
-    sets = paper.pop("sets")
-    pictures, tables = paper.pop("picture"), paper.pop("table")
+    sets, pictures, tables = (paper.pop(key) for key in ("sets", "picture", "table"))
     return Paper(
         name=name, jobs=code(name, "jobs").jobs, **paper,
-        pictures=tuple(Picture(**_asked(one, sets), draw=_function(name, one.pop("draw"), one)) for one in pictures),
-        tables=tuple(Numbers(**_asked(one, sets), make=_function(name, one.pop("make"), one)) for one in tables),
-        claims=tuple(_claim(name, one, sets | claims["texts"]) for one in _whole(claims["claim"])),
+        pictures=tuple(Picture(**_part(name, row, sets, "draw")) for row in pictures),
+        tables=tuple(Numbers(**_part(name, row, sets, "make")) for row in tables),
+        claims=tuple(_claim(name, row, sets, claims["texts"]) for row in _whole(claims["claim"])),
     )  # fmt: skip
 
 
-def _whole(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """The rows of claims; what a row doesn't say is as in the row that it is ``like``."""
-    known: dict[str, Mapping[str, Any]] = {row["id"]: row for row in rows}
-    for row in rows:
-        yield {key: value for key, value in ({**known[row["like"]], **row} if "like" in row else row).items() if key != "like"}
+def _part(paper: str, row: Mapping[str, Any], sets: Mapping[str, Sequence[str]], function: str) -> dict[str, Any]:
+    """What a row says, with names of jobs in place of their patterns, and the function in place of its name."""
+    said = {key: value for key, value in row.items() if key not in ("data", "with")}
+    return {**said, "needs": tuple(_expanded(row["data"], sets)), function: _function(paper, row[function], row.get("with", {}))}
 
 
-def _asked(row: dict[str, Any], sets: Mapping[str, Sequence[str]]) -> dict[str, Any]:
-    """What a row says but for its function, taken out of it."""
-    said = {key: row.pop(key) for key in list(row) if key not in ("draw", "make", "with")}
-    return {"needs": tuple(_expanded(said.pop("data"), sets)), **said}
-
-
-def _claim(paper: str, row: dict[str, Any], sets: Mapping[str, Any]) -> Claim:
+def _claim(paper: str, row: Mapping[str, Any], sets: Mapping[str, Sequence[str]], texts: Mapping[str, str]) -> Claim:
     """A claim from its row."""
-    says = {name: row.pop(name) for name in ("id", "figure", "says", "where", "rule")}
-    says["where"] = says["where"].format(**sets)
-    needs = tuple(_expanded(row.pop("data"), sets))
-    read = _function(paper, row.pop("read"), row)
-    row.pop("with", None)
-    checks, why = tuple(row.pop("checks")), row.pop("why", ())
-    return Claim(**says, needs=needs, judge=Row(read, checks, why=({"text": why},) if isinstance(why, str) else tuple(why), **row).judge)
+    said = _part(paper, row, sets, "read")
+    claim = {name: said.pop(name) for name in ("id", "figure", "says", "where", "rule", "needs")}
+    why = said.pop("why", ())
+    judged = Row(**said, why=({"text": why},) if isinstance(why, str) else tuple(why))
+    return Claim(**{**claim, "where": claim["where"].format(**texts)}, judge=judged.judge)
+
+
+def _whole(rows: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
+    """The rows of claims; what a row doesn't say is as in the row that it is ``like``."""
+    known = {row["id"]: row for row in rows}
+    for row in rows:
+        whole = {**known[row["like"]], **row} if "like" in row else row
+        yield {key: value for key, value in whole.items() if key != "like"}
 
 
 def _expanded(patterns: Sequence[str], sets: Mapping[str, Sequence[str]]) -> Iterator[str]:
@@ -200,10 +198,10 @@ def _expanded(patterns: Sequence[str], sets: Mapping[str, Sequence[str]]) -> Ite
             yield pattern.format(**dict(zip(fields, values, strict=True)))
 
 
-def _function(paper: str, place: str, row: Mapping[str, Any]) -> Callable[[Data], Any]:
+def _function(paper: str, place: str, arguments: Mapping[str, Any]) -> Callable[[Data], Any]:
     """The function ``module.name`` of a paper, with the arguments that its row gives."""
     module, _, name = place.partition(".")
-    return partial(getattr(code(paper, module), name), **row.get("with", {}))
+    return partial(getattr(code(paper, module), name), **arguments)
 
 
 # -- files that come with saltus ---------------------------------------------------------------------------------------------------
@@ -217,11 +215,11 @@ def folder_of(name: str) -> Path:
     """
     if name not in _PAPERS:
         raise ParameterError(f"no paper {name!r} can be reproduced. {nearest(name, _PAPERS)}")
-    places = [PACKAGE / "replications" / name, PACKAGE.parents[1] / "replications" / name]
-    for place in places:
-        if place.is_dir():
-            return place
-    raise ParameterError(f"the study files of {name} are missing: no folder {' or '.join(map(str, places))}. Install saltus again.")
+    beside = PACKAGE.parents[1] if PACKAGE.parent.name == "src" else PACKAGE
+    place = next((one for one in (PACKAGE / "replications" / name, beside / "replications" / name) if one.is_dir()), None)
+    if place is None:
+        raise ParameterError(f"the study files of {name} are missing: no folder {PACKAGE / 'replications' / name}. Install saltus again.")
+    return place
 
 
 def code(name: str, module: str) -> ModuleType:

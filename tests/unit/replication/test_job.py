@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,10 @@ CALLS = []
 def counted(*inputs, value, **how):
     CALLS.append(value)
     return compute(*inputs, value=value, **how)
+
+
+def beside(*inputs, **how):
+    return compute(*inputs, **how)
 
 
 def job(value=1.0, name="one", needs=()):
@@ -54,10 +59,8 @@ def test_another_input_is_another_result(at):
     assert CALLS == [1.0, 1.0]
 
 
-@pytest.mark.parametrize("other", [{"system": saltus.models.delangre("c")}, {"method": ODE45()}, {"compute": compute}])
+@pytest.mark.parametrize("other", [{"system": saltus.models.delangre("c")}, {"method": ODE45()}, {"compute": compute}, {"compute": beside}])
 def test_another_system_method_or_analysis_is_another_result(at, other):
-    from dataclasses import replace
-
     job().result({}, at)
     assert replace(job(), **other).result({}, at)[1]
 

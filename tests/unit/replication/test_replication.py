@@ -4,6 +4,7 @@ import math
 import re
 import tomllib
 from itertools import product
+from pathlib import Path
 
 import pytest
 
@@ -97,6 +98,13 @@ def test_a_row_of_a_claim_says_what_is_known_and_nothing_else(name):
         assert {"text", "of"} <= set(check)
         assert set(check) - {"text", "of", "each", "given"} <= set(RULES)
         assert len(set(check) & set(RULES)) <= 1
+
+
+def test_the_page_on_rows_shows_one_that_is_there_and_every_rule():
+    page = (Path(__file__).parents[3] / "docs" / "replication.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"```\{code-block\} toml\n(.*?)```", page, re.DOTALL)
+    assert row in (papers.folder_of("saunders2021") / "claims.toml").read_text(encoding="utf-8")
+    assert set(RULES) - {"is"} <= set(re.findall(r"`(\w+)", page))
 
 
 def test_code_is_imported_from_no_folder_but_saltus_s_own(tmp_path, monkeypatch):
