@@ -18,6 +18,7 @@ from saltus.analysis.orbits.orbits import Orbit
 from saltus.analysis.orbits.recurrence import recurring_orbits
 from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
 from saltus.analysis.statistics import BOUNDED, UNCLEAR, Means, batch_means, running_ends
+from saltus.results.dataset.kinds import Kind
 
 #: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the rounding of the faster: three digits are left.
 LOST = 29.0
@@ -87,7 +88,7 @@ def spectrum(
         if orbit is None:
             kinds.append(kind_of(rates[i], errors[i], forced))
             continue
-        kinds.append("periodic" if forced else "equilibrium")
+        kinds.append((Kind.PERIODIC if forced else Kind.EQUILIBRIUM).word)
         exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i])
         half_width[i], batches[i] = errors[i], 0
         volume[i] = _volume(flow, i, orbit)
@@ -163,9 +164,8 @@ def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
         return "unclear"
     limit = np.maximum(SURE * errors, BOUNDED / len(rates))
     if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # not one that was chaotic only at first
-        return "chaotic"
+        return Kind.CHAOTIC.word
     if abs(second[0]) > min(limit[0], 2 * BOUNDED / len(rates)):  # zero only if what grew stays bounded, however wide the error is
         return "unclear"
-    if forced:
-        return "quasi_periodic"
-    return "quasi_periodic" if len(mean) > 2 and abs(second[1]) <= limit[1] else "limit_cycle"
+    torus = forced or (len(mean) > 2 and abs(second[1]) <= limit[1])
+    return (Kind.QUASI_PERIODIC if torus else Kind.LIMIT_CYCLE).word

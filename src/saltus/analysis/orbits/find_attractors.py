@@ -10,13 +10,13 @@ from saltus.analysis.orbits.aperiodic import REPEATS, TRAIL, Wandering, merge, m
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.orbits.found import INSIDE, Found, is_about
-from saltus.analysis.orbits.limit_cycles import LIMIT_CYCLE, limit_cycles
+from saltus.analysis.orbits.limit_cycles import limit_cycles
 from saltus.analysis.orbits.noisy import Noisy, Stray, blurred, keep_to, stray_of
 from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
 from saltus.analysis.orbits.recurrence import recurrence
 from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
 from saltus.flow.maps import Map, Stroboscope, Travel
-from saltus.results.dataset.schema import NOISY
+from saltus.results.dataset.kinds import Kind
 
 #: Orbits tried in one round; what isn't tried has its turn in the next.
 TRIES = 12
@@ -69,9 +69,9 @@ def find_attractors(
     while len(going) and travel.age < most:
         points = travel.advance(ROUND)
         here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
-        here = here[~_keeping(found, NOISY, points[here], going[here], travel.age, owner, settled)]
+        here = here[~_keeping(found, Kind.NOISY_PERIODIC.word, points[here], going[here], travel.age, owner, settled)]
         while len(here) and _add_orbits(map_, points[here], scale, found, most):
-            here = here[~_keeping(found, NOISY, points[here], going[here], travel.age, owner, settled)]
+            here = here[~_keeping(found, Kind.NOISY_PERIODIC.word, points[here], going[here], travel.age, owner, settled)]
             here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
         if turns and len(here):
             here = here[~_on_cycles(map_, found, points[here], going[here], travel, here, scale, owner, settled)]
@@ -168,14 +168,14 @@ def _on_cycles(
     settled: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are looked for. Notes their owners."""
-    cycles = [one for one in found.wandering if one.kind == LIMIT_CYCLE]
+    cycles = [one for one in found.wandering if one.kind == Kind.LIMIT_CYCLE.word]
     alone = np.flatnonzero(keep_to(cycles, points, INSIDE) < 0)
     some = alone[np.unique(np.linspace(0, len(alone) - 1, min(TRIES, len(alone))).astype(int))] if len(alone) else alone
     some = some[travel.going[rows[some]]]
     if len(some) and isinstance(map_, Stroboscope):
         fresh = limit_cycles(map_, points[some, -1], ROUND * float(map_.period[0]), scale)
         found.wandering = merge([*found.wandering, *fresh])
-    return _keeping(found, LIMIT_CYCLE, points, who, travel.age, owner, settled)
+    return _keeping(found, Kind.LIMIT_CYCLE.word, points, who, travel.age, owner, settled)
 
 
 def _survey(
@@ -260,5 +260,6 @@ def wanders_on(found: Found, trails: np.ndarray, scale: np.ndarray) -> np.ndarra
     shares = np.stack([one.share(trails) for one in found.wandering], axis=1)
     _, apart = recurrence(trails, scale)
     best = shares.argmax(axis=1)
-    turns = np.array([one.kind in (LIMIT_CYCLE, NOISY) for one in found.wandering])  # looks at one may well repeat
+    recurring = (Kind.LIMIT_CYCLE.word, Kind.NOISY_PERIODIC.word)  # iterates on these may recur
+    turns = np.array([one.kind in recurring for one in found.wandering])
     return np.where((shares.max(axis=1) >= INSIDE) & ((apart > REPEATS) | turns[best]), best, -1)

@@ -13,7 +13,7 @@ from saltus.analysis.basins.serial import found_data, found_from
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
-from saltus.analysis.orbits.noisy import NARROW, NOISY, ROOM, Noisy, apart, blurred
+from saltus.analysis.orbits.noisy import NARROW, ROOM, Noisy, apart, blurred
 
 WIDE = np.array([1.0])
 SCALE = np.array([3.0, 1.0])
@@ -73,7 +73,7 @@ def test_the_scatter_of_a_linear_map_is_that_of_its_errors_added_up(slope):
     scatter = []
     for error in (1e-3, 4e-3):
         found, label, _ = find_attractors(linear(slope, error), starts(), WIDE, 256)
-        assert [(one.kind, one.orbit.period) for one in found.wandering] == [(NOISY, 1)]
+        assert [(one.kind, one.orbit.period) for one in found.wandering] == [("noisy_periodic", 1)]
         assert not found.orbits
         assert not found.astray
         assert set(label) == {0}
@@ -109,7 +109,7 @@ def test_what_scouts_miss_is_found_by_the_post_pass():
     result = settle(map_, starts(40, 2), nothing, 256)
     assert set(result.label) == {OPEN}
     found = complete(map_, result, nothing, SCALE, 256, 1)
-    assert [one.kind for one in found.wandering] == [NOISY]
+    assert [one.kind for one in found.wandering] == ["noisy_periodic"]
     assert set(result.label) == {0}
 
 
@@ -124,7 +124,7 @@ def test_an_exact_map_is_never_noisy():
     blurred_ = henon(1e-3)
     plain = FunctionMap(blurred_._function, "x y", blurred_._derivative)
     found, label, _ = find_attractors(plain, starts(size=2), SCALE, 256)
-    assert NOISY not in [one.kind for one in found.wandering]
+    assert "noisy_periodic" not in [one.kind for one in found.wandering]
     assert not found.astray
     assert set(label) == {-1}
 
@@ -167,7 +167,7 @@ def test_loops_that_errors_make_are_scatter_about_the_exact_orbit():
     map_ = FunctionMap(lambda z: -0.5 * z - error * np.where(z < 0, -1.0, 1.0), "x", derivative, 1e-5, exact)
     assert orbit_near(map_, np.array([2.1 * error]), 2, WIDE).period == 2
     found, label, _ = find_attractors(map_, starts(), WIDE, 256)
-    assert [(one.kind, one.orbit.period) for one in found.wandering] == [(NOISY, 1)]
+    assert [(one.kind, one.orbit.period) for one in found.wandering] == [("noisy_periodic", 1)]
     assert found.wandering[0].scatter.item() == pytest.approx(2 * error, rel=1e-3)
     assert not found.orbits
     assert set(label) == {0}
