@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text
 
 from .draw_attractors import Trio, deviations, trios
 from .looks import LOOKS, strobe
-from .reading import ENDS, Data, counted, listed, multipliers, names, parameter, place_of, three
+from .reading import ENDS, counted, listed, multipliers, names, parameter, place_of, three
 
 #: By the end of a job's name, what claims call this way of integrating.
 SHORT = {look.end: short for look, short in zip(LOOKS, ENDS, strict=True)}

@@ -10,9 +10,10 @@ import xarray as xr
 
 from saltus.analysis.basins.compare import compare
 from saltus.plot.maps import share_text
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import period_text
 
-from .reading import Data, by_peak, certainty, count, counted, listed, names, parameter, place_of, three, unmatched
+from .reading import by_peak, certainty, count, counted, listed, names, parameter, place_of, three, unmatched
 
 #: Peaks within this share of the largest look alike.
 LEVEL = 0.02

@@ -10,9 +10,10 @@ import xarray as xr
 
 from saltus.analysis.motion.settled import settled
 from saltus.plot.maps import share_text
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import period_text
 
-from .reading import Data, by_peak, certainty, count, counted, listed, multipliers, names, three
+from .reading import by_peak, certainty, count, counted, listed, multipliers, names, three
 
 #: Band around the gap in which a start is "near or within" it [m].
 NEAR = 0.2e-3

@@ -9,12 +9,13 @@ import numpy as np
 import xarray as xr
 
 from saltus.replication import folder_of
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import period_text
 from saltus.results.files.measured import read_measured
 from saltus.study.answers.compare import residuals
 
 from .printed import contacts
-from .reading import Data, between, either
+from .reading import between, either
 
 #: Rounding of frequencies of a grid [Hz].
 TICK = 1e-6
