@@ -20,7 +20,7 @@ LONGEST = (
     "unit/study/test_questions.py",
     "unit/study/test_maps_run.py",
     "truth/test_responses.py",
-    "unit/results/test_files.py",
+    "unit/results/files/test_files.py",
     "faults/test_result_files.py",
     "truth/test_order.py",
     "unit/analysis/test_wandering.py",
@@ -50,9 +50,10 @@ def pytest_configure():
 
 
 def pytest_collection_finish():
-    """Nor later, while tests run."""
+    """Nor later, while tests run. What they make is looked at once there is more of it than by default."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(50_000, 10, 50)
     gc.enable()
 
 

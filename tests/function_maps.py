@@ -7,8 +7,20 @@ from collections.abc import Callable
 import numpy as np
 
 from saltus.analysis.lyapunov.segments import SAMPLED_BLOCKS, Segment, TangentFlow
+from saltus.analysis.orbits.orbits import Orbit, find_orbits
 from saltus.flow.maps import Map
 from saltus.kernels import status as st
+
+
+def orbit_near(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
+    """The orbit of period n, or a part of it, near one state float64[D]: a batch of one. The noise is that of a box."""
+    found = find_orbits(map_, start[None], np.array([n]), scale[None], np.array([map_.noise]))
+    return found[0] if found.period[0] else None
+
+
+def attracts(orbit: Orbit) -> bool:
+    """Whether the largest multiplier lies inside the unit circle."""
+    return bool(abs(orbit.multipliers[0]) < 1)
 
 
 class FunctionMap:

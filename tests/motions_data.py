@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from saltus.results import Guards, motion_dataset, schema, spectrum_dataset
+from saltus.results import Guards, motion_dataset, spectrum_dataset
+from saltus.results.dataset import schema
 
 GUARDS = Guards(["lower_gap", "upper_gap"], ["x", "x"], np.array([0.0, 4e-4]))
 UNITS = {"x": "m", "v": "m/s", "force": "N"}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
+from saltus import models
+from saltus.flow import Taylor
 from saltus.replication import Check, Claim, Finding, Job, Numbers, Paper, Picture
 from saltus.results import AttractorTable, attractors_dataset
 from saltus.study.table import TextTable
@@ -20,9 +22,13 @@ def small_result(value):
     return attractors_dataset(states=("x", "v"), units={"x": "m", "v": "m/s"}, attractors=table)
 
 
-def compute(settings, inputs, show):
-    show(0.5)
-    return small_result(settings["value"] + sum(float(ds["attractor_peak"][0]) for ds in inputs.values()))
+def compute(system, *inputs, value, progress, **_):
+    progress(0.5)
+    return small_result(value + sum(float(ds["attractor_peak"][0]) for ds in inputs))
+
+
+def small_job(name, value, compute=compute, needs=()):
+    return Job(name, compute, models.delangre("b"), Taylor(), {"value": value}, needs)
 
 
 def draw(data):
@@ -50,8 +56,8 @@ def small_paper(compute=compute, draw=draw, judge=judge, table=table):
     """
     sound, sound_draw, sound_judge = _SOUND
     jobs = [
-        Job("fig2/first", {"value": 1.0}, compute), Job("fig2/second", {"value": 2.0}, sound, ("fig2/first",)),
-        Job("fig10/other", {"value": 3.0}, sound),
+        small_job("fig2/first", 1.0, compute), small_job("fig2/second", 2.0, sound, ("fig2/first",)),
+        small_job("fig10/other", 3.0, sound),
     ]  # fmt: skip
     return Paper(
         name="saunders2021", title="A title", citation="Somebody (2021)", about="About it.",

@@ -64,7 +64,7 @@ def run_command(line: str) -> None:
         return
     program, *arguments = shlex.split(line)
     assert program == "saltus", f"{line!r} is no command that a test runs"
-    from saltus.cli.app import app
+    from saltus.cli.commands import app
 
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, (line, result.output)

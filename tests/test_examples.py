@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import saltus as sl
 from saltus.analysis.basins import pipeline
-from saltus.cli.app import app
+from saltus.cli.commands import app
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_masses"
 

@@ -8,8 +8,8 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from saltus.results import schema
-from saltus.results.variable import Variable
+from saltus.results.dataset import schema
+from saltus.results.dataset.variable import Variable
 
 #: What stands in a batch or a map before the dims of one trajectory, by kind of result.
 _BATCHES = (schema.TRAJECTORY, schema.STROBOSCOPE, schema.SECTION, schema.SPECTRUM, schema.IMPACTS, schema.ENERGY)

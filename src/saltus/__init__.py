@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
     from saltus.flow import ODE45, Interrupted, Taylor
+    from saltus.interrupt import Stop
     from saltus.results import contacts, describe, load, samples, save, to_csv, to_mat
     from saltus.system import (
         System,
@@ -88,6 +89,7 @@ _HOMES = {
     "transmissibility": "saltus.analysis.motion.transmissibility",
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
+    "Stop": "saltus.interrupt",
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"), "saltus.results"),
     **dict.fromkeys(
@@ -103,6 +105,7 @@ __all__ = [
     "ODE45",
     "Interrupted",
     "SaltusError",
+    "Stop",
     "System",
     "Taylor",
     "abs",

@@ -1,4 +1,4 @@
-"""Ctrl-C: the exception that carries what was finished, and how work on threads learns that it is to stop."""
+"""Stopping on Ctrl-C or on request: the exception that carries what was finished, and how work on threads learns of it."""
 
 from __future__ import annotations
 
@@ -8,14 +8,19 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
+from contextvars import ContextVar, Token
 from functools import cache
 from types import FrameType
 from typing import Any
 
+#: Exit code of a command that Ctrl-C stopped: 128 + SIGINT, as shells expect.
+EXIT_CODE = 130
+
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a computation. ``partial`` holds what was finished; the rest has status ``interrupted`` or ``not_computed``.
+    """Ctrl-C during a computation, or a :class:`Stop`: ``partial`` holds what was finished.
+
+    The rest has status ``interrupted`` or ``not_computed``.
 
     Parameters
     ----------
@@ -48,8 +53,8 @@ class Interrupted(KeyboardInterrupt):
 
     def __str__(self) -> str:
         if not self.has_partial:
-            return "stopped by Ctrl-C before anything was finished."
-        return "stopped by Ctrl-C. What was finished stands in `partial` of this exception."
+            return "stopped before anything was finished."
+        return "stopped. What was finished stands in `partial` of this exception."
 
 
 def _interrupted(partial: Any) -> Interrupted:
@@ -100,26 +105,47 @@ def no_ctrl_c_is_lost() -> Iterator[None]:
 
 
 class Stop:
-    """A request to stop a piece of work: of its own, or of the work that it is part of."""
+    """A request to stop work, which another thread may make: ``stop.set()``.
+
+    Everything long that is called ``with stop:`` ends soon after it is made, as it does on Ctrl-C: with :class:`saltus.Interrupted`, whose
+    ``partial`` is what was finished. One that was made stays made.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> stop = sl.Stop()
+    >>> with stop:  # a window's button calls stop.set()
+    ...     run = sl.simulate(rig, periods=10)
+    """
 
     def __init__(self) -> None:
-        self._asked, self._outer = threading.Event(), _CURRENT.get()
+        self._asked, self._outer, self._works = threading.Event(), _CURRENT.get(), False
+        self._entered: list[Token[Stop | None]] = []
+
+    def __enter__(self) -> Stop:
+        self._entered.append(_CURRENT.set(self))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        _CURRENT.reset(self._entered.pop())
 
     def set(self) -> None:
-        """Ask for it."""
+        """Make the request."""
         self._asked.set()
 
     def is_set(self) -> bool:
-        """Whether it was asked for."""
+        """Whether it was made."""
         return self._asked.is_set() or (self._outer is not None and self._outer.is_set())
 
     @property
     def inside(self) -> bool:
         """Whether the work is part of other work, which Ctrl-C asks to stop and doesn't interrupt."""
-        return self._outer is not None
+        return self._outer is not None and (self._outer._works or self._outer.inside)
 
     def hold(self) -> None:
-        """Let all that this thread's context calls from now on ask this request (see :func:`check_stop`)."""
+        """Let all that this thread's context calls from now on ask this request (see :func:`check_stop`), as parts of one work."""
+        self._works = True
         _CURRENT.set(self)
 
 

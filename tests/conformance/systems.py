@@ -110,10 +110,8 @@ class Contact(NamedTuple):
 def contacts(run: xr.Dataset, trajectory: int | None = None) -> list[Contact]:
     """The table of contacts, of one trajectory if the run has many."""
     names = ("time", "guard", "kind", "direction", "velocity", "mode_before", "mode_after", "time_error")
-    rows = zip(*(run[f"contact_{name}"].values.tolist() for name in names), strict=True)
-    if trajectory is None:
-        return [Contact(*row) for row in rows]
-    return [Contact(*row) for row, who in zip(rows, run.contact_trajectory.values, strict=True) if who == trajectory]
+    own = slice(None) if trajectory is None else run.contact_trajectory.values == trajectory
+    return [Contact(*row) for row in zip(*(run.variables[f"contact_{name}"].values[own].tolist() for name in names), strict=True)]
 
 
 def bits(run: xr.Dataset, trajectory: int | None = None) -> dict[str, bytes]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from saltus.results.store import Store
+from saltus.results.store.store import Store
 
 IDENTITY = {"study": "0a1b2c", "system": "rig", "version": "0.1.0"}
 MAKE = {"shape": (7, 11), "chunk": 8, "arrays": {"basin": "i2", "peak": "f8", "settled": "?"}, "note": {"title": "a test"}}

@@ -13,10 +13,10 @@ import motions_data
 import saltus as sl
 from faults.test_python_arguments import ODD, only_arguments, rig  # noqa: F401  a fixture
 from saltus.errors import LONGEST, ParameterError, StudyError, UnitError, shown
-from saltus.results.files import ResultFileError
+from saltus.results.files.atomic import ResultFileError
 from unit.plot.responses_data import resonance
 from unit.results.conftest import sine_points, sine_run
-from unit.results.responses_data import responses
+from unit.results.dataset.responses_data import responses
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 

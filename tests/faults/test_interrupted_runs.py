@@ -1,6 +1,7 @@
 """Ctrl-C while trajectories are computed: at whatever moment it comes, what is kept is the beginning of the undisturbed answer."""
 
 import _thread
+import contextlib
 import os
 import signal
 import sys
@@ -12,10 +13,12 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from saltus.analysis.basins import basins, pipeline
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
 from saltus.interrupt import Stop, check_stop, ctrl_c_waits, no_ctrl_c_is_lost
+from saltus.results.dataset.schema import NOT_COMPUTED
 
 START = {"x": np.linspace(-4e-3, 4e-3, 24), "v": np.linspace(-0.5, 0.5, 24)}
 
@@ -63,6 +66,100 @@ def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, chun
         np.testing.assert_array_equal(mine, theirs[: len(mine)])
 
 
+# -- a request from another thread --------------------------------------------------------------------------------------------------
+class Holding:
+    """Holds work at a moment until another thread has asked it to stop."""
+
+    def __init__(self):
+        self.stop, self.begun, self._asked = sl.Stop(), threading.Event(), threading.Event()
+
+    def here(self):
+        """The moment."""
+        self.begun.set()
+        assert self._asked.wait(300)
+
+    def partial(self, call, *ready):
+        """What a call in another thread has finished when this one asks it to stop."""
+        found = []
+
+        def work():
+            try:
+                with self.stop:
+                    call()
+            except sl.Interrupted as stopped:
+                found.append(stopped.partial)
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        for event in (self.begun, *ready):
+            assert event.wait(300)
+        self.stop.set()
+        self._asked.set()
+        thread.join(300)
+        (partial,) = found
+        return partial
+
+
+def test_a_run_ends_on_request_as_it_does_on_ctrl_c(monkeypatch):
+    rig, holding = sl.models.delangre("b", force="4 N", frequency="15 Hz"), Holding()
+    monkeypatch.setattr(engine, "CHUNK", 8)
+    monkeypatch.setattr(engine, "SLICE", 200)
+    whole = sl.simulate(rig, START, periods=60, threads=1, progress=False)
+    cut = engine._cut
+
+    class Held(list):
+        def append(self, item):
+            super().append(item)
+            if len(self) == 3:
+                holding.here()
+
+    def held(*args):
+        chunk = cut(*args)
+        chunk.contacts = Held()
+        return chunk
+
+    monkeypatch.setattr(engine, "_cut", held)
+    part = holding.partial(lambda: sl.simulate(rig, START, periods=60, threads=1, progress=False))
+    assert set(part.variables) == set(whole.variables)
+    assert {"interrupted", "not_computed"} == set(part.status.values)
+    assert 0 < part.sizes["contact"] < whole.sizes["contact"]
+    for row in range(len(START["x"])):
+        mine = part.contact_time.values[part.contact_trajectory.values == row]
+        theirs = whole.contact_time.values[whole.contact_trajectory.values == row]
+        np.testing.assert_array_equal(mine, theirs[: len(mine)])
+
+
+def test_a_map_ends_on_request_as_it_does_on_ctrl_c(monkeypatch):
+    rig, holding, labelled = sl.models.delangre("b", force="4 N", frequency="16 Hz"), Holding(), threading.Event()
+    axes = {"x": ("-5 mm", "5 mm", 12), "v": ("-1 m/s", "1 m/s", 12)}
+    monkeypatch.setattr(pipeline, "CHUNK", 24)
+    monkeypatch.setattr(pipeline, "SCOUTS", 64)
+    whole = sl.basins(rig, **axes, threads=1, progress=False)
+    chunk = pipeline.BasinPlan.chunk
+
+    def held(plan, index, *rest):
+        if index == 3:
+            holding.here()
+        return chunk(plan, index, *rest)
+
+    monkeypatch.setattr(pipeline.BasinPlan, "chunk", held)
+    part = holding.partial(
+        lambda: sl.basins(rig, **axes, threads=1, progress=lambda share: share > basins.SCOUTING and labelled.set()), labelled
+    )
+    there = part.basin.values != NOT_COMPUTED
+    assert 24 <= there.sum() <= 72
+    np.testing.assert_array_equal(part.basin.values[there], whole.basin.values[there])
+    assert set(part.data_vars) <= set(whole.data_vars)
+
+
+def test_work_ends_at_once_where_it_was_asked_before():
+    stop = sl.Stop()
+    stop.set()
+    with stop, pytest.raises(sl.Interrupted):
+        sl.simulate(sl.models.delangre("b"), periods=10**9, keep=1, progress=False)
+    sl.simulate(sl.models.delangre("b"), periods=1, progress=False)
+
+
 def press_when(event):
     """Press Ctrl-C once the event is set."""
 
@@ -108,13 +205,15 @@ def test_a_frequency_response_hands_out_what_it_has():
     rig = sl.models.delangre("b", force="4 N")
     seen = threading.Event()
     presser = press_when(seen)
-    with pytest.raises(sl.Interrupted, match="stopped by Ctrl-C"):
+    with pytest.raises(sl.Interrupted, match="stopped"):
         sl.frequency_response(rig, ("2 Hz", "30 Hz", 4000), periods=2000, progress=lambda share: share > 0 and seen.set())
     presser.join()
 
 
 # -- a single piece is done by the thread that asks ---------------------------------------------------------------------------------
-def test_ctrl_c_waits_for_a_single_piece_and_asks_it_to_stop():
+@pytest.mark.parametrize("around", [contextlib.nullcontext, sl.Stop])
+def test_ctrl_c_waits_for_a_single_piece_and_asks_it_to_stop(around):
+    """Within a request of the user's own too, which isn't a part of other work."""
     seen = []
 
     def piece(_):
@@ -123,9 +222,10 @@ def test_ctrl_c_waits_for_a_single_piece_and_asks_it_to_stop():
         seen.extend(stop.is_set() for _ in range(100))
         return "whole"
 
-    stop = Stop()
-    with pytest.raises(KeyboardInterrupt):
-        on_threads(piece, [1], lambda *_: pytest.fail("it was told to stop"), stop=stop)
+    with around():
+        stop = Stop()
+        with pytest.raises(KeyboardInterrupt):
+            on_threads(piece, [1], lambda *_: pytest.fail("it was told to stop"), stop=stop)
     assert seen[-1]
     assert len(seen) == 100
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

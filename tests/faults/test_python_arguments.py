@@ -170,7 +170,7 @@ def test_every_refusal_is_in_words(only_arguments, seed, trials):
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda: sl.models.delangre([]), r"the rig has no case \[\]. Known: a, b, c"),
+        (lambda: sl.models.delangre([]), r"delangre has no case \[\]. Known: a, b, c"),
         (lambda: sl.system(states=5), 'states must be names, such as states="x v", not 5'),
         (lambda: sl.system(states="x v", units=5), "units must be a mapping"),
         (lambda: sl.system(states="x v", forced_at=[])(_equation), "forced_at must be the name of a parameter"),

@@ -10,7 +10,8 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.fence import has_control
-from saltus.results import ResultFileError, ending, export, known, load, save
+from saltus.results import ResultFileError, load, save
+from saltus.results.files import ending, export, known
 from unit.results.conftest import sine_run
 
 ENDING = 80
@@ -124,7 +125,7 @@ def test_a_file_that_would_write_to_the_terminal_is_refused(tmp_path, where, mon
         run = run.assign_attrs(source="\u202egpj.exe")
     with pytest.raises(ParameterError, match="holds control characters"):
         save(run, tmp_path / "run.nc")
-    monkeypatch.setattr("saltus.results.export.place_of_control", lambda _: "")  # as another program would write it
+    monkeypatch.setattr("saltus.results.files.export.place_of_control", lambda _: "")  # as another program would write it
     save(run, tmp_path / "run.nc")
     with pytest.raises(ResultFileError, match="holds control characters, which a terminal would obey") as refused:
         load(tmp_path / "run.nc")
@@ -142,7 +143,7 @@ def stranger(tmp_path, monkeypatch):
 def test_only_what_was_not_written_here_is_tried_elsewhere_and_once(stranger, monkeypatch):
     """Anybody can write a right checksum over a file that HDF5 reads for ever."""
     tried = []
-    monkeypatch.setattr(sys.modules["saltus.results.load"], "try_elsewhere", lambda path, _engine: tried.append(path.name))
+    monkeypatch.setattr(sys.modules["saltus.results.files.load"], "try_elsewhere", lambda path, _engine: tried.append(path.name))
     mine = save(sine_run(samples=50), stranger / "mine.nc")
     content = sine_run(samples=51).to_netcdf(engine="h5netcdf")
     (stranger / "theirs.nc").write_bytes(ending.with_ending(content))

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from faults.store_writer import FINE, IDENTITY, MAKE, SMALL, compute, die_at, hold, hold_and_fork, values
-from saltus.results.store import Store, StoreError
+from saltus.results.store.store import Store, StoreError
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 

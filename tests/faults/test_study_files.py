@@ -11,10 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from faults.mutated_studies import ROOT, SEEDS, mutated
-from saltus.cli.app import app
+from saltus.cli.commands import app
 from saltus.errors import SaltusError, StudyError
+from saltus.study.answers.ask import questions_of
 from saltus.study.run.copies import keep_copy
-from saltus.study.run.study import questions_of
 from saltus.study.setting.inputs import Input, Inputs
 from saltus.study.tables.read import parse, read
 

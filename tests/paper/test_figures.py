@@ -18,8 +18,8 @@ from saltus.analysis.basins.basins import label_all
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.motion.settled import settled
 from saltus.results import load
+from saltus.study.answers.basins import maps_of
 from saltus.study.run import maps
-from saltus.study.run.maps import jobs_of
 from saltus.study.run.running import Resources
 from saltus.study.run.study import run_study
 from saltus.study.tables.read import parse, read
@@ -59,10 +59,10 @@ def few_checks(monkeypatch):
 def brief(monkeypatch):
     """Few scouts, and little time for motions that never repeat: what comes out means nothing, but all of it is made."""
     monkeypatch.setattr(pipeline, "SCOUTS", 2)
-    monkeypatch.setattr("saltus.analysis.orbits.recurrence.WATCHED", 256)
+    monkeypatch.setattr("saltus.analysis.orbits.find_attractors.WATCHED", 256)
     monkeypatch.setattr("saltus.analysis.orbits.aperiodic.BLOCKS", 64)
-    for module in ("recurrence", "noisy", "steady"):
-        monkeypatch.setattr(f"saltus.analysis.{module}.TRAIL", 256)
+    for module in ("find_attractors", "noisy", "find_responses"):
+        monkeypatch.setattr(f"saltus.analysis.orbits.{module}.TRAIL", 256)
 
 
 def test_all_figures_are_here():
@@ -76,31 +76,31 @@ def test_the_file_is_planned_as_the_paper_has_it(name):
     """Box, force, case and frequency; every map by ode45 has the paper's tolerances and is set beside an exact one."""
     spec, text = read(FOLDER / f"{name}.toml")
     case, frequency = SETTINGS[name]
-    jobs = jobs_of(spec)
+    jobs = maps_of(spec)
     for job in jobs:
         system = job.plan.system
         assert system.values["force"] == 4.0
         assert (system.values["lower_gap"], system.values["upper_gap"]) == {"b": (0.0, 0.4e-3), "c": (0.0, 0.8e-3)}[case]
-        assert system.values["frequency"] == frequency or f"{system.values['frequency']:g} Hz" == job.name.split(",")[0]
+        assert system.values["frequency"] == frequency or f"{system.values['frequency']:g} Hz" == job.title.split(",")[0]
         assert [job.plan.axes[axis][[0, -1]].tolist() for axis in "xv"] == [[-0.005, 0.005], [-1.0, 1.0]]
         assert job.plan.cells == {"fig6b": 1_000_000, "fig13": 10_000}.get(name, 40_000)
         if job.plan.method.name == "ODE45":
             assert (job.plan.method.rtol, job.plan.method.atol) == (1e-4, 1e-7)
-            assert job.plan.method.events == ("ignore" if "not located" in job.name else "locate")
-            other = next(one for one in jobs if one.name == job.compare)
+            assert job.plan.method.events == ("ignore" if "not located" in job.title else "locate")
+            other = next(one for one in jobs if one.title == job.compare)
             assert other.plan.method.name == "Taylor"
             assert other.plan.system.values == system.values
     if "contact_stiffness" in text:
         units = {"N": 1.0, "kN": 1e3, "MN": 1e6}
         for job in jobs:
-            number, unit = job.name.split()[:2]
+            number, unit = job.title.split()[:2]
             assert job.plan.system.values["contact_stiffness"] == pytest.approx(float(number) * units[unit], rel=1e-15)
     assert f"saltus run replications/saunders2021/{name}.toml" in text
 
 
 @pytest.mark.parametrize(("name", "one"), list(EXACT), ids=[" ".join(each) for each in EXACT])
 def test_attractors_of_the_exact_maps(name, one):
-    job = next(job for job in jobs_of(parse(tiny(name))) if job.name == one)
+    job = next(job for job in maps_of(parse(tiny(name))) if job.title == one)
     found = job.plan.scout(1)
     assert [orbit.period for orbit in found.orbits] == EXACT[name, one]
     assert found.wandering == [], "all of them are periodic: what wanders is a transient"
@@ -112,7 +112,7 @@ def test_attractors_of_the_exact_maps(name, one):
 
 def test_the_second_attractor_of_fig_11_is_the_large_one():
     """The paper has one; the one that it misses has the larger amplitude and few starts."""
-    job = next(job for job in jobs_of(parse(tiny("fig11"))) if job.name == "8833 N per m, exact")
+    job = next(job for job in maps_of(parse(tiny("fig11"))) if job.title == "8833 N per m, exact")
     found = job.plan.scout(1)
     ds = job.plan.finish(job.plan.chunk(0, found), found, 1)
     (small,) = np.flatnonzero(ds.attractor_period == 2)
@@ -126,7 +126,7 @@ def test_fig_8_has_a_third_attractor_after_the_grazing():
 
     Here four of its columns in which the third has starts, and the outer ones; truth/test_basins.py counts the whole grid.
     """
-    jobs = {job.name: job.plan for job in jobs_of(read(FOLDER / "fig8.toml")[0]) if job.plan.method.name == "Taylor"}
+    jobs = {job.title: job.plan for job in maps_of(read(FOLDER / "fig8.toml")[0]) if job.plan.method.name == "Taylor"}
     counts = {}
     for name, whole in jobs.items():
         one = replace(whole, axes=whole.axes | {"x": whole.axes["x"][[0, 83, 84, 89, 90, 199]]})
@@ -151,11 +151,11 @@ def test_fig_6b_runs_as_a_study(tmp_path):
 def test_the_maps_of_one_value_run(name, tmp_path, brief):
     """Exact, located, not located: the whole way with few scouts and short transients. Only that it runs, and that all is written."""
     text = "[[basins.map]]".join(tiny(name, 3).replace("[basins]", "[basins]\nperiods = 16").split("[[basins.map]]")[:4])
-    jobs = jobs_of(parse(text))
+    jobs = maps_of(parse(text))
     outcome = run_study(parse(text), text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False)
     assert outcome.waiting == []
-    assert {file.name for file in outcome.files if file.suffix == ".nc"} == {f"{job.slug}.nc" for job in jobs} | {
-        f"{job.slug}-agreement.nc" for job in jobs if job.compare
+    assert {file.name for file in outcome.files if file.suffix == ".nc"} == {f"{job.stem}.nc" for job in jobs} | {
+        f"{job.stem}-agreement.nc" for job in jobs if job.compare
     }
     assert len(outcome.tables) == len(jobs) + sum(job.compare is not None for job in jobs)
 
@@ -173,7 +173,7 @@ def test_the_motions_run(name, periods, tmp_path):
     ("name", "panels"),
     [
         ("fig3", ["a1.5", "c4"]),
-        ("fig7", ["a", "f"]),
+        ("fig7", ["a", "d"]),
         *(pytest.param(name, None, marks=pytest.mark.nightly, id=f"{name}, all of it") for name in RESPONSES),
     ],
 )
@@ -193,7 +193,7 @@ def test_the_responses_run(name, panels, tmp_path, brief):
 
 def test_ode45_survives_orbits_that_do_not_close():
     """ode45's map isn't continuous, so a derivative may expand where the trajectory doesn't: no reason to stop the study."""
-    job = next(job for job in jobs_of(parse(tiny("fig6"))) if job.name == "14.75 Hz, ode45 located")
+    job = next(job for job in maps_of(parse(tiny("fig6"))) if job.title == "14.75 Hz, ode45 located")
     assert len(job.plan.scout(1)) > 0
 
 

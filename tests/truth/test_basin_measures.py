@@ -15,7 +15,7 @@ from saltus.analysis.basins.uncertainty import (
     uncertainty_exponent,
 )
 from saltus.errors import ParameterError
-from saltus.results.intervals import wilson
+from saltus.intervals import wilson
 
 
 def split(n: int, place: int) -> np.ndarray:

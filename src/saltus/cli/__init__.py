@@ -8,10 +8,7 @@ from __future__ import annotations
 import os
 import sys
 
-from saltus.interrupt import ctrl_c_waits, no_ctrl_c_is_lost
-
-#: Exit code of what the user stopped: 128 + SIGINT, as shells expect.
-INTERRUPTED = 130
+from saltus.interrupt import EXIT_CODE, ctrl_c_waits, no_ctrl_c_is_lost
 
 
 def main() -> None:
@@ -21,11 +18,11 @@ def main() -> None:
     try:
         with no_ctrl_c_is_lost():
             with ctrl_c_waits():
-                from saltus.cli.app import app
+                from saltus.cli.commands import app
             app(prog_name="saltus")
     except KeyboardInterrupt:
         sys.stderr.write("saltus: stopped.\n")
-        sys.exit(INTERRUPTED)
+        sys.exit(EXIT_CODE)
 
 
 def _replace_closed_streams() -> None:
@@ -37,4 +34,4 @@ def _replace_closed_streams() -> None:
             setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115  (takes the lowest number: this one)
 
 
-__all__ = ["INTERRUPTED", "main"]
+__all__ = ["main"]

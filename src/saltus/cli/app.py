@@ -1,4 +1,4 @@
-"""The application: its commands by name, and how errors end it."""
+"""The application without its commands, which register on it: how errors and Ctrl-C end it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from saltus.cli import INTERRUPTED
 from saltus.errors import SaltusError
+from saltus.interrupt import EXIT_CODE
 
 #: Exit code where what was asked for can't be done as asked.
 REFUSED = 2
@@ -44,7 +44,7 @@ class Commands(TyperGroup):
             raise typer.Exit(REFUSED) from None
         except KeyboardInterrupt:
             screen.fail("stopped. Files are written in full or not at all: none is left half-written.")
-            raise typer.Exit(INTERRUPTED) from None
+            raise typer.Exit(EXIT_CODE) from None
 
 
 app = typer.Typer(
@@ -65,6 +65,3 @@ def version(version: bool = typer.Option(False, "--version", help="Print the ver
 
         typer.echo(f"saltus {metadata.version('saltus')}")
         raise typer.Exit
-
-
-from saltus.cli import commands as commands  # noqa: E402  (registers the commands on `app`)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from saltus.cli.app import app
+from saltus.cli.app import app as app
 from saltus.errors import StudyError
 
 if TYPE_CHECKING:
@@ -269,8 +269,8 @@ def reproduce(
     folder = out or Path("saltus-runs") / (f"{paper}-quick" if quick else paper)
     matplotlib.use("Agg")  # no window, and none needed
     try:
-        with screen.replicating() as progress:
-            result = replication.reproduce(chosen, folder, figure or (), quick, threads, progress, screen.say)
+        with screen.reporting("bar") as (report, say):
+            result = replication.reproduce(chosen, folder, figure or (), quick, threads, report, say)
     except KeyboardInterrupt:
         screen.fail(f"stopped; what is computed is kept in {folder}. Go on with the same command.")
         raise
@@ -369,13 +369,13 @@ def cache_clear(
     """Delete the compiled kernels. They are built again when they are needed.
 
     The folder also knows the checksums of the result files that saltus wrote here, so that they are loaded at once. They stay: a file
-    whose checksum is forgotten is read by another process first, which takes a second. With --all they go too.
+    whose checksum is forgotten is read by another process first, which takes some tenths of a second. With --all they go too.
 
     Example: `saltus cache clear`
     """
     from saltus.cli import screen
     from saltus.codegen import cache as kernels
-    from saltus.results import known
+    from saltus.results.files import known
 
     count = kernels.clear()
     screen.say(f"deleted {count} {'entry' if count == 1 else 'entries'} from {kernels.folder()}")

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.analysis.motion.settled import LAST, settled
-from saltus.results.schema import period_text
-from saltus.study.answers.simulate_table import response_texts
+from saltus.results.dataset.schema import period_text
+from saltus.study.answers.simulate_rows import response_texts
 from saltus.study.table import Column, TextTable, quantity, table, words
 from saltus.units import from_si
 

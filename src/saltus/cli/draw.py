@@ -56,7 +56,7 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
     from saltus import plot
     from saltus.plot.choice import PICTURES, default_kind
     from saltus.results import load
-    from saltus.results.schema import kind_of
+    from saltus.results.dataset.schema import kind_of
 
     ds = load(result)
     possible = PICTURES.get(kind_of(ds), ())

@@ -18,7 +18,6 @@ from rich.table import Table
 from saltus.fence import printable
 
 if TYPE_CHECKING:
-    from saltus.replication import Progress
     from saltus.study.run.running import Report
     from saltus.study.table import TextTable
 
@@ -106,29 +105,6 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
 
     with telling(tell_json):
         yield report_json, say if kind != "json" else lambda _: None
-
-
-@contextmanager
-def replicating() -> Iterator[Callable[[Progress], None]]:
-    """Show how far a replication is; yields what to call with its progress."""
-    begin = time.perf_counter()
-
-    def text(progress: Progress) -> str:
-        running = f"; computing {', '.join(progress.running)}" if progress.running else ""
-        return _plain(
-            f"figure {progress.figure}: {progress.jobs_done} of {progress.jobs}{running}. In all {progress.done} of {progress.total}, "
-            f"{time.perf_counter() - begin:.0f} s"
-        )
-
-    from saltus.flow.progress import Lines
-
-    lines = Lines(lambda told: console(stderr=True).print(escape(f"saltus: {told}")))
-    with console(stderr=True).status("working ...") as status:
-        if sys.stderr.isatty():
-            yield lambda progress: status.update(text(progress))
-        else:
-            yield lambda progress: lines.show(progress.done / max(progress.total, 1))
-    say(f"computed in {time.perf_counter() - begin:.1f} s")
 
 
 def _log_lines() -> Callable[[Report], None]:

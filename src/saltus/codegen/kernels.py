@@ -1,10 +1,9 @@
 """The compiled flow of one equation, as the engine calls it: at once with sizes that are read as it runs, and made again once it has work.
 
-Three tiers give the same bits, for they are the same operations in the same order:
+Two tiers give the same bits, for they are the same operations in the same order:
 
 generic   the templates' machine code serves all equations and is on disk; only the equation is compiled, in a fraction of a second
-shape     sizes and tables are known to the compiler; one for all equations of one shape
-full      the equation too: one piece of code
+full      sizes, tables and the equation are known to the compiler: one piece of code
 
 A flow begins generic. Once it has worked for `STEADY_AFTER` seconds another process makes it again; it is kept on disk, and exchanged
 between two calls. The next process finds it there and begins with it.
@@ -28,7 +27,7 @@ from saltus.codegen.head import Constant, Head
 from saltus.codegen.interface import Interface
 from saltus.codegen.lane_ir import constants_ir, equation_ir
 
-GENERIC, SHAPE, FULL = TIERS = ("generic", "shape", "full")
+GENERIC, FULL = TIERS = ("generic", "full")
 #: What a flow becomes.
 STEADY = FULL
 #: Seconds of work after which a flow is made again: making it costs some three seconds of another processor, and gains a tenth.
@@ -101,6 +100,7 @@ class Kernels:
         self._lanes = int(head.constants.get("LANES", 1))  # type: ignore[arg-type]
         self._call = Call(interface.arguments)
         self._worked, self._asked = 0.0, threading.Lock()
+        self._memory = threading.local()
         self._kept: list[machine.Loaded] = []  # what has been called once may be running
         self.tier = ""
         order = self._order(STEADY)
@@ -108,11 +108,17 @@ class Kernels:
         self._begin(STEADY, [found]) if found is not None else self.exchange(GENERIC)
 
     def __getattr__(self, name: str) -> Any:
-        """What the layout says: CARRY, STEP_RECORDS, workspace()."""
+        """What the layout says: CARRY, STEP_RECORDS."""
         try:
             return self.__dict__["_layout"][name]
         except KeyError:
             raise AttributeError(f"{type(self).__name__} has no {name!r}") from None
+
+    def workspace(self) -> tuple:
+        """The memory that one call works in; one set for each thread, made once: many a call takes no longer than making it."""
+        if not hasattr(self._memory, "arrays"):
+            self._memory.arrays = self._layout["workspace"]()
+        return self._memory.arrays
 
     def propagate(self, *values: Any) -> int:
         """Call the kernel; kernels/batch.py says what its arrays are. Other threads go on meanwhile."""

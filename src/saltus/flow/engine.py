@@ -5,7 +5,6 @@ Every trajectory is independent of all others, so chunks may be cut and threads 
 
 from __future__ import annotations
 
-import threading
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -352,14 +351,11 @@ def _run_chunks(
 
     A single chunk that is moved by this very thread reports its own progress: a thread only for that would take as long as a short run.
     """
-    local = threading.local()
     here = len(chunks) == 1 and may_wait(stop)
 
     def work(chunk: _Chunk) -> None:
-        if not hasattr(local, "workspace"):
-            local.workspace = module.workspace()
         _open_tables(chunk, module)
-        _advance(chunk, module, local.workspace, stop, room, progress if here else None)
+        _advance(chunk, module, module.workspace(), stop, room, progress if here else None)
 
     show = None if progress is None or here else lambda _: progress(_share_done(chunks))
     on_threads(work, chunks, lambda *_: None, workers, show, stop)

@@ -53,7 +53,6 @@ class Flight:
     def __init__(self, system: System, method: Method, start: np.ndarray, parameters: np.ndarray, period: np.ndarray, longest: float):
         count = len(start)
         self._module = method.kernels(system.origin)
-        self._workspace = self._module.workspace()
         request = Request(start, parameters, period, 0.0, np.zeros(count, np.int64), np.zeros(count), Schedule.none(), None)
         _, self._arrays = allocate(request, start.shape[1], self._module)
         self._arrays["param"] = np.ascontiguousarray(parameters, float)
@@ -105,10 +104,10 @@ class Flight:
             rec_i=np.zeros((0, st.RECORD_INTEGERS), np.int64),
             rec_f=np.zeros((0, st.RECORD_FLOATS + states + 1)), rec_used=np.zeros(1, np.int64), data=self._data,
         )  # fmt: skip
-        steps = slice_of(states)
+        steps, workspace = slice_of(states), self._module.workspace()
         outcome, went_on = st.PAUSED, False
         while outcome == st.PAUSED or went_on:
-            outcome = self._module.propagate(*(call[name] for name in ARGUMENTS), steps, *self._workspace)
+            outcome = self._module.propagate(*(call[name] for name in ARGUMENTS), steps, *workspace)
             went_on = self._due is not None and resume(arrays, self._due)
             check_stop()
         self.age += periods

@@ -200,7 +200,7 @@ class ODE45(Method):
     ----------
     rtol, atol : float
         RelTol [-] and AbsTol [unit of each state]; the defaults are MATLAB's.
-    events : str
+    events : {"locate", "ignore"}
         ``"locate"``: integration stops at each contact and starts afresh, as with MATLAB's Events option. ``"ignore"``: contacts are
         stepped over and the right-hand side picks its side from the state, as without it.
     max_steps, max_events : int, optional

@@ -6,34 +6,19 @@ Every entry of :data:`MODELS` is a function that takes parameter values by name 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
 from saltus.errors import ParameterError, among, nearest, shown
-from saltus.models.aeroelastic import ENERGY as _AEROELASTIC_ENERGY
 from saltus.models.aeroelastic import aeroelastic
-from saltus.models.chain import ENERGY as _CHAIN_ENERGY
 from saltus.models.chain import chain
-from saltus.models.delangre import ENERGY as _DELANGRE_ENERGY
 from saltus.models.delangre import delangre
-from saltus.models.gear_pair import ENERGY as _GEAR_PAIR_ENERGY
 from saltus.models.gear_pair import gear_pair
 from saltus.system import System
 
 #: Every model by name.
-MODELS: dict[str, Callable[..., System]] = {
-    "delangre": delangre,
-    "chain": chain,
-    "gear_pair": gear_pair,
-    "aeroelastic": aeroelastic,
-}
-
-_ENERGIES: dict[str, dict[str, Callable[..., Any]]] = {
-    "delangre": _DELANGRE_ENERGY,
-    "chain": _CHAIN_ENERGY,
-    "gear_pair": _GEAR_PAIR_ENERGY,
-    "aeroelastic": _AEROELASTIC_ENERGY,
-}
+MODELS: dict[str, Callable[..., System]] = {one.__name__: one for one in (delangre, chain, gear_pair, aeroelastic)}
 
 
 def find(name: str) -> Callable[..., System]:
@@ -67,8 +52,7 @@ def energy(name: str) -> dict[str, Callable[..., Any]]:
     ParameterError
         If there is no such model.
     """
-    find(name)
-    return dict(_ENERGIES[name])
+    return dict(sys.modules[find(name).__module__].ENERGY)
 
 
 def describe() -> dict[str, str]:

@@ -13,16 +13,22 @@ r"""A typical wing section with freeplay in pitch, in a quasi-steady flow.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
-from saltus.models.by_name import by_name
-from saltus.system import System, freeplay, system
+from saltus.models.model import model
+from saltus.system import freeplay
 
 
-@by_name
-def aeroelastic(**values: Any) -> System:
+@model(
+    states={"plunge": "m", "pitch": "rad", "plunge_rate": "m/s", "pitch_rate": "rad/s"},
+    source="Typical section; values after the Texas A&M pitch-and-plunge apparatus (O'Neil, Strganac); pitch spring with freeplay.",
+)
+def aeroelastic(
+    t, plunge, pitch, plunge_rate, pitch_rate, *, airspeed="12 m/s", mass="12.4 kg/m", inertia="0.065 kg*m", imbalance=0.25,
+    half_chord="0.135 m", elastic_axis=-0.6, plunge_stiffness="2840 N/m^2", pitch_stiffness="40 N/rad", pitch_gap="0.01 rad",
+    plunge_damping="27.4 N*s/m^2", pitch_damping="0.036 N*s/rad", air_density="1.225 kg/m^3", lift_slope="6.28 1/rad",
+):  # fmt: skip
     """Typical wing section with freeplay in pitch, quasi-steady flow.
 
     States are ``plunge`` [m], ``pitch`` [rad] and their rates ``plunge_rate`` [m/s], ``pitch_rate`` [rad/s]. It isn't forced: in a
@@ -46,20 +52,6 @@ def aeroelastic(**values: Any) -> System:
     lift_slope          c_l        6.28 /rad
     ==================  =========  =================  =================================================
 
-    Parameters
-    ----------
-    **values
-        Parameter values: numbers in SI, or text with units such as ``pitch_gap="0.5 deg"``.
-
-    Returns
-    -------
-    System
-
-    Raises
-    ------
-    ParameterError, UnitError
-        If a name is unknown or a value is wrong.
-
     Notes
     -----
     The equations are those of every text on aeroelasticity; the values follow the pitch-and-plunge apparatus of Texas A&M University
@@ -68,43 +60,19 @@ def aeroelastic(**values: Any) -> System:
     At 12 m/s rest inside the freeplay and an oscillation of 0.0452 rad at 3.73 Hz are both stable; the latter is reached from
     pitch = 0.02 rad at rest. Without freeplay the section is linear; it flutters from 13.5002 m/s on.
     """
-    return _section().with_values(**values)
-
-
-@functools.cache
-def _section() -> System:
-    @system(
-        name="aeroelastic",
-        states="plunge pitch plunge_rate pitch_rate",
-        source="Typical section; values after the Texas A&M pitch-and-plunge apparatus (O'Neil, Strganac); pitch spring with freeplay.",
-        units={
-            "plunge": "m", "pitch": "rad", "plunge_rate": "m/s", "pitch_rate": "rad/s", "airspeed": "m/s", "mass": "kg/m",
-            "inertia": "kg*m", "imbalance": "1", "half_chord": "m", "elastic_axis": "1", "plunge_stiffness": "N/m^2",
-            "pitch_stiffness": "N/rad", "pitch_gap": "rad", "plunge_damping": "N*s/m^2", "pitch_damping": "N*s/rad",
-            "air_density": "kg/m^3", "lift_slope": "1/rad",
-        },
-    )  # fmt: skip
-    def section(
-        t, plunge, pitch, plunge_rate, pitch_rate, *, airspeed=12.0, mass=12.4, inertia=0.065, imbalance=0.25,
-        half_chord=0.135, elastic_axis=-0.6, plunge_stiffness=2840.0, pitch_stiffness=40.0, pitch_gap=0.01, plunge_damping=27.4,
-        pitch_damping=0.036, air_density=1.225, lift_slope=6.28,
-    ):  # fmt: skip
-        """A typical wing section with freeplay in pitch, in a quasi-steady flow."""
-        incidence = pitch + plunge_rate / airspeed + (0.5 - elastic_axis) * half_chord * pitch_rate / airspeed
-        lift = air_density * airspeed**2 * half_chord * lift_slope * incidence
-        moment = (0.5 + elastic_axis) * half_chord * lift
-        down = -lift - plunge_damping * plunge_rate - plunge_stiffness * plunge
-        turn = moment - pitch_damping * pitch_rate - freeplay(pitch, stiffness=pitch_stiffness, gap=pitch_gap)
-        coupling = mass * imbalance * half_chord
-        determinant = mass * inertia - coupling**2
-        return (
-            plunge_rate,
-            pitch_rate,
-            (inertia * down - coupling * turn) / determinant,
-            (mass * turn - coupling * down) / determinant,
-        )
-
-    return section
+    incidence = pitch + plunge_rate / airspeed + (0.5 - elastic_axis) * half_chord * pitch_rate / airspeed
+    lift = air_density * airspeed**2 * half_chord * lift_slope * incidence
+    moment = (0.5 + elastic_axis) * half_chord * lift
+    down = -lift - plunge_damping * plunge_rate - plunge_stiffness * plunge
+    turn = moment - pitch_damping * pitch_rate - freeplay(pitch, stiffness=pitch_stiffness, gap=pitch_gap)
+    coupling = mass * imbalance * half_chord
+    determinant = mass * inertia - coupling**2
+    return (
+        plunge_rate,
+        pitch_rate,
+        (inertia * down - coupling * turn) / determinant,
+        (mass * turn - coupling * down) / determinant,
+    )
 
 
 # -- energy --------------------------------------------------------------------------------------------------------------------

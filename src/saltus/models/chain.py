@@ -9,16 +9,23 @@ where :math:`f_i` is zero inside a symmetric clearance and a linear spring beyon
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
-from saltus.models.by_name import by_name
-from saltus.system import System, cos, freeplay, pi, system
+from saltus.models.model import model
+from saltus.system import cos, freeplay, pi
 
 
-@by_name
-def chain(**values: Any) -> System:
+@model(
+    states={"x1": "m", "x2": "m", "v1": "m/s", "v2": "m/s"},
+    forced_at="frequency",
+    source="Textbook configuration; round values chosen for saltus.",
+)
+def chain(
+    t, x1, x2, v1, v2, *, first_mass="1 kg", second_mass="0.5 kg", ground_stiffness="1e3 N/m", coupling_stiffness="400 N/m",
+    ground_damping="4 N*s/m", coupling_damping="2 N*s/m", ground_contact_stiffness="20e3 N/m", ground_gap="1 mm",
+    coupling_contact_stiffness="10e3 N/m", coupling_gap="0.5 mm", force="2 N", frequency="7 Hz",
+):  # fmt: skip
     """Chain of two masses with two clearances, shaken harmonically.
 
     States are the displacements ``x1``, ``x2`` [m] and velocities ``v1``, ``v2`` [m/s]; it is forced at ``frequency``.
@@ -39,59 +46,19 @@ def chain(**values: Any) -> System:
     frequency                   7 Hz       of the force
     ==========================  =========  =================================================
 
-    Parameters
-    ----------
-    **values
-        Parameter values: numbers in SI, or text with units such as ``ground_gap="2 mm"``.
-
-    Returns
-    -------
-    System
-
-    Raises
-    ------
-    ParameterError, UnitError
-        If a name is unknown or a value is wrong.
-
     Notes
     -----
     A textbook configuration with round values chosen here, not one publication's. One clearance acts on a state, the other on the
     difference of two. Without contact it is linear; its undamped natural frequencies are then 3.412 Hz and 6.639 Hz. At the default
     values it settles from rest to an orbit of one forcing period with 12 contacts a period.
     """
-    return _chain().with_values(**values)
-
-
-@functools.cache
-def _chain() -> System:
-    @system(
-        name="chain",
-        states="x1 x2 v1 v2",
-        forced_at="frequency",
-        source="Textbook configuration; round values chosen for saltus.",
-        units={
-            "x1": "m", "x2": "m", "v1": "m/s", "v2": "m/s", "first_mass": "kg", "second_mass": "kg", "ground_stiffness": "N/m",
-            "coupling_stiffness": "N/m", "ground_damping": "N*s/m", "coupling_damping": "N*s/m", "ground_contact_stiffness": "N/m",
-            "ground_gap": "m", "coupling_contact_stiffness": "N/m", "coupling_gap": "m", "force": "N", "frequency": "Hz",
-        },
-    )  # fmt: skip
-    def rig(
-        t, x1, x2, v1, v2, *, first_mass=1.0, second_mass=0.5, ground_stiffness=1e3, coupling_stiffness=400.0, ground_damping=4.0,
-        coupling_damping=2.0, ground_contact_stiffness=2e4, ground_gap=1e-3, coupling_contact_stiffness=1e4, coupling_gap=0.5e-3,
-        force=2.0, frequency=7.0,
-    ):  # fmt: skip
-        """Two masses in a row with two clearances: one to the ground, one between the masses."""
-        stretch, rate = x2 - x1, v2 - v1
-        ground = ground_stiffness * x1 + ground_damping * v1 + freeplay(x1, stiffness=ground_contact_stiffness, gap=ground_gap)
-        coupling = (
-            coupling_stiffness * stretch
-            + coupling_damping * rate
-            + freeplay(stretch, stiffness=coupling_contact_stiffness, gap=coupling_gap)
-        )
-        drive = force * cos(2 * pi * frequency * t)
-        return v1, v2, (drive - ground + coupling) / first_mass, -coupling / second_mass
-
-    return rig
+    stretch, rate = x2 - x1, v2 - v1
+    ground = ground_stiffness * x1 + ground_damping * v1 + freeplay(x1, stiffness=ground_contact_stiffness, gap=ground_gap)
+    coupling = (
+        coupling_stiffness * stretch + coupling_damping * rate + freeplay(stretch, stiffness=coupling_contact_stiffness, gap=coupling_gap)
+    )
+    drive = force * cos(2 * pi * frequency * t)
+    return v1, v2, (drive - ground + coupling) / first_mass, -coupling / second_mass
 
 
 # -- energy --------------------------------------------------------------------------------------------------------------------

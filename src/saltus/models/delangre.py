@@ -12,25 +12,30 @@ force for the field of the magnet.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
-from saltus.errors import ParameterError, among, nearest, shown
-from saltus.models.by_name import by_name
-from saltus.system import System, cos, pi, piecewise, system
+from saltus.models.model import model
+from saltus.system import cos, pi, piecewise
 
 _SOURCE = (
     "Experiment: de Langre et al. Equations and values: B. E. Saunders, R. Vasconcellos, R. J. Kuether, A. Abdelkefi, Relationship between "
     "the contact force strength and numerical inaccuracies in piecewise-smooth systems (2021), eqs. (1)-(4), Table 1."
 )
 
-#: Lower and upper gap of each case [m].
-CASES = {"a": (0.4e-3, 0.4e-3), "b": (0.0, 0.4e-3), "c": (0.0, 0.8e-3)}
+#: Lower and upper gap of each case.
+CASES = {
+    "a": {"lower_gap": "0.4 mm", "upper_gap": "0.4 mm"},
+    "b": {"lower_gap": "0 mm", "upper_gap": "0.4 mm"},
+    "c": {"lower_gap": "0 mm", "upper_gap": "0.8 mm"},
+}
 
 
-@by_name
-def delangre(case: str = "b", **values: Any) -> System:
+@model(states={"x": "m", "v": "m/s"}, forced_at="frequency", source=_SOURCE, cases=CASES, case="b")
+def delangre(
+    t, x, v, *, mass="3 kg", damping_ratio=0.03, natural_frequency="5 Hz", cubic="7e8 N/m^3", contact_stiffness="14e3 N/m",
+    lower_gap="0 mm", upper_gap="0.4 mm", force="4 N", frequency="15 Hz",
+):  # fmt: skip
     """Forced Duffing oscillator with freeplay: the rig of de Langre et al.
 
     States are the displacement ``x`` [m] and velocity ``v`` [m/s] of the block; it is forced at ``frequency``.
@@ -53,17 +58,6 @@ def delangre(case: str = "b", **values: Any) -> System:
     ----------
     case : {"a", "b", "c"}
         The gaps (lower, upper): a = (0.4, 0.4) mm, b = (0, 0.4) mm, c = (0, 0.8) mm. The paper's "b4" is case b with a force of 4 N.
-    **values
-        Parameter values: numbers in SI, or text with units such as ``frequency="15 Hz"``. They win over the case's gaps.
-
-    Returns
-    -------
-    System
-
-    Raises
-    ------
-    ParameterError, UnitError
-        If the case or a name is unknown or a value is wrong.
 
     Notes
     -----
@@ -71,36 +65,11 @@ def delangre(case: str = "b", **values: Any) -> System:
     stable orbit of one forcing period that swings 5.440 mm either way and meets the springs 4 times a period. The exponents of every
     orbit add up to -2 zeta omega_n = -1.884955592 /s.
     """
-    if not among(case, CASES):
-        raise ParameterError(f"the rig has no case {shown(case)}. {nearest(case, CASES)}")
-    lower_gap, upper_gap = CASES[case]
-    return _rig().with_values(**{"lower_gap": lower_gap, "upper_gap": upper_gap, **values})
-
-
-@functools.cache
-def _rig() -> System:
-    @system(
-        name="delangre",
-        states="x v",
-        forced_at="frequency",
-        source=_SOURCE,
-        units={
-            "x": "m", "v": "m/s", "mass": "kg", "damping_ratio": "1", "natural_frequency": "Hz", "cubic": "N/m^3",
-            "contact_stiffness": "N/m", "lower_gap": "m", "upper_gap": "m", "force": "N", "frequency": "Hz",
-        },
-    )  # fmt: skip
-    def rig(
-        t, x, v, *, mass=3.0, damping_ratio=0.03, natural_frequency=5.0, cubic=7e8, contact_stiffness=1.4e4, lower_gap=0.0,
-        upper_gap=0.4e-3, force=4.0, frequency=15.0,
-    ):  # fmt: skip
-        """A block on beams between two springs with gaps, shaken by an electromagnet."""
-        wn, w = 2 * pi * natural_frequency, 2 * pi * frequency
-        beyond = piecewise((x + lower_gap, x < -lower_gap), (x - upper_gap, x > upper_gap), otherwise=0)
-        # The order of eq. (3), which is the one whose rounding in ode45 gives the digits of the paper's Table 2 (docs/decisions/0007).
-        restoring = -2 * damping_ratio * wn * v - wn**2 * x - cubic / mass * x**3 - contact_stiffness / mass * beyond
-        return v, restoring + force * (1 - 18 / w**2) * cos(w * t) / mass
-
-    return rig
+    wn, w = 2 * pi * natural_frequency, 2 * pi * frequency
+    beyond = piecewise((x + lower_gap, x < -lower_gap), (x - upper_gap, x > upper_gap), otherwise=0)
+    # The order of eq. (3), which is the one whose rounding in ode45 gives the digits of the paper's Table 2 (docs/decisions/0007).
+    restoring = -2 * damping_ratio * wn * v - wn**2 * x - cubic / mass * x**3 - contact_stiffness / mass * beyond
+    return v, restoring + force * (1 - 18 / w**2) * cos(w * t) / mass
 
 
 # -- energy --------------------------------------------------------------------------------------------------------------------

@@ -11,16 +11,22 @@ in :math:`|x| < b`; below :math:`-b` their backs touch.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
-from saltus.models.by_name import by_name
-from saltus.system import System, cos, freeplay, pi, sin, sqrt, system
+from saltus.models.model import model
+from saltus.system import cos, freeplay, pi, sin, sqrt
 
 
-@by_name
-def gear_pair(**values: Any) -> System:
+@model(
+    states={"x": "m", "v": "m/s"},
+    forced_at="mesh_frequency",
+    source="A. Kahraman, R. Singh, Non-linear dynamics of a spur gear pair, J. Sound Vib. 142(1), 49-75 (1990); own values.",
+)
+def gear_pair(
+    t, x, v, *, mesh_mass="0.25 kg", damping_ratio=0.05, mesh_stiffness="4e8 N/m", stiffness_variation=0.2, gap="20 um",
+    mean_force="800 N", alternating_force="400 N", mesh_frequency="6e3 Hz",
+):  # fmt: skip
     """Spur gear pair with backlash and varying mesh stiffness (after Kahraman and Singh).
 
     States are the dynamic transmission error ``x`` [m] and its rate ``v`` [m/s]; it is forced at ``mesh_frequency``.
@@ -38,20 +44,6 @@ def gear_pair(**values: Any) -> System:
     mesh_frequency       f        6 kHz        teeth a second
     ===================  =======  ===========  ===================================================================
 
-    Parameters
-    ----------
-    **values
-        Parameter values: numbers in SI, or text with units such as ``gap="50 um"``.
-
-    Returns
-    -------
-    System
-
-    Raises
-    ------
-    ParameterError, UnitError
-        If a name is unknown or a value is wrong.
-
     Notes
     -----
     The equation of A. Kahraman and R. Singh, Non-linear dynamics of a spur gear pair, Journal of Sound and Vibration 142(1), 49-75 (1990),
@@ -59,32 +51,10 @@ def gear_pair(**values: Any) -> System:
     F_a/(k b) = 0.05, natural frequency 6366 Hz. While the teeth stay in contact the system is linear in x; so it is up to 5 kHz. At 6 kHz
     the teeth part once in each mesh period, and x swings between 18.05 µm and 25.74 µm.
     """
-    return _gear_pair().with_values(**values)
-
-
-@functools.cache
-def _gear_pair() -> System:
-    @system(
-        name="gear_pair",
-        states="x v",
-        forced_at="mesh_frequency",
-        source="A. Kahraman, R. Singh, Non-linear dynamics of a spur gear pair, J. Sound Vib. 142(1), 49-75 (1990); own values.",
-        units={
-            "x": "m", "v": "m/s", "mesh_mass": "kg", "damping_ratio": "1", "mesh_stiffness": "N/m", "stiffness_variation": "1", "gap": "m",
-            "mean_force": "N", "alternating_force": "N", "mesh_frequency": "Hz",
-        },
-    )  # fmt: skip
-    def gears(
-        t, x, v, *, mesh_mass=0.25, damping_ratio=0.05, mesh_stiffness=4e8, stiffness_variation=0.2, gap=20e-6, mean_force=800.0,
-        alternating_force=400.0, mesh_frequency=6e3,
-    ):  # fmt: skip
-        """A spur gear pair with backlash: one degree of freedom along the line of action."""
-        wave = cos(2 * pi * mesh_frequency * t)
-        mesh = freeplay(x, stiffness=mesh_stiffness, gap=gap) * (1 + stiffness_variation * wave)
-        damper = 2 * damping_ratio * sqrt(mesh_stiffness * mesh_mass) * v
-        return v, (mean_force + alternating_force * wave - damper - mesh) / mesh_mass
-
-    return gears
+    wave = cos(2 * pi * mesh_frequency * t)
+    mesh = freeplay(x, stiffness=mesh_stiffness, gap=gap) * (1 + stiffness_variation * wave)
+    damper = 2 * damping_ratio * sqrt(mesh_stiffness * mesh_mass) * v
+    return v, (mean_force + alternating_force * wave - damper - mesh) / mesh_mass
 
 
 # -- energy --------------------------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from saltus.plot.basins import paint
 from saltus.plot.palette import hues
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, style
-from saltus.results.schema import AGREEMENT, kind_text
+from saltus.results.dataset.schema import AGREEMENT, kind_text
 
 #: Colour and name of each value of the agreement; differences are the news.
 _LOOKS = {

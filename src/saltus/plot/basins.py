@@ -22,7 +22,7 @@ from saltus.plot import maps
 from saltus.plot.palette import shades
 from saltus.plot.picture import check, picture
 from saltus.plot.style import QUIET, Scale
-from saltus.results.schema import BASINS
+from saltus.results.dataset.schema import BASINS
 from saltus.units import from_si
 
 #: Shades of a hue; the middle one is the hue itself.

@@ -14,7 +14,7 @@ from saltus.plot import kinds, regions
 from saltus.plot import response_points as points
 from saltus.plot.picture import caller, picture
 from saltus.plot.style import QUIET, Scale
-from saltus.results.schema import response_name, sample_name, states_of
+from saltus.results.dataset.schema import response_name, sample_name, states_of
 
 #: What the vertical axis shows, by what was sampled.
 _SHOWN = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
-from saltus.results.schema import kind_of, parameters_of
+from saltus.results.dataset.schema import kind_of, parameters_of
 
 #: The functions of saltus.plot that draw each kind of result, the usual one first.
 PICTURES: dict[str, tuple[str, ...]] = {

@@ -17,8 +17,8 @@ from saltus.plot import kinds
 from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, Scale
-from saltus.results.measured import read_measured
-from saltus.results.schema import states_of
+from saltus.results.dataset.schema import states_of
+from saltus.results.files.measured import read_measured
 from saltus.units import to_si
 
 Quantity = Literal[

@@ -21,7 +21,7 @@ from saltus.plot.history import history
 from saltus.plot.phase import phase
 from saltus.plot.picture import caller, check, picture
 from saltus.plot.style import display_scale, style
-from saltus.results import schema
+from saltus.results.dataset import schema
 
 #: Forcing periods in the time history of a response that doesn't repeat, and the fewest of one that does: it takes two to see a repeat.
 _SHOWN_IF_APERIODIC, _FEWEST = 12, 2

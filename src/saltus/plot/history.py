@@ -16,7 +16,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
-from saltus.results.schema import TRAJECTORY, contact_name, equations_of, forcing_period, states_of
+from saltus.results.dataset.schema import TRAJECTORY, contact_name, equations_of, forcing_period, states_of
 
 #: Marker, face and name of each kind of contact. Hollow means undecided.
 _MARKERS: dict[str, dict[str, Any]] = {

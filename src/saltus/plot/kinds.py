@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.plot.palette import hues, shades
-from saltus.results.schema import period_text
+from saltus.results.dataset.schema import period_text
 
 #: Periods with a hue of their own; longer ones share the next. More hues than these can't be distinguished as small dots.
 OWN_HUES = 8

@@ -14,7 +14,7 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.schema import ENERGY, IMPACTS
+from saltus.results.dataset.schema import ENERGY, IMPACTS
 
 #: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a motion that repeats, and how often each
 #: must be seen.

@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatter
 
 from saltus.errors import ParameterError
+from saltus.intervals import wilson
 from saltus.plot import axes as draw
 from saltus.plot.picture import caller, picture
 from saltus.plot.response_points import is_log, parameter_scale
 from saltus.plot.style import CYCLE
-from saltus.results.intervals import wilson
-from saltus.results.schema import METHODS
+from saltus.results.dataset.schema import METHODS
 
 #: Pieces of the axis over which medians and shares are taken: the eye can't follow 2000 values, and a share needs some dozen.
 PIECES = 30

@@ -16,8 +16,8 @@ from matplotlib.text import Text
 
 from saltus.arguments import checked
 from saltus.errors import ParameterError
-from saltus.results import schema
-from saltus.results.reader import reader
+from saltus.results.dataset import schema
+from saltus.results.dataset.reader import reader
 
 P = ParamSpec("P")
 R = TypeVar("R")

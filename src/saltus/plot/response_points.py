@@ -15,7 +15,7 @@ from saltus.errors import ParameterError
 from saltus.plot import kinds
 from saltus.plot.picture import caller, check
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.schema import RESPONSES, event_name, parameters_of, response_name
+from saltus.results.dataset.schema import RESPONSES, event_name, parameters_of, response_name
 
 #: What a picture of responses takes: a Dataset, or several by their names.
 Source = xr.Dataset | Mapping[str, xr.Dataset]

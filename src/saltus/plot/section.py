@@ -14,7 +14,7 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
-from saltus.results.schema import SECTION, states_of
+from saltus.results.dataset.schema import SECTION, states_of
 
 #: What can stand on an axis besides the states: variable and name.
 _OTHERS = {"phase": ("crossing_phase", "phase of the forcing, t/T mod 1"), "time": ("crossing_time", "time")}

@@ -14,7 +14,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.plot.picture import caller
-from saltus.results.schema import contact_name, equations_of, forcing_period, sample_dim, states_of
+from saltus.results.dataset.schema import contact_name, equations_of, forcing_period, sample_dim, states_of
 from saltus.units import from_si
 
 Periods = int | float | tuple[float, float] | None

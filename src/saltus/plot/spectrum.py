@@ -15,7 +15,7 @@ from saltus.plot import axes as draw
 from saltus.plot import selection
 from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
-from saltus.results.schema import SPECTRUM, states_of
+from saltus.results.dataset.schema import SPECTRUM, states_of
 
 #: The picture reaches down to this share of the largest amplitude, and up to the last frequency that has so much; the rest is what
 #: sampling folds back.

@@ -1,26 +1,23 @@
 """Replications: a published paper's figures drawn again, and each of its claims held against the data, by one command.
 
-A paper is a list of *jobs* (each gives one Dataset, kept in a file), *pictures* drawn from them, and *claims*, each with a rule in words and
-a judge that applies it to the data. Nothing here knows a result in advance.
+A paper is a folder of study files, *jobs* (each gives one Dataset, kept as a study keeps its results), *pictures* drawn from them, and
+*claims*: rows with the quantities that decide them, rules and limits. Nothing here knows a result in advance.
 """
 
-from saltus.replication.job import Job, JobError
-from saltus.replication.papers import Numbers, Paper, Picture, find, folder_of, names
+from saltus.replication.job import Job
+from saltus.replication.papers import Claim, Numbers, Paper, Picture, find, folder_of, names
 from saltus.replication.run import Replication, reproduce
 from saltus.replication.tables import claims_table, verdict_table
-from saltus.replication.verdict import Check, Claim, Finding
-from saltus.replication.workers import Progress
+from saltus.replication.verdict import Check, Finding
 
 __all__ = [
     "Check",
     "Claim",
     "Finding",
     "Job",
-    "JobError",
     "Numbers",
     "Paper",
     "Picture",
-    "Progress",
     "Replication",
     "claims_table",
     "find",

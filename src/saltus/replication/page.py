@@ -12,12 +12,12 @@ from string import Template
 from typing import TYPE_CHECKING
 
 from saltus.flow.threads import usable_processors
-from saltus.replication.verdict import FAILS, HOLDS, IN_PART, RULE_OF_ALL, UNDECIDED, VERDICTS, Claim, Finding
-from saltus.results.files import replacing
+from saltus.replication.verdict import FAILS, HOLDS, IN_PART, RULE_OF_ALL, UNDECIDED, VERDICTS, Finding
+from saltus.results.files.atomic import replacing
 from saltus.results.provenance import versions
 
 if TYPE_CHECKING:
-    from saltus.replication.papers import Picture
+    from saltus.replication.papers import Claim, Picture
     from saltus.replication.run import Replication
     from saltus.study.table import TextTable
 
@@ -45,7 +45,8 @@ def page(result: Replication) -> str:
     return Template(_part("page.html")).substitute(
         name=_text(paper.name), css=_part("page.css"), version=_text(_version()),
         kind=_text(kind), title=_text(paper.title), citation=_text(paper.citation), about=_text(paper.about), tally=_tally(result),
-        nav=_nav(result), rule=_text(RULE_OF_ALL), glance=_glance(result), figures="\n".join(_figure(result, one) for one in result.figures),
+        nav=_nav(result), rule=_text(RULE_OF_ALL), glance=_glance(result),
+        figures="\n".join(_figure(result, one) for one in result.figures),
         made=_made(result), foot=_text(f"Made by: {command(result)}"),
     )  # fmt: skip
 
@@ -135,7 +136,8 @@ def _table(table: TextTable) -> str:
     head = "".join(f"<th>{_text(column)}</th>" for column in table.columns)
     rows = "".join("<tr>" + "".join(f'<td class="number">{_text(cell)}</td>' for cell in row) + "</tr>" for row in table.rows)
     notes = "".join(f'<p class="quiet">{_text(note)}</p>' for note in table.notes)
-    return f'<div class="scroll"><table><caption>{_text(table.title)}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{notes}'
+    inner = f"<caption>{_text(table.title)}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody>"
+    return f'<div class="scroll"><table>{inner}</table></div>{notes}'
 
 
 def _missing(result: Replication, figure: str) -> list[str]:
@@ -164,23 +166,21 @@ def _claim(result: Replication, claim: Claim, finding: Finding) -> str:
 # -- end -----------------------------------------------------------------------------------------------------------------------
 def _made(result: Replication) -> str:
     """What was computed, on what, for how long."""
-    shelf = result.shelf
-    names = {*shelf.computed, *shelf.kept}
-    total = sum(shelf.seconds.get(name, 0.0) for name in names)
-    python = versions()
-    packages = ", ".join(f"{name} {value}" for name, value in python.items())
+    packages = ", ".join(f"{name} {value}" for name, value in versions().items())
+    new, kept = len(result.computed), len(result.data) - len(result.computed)
     size = (
         "Grids and sweeps are coarser than in the full run, and shorter."
         if result.quick
         else "Grids and sweeps are those of the study files."
     )
     return (
-        f"<p>{_many(len(shelf.computed), 'computation')} in this run, {len(shelf.kept)} from an earlier one with the same settings and code. "
-        f"This run took {result.seconds:.0f} s, with up to {_many(result.threads, 'computation')} at a time on "
-        f"{_many(usable_processors(), 'usable core')} ({_text(platform.machine())}, {_text(platform.system())}). The times from begin to end of "
-        f"all computations, the earlier ones too, add up to {total:.0f} s; those that run at a time slow each other. {size}</p>"
+        f"<p>{_many(new, 'computation')} in this run, {kept} from an earlier one with the same settings and code. "
+        f"This run took {result.seconds:.0f} s, with {_many(result.threads, 'thread')} on "
+        f"{_many(usable_processors(), 'usable core')} ({_text(platform.machine())}, {_text(platform.system())}). All computations, "
+        f"the earlier ones too, took {result.seconds_in_all:.0f} s. {size}</p>"
         f'<p class="quiet">{_text(packages)}</p>'
-        f"<p>Every number comes from Datasets that stand beside this file in <code>data/</code>; each knows its equations, values and method "
-        f"(<code>saltus plot</code> draws them, <code>sl.load</code> reads them). The claims, both answers and the verdicts are also in "
-        f"<code>{_text(result.claims_file.name)}</code>. The study files are in <code>replications/{_text(result.paper.name)}/</code>.</p>"
+        f"<p>Every number comes from Datasets that stand beside this file in <code>data/</code>; each knows its equations, values and "
+        f"method (<code>saltus plot</code> draws them, <code>sl.load</code> reads them). The claims, both answers and the verdicts are "
+        f"also in <code>{_text(result.claims_file.name)}</code>. The study files are in "
+        f"<code>replications/{_text(result.paper.name)}/</code>.</p>"
     )

@@ -1,24 +1,30 @@
-"""The papers that can be reproduced, and where their study files stand."""
+"""The papers that can be reproduced: rows beside their study files, and the few functions that can't be rows."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+import importlib.util
+import sys
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
+from functools import cache, partial
+from itertools import product
 from pathlib import Path
+from string import Formatter
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, nearest
+from saltus.replication.claims import Data, Row
+from saltus.study.identity import PACKAGE
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from saltus.replication.job import Job
-    from saltus.replication.verdict import Claim
+    from saltus.replication.verdict import Finding
     from saltus.study.table import TextTable
 
-#: Name of each paper: what it is. Its module is saltus.replication.NAME.
+#: Name of each paper: what it is. Its folder is replications/NAME.
 _PAPERS = {
     "saunders2021": "Contact force strength and numerical inaccuracies in piecewise-smooth systems: ode45 with and without event location",
 }
@@ -47,7 +53,7 @@ class Picture:
     title: str
     caption: str
     needs: tuple[str, ...]
-    draw: Callable[[Mapping[str, xr.Dataset]], Any]
+    draw: Callable[[Data], Any]
 
 
 @dataclass(frozen=True)
@@ -69,7 +75,38 @@ class Numbers:
     figure: str
     name: str
     needs: tuple[str, ...]
-    make: Callable[[Mapping[str, xr.Dataset]], TextTable]
+    make: Callable[[Data], TextTable]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper, and how it is judged.
+
+    Attributes
+    ----------
+    id : str
+        Short name, also its anchor in the report.
+    figure : str
+        The figure that shows it.
+    says : str
+        The claim.
+    where : str
+        Where the paper says so.
+    rule : str
+        The rule in words.
+    needs : tuple of str
+        Names of the jobs whose Datasets decide it.
+    judge : callable
+        From Datasets by name to a :class:`~saltus.replication.verdict.Finding`.
+    """
+
+    id: str
+    figure: str
+    says: str
+    where: str
+    rule: str
+    needs: tuple[str, ...]
+    judge: Callable[[Data], Finding]
 
 
 @dataclass(frozen=True)
@@ -110,6 +147,7 @@ def names() -> dict[str, str]:
     return dict(_PAPERS)
 
 
+@cache
 def find(name: str) -> Paper:
     """A paper by its name.
 
@@ -118,23 +156,80 @@ def find(name: str) -> Paper:
     ParameterError
         If there is none of this name; the message offers the nearest.
     """
-    if name not in _PAPERS:
-        raise ParameterError(f"no paper {name!r} can be reproduced. {nearest(name, _PAPERS)}")
-    paper: Paper = importlib.import_module(f"saltus.replication.{name}").PAPER
-    return paper
+    folder = folder_of(name)
+    paper, claims = (tomllib.loads((folder / file).read_text(encoding="utf-8")) for file in ("paper.toml", "claims.toml"))
+    sets, pictures, tables = (paper.pop(key) for key in ("sets", "picture", "table"))
+    return Paper(
+        name=name, jobs=code(name, "jobs").jobs, **paper,
+        pictures=tuple(Picture(**_part(name, row, sets, "draw")) for row in pictures),
+        tables=tuple(Numbers(**_part(name, row, sets, "make")) for row in tables),
+        claims=tuple(_claim(name, row, sets, claims["texts"]) for row in _whole(claims["claim"])),
+    )  # fmt: skip
 
 
+def _part(paper: str, row: Mapping[str, Any], sets: Mapping[str, Sequence[str]], function: str) -> dict[str, Any]:
+    """What a row says, with names of jobs in place of their patterns, and the function in place of its name."""
+    said = {key: value for key, value in row.items() if key not in ("data", "with")}
+    return {**said, "needs": tuple(_expanded(row["data"], sets)), function: _function(paper, row[function], row.get("with", {}))}
+
+
+def _claim(paper: str, row: Mapping[str, Any], sets: Mapping[str, Sequence[str]], texts: Mapping[str, str]) -> Claim:
+    """A claim from its row."""
+    said = _part(paper, row, sets, "read")
+    claim = {name: said.pop(name) for name in ("id", "figure", "says", "where", "rule", "needs")}
+    why = said.pop("why", ())
+    judged = Row(**said, why=({"text": why},) if isinstance(why, str) else tuple(why))
+    return Claim(**{**claim, "where": claim["where"].format(**texts)}, judge=judged.judge)
+
+
+def _whole(rows: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
+    """The rows of claims; what a row doesn't say is as in the row that it is ``like``."""
+    known = {row["id"]: row for row in rows}
+    for row in rows:
+        whole = {**known[row["like"]], **row} if "like" in row else row
+        yield {key: value for key, value in whole.items() if key != "like"}
+
+
+def _expanded(patterns: Sequence[str], sets: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Names of jobs: ``{ends}`` in a pattern stands for each text of this set in turn."""
+    for pattern in patterns:
+        fields = [name for _, name, _, _ in Formatter().parse(pattern) if name]
+        for values in product(*(sets[name] for name in fields)):
+            yield pattern.format(**dict(zip(fields, values, strict=True)))
+
+
+def _function(paper: str, place: str, arguments: Mapping[str, Any]) -> Callable[[Data], Any]:
+    """The function ``module.name`` of a paper, with the arguments that its row gives."""
+    module, _, name = place.partition(".")
+    return partial(getattr(code(paper, module), name), **arguments)
+
+
+# -- files that come with saltus ---------------------------------------------------------------------------------------------------
 def folder_of(name: str) -> Path:
-    """The folder of a paper's study files: in an installed package beside its modules, in the repository beside ``src``.
+    """The folder of a paper: in an installed package beside its modules, in the repository beside ``src``.
 
     Raises
     ------
     ParameterError
-        If neither is there.
+        If there is no paper of this name, or its folder is neither here nor there.
     """
-    package = Path(str(resources.files("saltus")))
-    places = [package / "replications" / name, package.parents[1] / "replications" / name]
-    for place in places:
-        if place.is_dir():
-            return place
-    raise ParameterError(f"the study files of {name} are missing: no folder {' or '.join(map(str, places))}. Install saltus again.")
+    if name not in _PAPERS:
+        raise ParameterError(f"no paper {name!r} can be reproduced. {nearest(name, _PAPERS)}")
+    beside = PACKAGE.parents[1] if PACKAGE.parent.name == "src" else PACKAGE
+    place = next((one for one in (PACKAGE / "replications" / name, beside / "replications" / name) if one.is_dir()), None)
+    if place is None:
+        raise ParameterError(f"the study files of {name} are missing: no folder {PACKAGE / 'replications' / name}. Install saltus again.")
+    return place
+
+
+def code(name: str, module: str) -> ModuleType:
+    """A module of a paper's folder, which comes with saltus. Nothing is ever imported from a folder that a user names."""
+    package = f"saltus_{name}"
+    if package not in sys.modules:
+        folder = folder_of(name)
+        spec = importlib.util.spec_from_file_location(package, folder / "__init__.py", submodule_search_locations=[str(folder)])
+        assert spec is not None
+        assert spec.loader is not None
+        sys.modules[package] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[package])
+    return importlib.import_module(f"{package}.{module}")

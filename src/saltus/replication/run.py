@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusError
 from saltus.flow.threads import usable_processors
-from saltus.replication.job import JobError, Shelf
-from saltus.replication.papers import Numbers, Paper, Picture
+from saltus.replication.job import SECONDS, Job
+from saltus.replication.papers import Claim, Numbers, Paper, Picture, folder_of
 from saltus.replication.tables import claims_table
-from saltus.replication.verdict import Claim, Finding, undecided
-from saltus.replication.workers import Progress, Workers, cause
-from saltus.results.files import ResultFileError, replacing, usable_folder
-from saltus.results.lock import WHOLE, locked
+from saltus.replication.verdict import Finding, undecided
+from saltus.results.files.atomic import ResultFileError, replacing, usable_folder
+from saltus.results.store.lock import WHOLE, locked
+from saltus.study.run.running import Report, Resources, Running
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,12 +47,12 @@ class Replication:
         The figures that were asked for.
     folder : Path
         Where everything is.
-    shelf : Shelf
-        What was computed, what was there already, and how long each job took.
     threads : int
-        Jobs computed at a time.
+        Threads of each computation.
     data : dict of str to Dataset
         Every job's result, by name.
+    computed : list of str
+        Jobs computed by this run; the results of the others were there.
     findings : list of (Claim, Finding)
         In the order of the report.
     pictures : list of (Picture, Path)
@@ -68,9 +69,9 @@ class Replication:
     quick: bool
     figures: tuple[str, ...]
     folder: Path
-    shelf: Shelf
     threads: int
     data: dict[str, xr.Dataset] = field(default_factory=dict)
+    computed: list[str] = field(default_factory=list)
     findings: list[tuple[Claim, Finding]] = field(default_factory=list)
     pictures: list[tuple[Picture, Path]] = field(default_factory=list)
     tables: list[tuple[Numbers, TextTable]] = field(default_factory=list)
@@ -91,6 +92,11 @@ class Replication:
     def _some(self) -> str:
         return "" if len(self.figures) == len(self.paper.figures) else "".join(f"-fig{figure}" for figure in self.figures)
 
+    @property
+    def seconds_in_all(self) -> float:
+        """What all computations took, the earlier ones too [s]."""
+        return float(sum(ds.attrs.get(SECONDS, 0.0) for ds in self.data.values()))
+
 
 def reproduce(
     paper: Paper,
@@ -98,7 +104,7 @@ def reproduce(
     figures: Sequence[str] = (),
     quick: bool = False,
     threads: int | None = None,
-    progress: Callable[[Progress], None] = lambda _: None,
+    report: Callable[[Report], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Replication:
     """Reproduce a paper, or some figures of it. What is in the folder already, from the same settings and code, isn't computed again.
@@ -116,9 +122,9 @@ def reproduce(
     quick : bool
         Coarser grids, shorter sweeps: minutes.
     threads : int, optional
-        Jobs computed at a time; by default one for each usable core.
-    progress, say : callable
-        Called with the progress, about four times a second; with a sentence when a figure is done.
+        Of each computation; by default one for each usable core. Results don't depend on it.
+    report, say : callable
+        Called with the progress of a computation; with a sentence, such as when a figure is done.
 
     Returns
     -------
@@ -134,14 +140,14 @@ def reproduce(
     StoreError
         If another run works in the folder: names host, process and time.
     KeyboardInterrupt
-        On Ctrl-C; what is done is kept, the jobs under way are lost.
+        On Ctrl-C; what is done is kept.
     """
     chosen = _chosen(paper, figures)
     for name in (DATA, PICTURES, LOCKS):
         usable_folder(out / name)
-    result = Replication(paper, quick, chosen, out, Shelf(out / DATA), threads or usable_processors())
+    result = Replication(paper, quick, chosen, out, threads or usable_processors())
     with locked(out / LOCKS, WHOLE):
-        _make(result, progress, say)
+        _make(result, report, say)
     return result
 
 
@@ -154,22 +160,72 @@ def _chosen(paper: Paper, figures: Sequence[str]) -> tuple[str, ...]:
     return tuple(figure for figure in paper.figures if figure in wanted or not wanted)
 
 
-def _make(result: Replication, progress: Callable[[Progress], None], say: Callable[[str], None]) -> None:
+def _make(result: Replication, report: Callable[[Report], None], say: Callable[[str], None]) -> None:
     """Compute, draw, judge and write."""
     from saltus.replication.page import write_page
 
     begin = time.perf_counter()
-    with Workers(result.paper, result.figures, result.quick, result.shelf, result.threads) as workers:
-        for figure in result.figures:
-            for name, outcome in workers.wait_for(figure, progress).items():
-                if isinstance(outcome, JobError):
-                    result.failures[name] = str(outcome)
-                else:
-                    result.data[name] = outcome
-            say(_finish(result, figure))
+    jobs = {job.name: job for job in result.paper.jobs(folder_of(result.paper.name), result.quick)}
+    at = Running(result.folder / DATA, f"saltus reproduce {result.paper.name}", Resources(result.threads), report, say)
+    for figure in result.figures:
+        names = closure(jobs, wanted_by(result.paper, figure))
+        for number, name in enumerate(names, 1):
+            if name not in result.data:
+                _compute(result, jobs[name], replace(at, report=partial(_counted, report, f"{number} of {len(names)}")))
+        say(_finish(result, figure))
     result.seconds = time.perf_counter() - begin
     claims_table(result).write_csv(result.claims_file)
     write_page(result)
+
+
+def wanted_by(paper: Paper, figure: str) -> set[str]:
+    """Names of the jobs that a figure's pictures, tables and claims ask for."""
+    parts: list[Any] = [*paper.pictures, *paper.claims, *paper.tables]
+    return {name for one in parts if one.figure == figure for name in one.needs}
+
+
+def closure(jobs: Mapping[str, Job], wanted: set[str]) -> list[str]:
+    """Wanted jobs and all that they need, in the order of ``jobs``."""
+    waiting, found = list(wanted), set()
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += jobs[name].needs
+    return [name for name in jobs if name in found]
+
+
+def _counted(report: Callable[[Report], None], number: str, one: Report) -> None:
+    report(replace(one, name=f"{one.name} ({number})"))
+
+
+def _compute(result: Replication, job: Job, at: Running) -> None:
+    """Take in the Dataset of a job, or the reason why there is none."""
+    lost = next((name for name in job.needs if name not in result.data), None)
+    if lost is not None:
+        result.failures[job.name] = result.failures[lost]
+        return
+    try:
+        ds, new = job.result(result.data, at)
+    except ResultFileError:  # the next file couldn't be written either
+        raise
+    except Exception as error:
+        result.failures[job.name] = (
+            f"{job.name} could not be computed: {_cause(error)}. What is computed is kept in {at.folder}: run the same command again, "
+            "and only what is missing is tried again. If it fails again, report this message."
+        )
+        return
+    result.data[job.name] = ds
+    result.computed += [job.name] * new
+
+
+def _cause(error: Exception) -> str:
+    """What went wrong, in a sentence without its full stop; of an error that nobody foresaw also where."""
+    text = str(error).rstrip(". ")
+    if isinstance(error, SaltusError):
+        return text
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__} in {Path(last.filename).name}, line {last.lineno}{f': {text}' if text else ''}"
 
 
 # -- what stands in the report ---------------------------------------------------------------------------------------------------
@@ -204,7 +260,7 @@ def _attempt(result: Replication, what: str, part: Picture | Numbers | Claim, ma
     except ResultFileError:  # the next file couldn't be written either
         raise
     except Exception as error:
-        result.failures[what] = f"{what} failed: {cause(error)}. Its data are kept in {result.shelf.folder}. Report this message."
+        result.failures[what] = f"{what} failed: {_cause(error)}. Its data are kept in {result.folder / DATA}. Report this message."
         return None
 
 

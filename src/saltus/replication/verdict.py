@@ -1,13 +1,11 @@
-"""Claims and verdicts: what a paper says, the checks that this comes down to, and what follows when they pass or fail."""
+"""Verdicts: the rules that hold a number of a claim against its limit, and what follows when checks pass or fail."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import xarray as xr
+from typing import Any
 
 HOLDS, IN_PART, FAILS, UNDECIDED = "holds", "holds in part", "does not hold", "not decidable"
 #: All verdicts, best first.
@@ -18,7 +16,21 @@ RULE_OF_ALL = (
     "decided. It is not decidable if no check can be decided."
 )
 
-Data = Mapping[str, "xr.Dataset"]
+#: Rules of a check: from a quantity and the limit to whether it is so.
+RULES: dict[str, Callable[[Any, Any], bool]] = {
+    "below": lambda value, limit: value < limit,
+    "at_most": lambda value, limit: value <= limit,
+    "above": lambda value, limit: value > limit,
+    "at_least": lambda value, limit: value >= limit,
+    "equals": lambda value, limit: value == limit,
+    "differs": lambda value, limit: value != limit,
+    "between": lambda value, ends: ends[0] <= value <= ends[1],
+    "inside": lambda value, ends: ends[0] < value < ends[1],
+    "near": lambda value, limit: abs(value / limit[0] - 1) < limit[1],
+    "same_set": lambda values, limit: sorted(values) == sorted(limit),
+    "contains": lambda values, limit: set(limit) <= set(values),
+    "is": lambda value, limit: bool(value) is limit,
+}
 
 
 @dataclass(frozen=True)
@@ -39,7 +51,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a judge found.
+    """What was found on a claim.
 
     Attributes
     ----------
@@ -67,35 +79,34 @@ class Finding:
         return verdict_of(self.checks)
 
 
-@dataclass(frozen=True)
-class Claim:
-    """A statement of the paper, and how it is judged.
+def passed(row: Mapping[str, Any], quantities: Mapping[str, Any]) -> bool | None:
+    """Apply the rule of a check.
 
-    Attributes
+    Parameters
     ----------
-    id : str
-        Short name, also its anchor in the report.
-    figure : str
-        The figure that shows it.
-    says : str
-        The claim.
-    where : str
-        Where the paper says so.
-    rule : str
-        The rule of the judge, in words.
-    needs : tuple of str
-        Names of the jobs whose Datasets the judge takes.
-    judge : callable
-        From Datasets to a :class:`Finding`.
-    """
+    row : mapping
+        ``of``: name of a quantity. One of :data:`RULES`: the limit, or the name of the quantity that is the limit. Without a rule the
+        quantity itself says whether it is so. ``given``: name of a quantity that must be true for the data to decide.
+    quantities : mapping
+        What was read from the data, by name.
 
-    id: str
-    figure: str
-    says: str
-    where: str
-    rule: str
-    needs: tuple[str, ...]
-    judge: Callable[[Data], Finding]
+    Returns
+    -------
+    bool or None
+        None where the quantity isn't known (None, NaN) or the data don't decide.
+    """
+    if "given" in row and not quantities[row["given"]]:
+        return None
+    value = quantities[row["of"]]
+    (rule,) = [name for name in row if name in RULES] or ["is"]
+    limit = row.get(rule, True)
+    if isinstance(limit, str):
+        limit = quantities[limit]
+    return None if _unknown(value) or _unknown(limit) else bool(RULES[rule](value, limit))
+
+
+def _unknown(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and math.isnan(value))
 
 
 def verdict_of(checks: Sequence[Check]) -> str:

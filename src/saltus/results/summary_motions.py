@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import ENERGY, IMPACTS, SECTION, SPECTRUM, states_of
+from saltus.results.dataset.schema import ENERGY, IMPACTS, SECTION, SPECTRUM, states_of
 
 #: Largest lines of a spectrum that are listed.
 _LINES = 5

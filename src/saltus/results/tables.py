@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.results.schema import parameters_of, response_name, sample_dim, states_of
+from saltus.results.dataset.schema import parameters_of, response_name, sample_dim, states_of
 
 Table = dict[str, np.ndarray]
 

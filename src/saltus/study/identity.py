@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 PACKAGE = Path(__file__).parents[1]
 #: All code that takes part in the way from equations, values and arguments to a Dataset: these packages and modules import nothing else of
 #: saltus, but for messages. Models and the reading of study files stand in the equations, values and arguments themselves.
-COMPUTING = ("fence", "interrupt", "unit_table", "units", "system", "kernels", "codegen", "flow", "results", "analysis")
+COMPUTING = ("fence", "intervals", "interrupt", "unit_table", "units", "system", "kernels", "codegen", "flow", "results", "analysis")
 
 
 def identity(system: System, method: Any, arguments: Mapping[str, Any]) -> dict[str, str]:

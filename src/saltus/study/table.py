@@ -45,7 +45,7 @@ class TextTable:
 
     def write_csv(self, path: Path) -> Path:
         """Write the table as CSV, the notes as comment lines above it."""
-        from saltus.results.files import replacing
+        from saltus.results.files.atomic import replacing
 
         with replacing(path) as (part,), part.open("w", newline="", encoding="utf-8") as file:
             file.writelines(f"# {' '.join(note.split())}\n" for note in (self.title, *self.notes))

@@ -11,9 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 from saltus.cli import commands
-from saltus.cli.app import app
+from saltus.cli.commands import app
 from saltus.codegen import entry
-from saltus.results import known
+from saltus.results.files import known
 
 COMMANDS = ["demo", "run", "status", "resume", "plot", "reproduce", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
 
@@ -192,8 +192,8 @@ def test_a_wrong_figure_gets_those_that_there_are(tmp_path):
 def test_a_closed_output_ends_quietly(command, how):
     """``saltus models | head``, ``saltus models >&-``: nothing is wrong with a file, so nothing is said about one."""
     close = {"nobody reads on": "", "closed from the start": "os.close(1); ", "closed on the way": "os.close(1); "}[how]
-    call = "cli.app.app(prog_name='saltus')" if how == "closed on the way" else "cli.main()"
-    code = f"import os, sys; import saltus.cli.app; from saltus import cli; sys.argv = ['saltus', *{command!r}]; {close}{call}"
+    call = "cli.commands.app(prog_name='saltus')" if how == "closed on the way" else "cli.main()"
+    code = f"import os, sys; import saltus.cli.commands; from saltus import cli; sys.argv = ['saltus', *{command!r}]; {close}{call}"
     read, write = os.pipe()
     os.close(read)
     try:

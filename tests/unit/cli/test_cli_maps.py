@@ -13,9 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 from saltus.analysis.basins import pipeline
-from saltus.cli.app import app
+from saltus.cli.commands import app
 from saltus.results import load
-from saltus.results.store import Store
+from saltus.results.store.store import Store
 from small_maps import small_maps
 from small_study import small_study
 

@@ -6,7 +6,7 @@ from saltus import plot
 from saltus.cli import draw
 from saltus.cli.commands import Kind
 from saltus.plot.choice import PICTURES
-from saltus.results.schema import TABLES
+from saltus.results.dataset.schema import TABLES
 
 
 def test_every_kind_of_result_is_known():

@@ -12,7 +12,7 @@ import pytest
 
 import saltus as sl
 from saltus.codegen import building, cache, kernels, machine, module, templates
-from saltus.codegen.kernels import FULL, GENERIC, SHAPE, TIERS, Call
+from saltus.codegen.kernels import FULL, GENERIC, TIERS, Call
 
 needs_jit = pytest.mark.skipif(module.jit_disabled(), reason="nothing is compiled with the JIT off")
 METHODS = {
@@ -43,14 +43,6 @@ def equation(power, name="same name"):
     return free
 
 
-def with_number(number, more=0):
-    @sl.system(states=" ".join(f"x{i}" for i in range(2 + more)))
-    def free(t, *x, stiffness=2.0):
-        return x[1], -stiffness * x[0] ** 3 - number * x[0] * x[1], *(x[0] for _ in range(more))
-
-    return free
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_values_do_not_matter_and_equations_do(keys, method):
     rig = sl.models.delangre("b")
@@ -61,15 +53,6 @@ def test_values_do_not_matter_and_equations_do(keys, method):
     assert before[GENERIC][0] == after[GENERIC][0]  # the templates' code serves all equations
     assert before[GENERIC][1] != after[GENERIC][1]
     assert before[FULL] != after[FULL]
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_equations_of_one_shape_share_its_code(keys, method):
-    """They differ in a number of the equation, in no size; one with another state differs in both."""
-    plain, stiffer, larger = (keys(one, method) for one in (with_number(2.0), with_number(3.0), with_number(2.0, 1)))
-    assert plain[SHAPE][0] == stiffer[SHAPE][0]
-    assert plain[SHAPE][1] != stiffer[SHAPE][1]
-    assert len({plain[SHAPE][0], larger[SHAPE][0], plain[GENERIC][0]}) == 3
 
 
 def test_methods_orders_and_lanes_have_code_of_their_own(keys):

@@ -40,7 +40,7 @@ def test_every_key_of_a_study_stands_in_the_tables():
 def test_every_variable_of_every_result_stands_in_the_dictionary():
     from result_tables import markdown
 
-    from saltus.results.schema import TABLES
+    from saltus.results.dataset.schema import TABLES
 
     text = markdown()
     for table in TABLES.values():

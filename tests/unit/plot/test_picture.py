@@ -7,7 +7,7 @@ import pytest
 from matplotlib.text import Text
 
 from saltus import plot
-from saltus.study.run.kept import save_picture
+from saltus.study.run.write import save_picture
 
 from .conftest import rig_run
 from .responses_data import resonance

@@ -7,12 +7,17 @@ import pytest
 import xarray as xr
 
 from saltus.replication import find
-from saltus.replication.saunders2021 import sameness
-from saltus.replication.saunders2021.claims import attractor_claims, basin_claims, multistable, reading, stiffness, validation
+from saltus.replication.papers import code
 from saltus.replication.verdict import FAILS, HOLDS, IN_PART, UNDECIDED
 
+PAPER = find("saunders2021")
+CLAIMS = {claim.id: claim.judge for claim in PAPER.claims}
+multistable, stiffness, validation, attractors_, sameness = (
+    code("saunders2021", name) for name in ("read_multistable", "read_stiffness", "read_validation", "read_attractors", "sameness")
+)
+
 KINDS = {"c": "chaotic", "1": "periodic", "2": "periodic", "u": "unconverged"}
-ENDS = (reading.EXACT, reading.ON, reading.OFF)
+ENDS = ("exact", "ode45 located", "ode45 not located")
 
 
 def diagram(text, rms=None):
@@ -53,7 +58,7 @@ def attractors(kinds, peaks=None, shares=None, margins=None, multiplier=0.5, **a
 # -- over the stiffness ----------------------------------------------------------------------------------------------------------
 def test_chaos_beyond_a_stiffness_holds_or_not():
     hard, soft = "1" * 70 + "c" * 30, "1" * 90 + "c1" * 5
-    judge = stiffness.chaos_17
+    judge = CLAIMS["chaos-17"]
     data = {f"fig7/e, {end}": diagram(hard) for end in ENDS}
     assert judge(data).verdict == HOLDS
     data = {f"fig7/e, {end}": diagram(soft) for end in ENDS}
@@ -62,22 +67,22 @@ def test_chaos_beyond_a_stiffness_holds_or_not():
 
 def test_what_only_ode45_takes_for_chaos_is_told():
     data = {"fig7/e, exact": diagram("1" * 100)} | {f"fig7/e, {end}": diagram("1" * 60 + "u" * 40) for end in ENDS[1:]}
-    finding = stiffness.chaos_17(data)
+    finding = CLAIMS["chaos-17"](data)
     assert finding.verdict == FAILS
     assert "looks like chaos" in finding.why
-    assert "looks like chaos" not in stiffness.chaos_17({f"fig7/e, {end}": diagram("1" * 100) for end in ENDS}).why
+    assert "looks like chaos" not in CLAIMS["chaos-17"]({f"fig7/e, {end}": diagram("1" * 100) for end in ENDS}).why
 
 
 def test_onset_of_chaos_that_persists():
     kinds = np.array([KINDS[one] for one in "1c1111cccc"])
-    assert stiffness._onset(np.arange(10.0), kinds) == 6.0
-    assert np.isnan(stiffness._onset(np.arange(3.0), np.array(["periodic"] * 3)))
+    assert stiffness.onset(np.arange(10.0), kinds) == 6.0
+    assert np.isnan(stiffness.onset(np.arange(3.0), np.array(["periodic"] * 3)))
 
 
 @pytest.mark.parametrize(("where", "verdict"), [(8.0e3, HOLDS), (3e4, FAILS)])
 def test_the_period_doubling_is_looked_for_where_it_is(where, verdict):
     text = "".join("1" if value < where else "2" for value in np.logspace(3, 9, 601))
-    assert stiffness.doubling({f"fig7/e, {end}": diagram(text) for end in ENDS}).verdict == verdict
+    assert CLAIMS["doubling"]({f"fig7/e, {end}": diagram(text) for end in ENDS}).verdict == verdict
 
 
 def beside(exact, on, off, error=(1e-4, 1e-4)):
@@ -104,26 +109,26 @@ def test_errors_at_intermediate_stiffness():
     data = {f"fig7/{panel}, compared": beside(np.ones(301), np.ones(301), hump) for panel in "def"}
     for ds in data.values():
         ds["step_error_rms"][2] = np.where((at > 1e4) & (at < 1e8), 2e-4, 1e-4)
-    assert [check.passed for check in stiffness.intermediate(data).checks] == [True] * 6
+    assert [check.passed for check in CLAIMS["intermediate"](data).checks] == [True] * 6
     nearly = {f"fig7/{panel}, compared": beside(np.ones(301), np.ones(301), np.ones(301), (1e-4, 1e-4)) for panel in "def"}
-    assert [check.passed for check in stiffness.intermediate(nearly).checks] == [None] * 6
+    assert [check.passed for check in CLAIMS["intermediate"](nearly).checks] == [None] * 6
     growing = {f"fig7/{panel}, compared": beside(np.ones(301), np.ones(301), np.where(at > 1e7, 2.0, 1.0)) for panel in "def"}
-    assert [check.passed for check in stiffness.intermediate(growing).checks[::2]] == [False] * 3
+    assert [check.passed for check in CLAIMS["intermediate"](growing).checks[:3]] == [False] * 3
 
 
 def test_location_helps_only_if_it_does():
     wrong, right = np.full(50, 2.0), np.ones(50)
     good = {f"fig7/{panel}, compared": beside(right, right, wrong, (1e-5, 1e-3)) for panel in "def"}
     good |= {f"fig7/{panel}, tighter": tighter(1e-6, 1e-4) for panel in "def"}
-    assert stiffness.location_helps(good).verdict == HOLDS
+    assert CLAIMS["location-helps"](good).verdict == HOLDS
     bad = {f"fig7/{panel}, compared": beside(right, wrong, right, (1e-3, 1e-5)) for panel in "def"}
     bad |= {f"fig7/{panel}, tighter": tighter(1e-6, 1e-6) for panel in "def"}
-    assert stiffness.location_helps(bad).verdict == FAILS
+    assert CLAIMS["location-helps"](bad).verdict == FAILS
 
 
 def test_two_sets_of_dots():
     on, off = np.array([[1.0, 2.0], [1.0, 1.0], [1.0, np.nan]]), np.array([[2.0, 1.01], [1.0, 3.0], [1.0, 1.0]])
-    assert stiffness._curves_differ(on, off).tolist() == [False, True, False]
+    assert stiffness.curves_differ(on, off).tolist() == [False, True, False]
 
 
 # -- sameness --------------------------------------------------------------------------------------------------------------------
@@ -154,7 +159,7 @@ def test_one_attractor_on_both_sides(after, verdict):
     data = {
         f"fig11/{setting}, {end}": attractors(kinds) for setting, kinds in (("7694 N per m", "1"), ("8833 N per m", after)) for end in ENDS
     }
-    assert basin_claims.fig11_one(data).verdict == verdict
+    assert CLAIMS["fig11-one"](data).verdict == verdict
 
 
 @pytest.mark.parametrize(("off", "verdict"), [(0, HOLDS), (3, IN_PART)])
@@ -166,15 +171,15 @@ def test_a_third_attractor_with_location_only(off, verdict):
         rare = attractors("1 1 1")
         rare["basin"] = "trajectory", np.array([2] * hits + [0] * (9 - hits))
         data[f"fig8/rare, {name}"] = rare
-    assert basin_claims.fig8_after(data).verdict == verdict
+    assert CLAIMS["fig8-after"](data).verdict == verdict
 
 
 def test_granular_basins_that_no_grid_measures_are_not_decided():
-    names = [f"fig13/{setting}, {end}" for setting in basin_claims.STIFF for end in ENDS]
+    names = [f"fig13/{setting}, {end}" for setting in ("18.4 MN per m", "19.4 MN per m") for end in ENDS]
     data = {name: attractors("1 2", uncertainty_exponent=np.nan) for name in names}
-    assert basin_claims.fig13_granular(data).verdict == UNDECIDED
+    assert CLAIMS["fig13-granular"](data).verdict == UNDECIDED
     data = {name: attractors("1 2", uncertainty_exponent=0.8) for name in names}
-    assert basin_claims.fig13_granular(data).verdict == FAILS
+    assert CLAIMS["fig13-granular"](data).verdict == FAILS
 
 
 @pytest.mark.parametrize(
@@ -185,12 +190,12 @@ def test_a_chaotic_attractor_at_stiff_contact(wild, off, verdict):
     data = {}
     for end in ENDS:
         name = f"fig13/18.4 MN per m, {end}"
-        data[name] = attractors(off if end == reading.OFF else "1 2 3 6")
+        data[name] = attractors(off if end == ENDS[2] else "1 2 3 6")
         kinds, rates = (["chaotic"], [5.0]) if end in wild else (["periodic"], [-0.9])
         data[f"{name}, variational"] = xr.Dataset(
             {"kind": ("trajectory", kinds), "lyapunov_exponent": (("trajectory", "number"), [[*rates, -2.0]])}
         )
-    finding = attractor_claims.chaotic_3(data)
+    finding = CLAIMS["fig14-chaotic"](data)
     assert finding.verdict == verdict
     assert ("look chaotic" in finding.why) == (verdict == IN_PART)
 
@@ -203,7 +208,7 @@ def test_twelve_or_twenty_four(n, inner, verdict, monkeypatch):
     found = attractors(f"{n} 30").drop_vars("basin").assign(basin=("trajectory", [1, 1, 0, 1]))
     told = xr.Dataset({"response_period": ("trajectory", [3, 5, n, 4])})
     monkeypatch.setattr(multistable, "settled", lambda _: told)
-    finding = multistable.fig5_twelve({"fig5/halved": halved, "fig5/attractors": found, "fig5/ode45": None})
+    finding = CLAIMS["fig5-twelve"]({"fig5/halved": halved, "fig5/attractors": found, "fig5/ode45": None})
     assert finding.verdict == verdict
     assert ("twelve dots" in finding.why) == (n == 24)
 
@@ -211,15 +216,15 @@ def test_twelve_or_twenty_four(n, inner, verdict, monkeypatch):
 def test_a_third_attractor_that_the_map_misses_is_not_decided():
     two = attractors("1 1", shares=[0.2, 0.8])
     data = {f"fig8/23.2 kN per m, {end}": two for end in ENDS} | {f"fig8/rare, {name}": two for name in ("exact", "on", "off")}
-    assert basin_claims.fig8_after(data).verdict == UNDECIDED
-    assert basin_claims.fig8_few(data).verdict == UNDECIDED
+    assert CLAIMS["fig8-after"](data).verdict == UNDECIDED
+    assert CLAIMS["fig8-few"](data).verdict == UNDECIDED
 
 
 def test_large_exponents_by_wolf_on_inexact_motions_decide_nothing():
-    assert attractor_claims._small(np.array([0.1, -0.1]), 0.5, exact=False) is True
-    assert attractor_claims._small(np.array([0.1, 7.0]), 0.5, exact=False) is None
-    assert attractor_claims._small(np.array([0.1, 7.0]), 0.5, exact=True) is False
-    assert attractor_claims._small(np.array([]), 0.5, exact=True) is None
+    assert attractors_.small(np.array([0.1, -0.1]), 0.5, exact=False) is True
+    assert attractors_.small(np.array([0.1, 7.0]), 0.5, exact=False) is None
+    assert attractors_.small(np.array([0.1, 7.0]), 0.5, exact=True) is False
+    assert attractors_.small(np.array([]), 0.5, exact=True) is None
 
 
 @pytest.mark.parametrize(("bunch", "passed"), [([4] * 5, True), ([4, 5, 4, 5, 24], None), ([5] * 5, False)])
@@ -227,7 +232,7 @@ def test_a_start_decides_only_if_its_neighbours_agree(bunch, passed, monkeypatch
     exact = xr.Dataset({"response_period": ("trajectory", [3, 5, 24, bunch[0]])})
     rows = xr.Dataset({"response_period": ("trajectory", [3] * 5 + [5] * 5 + [24] * 5 + bunch)})
     monkeypatch.setattr(multistable, "settled", lambda ds: rows if ds == "beside" else exact)
-    checks = multistable.fig5_periods({"fig5/exact": "exact", "fig5/ode45": "ode45", "fig5/beside": "beside"}).checks
+    checks = CLAIMS["fig5-periods"]({"fig5/exact": "exact", "fig5/ode45": "ode45", "fig5/beside": "beside"}).checks
     assert [check.passed for check in checks] == [True, True, False, passed]
 
 
@@ -244,13 +249,13 @@ def contacts(shift):
 
 @pytest.mark.parametrize(("shift", "verdict"), [(1e-15, HOLDS), (1e-5, FAILS)])
 def test_a_small_residual_is_no_exact_time(shift, verdict):
-    assert validation.table2_time({"fig2/ode45": contacts(shift), "fig2/exact": contacts(0.0)}).verdict == verdict
+    assert CLAIMS["table2-time"]({"fig2/ode45": contacts(shift), "fig2/exact": contacts(0.0)}).verdict == verdict
 
 
 def test_three_measured_points_are_not_decided_without_them():
     ds = xr.Dataset({name: ("response", values) for name, values in {
         "response_frequency": [18.0], "response_period": [3], "response_rms": [4e-4]}.items()})  # fmt: skip
-    assert validation.three_points({"fig3/a4, exact": ds}).verdict == UNDECIDED
+    assert CLAIMS["three-points"]({"fig3/a4, exact": ds}).verdict == UNDECIDED
 
 
 @pytest.mark.parametrize(("rms", "verdict"), [("0.41", HOLDS), ("0.1", FAILS)])
@@ -259,18 +264,19 @@ def test_three_measured_points_decide_if_they_are_given(rms, verdict, tmp_path, 
     monkeypatch.setattr(validation, "folder_of", lambda _: tmp_path)
     ds = xr.Dataset({name: ("response", values) for name, values in {
         "response_frequency": [18.0], "response_period": [3], "response_rms": [4e-4]}.items()})  # fmt: skip
-    assert validation.three_points({"fig3/a4, exact": ds}).verdict == verdict
+    assert CLAIMS["three-points"]({"fig3/a4, exact": ds}).verdict == verdict
 
 
 # -- jobs ------------------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("quick", [False, True])
 def test_whatever_is_asked_for_is_computed(quick):
     from saltus.replication.papers import folder_of
+    from saltus.study.tables.parts import slug
 
-    paper = find("saunders2021")
+    paper = PAPER
     jobs = paper.jobs(folder_of(paper.name), quick)
     names = [job.name for job in jobs]
-    assert len(set(names)) == len(names) == len({job.file_name for job in jobs})
+    assert len(set(names)) == len(names) == len({slug(job.name) for job in jobs})
     for one in (*paper.pictures, *paper.claims, *paper.tables):
         assert set(one.needs) <= set(names), one
     for place, job in enumerate(jobs):

@@ -3,134 +3,101 @@
 from __future__ import annotations
 
 import ast
-import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import saltus
-from edited_copy import edited_copy
+from saltus.flow import ODE45
 from saltus.replication import job as jobs
-from saltus.replication.job import Job, Shelf
-from saltus.replication.saunders2021 import compute_responses, plan
+from saltus.replication import papers
 from saltus.study import identity
-from small_paper import small_result
+from saltus.study.run.running import Resources, Running
+from small_paper import compute, small_job, small_result
 
 CALLS = []
 
 
-def compute(settings, inputs, show):
-    CALLS.append(settings["value"])
-    show(0.5)
-    return small_result(settings["value"] + sum(float(ds["attractor_peak"][0]) for ds in inputs.values()))
+def counted(*inputs, value, **how):
+    CALLS.append(value)
+    return compute(*inputs, value=value, **how)
 
 
-def stopped(settings, inputs, show):
-    raise KeyboardInterrupt
+def beside(*inputs, **how):
+    return compute(*inputs, **how)
+
+
+def job(value=1.0, name="one", needs=()):
+    return small_job(name, value, counted, needs)
 
 
 @pytest.fixture
-def shelf(tmp_path):
+def at(tmp_path):
     CALLS.clear()
-    return Shelf(tmp_path)
+    return Running(tmp_path, "a test", Resources(1), lambda _: None, lambda _: None)
 
 
-def test_the_second_time_nothing_is_computed(shelf):
-    job = Job("fig1/a b", {"value": 1.0}, compute)
-    first = shelf.result(job, {}, lambda _: None)
-    again = shelf.result(job, {}, lambda _: None)
-    assert CALLS == [1.0]
+def test_the_second_time_nothing_is_computed(at):
+    first, new = job(name="fig1/a b").result({}, at)
+    again, kept = job(name="fig1/a b").result({}, at)
+    assert (CALLS, new, kept) == ([1.0], True, False)
     assert first.attrs["result_hash"] == again.attrs["result_hash"]
-    assert (shelf.computed, shelf.kept) == (["fig1/a b"], ["fig1/a b"])
+    assert [file.name for file in at.folder.iterdir()] == ["fig1-a-b.nc"]
 
 
-def test_another_setting_is_another_result(shelf):
-    shelf.result(Job("one", {"value": 1.0}, compute), {}, lambda _: None)
-    shelf.result(Job("one", {"value": 2.0}, compute), {}, lambda _: None)
+def test_another_setting_is_another_result(at):
+    job(1.0).result({}, at)
+    job(2.0).result({}, at)
     assert CALLS == [1.0, 2.0]
 
 
-def test_another_input_is_another_result(shelf):
-    job = Job("two", {"value": 1.0}, compute, ("one",))
+def test_another_input_is_another_result(at):
     for value in (1.0, 1.0, 2.0):
-        shelf.result(job, {"one": small_result(value)}, lambda _: None)
+        job(needs=("zero",)).result({"zero": small_result(value)}, at)
     assert CALLS == [1.0, 1.0]
 
 
-def test_what_was_stopped_is_computed_again(shelf):
-    with pytest.raises(KeyboardInterrupt):
-        shelf.result(Job("one", {"value": 1.0}, stopped), {}, lambda _: None)
-    assert not list(shelf.folder.iterdir())
-    shelf.result(Job("one", {"value": 1.0}, compute), {}, lambda _: None)
-    assert CALLS == [1.0]
+@pytest.mark.parametrize("other", [{"system": saltus.models.delangre("c")}, {"method": ODE45()}, {"compute": compute}, {"compute": beside}])
+def test_another_system_method_or_analysis_is_another_result(at, other):
+    job().result({}, at)
+    assert replace(job(), **other).result({}, at)[1]
 
 
-def test_a_result_without_its_identity_counts_for_nothing(shelf):
-    job = Job("one", {"value": 1.0}, compute)
-    shelf.result(job, {}, lambda _: None)
-    shelf.files(job)[1].unlink()
-    shelf.result(job, {}, lambda _: None)
+def test_a_damaged_file_is_computed_again(at):
+    job().result({}, at)
+    (file,) = at.folder.iterdir()
+    file.write_bytes(file.read_bytes()[: len(file.read_bytes()) // 3])
+    job().result({}, at)
     assert CALLS == [1.0, 1.0]
 
 
-@pytest.mark.parametrize("what", [0, 1])
-def test_a_damaged_file_is_computed_again(shelf, what):
-    job = Job("one", {"value": 1.0}, compute)
-    shelf.result(job, {}, lambda _: None)
-    file = shelf.files(job)[what]
-    file.write_bytes(file.read_bytes()[: -len(file.read_bytes()) // 3])
-    shelf.result(job, {}, lambda _: None)
+def test_other_code_is_another_result(at, monkeypatch):
+    job().result({}, at)
+    monkeypatch.setattr("saltus.study.identity.code_hash", lambda *_: "other")
+    job().result({}, at)
     assert CALLS == [1.0, 1.0]
 
 
-def test_other_code_is_another_result(shelf, monkeypatch):
-    job = Job("one", {"value": 1.0}, compute)
-    shelf.result(job, {}, lambda _: None)
-    monkeypatch.setattr("saltus.replication.job.code_hash", lambda *_: "other")
-    shelf.result(job, {}, lambda _: None)
-    assert CALLS == [1.0, 1.0]
-
-
-# -- data and their note belong together -----------------------------------------------------------------------------------------
-def test_the_note_of_one_result_does_not_vouch_for_the_data_of_another(shelf, tmp_path):
-    """As two runs at a time in one folder would leave them."""
-    other = Shelf(tmp_path / "other")
-    other.folder.mkdir()
-    shelf.result(Job("one", {"value": 1.0}, compute), {}, lambda _: None)
-    other.result(Job("one", {"value": 2.0}, compute), {}, lambda _: None)
-    job = Job("one", {"value": 1.0}, compute)
-    shutil.copy(other.files(job)[0], shelf.files(job)[0])
-    assert float(shelf.result(job, {}, lambda _: None)["attractor_peak"][0]) == 1.0
-    assert CALLS == [1.0, 2.0, 1.0]
-
-
-@pytest.mark.parametrize("missing", ["identity", "result_hash", "seconds"])
-def test_a_note_that_lacks_something_counts_for_nothing(shelf, missing):
-    job = Job("one", {"value": 1.0}, compute)
-    shelf.result(job, {}, lambda _: None)
-    note = shelf.files(job)[1]
-    told = json.loads(note.read_text())
-    del told[missing]
-    note.write_text(json.dumps(told))
-    shelf.result(job, {}, lambda _: None)
-    assert CALLS == [1.0, 1.0]
-
-
-def test_the_file_of_a_job_s_function_is_part_of_its_identity(tmp_path):
-    """And so are modules beside it that it may call."""
-    before = jobs._source_hash.__wrapped__(Path(__file__))
+def test_the_file_of_a_paper_s_own_function_is_part_of_its_identity(tmp_path, monkeypatch):
     copied = Path(shutil.copy(__file__, tmp_path))
-    assert jobs._source_hash.__wrapped__(copied) == before
-    (tmp_path / "compute_more.py").write_text("")
-    more = jobs._source_hash.__wrapped__(copied)
+    before = jobs._own_code.__wrapped__(__name__)
+    monkeypatch.setattr("sys.modules", {__name__: type("module", (), {"__file__": str(copied)})})
+    assert jobs._own_code.__wrapped__(__name__) == before
     copied.write_text(copied.read_text(encoding="utf-8") + "#")
-    assert len({before, more, jobs._source_hash.__wrapped__(copied)}) == 3
+    assert jobs._own_code.__wrapped__(__name__) != before
+
+
+def test_the_code_of_saltus_is_no_paper_s_own():
+    assert jobs._own_code("saltus.analysis.motion.simulate") == ""
 
 
 # -- what a result depends on ----------------------------------------------------------------------------------------------------
 #: Packages that take no part in numbers: messages, what kinds arguments may be of, the end of work, and pictures of what was computed.
 NO_NUMBERS = ("cache_folder", "errors", "arguments", "interrupt", "plot")
+#: What only says which system, method and arguments: these are in the identity themselves.
+SAYS_WHAT = ("replication.Job", "study.tables", "study.setting")
 
 
 def sources(place):
@@ -140,10 +107,11 @@ def sources(place):
 
 
 def imported(file):
-    """What a module imports of saltus, wherever it does so: ``analysis.lyapunov``, ``units.to_si``."""
+    """What a module imports of saltus or of its own folder, wherever it does so: ``analysis.lyapunov``, ``units.to_si``."""
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.partition(".")[0] == "saltus":
-            yield from (f"{node.module}.{alias.name}".partition(".")[2] for alias in node.names)
+        if isinstance(node, ast.ImportFrom) and (node.level or (node.module or "").partition(".")[0] == "saltus"):
+            module = node.module or "" if not node.level else f"saltus.beside.{node.module or ''}"
+            yield from (f"{module}.{alias.name}".partition(".")[2] for alias in node.names)
 
 
 def strangers(files, known):
@@ -159,39 +127,25 @@ def test_the_hash_of_a_study_covers_all_that_its_code_calls():
     assert strangers(files, (*identity.COMPUTING, *NO_NUMBERS)) == set()
 
 
-def test_the_hash_of_a_job_covers_all_that_its_code_calls():
-    known = (*identity.COMPUTING, *jobs._READING)
-    own = [file for file in sources("replication.saunders2021") if file.name.startswith("compute")]
-    files = [*own, *(file for place in known for file in sources(place))]
-    siblings = ("replication.job.Show", "replication.saunders2021.compute")
-    assert strangers(files, (*known, *NO_NUMBERS, *siblings)) == set()
+@pytest.mark.parametrize("paper", papers.names())
+def test_the_identity_of_a_job_covers_all_that_its_code_calls(paper):
+    """Its own file counts, so it may call none beside it."""
+    assert strangers([papers.folder_of(paper) / "jobs.py"], (*identity.COMPUTING, *NO_NUMBERS, *SAYS_WHAT)) == set()
 
 
-@pytest.mark.parametrize("changed", ["delangre.py", "setting.py", "parts.py", "lyapunov_table.py", "intervals.py", "units.py"])
-def test_an_edit_of_a_model_or_of_the_reading_is_another_result(shelf, tmp_path, monkeypatch, changed):
-    before = Job("one", {"value": 1.0}, compute).identity({})
-    edited_copy(tmp_path, changed, monkeypatch)
-    identity.code_hash.cache_clear()
-    after = Job("one", {"value": 1.0}, compute).identity({})
-    identity.code_hash.cache_clear()
-    assert after["code"] != before["code"]
-
-
-def test_errors_of_further_methods_are_kept(tmp_path):
+def test_errors_of_further_methods_are_kept(at):
     """From a diagram of three values: as Fig. 7 asks for them."""
-    vary = {"contact_stiffness": {"first": "1 kN/m", "last": "1 MN/m", "count": 3, "scale": "log"}}
-    settings = {
-        "question": "bifurcation_diagram", "method": plan.TAYLOR,
-        "system": {"model": "delangre", "case": "c", "force": "4 N", "frequency": "5 Hz"},
-        "table": {"vary": vary, "start": {"x": "0.32 mm", "v": "0 m/s"}, "periods": 200, "sample": "stroboscope"},
-    }  # fmt: skip
-    exact = Job("exact", settings, compute_responses.responses)
-    tighter = Job("tighter", {**settings, "methods": plan.TIGHTER}, compute_responses.period_errors, ("exact",))
-    shelf = Shelf(tmp_path)
-    diagram = shelf.result(exact, {}, lambda _: None)
-    shelf.result(tighter, {"exact": diagram}, lambda _: None)
-    kept = Shelf(tmp_path).result(tighter, {"exact": diagram}, lambda _: pytest.fail("computed again"))
+    own = papers.code("saunders2021", "jobs")
+    asked = {"vary": {"contact_stiffness": ("1 kN/m", "1 MN/m", 3, "log")}, "start": {"x": "0.32 mm", "v": "0 m/s"}, "periods": 200,
+             "sample": "stroboscope"}  # fmt: skip
+    system = saltus.models.delangre("c").with_values(force="4 N", frequency="5 Hz")
+    exact = jobs.Job("exact", own.bifurcation_diagram, system, own.ENDS["exact"], asked)
+    tighter = jobs.Job("tighter", own.tighter, system, own.ENDS["exact"], {}, ("exact",))
+    diagram = exact.result({}, at)[0]
+    tighter.result({"exact": diagram}, at)
+    kept, new = tighter.result({"exact": diagram}, at)
     errors = kept["step_error_rms"].values
+    assert not new
     assert errors.shape == (2, 3)
     assert (errors < 1e-5).all()
     assert (errors > 1e-12).all()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 import re
-import threading
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,18 +12,18 @@ import matplotlib.pyplot as plt
 import pytest
 from typer.testing import CliRunner
 
-from saltus.cli.app import app
+from saltus.cli.commands import app
 from saltus.errors import ParameterError
-from saltus.replication import Check, Finding, claims_table, reproduce, run
-from saltus.replication.job import JobError
+from saltus.interrupt import Interrupted
+from saltus.replication import Check, Finding, claims_table, reproduce
 from saltus.replication.verdict import HOLDS, UNDECIDED
-from saltus.results.durable import StoreError
-from saltus.results.files import ResultFileError
-from saltus.results.lock import WHOLE, locked
-from small_paper import compute, draw, small_paper
+from saltus.results.files.atomic import ResultFileError
+from saltus.results.store.durable import StoreError
+from saltus.results.store.lock import WHOLE, locked
+from small_paper import compute, draw, small_paper, small_result
 
 
-def broken(*_):
+def broken(*_, **__):
     raise ZeroDivisionError("no such luck")
 
 
@@ -64,7 +62,7 @@ def test_a_job_that_fails_costs_only_what_needs_it(tmp_path):
 def test_what_failed_is_tried_again_and_only_that(tmp_path):
     reproduce(small_paper(compute=broken), tmp_path)
     again = reproduce(small_paper(), tmp_path)
-    assert (set(again.shelf.computed), set(again.shelf.kept)) == ({"fig2/first", "fig2/second"}, {"fig10/other"})
+    assert set(again.data) - set(again.computed) == {"fig10/other"}
     assert verdicts(again) == {"two-is": HOLDS, "ten-is": HOLDS}
 
 
@@ -93,15 +91,9 @@ def test_a_folder_that_can_not_be_written_to_stops_everything(tmp_path, monkeypa
     def full(*_):
         raise ResultFileError("the disk is full")
 
-    monkeypatch.setattr("saltus.replication.job.save", full)
+    monkeypatch.setattr("saltus.study.run.kept.save", full)
     with pytest.raises(ResultFileError, match="the disk is full"):
         reproduce(small_paper(), tmp_path)
-
-
-def test_a_failed_job_is_an_error_of_ours(tmp_path):
-    paper = small_paper(compute=broken)
-    with run.Workers(paper, ["2"], False, run.Shelf(tmp_path), 1) as workers:
-        assert isinstance(workers.wait_for("2", lambda _: None)["fig2/second"], JobError)
 
 
 def test_claims_that_fail_come_first(tmp_path):
@@ -112,28 +104,26 @@ def test_claims_that_fail_come_first(tmp_path):
 
 
 # -- it is stopped ---------------------------------------------------------------------------------------------------------------
-def test_ctrl_c_stops_the_other_threads_and_keeps_what_is_done(tmp_path):
-    ended = []
-
-    def endless(settings, inputs, show):
-        try:
-            while True:
-                show(0.5)
-                time.sleep(0.01)
-        finally:
-            ended.append(threading.current_thread())
-
-    def stop(progress):
-        if progress.done and progress.running:
+def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(tmp_path):
+    def stop(report):
+        if report.name == "fig2/second (2 of 2)":
             raise KeyboardInterrupt
 
-    before = set(threading.enumerate())
     with pytest.raises(KeyboardInterrupt):
-        reproduce(small_paper(compute=endless), tmp_path, threads=3, progress=stop)
-    assert len(ended) == 1
-    assert set(threading.enumerate()) <= before
-    assert {file.name for file in (tmp_path / "data").iterdir()} == {"fig10-other.nc", "fig10-other.json"}
+        reproduce(small_paper(), tmp_path, report=stop)
+    assert {file.name for file in (tmp_path / "data").iterdir()} == {"fig2-first.nc"}
     assert not list(tmp_path.glob("report*"))
+    assert set(reproduce(small_paper(), tmp_path).computed) == {"fig2/second", "fig10/other"}
+
+
+def test_what_ctrl_c_interrupts_is_computed_again(tmp_path):
+    def stopped(*_, **__):
+        raise Interrupted(lambda: small_result(1.0))
+
+    with pytest.raises(KeyboardInterrupt):
+        reproduce(small_paper(compute=stopped), tmp_path)
+    assert "fig2-first.nc" not in {file.name for file in (tmp_path / "data").iterdir()}
+    assert len(reproduce(small_paper(), tmp_path).computed) == 3
 
 
 # -- it meets another ------------------------------------------------------------------------------------------------------------
@@ -148,11 +138,11 @@ def test_two_runs_at_a_time_in_one_folder_are_kept_apart(tmp_path):
 def test_a_run_holds_the_folder_while_it_computes(tmp_path):
     refused = []
 
-    def meeting(settings, inputs, show):
+    def meeting(*inputs, **how):
         with pytest.raises(StoreError) as caught:
             reproduce(small_paper(), tmp_path)
         refused.append(str(caught.value))
-        return compute(settings, inputs, show)
+        return compute(*inputs, **how)
 
     assert reproduce(small_paper(compute=meeting), tmp_path).failures == {}
     assert len(refused) == 1
@@ -216,18 +206,19 @@ def test_claims_are_a_table_to_go_on_with(tmp_path):
     assert len(rows) == 3
 
 
-@pytest.mark.parametrize(("threads", "told"), [(1, "up to 1 computation at a time"), (3, "up to 3 computations at a time")])
+@pytest.mark.parametrize(("threads", "told"), [(1, "with 1 thread on"), (3, "with 3 threads on")])
 def test_the_report_says_what_its_times_are(tmp_path, threads, told):
-    text = page(reproduce(small_paper(), tmp_path, threads=threads))
-    assert told in text
-    assert "slow each other" in text
-    assert "of one core" not in text
+    first = reproduce(small_paper(), tmp_path, threads=threads)
+    assert told in page(first)
+    again = reproduce(small_paper(), tmp_path, threads=threads)
+    assert again.seconds_in_all == first.seconds_in_all > 0.0
+    assert "0 computations in this run, 3 from an earlier one" in page(again)
 
 
 def test_the_folder_of_study_files_says_what_each_is():
     """And how all of them are computed at once."""
     folder = Path(__file__).parents[3] / "replications" / "saunders2021"
     told = (folder / "README.md").read_text(encoding="utf-8")
-    assert [file.name for file in sorted(folder.iterdir()) if file.name != "README.md" and f"`{file.name}`" not in told] == []
+    assert [file.name for file in sorted(folder.glob("*.*")) if file.name != "README.md" and f"`{file.name}`" not in told] == []
     assert "saltus reproduce saunders2021" in told
     assert "measured_" in told

@@ -63,7 +63,7 @@ def sine_points(**changes):
 @pytest.fixture
 def untried(monkeypatch):
     """A file without a checksum is read at once. That it is tried in a process of its own first is seen in faults/test_result_files.py."""
-    monkeypatch.setattr(sys.modules["saltus.results.load"], "try_elsewhere", lambda *_: None)
+    monkeypatch.setattr(sys.modules["saltus.results.files.load"], "try_elsewhere", lambda *_: None)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from saltus.results import AttractorTable, basins_dataset
-from saltus.study.answers.basins_table import attractor_table
+from saltus.study.answers.basins_rows import attractor_table
 
 SCATTER = 4.3e-6 / 3
 TABLE = AttractorTable(

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from saltus.errors import StudyError
-from saltus.study.answers.simulate_compare import contact_table, exact_times, printed_rows
+from saltus.study.answers.compare import contact_table, exact_times, printed_rows
 
 
 def made_up_run(method: str, times: list[float]) -> xr.Dataset:

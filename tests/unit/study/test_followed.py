@@ -9,10 +9,11 @@ import pytest
 import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.results import load
-from saltus.study.answers.followed_tables import spectrum_table
+from saltus.study.answers.ask import questions_of
+from saltus.study.answers.motion_rows import spectrum_table
 from saltus.study.run.running import Resources
 from saltus.study.run.status import status_tables
-from saltus.study.run.study import questions_of, run_study
+from saltus.study.run.study import run_study
 from saltus.study.setting.inputs import Inputs
 from saltus.study.tables.read import parse
 from saltus.units import from_si
@@ -193,7 +194,7 @@ def test_what_changed_is_computed_again(whole, tmp_path, monkeypatch, old, new, 
     assert len(calls) == 1
 
 
-@pytest.mark.parametrize("question", [SECTION, SPECTRUM, IMPACTS, ENERGY, "[lyapunov]\n"])
+@pytest.mark.parametrize("question", [SECTION, SPECTRUM, IMPACTS, ENERGY, "[lyapunov]\n", "[simulate]\nperiods = 3\n"])
 def test_the_values_of_the_system_are_part_of_every_answer(question, tmp_path):
     """They aren't hidden by the values that the question itself may have."""
 
@@ -218,7 +219,7 @@ def test_the_values_of_the_system_are_part_of_every_answer(question, tmp_path):
         (SECTION.replace('"upper_gap"', '{ x = "3 mm", v = "1 m/s" }'), r"surface is a level of one state"),
         (SECTION.replace('"upper_gap"', "3"), r"surface = 3 must be text in quotes\. For example: surface = { x ="),
         (SECTION.replace('surface = "upper_gap"\n', ""), r"\[poincare 1\] needs 'surface'\. For example"),
-        (SECTION.replace("direction = 1", "direction = 2"), r"direction = 2 must be less than or equal to 1"),
+        (SECTION.replace("direction = 1", "direction = 2"), r"direction = 2 must be 0, 1 or -1"),
         (SECTION.replace("direction", "directon"), r"no key 'directon'\. Did you mean 'direction'\?"),
         (SECTION + SECTION, r"two \[\[poincare\]\] have the same name"),
         (SECTION + 'method = { name = "ODE45", events = "ignore" }\n', r"\[poincare\] needs a method that locates contacts"),

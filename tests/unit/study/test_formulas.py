@@ -9,9 +9,10 @@ import pytest
 import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.results import load
+from saltus.study.answers.ask import questions_of
 from saltus.study.run.copies import copy_of, inputs_of
 from saltus.study.run.running import Resources
-from saltus.study.run.study import questions_of, run_study
+from saltus.study.run.study import run_study
 from saltus.study.setting.inputs import Inputs
 from saltus.study.tables.read import parse, read
 from saltus.study.tables.spec import Study
@@ -98,7 +99,7 @@ def whole(tmp_path_factory):
 
 
 def test_a_system_that_is_written_out_is_that_of_python(whole):
-    made = questions_of(parse(RIG + SIMULATE), None, Inputs(whole.parent / "study"))[0].setting.base
+    made = questions_of(parse(RIG + SIMULATE), None, Inputs(whole.parent / "study"))[0].system
     assert made.fingerprint() == rig.fingerprint()
     assert made.description == "A mass with a stop, driven by a record."
     ours, theirs = load(whole / "run.nc"), sl.simulate(rig, (0, 0), periods=6, samples=16, progress=False)
@@ -161,7 +162,7 @@ def test_guards_have_the_names_that_the_study_gives_them(tmp_path):
 
 def test_a_motion_without_a_start_begins_at_rest(tmp_path):
     (question,) = questions_of(parse(RIG + "[simulate]\nperiods = 6\n"), None, Inputs(files(tmp_path)))
-    assert question.arguments["start"] == {"x": 0.0, "v": 0.0}
+    assert question.arguments["start"] is None, "the analysis begins at rest then"
 
 
 def test_units_of_rates_are_checked_unless_the_study_says_no(tmp_path):
@@ -180,7 +181,7 @@ t_end = "1 s"
     with pytest.raises(StudyError, match=r"\[system\] forgotten.*\[system\] check_units = false leaves units unchecked"):
         questions_of(parse(text), None, Inputs(files(tmp_path)))
     (question,) = questions_of(parse(text.replace("[system]", "[system]\ncheck_units = false")), None, Inputs(tmp_path))
-    assert question.setting.base.name == "forgotten"
+    assert question.system.name == "forgotten"
 
 
 @pytest.mark.parametrize(

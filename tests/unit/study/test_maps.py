@@ -10,9 +10,9 @@ import pytest
 from edited_copy import edited_copy
 from saltus.errors import SaltusError, StudyError, UnitError
 from saltus.study import identity
-from saltus.study.run.maps import MapJob, jobs_of
+from saltus.study.answers.ask import questions_of
+from saltus.study.answers.basins import BasinMap, maps_of
 from saltus.study.run.running import Report, Resources, shard_of
-from saltus.study.run.study import questions_of
 from saltus.study.setting.inputs import Inputs
 from saltus.study.tables.read import parse
 from small_study import small_study
@@ -21,8 +21,8 @@ BASE = small_study(6, 4)
 MAPS = BASE + '[[basins.map]]\nname = "first"\n[[basins.map]]\nname = "second"\n'
 
 
-def job(text=BASE) -> MapJob:
-    return jobs_of(parse(text))[0]
+def job(text=BASE) -> BasinMap:
+    return maps_of(parse(text))[0]
 
 
 def replaced(old, new, text=BASE):
@@ -33,7 +33,7 @@ def replaced(old, new, text=BASE):
 # -- the plan --------------------------------------------------------------------------------------------------------------------
 def test_a_study_becomes_a_plan():
     one = job()
-    assert (one.name, one.slug, one.compare) == ("small", "basins", None)
+    assert (one.title, one.stem, one.compare) == ("small", "basins", None)
     assert one.plan.shape == (6, 4)
     assert list(one.plan.axes) == ["x", "v"]
     assert one.plan.axes["x"][[0, -1]].tolist() == [-0.005, 0.005]
@@ -42,8 +42,8 @@ def test_a_study_becomes_a_plan():
 
 
 def test_maps_have_values_and_methods_of_their_own():
-    first, second = jobs_of(parse(MAPS + 'values = { frequency = "7 Hz" }\nmethod = { name = "ODE45", rtol = 1e-4 }\ncompare = "first"\n'))
-    assert (first.slug, second.slug, second.compare) == ("first", "second", "first")
+    first, second = maps_of(parse(MAPS + 'values = { frequency = "7 Hz" }\nmethod = { name = "ODE45", rtol = 1e-4 }\ncompare = "first"\n'))
+    assert (first.stem, second.stem, second.compare) == ("first", "second", "first")
     assert [one.plan.system.values["frequency"] for one in (first, second)] == [16.0, 7.0]
     assert [one.plan.method.name for one in (first, second)] == ["Taylor", "ODE45"]
     assert second.plan.method.rtol == 1e-4
@@ -63,7 +63,7 @@ def test_maps_have_values_and_methods_of_their_own():
 )
 def test_a_name_becomes_a_file_name(name, slug):
     """Nothing that leads out of the folder."""
-    assert job(BASE + f"[[basins.map]]\nname = {json.dumps(name)}\n").slug == slug
+    assert job(BASE + f"[[basins.map]]\nname = {json.dumps(name)}\n").stem == slug
 
 
 @pytest.mark.parametrize("second", ["a agreement", "a attractors"])
@@ -181,7 +181,7 @@ def test_the_code_is_part_of_the_identity(tmp_path, monkeypatch):
     """A label that comes from other code isn't mixed with this one's: every file that a label depends on counts."""
     before = identity.code_hash.__wrapped__()
     assert before == identity.code_hash.__wrapped__() == job().identity()["code"]
-    for target in ("taylor_step.py", "labels.py", "engine.py", "trace.py", "recurrence.py", "capture.py", "maps.py", "module.py",
+    for target in ("taylor_step.py", "labels.py", "engine.py", "trace.py", "find_attractors.py", "capture.py", "maps.py", "module.py",
                    "assemble.py", "units.py"):  # fmt: skip
         with monkeypatch.context() as patch:
             edited_copy(tmp_path / target, target, patch)

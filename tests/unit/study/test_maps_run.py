@@ -10,11 +10,11 @@ import saltus as sl
 from saltus.analysis.basins import pipeline
 from saltus.errors import StudyError
 from saltus.results import load
-from saltus.results.store import Store, StoreError
+from saltus.results.store.store import Store, StoreError
 from saltus.study import identity
+from saltus.study.answers.basins import maps_of
 from saltus.study.run import copies, maps
 from saltus.study.run.copies import copy_of
-from saltus.study.run.maps import jobs_of
 from saltus.study.run.running import Resources
 from saltus.study.run.status import status_table, status_tables, stores
 from saltus.study.run.study import run_study
@@ -340,4 +340,4 @@ def test_a_full_disk_keeps_the_copy_of_the_study(whole, tmp_path, monkeypatch):
 
 
 def test_maps_of_one_system_need_one_compilation():
-    assert len({one.plan.system.fingerprint() for one in jobs_of(parse(PAIR))}) == 1
+    assert len({one.plan.system.fingerprint() for one in maps_of(parse(PAIR))}) == 1

@@ -13,10 +13,11 @@ import saltus as sl
 from saltus.errors import SaltusError, StudyError
 from saltus.flow import Interrupted
 from saltus.results import load, save
+from saltus.study.answers.ask import questions_of
 from saltus.study.run.copies import inputs_of
 from saltus.study.run.running import Resources
 from saltus.study.run.status import status_tables
-from saltus.study.run.study import questions_of, run_study
+from saltus.study.run.study import run_study
 from saltus.study.setting.inputs import Inputs
 from saltus.study.tables.read import parse
 from saltus.study.tables.spec import Study
@@ -312,7 +313,7 @@ def test_every_key_tells_what_it_is():
 
 
 def test_examples_of_the_schema_are_read():
-    from saltus.study.answers.responses import BifurcationDiagram, FrequencyResponse
+    from saltus.study.tables.questions import BifurcationDiagram, FrequencyResponse
     from saltus.study.tables.wording import toml
 
     for key, table in (("frequency_response", FrequencyResponse), ("bifurcation_diagram", BifurcationDiagram)):

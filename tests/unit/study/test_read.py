@@ -7,7 +7,7 @@ import json
 import pytest
 
 from saltus.errors import StudyError
-from saltus.study.tables.parts import ODE45, Taylor
+from saltus.study.tables.methods import ODE45, Taylor
 from saltus.study.tables.read import parse, read
 from saltus.study.tables.spec import Study
 

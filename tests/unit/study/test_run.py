@@ -92,7 +92,7 @@ def test_table2_exact_times_by_taylor(table2):
 
 
 def test_files_keep_it_all(table2):
-    assert [file.name for file in table2.outcome.files] == ["run.nc", "run.csv", "run-reference.nc"]
+    assert [file.name for file in table2.outcome.files] == ["run-reference.nc", "run.nc", "run.csv"]
     study = (ROOT / "replications" / "saunders2021" / "table2.toml").read_text()
     assert table2.run.attrs["study"] == study
     assert (table2.folder / "study.toml").read_text() == study

@@ -85,9 +85,13 @@ def basins(
     >>> found["basin"].shape, found["attractor_period"].values.tolist()
     ((20, 20), [1, 1, 3, 9])
     """
-    plan = basin_plan(system, axes, at, check_method(method), periods, every)
+    return map_of(basin_plan(system, axes, at, check_method(method), periods, every), threads, progress)
+
+
+def map_of(plan: BasinPlan, threads: int | None, progress: bool | Callable[[float], None] | None) -> xr.Dataset:
+    """The Dataset of a planned map, as :func:`basins` returns it. Raises Interrupted on Ctrl-C."""
     show, close = reporter(progress)
-    result = Settling.empty(plan.cells, len(system.states))
+    result = Settling.empty(plan.cells, len(plan.system.states))
     found = None
     try:
         found = plan.scout(threads, _part(show, 0.0, SCOUTING))

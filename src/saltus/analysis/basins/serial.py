@@ -53,7 +53,7 @@ def _holds_together(found: Found, size: int) -> bool:
         len(near.centres) == len(near.weights) == len(near.owners)
         and bool(np.isfinite(near.centres).all() and np.isfinite(near.weights).all())
         and bool(((near.owners >= 0) & (near.owners < len(found))).all())
-        and all(len(one.points) == len(one.monodromy) > 0 and one.multipliers.shape == (size,) for one in orbits)
+        and all(len(one.points) > 0 and one.multipliers.shape == (size,) for one in orbits)
         and all(len(one.points) > 0 and one.scale.shape == (size,) for one in found.wandering)
         and all(one.size.shape == one.scatter.shape == (size,) for one in found.wandering if isinstance(one, Noisy))
     )
@@ -72,14 +72,14 @@ def _found(data: Mapping[str, Any], size: int) -> Found:
 def _orbit_data(orbit: Orbit) -> dict[str, Any]:
     values = orbit.multipliers
     return {
-        "points": orbit.points.tolist(), "monodromy": orbit.monodromy.tolist(), "mismatch": orbit.mismatch,
+        "points": orbit.points.tolist(), "mismatch": orbit.mismatch,
         "multipliers": [[float(value.real), float(value.imag)] for value in values],
     }  # fmt: skip
 
 
 def _orbit_from(data: Mapping[str, Any], size: int) -> Orbit:
     values = np.array([complex(real, imaginary) for real, imaginary in data["multipliers"]])
-    return Orbit(_array(data["points"], size), _array(data["monodromy"], size, size), values, float(data["mismatch"]))
+    return Orbit(_array(data["points"], size), values, float(data["mismatch"]))
 
 
 def _wandering_data(one: Wandering) -> dict[str, Any]:

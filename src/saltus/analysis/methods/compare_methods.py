@@ -20,8 +20,8 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
+from saltus.intervals import wilson
 from saltus.results import methods_dataset
-from saltus.results.intervals import wilson
 from saltus.system.system import System
 
 #: The question of Saunders et al. (2021): ode45 as it comes, with and without event location.

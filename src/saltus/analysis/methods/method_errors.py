@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.orbits.steady import motion_range
+from saltus.analysis.orbits.find_responses import motion_range
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
-from saltus.results.schema import parameters_of, response_name, states_of
+from saltus.results.dataset.schema import parameters_of, response_name, states_of
 from saltus.system.system import System
 
 #: Orbits of two methods are one if they lie so many times the method's own noise apart, and at least this much of the motion's range.

@@ -18,7 +18,8 @@ from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.room import check_room
-from saltus.results import motion_dataset, schema
+from saltus.results import motion_dataset
+from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Expr
 from saltus.system.quantity import Quantity, quantity, with_integrals
@@ -64,9 +65,9 @@ def energy_balance(
     supplied, dissipated : callable
         Power that flows in, and power that is lost [W], likewise.
     periods : int
-        Whole forcing periods to look at, after the transient; or
+        Whole forcing periods to look at, after the transient.
     t_end : float or str
-        the time at the end [s]; of a forced system at a whole period.
+        Time at the end [s], in place of periods; of a forced system at a whole period.
     transient : int, or float or str
         Whole forcing periods before; of an unforced system a time [s].
     intervals : int

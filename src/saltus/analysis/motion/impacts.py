@@ -17,7 +17,8 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
-from saltus.results import motion_dataset, schema
+from saltus.results import motion_dataset
+from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate
 from saltus.system.quantity import Quantity, with_integrals
 from saltus.system.system import System
@@ -54,9 +55,9 @@ def impact_statistics(
     system, start, t_start, method, values, threads, progress
         As for :func:`saltus.simulate`. The method must locate contacts.
     periods : int
-        Whole forcing periods to look at, after the transient; or
+        Whole forcing periods to look at, after the transient.
     t_end : float or str
-        the time at the end [s].
+        Time at the end [s], in place of periods.
     transient : int, or float or str
         Whole forcing periods before; of an unforced system a time [s].
     force : mapping of str to callable, optional

@@ -18,7 +18,8 @@ from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.kernels import status as st
-from saltus.results import motion_dataset, schema
+from saltus.results import motion_dataset
+from saltus.results.dataset import schema
 from saltus.system.guards import equation_of
 from saltus.system.quantity import Quantity, acting_guards, turning_surface, with_level, with_surface
 from saltus.system.system import System
@@ -59,9 +60,9 @@ def poincare(
     direction : {0, 1, -1}
         Keep all crossings, or only those where the function rises (1) or falls (-1).
     periods : int
-        Whole forcing periods to look at, after the transient; or
+        Whole forcing periods to look at, after the transient.
     t_end : float or str
-        the time at the end [s].
+        Time at the end [s], in place of periods.
     transient : int, or float or str
         Whole forcing periods before the first crossing is kept; of an unforced system a time [s].
 

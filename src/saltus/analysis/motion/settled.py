@@ -13,8 +13,8 @@ import xarray as xr
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole as whole_number
-from saltus.results.reader import reader
-from saltus.results.schema import TRAJECTORY, check, kind_of, states_of
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import TRAJECTORY, check, kind_of, states_of
 
 #: Largest mismatch that counts as a repeat: far above rounding, far below what tells 24T from its neighbour 12T on the rig (1e-2).
 TOLERANCE = 1e-6

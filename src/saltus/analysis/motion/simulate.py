@@ -58,9 +58,9 @@ def simulate(
         State at the start: ``(0.0, 0.0)``, ``("1 mm", 0)``, ``{"x": [...], "v": [...]}`` or an array (trajectory, state). Numbers are
         SI. Default: all zero.
     periods : int
-        Whole forcing periods to run; or
+        Whole forcing periods to run.
     t_end : float or str
-        the time at the end [s].
+        Time at the end [s], in place of periods.
     t_start : float or str
         Time at the start [s]; the phase of the forcing is that of this time.
     method : Method
@@ -72,7 +72,7 @@ def simulate(
         Keep samples and contacts of the last so many periods only (default all).
     values : mapping
         Parameter values of this call: one each, or an array with one for each trajectory (the forcing frequency included).
-    time_errors : str
+    time_errors : {"measured", "local"}
         ``"measured"``: ``contact_time_error`` is estimated from three more runs of every trajectory, by a more exact method and nudged by
         roundings. ``"local"``: the error of the step that holds the contact only, at a quarter of the cost.
     threads : int

@@ -15,8 +15,9 @@ from saltus.analysis.motion.settled import settled
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole as whole_number
-from saltus.results import schema, spectrum_dataset
-from saltus.results.reader import reader
+from saltus.results import spectrum_dataset
+from saltus.results.dataset import schema
+from saltus.results.dataset.reader import reader
 
 #: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the first).
 WINDOWS = {

@@ -9,8 +9,8 @@ import xarray as xr
 
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
-from saltus.results.reader import reader
-from saltus.results.schema import RESPONSES, check
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import RESPONSES, check
 
 #: What two outputs are compared by.
 By = Literal["amplitude", "rms", "rms_about_mean"]

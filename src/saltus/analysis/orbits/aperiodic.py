@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.analysis.statistics import BOUNDED, UNCLEAR
-from saltus.flow.maps import Map, Stroboscope
+from saltus.flow.maps import Map
+from saltus.results.dataset.kinds import Kind
 
 #: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its way.
 BLOCK, BLOCKS, ALIGNING = 8, 192, 48
@@ -126,7 +127,7 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
             groups.append([i])
         else:
             home.append(i)
-    _, kinds = kinds_of(lambda _: map_, start[usable], np.broadcast_to(scale, start[usable].shape), groups)
+    _, kinds = kinds_of(map_, start[usable], np.broadcast_to(scale, start[usable].shape), groups)
     return [Wandering(*kind, points[usable[group[0]]], scale) for group, kind in zip(groups, kinds, strict=True) if kind is not None]
 
 
@@ -152,20 +153,20 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
     if error > UNCLEAR:
         return None
     if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():  # growth like t looks positive at first
-        return "chaotic", exponent, error
+        return Kind.CHAOTIC.word, exponent, error
     zero = max(FLOOR, min(SURE * error, BOUNDED / (len(second) * BLOCK)))
-    return ("quasi_periodic", exponent, error) if abs(second.mean()) <= zero else None
+    return (Kind.QUASI_PERIODIC.word, exponent, error) if abs(second.mean()) <= zero else None
 
 
 def kinds_of(
-    part: Callable[[np.ndarray], Map | Stroboscope], start: np.ndarray, scale: np.ndarray, groups: Sequence[Sequence[int]]
+    map_: Map, start: np.ndarray, scale: np.ndarray, groups: Sequence[Sequence[int]]
 ) -> tuple[np.ndarray, list[tuple[str, float, float] | None]]:
     """What motions that never repeat are: their exponents are measured for longer while they could be zero as well as positive.
 
     Parameters
     ----------
-    part : callable
-        The map for some of the trajectories, by their numbers int64[m].
+    map_ : Map
+        The map, with a row for each trajectory or one for all.
     start, scale : float64[k, D]
         Where trajectories stand, and the range of each state.
     groups : sequence of sequence of int
@@ -178,7 +179,7 @@ def kinds_of(
     kinds : list
         (kind, exponent, its standard error) of each group; None if they don't say even then.
     """
-    state, blocks = growth_rates(part(np.arange(len(start))), start, scale)
+    state, blocks = growth_rates(map_, start, scale)
     rates = list(blocks.T)
     kinds = [kind_of_growth(np.stack([rates[i] for i in group], axis=1)) for group in groups]
     for _ in range(MEASURED - 1):
@@ -186,7 +187,7 @@ def kinds_of(
         if not again:
             break
         rows = np.concatenate([groups[n] for n in again])
-        state[rows], blocks = growth_rates(part(rows), state[rows], scale[rows])
+        state[rows], blocks = growth_rates(map_.rows(rows), state[rows], scale[rows])
         for i, more in zip(rows.tolist(), blocks.T, strict=True):
             rates[i] = np.append(rates[i], more)
         for n in again:
@@ -194,7 +195,7 @@ def kinds_of(
     return state, kinds
 
 
-def growth_rates(map_: Map | Stroboscope, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction, block by block, float64[blocks, k]."""
     k, size = start.shape
     direction = np.zeros((k, size, size))

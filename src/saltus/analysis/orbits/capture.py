@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from saltus.analysis.orbits.orbits import JITTER, Orbit
+from saltus.analysis.orbits.orbits import Orbit
+from saltus.analysis.orbits.tolerances import JITTER
 from saltus.codegen.module import capture_module
 from saltus.flow.maps import Map
 
@@ -108,7 +109,8 @@ def _verified(map_: Map, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, n
     Where no radius passes, what lies within the map's own errors of the point is taken to be on it.
     """
     every = -(-orbit.period // MOST_POINTS)
-    points, monodromy = orbit.points[::every], orbit.monodromy[::every]
+    points = orbit.points[::every]
+    _, monodromy = map_.tangent(points, orbit.period)
     n, size = points.shape
     iterates = orbit.period * _returns(orbit)
     norms = np.stack([_norm(matrix, scale) for matrix in monodromy])

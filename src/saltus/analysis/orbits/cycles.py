@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.orbits.equilibria import field_of, jacobian_of
-from saltus.analysis.orbits.orbits import AMPLIFIED, MARGINAL
+from saltus.analysis.orbits.newton import leading_first, newton
+from saltus.analysis.orbits.orbits import OrbitBatch
+from saltus.analysis.orbits.tolerances import AMPLIFIED, BESIDE, CONVERGED, LONGEST, RESTS, ROUNDING
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 
@@ -27,16 +29,14 @@ TURN, FOLLOWED = 0.95, 0.9
 FAR, ENOUGH = 0.05, 8
 #: Returns that samples can't tell apart: the error of the cubic between them, in units of the scale.
 SAMPLED = 1e-6
-#: Steps that locate the return; Newton steps, and a step that is the last one, in units of the scale.
-LOCATED, MOST_STEPS, CONVERGED = 3, 15, 1e-12
+#: Steps that locate the return.
+LOCATED = 3
 #: Farthest that a cycle found lies from where it was looked for, in units of the scale.
 FARTHEST = 1.0
 #: Most turns of a cycle that may have been taken for one: a return is seen in SAMPLES samples, of which a turn has 20 where they follow it.
 MOST_PARTS = SAMPLES // 16
-#: Points in equal steps of time that a cycle is known by: as many as the longest orbit of a stroboscope has.
-POINTS = 64
 #: Range of the motion, in units of the scale, below which it is no cycle but rest.
-RESTS = 1e-7
+NO_CYCLE = 1e-7
 
 
 @dataclass
@@ -56,34 +56,6 @@ class Returns:
     time: np.ndarray
     apart: np.ndarray
     scale: np.ndarray
-
-
-@dataclass
-class Cycles:
-    """Limit cycles of k rows; NaN where there is none.
-
-    Attributes
-    ----------
-    period : float64[k]
-        [s].
-    points : float64[k, POINTS, D]
-        States in equal steps of time, from where the first state that moves is least.
-    multipliers : complex128[k, D]
-        The trivial 1 first, then the others, the largest first.
-    moved : float64[k]
-        How far from the first guess Newton's method arrived, in units of the scale.
-    """
-
-    period: np.ndarray
-    points: np.ndarray
-    multipliers: np.ndarray
-    moved: np.ndarray
-
-    @property
-    def stable(self) -> np.ndarray:
-        """Which attract: all multipliers but the trivial one lie inside the unit circle by more than rounding, bool[k]."""
-        with np.errstate(invalid="ignore"):
-            return np.isfinite(self.period) & (np.abs(self.multipliers[:, 1:2]).max(axis=1, initial=0.0) < 1.0 - MARGINAL)
 
 
 # -- the first guess -----------------------------------------------------------------------------------------------------------
@@ -117,7 +89,7 @@ def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.
     rates = field_of(map_.system, samples.reshape(-1, size), values).reshape(k, SAMPLES, size)
     with np.errstate(all="ignore"):
         ranges, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
-        scale = np.where(np.isfinite(ranges) & (ranges > 1e-9 * sizes), ranges, np.where(sizes > 0, sizes, 1.0))
+        scale = np.where(np.isfinite(ranges) & (ranges > RESTS * sizes), ranges, np.where(sizes > 0, sizes, 1.0))
         scale = np.where(np.isfinite(scale), scale, 1.0)
         across = rates / scale[:, None]
         across /= np.linalg.norm(across, axis=2, keepdims=True)
@@ -161,7 +133,7 @@ def _locate(map_: Stroboscope, start: np.ndarray, which: np.ndarray, result: Ret
 
 
 # -- Newton's method -----------------------------------------------------------------------------------------------------------
-def find_cycles(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Cycles:
+def find_cycles(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> tuple[OrbitBatch, np.ndarray]:
     """The limit cycles near states float64[k, D] that nearly recur after times float64[k] [s].
 
     Parameters
@@ -172,58 +144,84 @@ def find_cycles(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: n
         A first guess of each.
     scale : float64[k, D]
         Range of each state.
+
+    Returns
+    -------
+    cycles : OrbitBatch
+        Each by points in equal steps of its time, from where the first state that moves is least.
+    moved : float64[k]
+        How far from the first guess Newton's method arrived, in units of the scale; NaN where it found none.
     """
-    k, size = start.shape
-    result = Cycles(np.full(k, np.nan), np.full((k, POINTS, size), np.nan), np.full((k, size), np.nan + 0j), np.full(k, np.nan))
-    x, period, found = _newton(map_, start, time, scale)
+    result, moved = OrbitBatch.none(*start.shape), np.full(len(start), np.nan)
+    x, time, found = _newton(map_, start, time, scale)
     rows = np.flatnonzero(found)
     if not len(rows):
-        return result
+        return result, moved
     mine = map_.rows(rows)
-    period = _least_period(mine, x[rows], period[rows], scale[rows])
-    first = _first(mine, x[rows], period)
-    points = mine.with_period(period).run(first, 1, Schedule.even(1, POINTS)).samples
-    moves = (np.ptp(points, axis=1) / scale[rows]).max(axis=1) > RESTS
-    multipliers = _multipliers(mine.with_period(period), first)
+    time = _least_period(mine, x[rows], time[rows], scale[rows])
+    first = _first(mine, x[rows], time)
+    points = mine.with_period(time).run(first, 1, Schedule.even(1, LONGEST)).samples
+    moves = (np.ptp(points, axis=1) / scale[rows]).max(axis=1) > NO_CYCLE
+    multipliers = _multipliers(mine.with_period(time), first)
     good = moves & np.isfinite(points).all(axis=(1, 2)) & np.isfinite(multipliers).all(axis=1)
-    moved = np.abs((x[rows] - start[rows]) / scale[rows]).max(axis=1)
-    columns = (result.period, result.points, result.multipliers, result.moved)
-    for column, values in zip(columns, (period, points, multipliers, moved), strict=True):
-        column[rows[good]] = values[good]
-    return result
+    rows, period = rows[good], np.full(np.count_nonzero(good), LONGEST)
+    result.put(rows, OrbitBatch(period, points[good], multipliers[good], time[good], np.full(len(rows), np.nan)))
+    moved[rows] = np.abs((x[rows] - start[rows]) / scale[rows]).max(axis=1)
+    return result, moved
+
+
+def attracting_cycles(map_: Stroboscope, state: np.ndarray, window: float, near: float) -> tuple[OrbitBatch, np.ndarray, np.ndarray]:
+    """The limit cycles of trajectories that nearly return.
+
+    Parameters
+    ----------
+    map_ : Stroboscope
+        k flows without forcing.
+    state : float64[k, D]
+        Where each trajectory stands.
+    window : float
+        Time over which a return is looked for first [s].
+    near : float
+        Distance of a return, in units of the range of the motion, that is worth a try by Newton's method.
+
+    Returns
+    -------
+    cycles : OrbitBatch
+        What Newton's method found.
+    beside : bool[k]
+        Which attract, and lie beside their trajectory.
+    scale : float64[k, D]
+        Range of each state in the window.
+    """
+    seen = returns(map_, state, window)
+    noise = map_.noise_of(seen.scale)
+    cycles, moved = find_cycles(map_, state, np.where(seen.apart < np.maximum(near, noise), seen.time, np.nan), seen.scale)
+    with np.errstate(invalid="ignore"):
+        beside = cycles.stable & (moved <= BESIDE * np.maximum(np.maximum(seen.apart, ROUNDING), noise))
+    return cycles, beside, seen.scale
 
 
 def _newton(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States float64[k, D] and periods float64[k] [s] that solve phi_T(x) = x, and where the iteration converged, bool[k]."""
-    x, period, found = np.array(start, float), np.array(time, float), np.zeros(len(start), bool)
-    before, rows = np.full(len(start), np.inf), np.flatnonzero(np.isfinite(time))
-    size, enough = x.shape[1], np.full(len(x), CONVERGED) if map_.exact else map_.noise_of(scale)
-    for _ in range(MOST_STEPS):
-        if not len(rows):
-            break
-        mine, unit = map_.rows(rows), scale[rows]
-        end, matrix = mine.with_period(period[rows]).tangent(x[rows], 1)
-        speed = field_of(map_.system, x[rows], mine.values) / unit
-        arrival = field_of(map_.system, end, mine.values) / unit * period[rows, None]
-        system = np.zeros((len(rows), size + 1, size + 1))
-        system[:, :size, :size] = matrix * unit[:, None, :] / unit[:, :, None] - np.eye(size)
-        system[:, :size, size], system[:, size, :size] = arrival, speed * period[rows, None]
-        good = np.isfinite(system).all(axis=(1, 2)) & np.isfinite(end).all(axis=1)
-        good[good] = np.linalg.cond(system[good]) < 1e15
-        rows, unit, end, system = rows[good], unit[good], end[good], system[good]
-        if not len(rows):
-            break
-        missing = np.concatenate([(x[rows] - end) / unit, np.zeros((len(rows), 1))], axis=1)
-        step = np.linalg.solve(system, missing[:, :, None])[:, :, 0]
-        x[rows] += step[:, :size] * unit
-        period[rows] *= 1.0 + np.clip(step[:, size], -0.5, 0.5)
-        length = np.abs(step).max(axis=1)
-        done = (length < enough[rows]) | ((length < AMPLIFIED) & (length > 0.5 * before[rows]))  # stiff cycles amplify rounding
-        found[rows[done]] = True
-        before[rows] = length
-        near = np.abs((x[rows] - start[rows]) / unit).max(axis=1) < FARTHEST
-        rows = rows[~done & near & (length < 1.0)]
-    return x, period, found
+    """States float64[k, D] and periods float64[k] [s] that solve phi_T(x) = x, and where the iteration converged, bool[k].
+
+    The last unknown is the time in units of the first guess. The last equation keeps each step across the flow.
+    """
+    size = start.shape[1]
+
+    def equations(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mine, x, unit, times = map_.rows(rows), z[:, :size], scale[rows], time[rows, None]
+        end, matrix = mine.with_period(z[:, size] * time[rows]).tangent(x, 1)
+        residual, derivative = np.zeros((len(rows), size + 1)), np.zeros((len(rows), size + 1, size + 1))
+        residual[:, :size] = (end - x) / unit
+        derivative[:, :size, :size] = matrix * unit[:, None, :] / unit[:, :, None] - np.eye(size)
+        derivative[:, :size, size] = field_of(mine.system, end, mine.values) / unit * times
+        derivative[:, size, :size] = field_of(mine.system, x, mine.values) / unit * times
+        return residual, derivative
+
+    guess, units = (np.concatenate([part, np.ones((len(start), 1))], axis=1) for part in (start, scale))
+    guess[~np.isfinite(time)] = np.nan
+    z, found = newton(equations, guess, units, CONVERGED if map_.exact else map_.noise_of(scale), farthest=FARTHEST)
+    return z[:, :size], z[:, size] * time, found
 
 
 def _least_period(map_: Stroboscope, x: np.ndarray, period: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -239,7 +237,7 @@ def _first(map_: Stroboscope, x: np.ndarray, period: np.ndarray) -> np.ndarray:
     """The state of each cycle at which the first state that moves is least: where its points begin, whoever found it."""
     samples = map_.with_period(period).run(x, 1, Schedule.even(1, SAMPLES)).samples
     ranges = np.ptp(samples, axis=1)
-    rows, column = np.arange(len(x)), np.argmax(ranges > 1e-9 * np.abs(samples).max(axis=1), axis=1)
+    rows, column = np.arange(len(x)), np.argmax(ranges > RESTS * np.abs(samples).max(axis=1), axis=1)
     least = np.argmin(samples[rows, :, column], axis=1)
     state = samples[rows, least]
     for _ in range(LOCATED):  # where its rate vanishes
@@ -263,6 +261,5 @@ def _multipliers(map_: Stroboscope, x: np.ndarray) -> np.ndarray:
         if not (np.isfinite(matrix).all() and np.isfinite(rate).all() and rate.any()):
             continue
         frame = np.linalg.qr(np.concatenate([rate[:, None], np.eye(size)], axis=1))[0][:, :size]
-        others = np.linalg.eigvals(frame[:, 1:].T @ matrix @ frame[:, 1:])
-        result[i] = np.concatenate([[1.0], others[np.lexsort((-others.imag, -np.round(np.abs(others), 12)))]])
+        result[i] = np.append(1.0, leading_first((frame[:, 1:].T @ matrix @ frame[:, 1:])[None])[0])
     return result

@@ -14,13 +14,15 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
 from saltus.analysis.orbits.capture import RADII, SAFETY, sphere
+from saltus.analysis.orbits.newton import newton
+from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.flow.maps import Stroboscope
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import depends_on
 from saltus.system.system import System
 
-#: Newton steps, and the length of the last one in units of the scale: the next is rounding.
-MOST_STEPS, CONVERGED = 30, 1e-12
+#: Longest step of Newton's method, in units of the scale: the field of a motion that has escaped points anywhere.
+FARTHEST_STEP = 1e6
 #: Share of the norm of the Jacobian that a real part must lie below zero: more than rounding.
 MARGINAL = 1e-10
 #: Shells inside the largest one at which the field is looked at.
@@ -56,6 +58,15 @@ class Equilibria:
         """Which attract, bool[k]."""
         return np.isfinite(self.reach).all(axis=(1, 2))
 
+    @property
+    def orbits(self) -> OrbitBatch:
+        """They as orbits of one point and of time 0."""
+        found = np.isfinite(self.place).all(axis=1)
+        result = OrbitBatch.none(*self.place.shape)
+        result.period[found], result.time[found] = 1, 0.0
+        result.points[:, 0], result.multipliers[:] = self.place, self.eigenvalues
+        return result
+
     def holds(self, states: np.ndarray) -> np.ndarray:
         """Which of states float64[k, D] lie where their equilibrium captures, bool[k]."""
         with np.errstate(invalid="ignore"):
@@ -90,7 +101,13 @@ def find_equilibria(map_: Stroboscope, start: np.ndarray, scale: np.ndarray, cap
     ``captures``: whether to ask where they capture.
     """
     system, values = map_.system, map_.values
-    x, found = _newton(system, values, np.array(start, float), scale)
+
+    def equations(x: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mine, unit = {name: column[rows] for name, column in values.items()}, scale[rows]
+        derivative = jacobian_of(system, x, mine) * unit[:, None, :] / unit[:, :, None]
+        return field_of(system, x, mine) / unit, derivative
+
+    x, found = newton(equations, start, scale, longest_step=FARTHEST_STEP)
     place = np.where(found[:, None], x, np.nan)
     eigenvalues = np.full(x.shape, np.nan + 0j)
     reach = np.full((*x.shape, x.shape[1]), np.nan)
@@ -102,27 +119,6 @@ def find_equilibria(map_: Stroboscope, start: np.ndarray, scale: np.ndarray, cap
             if captures and eigenvalues[i, 0].real < -MARGINAL * np.linalg.norm(matrix, 2):
                 reach[i] = _reach(system, {n: v[[i]] for n, v in values.items()}, x[i], matrix, scale[i])
     return Equilibria(place, eigenvalues, reach)
-
-
-def _newton(system: System, values: Mapping[str, np.ndarray], x: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Zeros of the field, float64[k, D], and where the iteration converged, bool[k]."""
-    found, rows = np.zeros(len(x), bool), np.arange(len(x))
-    for _ in range(MOST_STEPS):
-        mine = {name: column[rows] for name, column in values.items()}
-        rates, matrix = field_of(system, x[rows], mine), jacobian_of(system, x[rows], mine)
-        good = np.isfinite(rates).all(axis=1) & np.isfinite(matrix).all(axis=(1, 2))
-        good[good] = np.abs(np.linalg.det(matrix[good])) > 0
-        rows, rates, matrix = rows[good], rates[good], matrix[good]
-        if not len(rows):
-            break
-        step = np.linalg.solve(matrix, rates[:, :, None])[:, :, 0]
-        x[rows] -= step
-        length = np.abs(step / scale[rows]).max(axis=1)
-        rounding = np.abs(step) <= 4 * np.finfo(float).eps * np.abs(x[rows])
-        done = (length < CONVERGED) | rounding.all(axis=1)
-        found[rows[done]] = True
-        rows = rows[~done & (length < 1e6)]
-    return x, found
 
 
 def _reach(system: System, values: Mapping[str, np.ndarray], place: np.ndarray, matrix: np.ndarray, scale: np.ndarray) -> np.ndarray:

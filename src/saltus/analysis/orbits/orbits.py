@@ -1,52 +1,48 @@
-"""Periodic orbits of a map: polished by Newton's method, with their multipliers; those of an inexact map (ode45's) are followed instead.
+"""Periodic orbits of maps, many at a time: closed by Newton's method, with their multipliers.
 
 Newton on P^n(x) - x = 0 with the derivative from the tangent flow; Parker & Chua, Practical Numerical Algorithms for Chaotic Systems
-(1989), chapter 5.
+(1989), chapter 5. Orbits of an inexact map (ode45's) are followed instead: ode45 restarted at every period has another fixed point than
+ode45 that goes on, a twentieth of the range apart at (1e-4, 1e-7) where damping is weak. What a run settles on is its attractor.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 
 import numpy as np
 
+from saltus.analysis.orbits.newton import leading_first, newton
+from saltus.analysis.orbits.tolerances import (
+    AMPLIFIED,
+    APART,
+    AVERAGED_RETURNS,
+    JITTER,
+    LONGEST,
+    MARGINAL,
+    MAX_NEWTON_STEPS,
+    SETTLING_ITERATES,
+    SHOWING,
+)
 from saltus.flow.maps import Map
-
-#: Newton steps: quadratic convergence needs a handful.
-MOST_STEPS = 30
-#: Distance of a multiplier from the unit circle that rounding can't make.
-MARGINAL = 1e-7
-#: Mismatch up to which a stiff orbit may amplify rounding.
-AMPLIFIED = 1e-9
-#: Iterates after which a trajectory of an inexact map has settled, and returns whose mean is taken then.
-FOLLOWED, LAST = 400, 8
-#: Scatter of the returns to one place, in units of the map's noise, that its errors may make; places lie so many scatters apart.
-JITTER, APART = 2.0, 5.0
-#: Scatter below which nothing is looked for in it.
-SHOWING = 1e-6
-#: A step shorter than this times the scale is rounding.
-SHORTEST = 1e-15
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """An orbit of period n of a map with D states.
+    """An orbit of period n of a map with D states: one of a batch.
 
     Attributes
     ----------
     points : float64[n, D]
         Its points, in the order in which they are visited; the first is the smallest in the first state.
-    monodromy : float64[n, D, D]
-        Derivative of the n-th return at each of them.
     multipliers : complex128[D]
-        Its eigenvalues, the largest first.
+        Floquet multipliers, the largest first.
     mismatch : float
         Largest distance between a point and its n-th image, in units of the scale.
     """
 
     points: np.ndarray
-    monodromy: np.ndarray
     multipliers: np.ndarray
     mismatch: float
 
@@ -56,64 +52,156 @@ class Orbit:
         return len(self.points)
 
     @property
-    def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle, by more than rounding."""
-        return bool(np.abs(self.multipliers[0]) < 1.0 - MARGINAL)
-
-    @property
     def exponent(self) -> float:
         """Largest Lyapunov exponent [per iterate]."""
         largest = abs(self.multipliers[0])
         return math.log(largest) / self.period if largest > 0 else -math.inf
 
 
-def polish(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
-    """The periodic orbit near a point, if Newton's method finds one.
+@dataclass
+class OrbitBatch:
+    """Orbits of k trajectories, or none where none was found.
+
+    Attributes
+    ----------
+    period : int64[k]
+        n, the smallest number of iterates after which the orbit closes; 0 where there is none.
+    points : float64[k, N, D]
+        Its points from the smallest in the first state on, NaN after n.
+    multipliers : complex128[k, D]
+        Floquet multipliers, the largest first; of a limit cycle the trivial 1 before them, of an equilibrium the eigenvalues [1/s].
+    time : float64[k]
+        Period of a limit cycle [s], 0 of an equilibrium, NaN of an orbit of a map. A limit cycle has points in equal steps of its time.
+    mismatch : float64[k]
+        Largest distance between a point of an orbit of a map and its n-th image, in units of the scale.
+    """
+
+    period: np.ndarray
+    points: np.ndarray
+    multipliers: np.ndarray
+    time: np.ndarray
+    mismatch: np.ndarray
+
+    @classmethod
+    def none(cls, count: int, size: int) -> OrbitBatch:
+        """No orbit yet, of points with so many states."""
+        points, multipliers = np.full((count, LONGEST, size), np.nan), np.full((count, size), np.nan + 0j)
+        return cls(np.zeros(count, np.int64), points, multipliers, *np.full((2, count), np.nan))
+
+    def __len__(self) -> int:
+        return len(self.period)
+
+    def __iter__(self) -> Iterator[Orbit]:
+        return (self[row] for row in range(len(self)))
+
+    def __getitem__(self, row: int) -> Orbit:
+        return Orbit(self.points[row, : self.period[row]].copy(), self.multipliers[row], float(self.mismatch[row]))
+
+    @property
+    def stable(self) -> np.ndarray:
+        """Which are orbits all of whose multipliers (but a trivial one) lie inside the unit circle by more than rounding, bool[k]."""
+        leading = np.where(self.time > 0, self.multipliers[:, min(1, self.multipliers.shape[1] - 1)], self.multipliers[:, 0])
+        with np.errstate(invalid="ignore"):
+            inside = np.where(self.time == 0, leading.real < 0, np.abs(leading) < 1.0 - MARGINAL)
+        return (self.period > 0) & inside
+
+    def rows(self, which: np.ndarray) -> OrbitBatch:
+        """Those of some rows, int64[m] or bool[k]."""
+        return OrbitBatch(*(getattr(self, field.name)[which] for field in fields(self)))
+
+    def put(self, rows: np.ndarray, other: OrbitBatch) -> None:
+        """Write others to the rows int64[m]."""
+        for field in fields(self):
+            getattr(self, field.name)[rows] = getattr(other, field.name)
+
+    def distance(self, state: np.ndarray, scale: np.ndarray, rows: np.ndarray | list[int] | slice = slice(None)) -> np.ndarray:
+        """How far states float64[m, D] lie from the orbits of some rows (default all), in units of the scale; inf where there is none."""
+        apart = np.abs((self.points[rows] - state[:, None]) / scale[:, None]).max(axis=2)
+        return np.where(np.isnan(apart), np.inf, apart).min(axis=1)
+
+
+def find_orbits(
+    map_: Map, start: np.ndarray, n: np.ndarray, scale: np.ndarray, noise: np.ndarray, max_slow: int = MAX_NEWTON_STEPS
+) -> OrbitBatch:
+    """The periodic orbits near states that nearly recur.
 
     Parameters
     ----------
     map_ : Map
         The map.
-    start : float64[D]
-        A point near the orbit.
-    n : int
-        Its period; the result has the smallest period that divides n.
-    scale : float64[D]
+    start : float64[k, D]
+        A point near each orbit.
+    n : int64[k]
+        Its period, or a multiple of it; at most LONGEST.
+    scale : float64[k, D]
         Range of each state.
-
-    Returns
-    -------
-    Orbit or None
+    noise : float64[k]
+        Mismatch of a closed orbit that errors of the map explain, in units of the scale.
+    max_slow : int
+        Newton's method gives up after so many slow steps: where they are more the orbit isn't near. One may be due to a contact between.
     """
-    if not map_.exact:
-        return _followed(map_, start, n, scale)
-    x = np.array(start, float)
-    for _ in range(MOST_STEPS):
-        end, matrix = map_.tangent(x[None], n)
-        if not np.isfinite(matrix).all():
-            return None
-        try:
-            step = np.linalg.solve(np.eye(len(x)) - matrix[0], end[0] - x)
-        except np.linalg.LinAlgError:
-            return None
-        x = x + step
-        length = np.abs(step / scale).max()
-        if not length < 1.0:
-            return None
-        if length < SHORTEST:
-            break
-    return _closed(map_, x, n, scale)
+    result = OrbitBatch.none(*start.shape)
+    if not len(start):
+        return result
+    if map_.exact:
+        rows, points, mismatch = _closed(map_, start, n, scale, noise, max_slow)
+    else:
+        rows, points, mismatch = _averaged(map_, start, n, scale, noise)
+    points = [np.roll(one, -int(np.lexsort(one.T[::-1])[0]), axis=0) for one in points]
+    period = np.array([len(one) for one in points], np.int64)
+    if len(rows):
+        _, monodromy = map_.rows(rows).tangent(np.array([one[0] for one in points]), period)
+        multipliers = leading_first(monodromy)
+        for i in np.flatnonzero(np.isfinite(multipliers).all(axis=1)):
+            row = rows[i]
+            result.period[row], result.points[row, : period[i]], result.multipliers[row] = period[i], points[i], multipliers[i]
+            result.mismatch[row] = mismatch[i]
+    return result
 
 
-def _followed(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
-    """The orbit that a trajectory of an inexact map settles on: the mean of its last returns.
+def _closed(
+    map_: Map, start: np.ndarray, n: np.ndarray, scale: np.ndarray, noise: np.ndarray, max_slow: int
+) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Which rows Newton's method closes, int64[m], the points of their orbits, float64[n, D] each, and their mismatch, float64[m]."""
 
-    ode45 restarted at every period has another fixed point than ode45 that goes on: a twentieth of the range apart at (1e-4, 1e-7) where
-    damping is weak. What a run settles on is its attractor.
+    def equations(x: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        end, matrix = map_.rows(rows).tangent(x, n[rows])
+        unit = scale[rows]
+        return (end - x) / unit, matrix * unit[:, None, :] / unit[:, :, None] - np.eye(x.shape[1])
+
+    x, found = newton(equations, start, scale, max_slow=max_slow)
+    rows = np.flatnonzero(found)
+    if not len(rows):
+        return rows, [], np.zeros(0)
+    points = np.concatenate([x[rows][:, None], map_.rows(rows).launch(x[rows], LONGEST).advance(int(n[rows].max()))], axis=1)
+    distance = np.abs((points[:, 1:] - points[:, :1]) / scale[rows, None]).max(axis=2)
+    last = distance[np.arange(len(rows)), n[rows] - 1]
+    period = _smallest_period(distance, n[rows], np.maximum(10.0 * last, noise[rows]))
+    closes = np.flatnonzero(last < AMPLIFIED)
+    return rows[closes], [points[i, : period[i]] for i in closes], distance[closes, period[closes] - 1]
+
+
+def _smallest_period(distance: np.ndarray, n: np.ndarray, enough: np.ndarray) -> np.ndarray:
+    """The smallest divisor of n int64[k] after which orbits are back, int64[k]; distances float64[k, m] are those after 1, 2, ..."""
+    period = n.copy()
+    for m in range(distance.shape[1], 0, -1):
+        period[(n % m == 0) & (distance[:, m - 1] <= enough)] = m
+    return period
+
+
+def _averaged(
+    map_: Map, start: np.ndarray, n: np.ndarray, scale: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Which trajectories of inexact maps settle on an orbit, the means of their last returns, and how far these scatter.
+
+    One more iterate is run than is looked at: a step of ode45 ends there, and nowhere before.
     """
-    returns = max(-(-FOLLOWED // n), 2 * LAST)
-    mean = mean_orbit(map_.launch(start[None], returns * n + 1).advance(returns * n + 1)[0, :-1], n, scale, map_.noise)
-    return None if mean is None else _orbit(map_, *mean)
+    length = n * np.maximum(-(-SETTLING_ITERATES // n), 2 * AVERAGED_RETURNS)
+    longest = int(length.max())
+    trails = map_.launch(start, longest + 1).advance(longest + 1)
+    means = [mean_orbit(trails[i, : length[i]], int(n[i]), scale[i], float(noise[i])) for i in range(len(n))]
+    known = [(row, *mean) for row, mean in enumerate(means) if mean is not None and len(mean[0]) <= LONGEST]
+    return np.array([row for row, _, _ in known], np.int64), [points for _, points, _ in known], np.array([mean[2] for mean in known])
 
 
 def mean_orbit(trail: np.ndarray, n: int, scale: np.ndarray, noise: float) -> tuple[np.ndarray, float] | None:
@@ -130,7 +218,7 @@ def mean_orbit(trail: np.ndarray, n: int, scale: np.ndarray, noise: float) -> tu
     noise : float
         Errors of the map, in units of the scale.
     """
-    last = trail[-LAST * n :]
+    last = trail[-AVERAGED_RETURNS * n :]
     points, scatter = _mean(last, n, scale)
     if not scatter <= JITTER * noise:
         return None
@@ -154,33 +242,6 @@ def _mean(points: np.ndarray, n: int, scale: np.ndarray) -> tuple[np.ndarray, fl
     returns = points.reshape(-1, n, points.shape[1])
     mean = returns.mean(axis=0)
     return mean, float(np.abs((returns - mean) / scale).max())
-
-
-def _closed(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
-    """The orbit through a point, if it comes back."""
-    points = np.concatenate([x[None], map_.launch(x[None], n).advance(n)[0]])
-    distances = np.abs((points[1:] - x) / scale).max(axis=1)
-    if not np.isfinite(distances).all() or distances[-1] > min(map_.noise * _stiffness(map_, x, n, scale), AMPLIFIED):
-        return None
-    n = 1 + int(np.argmax(distances <= max(10 * distances[-1], map_.noise)))
-    return _orbit(map_, points[:n], float(distances[n - 1]))
-
-
-def _orbit(map_: Map, points: np.ndarray, mismatch: float) -> Orbit | None:
-    """An orbit from its points: which is the first, monodromy, multipliers."""
-    points = np.roll(points, -int(np.lexsort(points.T[::-1])[0]), axis=0)
-    _, matrices = map_.tangent(points, len(points))
-    if not np.isfinite(matrices).all():
-        return None
-    values = np.linalg.eigvals(matrices[0])
-    order = np.lexsort((-values.imag, -np.round(np.abs(values), 12)))
-    return Orbit(points, matrices, values[order], mismatch)
-
-
-def _stiffness(map_: Map, x: np.ndarray, n: int, scale: np.ndarray) -> float:
-    """How much the return amplifies rounding."""
-    _, matrix = map_.tangent(x[None], n)
-    return max(1.0, float(np.abs(matrix * scale / scale[:, None]).max())) if np.isfinite(matrix).all() else 1.0
 
 
 def same(a: Orbit, b: Orbit, scale: np.ndarray, tolerance: float) -> bool:

@@ -6,18 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.orbits.cycles import POINTS, Cycles, find_cycles, returns
+from saltus.analysis.orbits.cycles import attracting_cycles, find_cycles, returns
 from saltus.analysis.orbits.equilibria import find_equilibria
 from saltus.analysis.orbits.orbit_measures import Measures
-from saltus.analysis.orbits.polish import Closed
-from saltus.analysis.orbits.recurrence import LONGEST
+from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.flow.maps import Stroboscope
 from saltus.system.evaluate import evaluate
 
-#: A limit cycle is that of a trajectory that lies so many times closer than its return: 1/(1 - multiplier) is the ratio of the two.
-BESIDE = 30.0
-#: Distance that rounding can make.
-ROUNDING = 1e-9
 #: Parts of a trail that must each be larger than the one before, and how much the last must be larger than the first, to run away.
 EIGHTHS, GROWN = 8, 3.0
 #: Returns farther than this, in units of the range, are no sign of a limit cycle.
@@ -30,13 +25,13 @@ class Attracted:
 
     Attributes
     ----------
-    orbits : Closed
+    orbits : OrbitBatch
         Their equilibria (time 0) and limit cycles (time > 0); period 0 where there is none yet.
     scale : float64[k, D]
         Range of each state on the limit cycle; of an equilibrium that which was given.
     """
 
-    orbits: Closed
+    orbits: OrbitBatch
     scale: np.ndarray
 
 
@@ -56,23 +51,16 @@ def attracted(map_: Stroboscope, state: np.ndarray, scale: np.ndarray, window: f
     near : float
         Distance of a return, in units of the scale, that is worth a try by Newton's method.
     """
-    result = Attracted(Closed.none(len(state), LONGEST, state.shape[1]), scale.copy())
+    result = Attracted(OrbitBatch.none(len(state), state.shape[1]), scale.copy())
     rest = find_equilibria(map_, state, scale)
     here = np.flatnonzero(rest.stable & rest.holds(state))
-    _put_equilibria(result.orbits, here, rest.place[here], rest.eigenvalues[here])
+    result.orbits.put(here, rest.orbits.rows(here))
     result.scale[here] = np.maximum(scale[here], np.abs(rest.place[here]))
     rows = np.flatnonzero(result.orbits.period == 0)
     if not len(rows):
         return result
-    seen = returns(map_.rows(rows), state[rows], window)
-    ready = np.flatnonzero(seen.apart < np.maximum(near, map_.rows(rows).noise_of(seen.scale)))
-    if not len(ready):
-        return result
-    rows, own = rows[ready], seen.scale[ready]
-    cycles = find_cycles(map_.rows(rows), state[rows], seen.time[ready], own)
-    tolerance = BESIDE * np.maximum(np.maximum(seen.apart[ready], ROUNDING), map_.rows(rows).noise_of(own))
-    beside = cycles.stable & (cycles.moved <= tolerance)
-    _put_cycles(result.orbits, rows, cycles, beside)
+    cycles, beside, own = attracting_cycles(map_.rows(rows), state[rows], window, near)
+    result.orbits.put(rows[beside], cycles.rows(beside))
     result.scale[rows[beside]] = own[beside]
     return result
 
@@ -106,56 +94,17 @@ def rest(map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measur
         numbers.turning[row] = one[None]
 
 
-def closed_cycles(map_: Stroboscope, state: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
-    """Limit cycles near states that nearly recur after a time [s]."""
-    result = Closed.none(len(state), LONGEST, state.shape[1])
-    cycles = find_cycles(map_, state, time, scale)
-    _put_cycles(result, np.arange(len(state)), cycles, np.isfinite(cycles.period))
-    return result
-
-
-def _put_cycles(result: Closed, rows: np.ndarray, cycles: Cycles, which: np.ndarray) -> None:
-    """Write some of the limit cycles, bool[m], to their rows int64[m]."""
-    chosen = rows[which]
-    result.period[chosen], result.time[chosen] = POINTS, cycles.period[which]
-    result.points[chosen], result.multipliers[chosen] = cycles.points[which], cycles.multipliers[which]
-
-
-def closed_equilibria(map_: Stroboscope, state: np.ndarray, scale: np.ndarray) -> Closed:
-    """Equilibria near states."""
-    result = Closed.none(len(state), LONGEST, state.shape[1])
-    rest = find_equilibria(map_, state, scale)
-    _put_equilibria(result, np.flatnonzero(np.isfinite(rest.place).all(axis=1)), *_finite(rest.place, rest.eigenvalues))
-    return result
-
-
 def multipliers_and_eigenvalues(values: np.ndarray, rests: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Floquet multipliers, and eigenvalues [1/s] of what rests, complex128[m, D]; each NaN where it is the other."""
     return np.where(rests[:, None], np.nan + 0j, values), np.where(rests[:, None], values, np.nan + 0j)
 
 
-def _finite(place: np.ndarray, eigenvalues: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    there = np.isfinite(place).all(axis=1)
-    return place[there], eigenvalues[there]
-
-
-def _put_equilibria(result: Closed, rows: np.ndarray, place: np.ndarray, eigenvalues: np.ndarray) -> None:
-    result.period[rows], result.time[rows] = 1, 0.0
-    result.points[rows, 0], result.multipliers[rows] = place, eigenvalues
-
-
-def _put(result: Closed, rows: np.ndarray, other: Closed) -> None:
-    result.period[rows], result.points[rows], result.multipliers[rows], result.time[rows] = (
-        other.period, other.points, other.multipliers, other.time,
-    )  # fmt: skip
-
-
-def close_again(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
+def close_again(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> OrbitBatch:
     """Equilibria (time 0) and limit cycles (their period) from those at other parameter values."""
-    result = Closed.none(len(start), LONGEST, start.shape[1])
+    result = OrbitBatch.none(len(start), start.shape[1])
     rests, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)
     if len(rests):
-        _put(result, rests, closed_equilibria(map_.rows(rests), start[rests], scale[rests]))
+        result.put(rests, find_equilibria(map_.rows(rests), start[rests], scale[rests]).orbits)
     if len(turns):
-        _put(result, turns, closed_cycles(map_.rows(turns), start[turns], time[turns], scale[turns]))
+        result.put(turns, find_cycles(map_.rows(turns), start[turns], time[turns], scale[turns])[0])
     return result

@@ -45,7 +45,7 @@ def bifurcation_diagram(
         list or array of values.
     start : sequence, mapping, array or str
         As for :func:`saltus.frequency_response`.
-    sample : str
+    sample : {"turning_points", "stroboscope", "contacts"}
         What is kept of each response over one period of its own: ``"turning_points"`` (where the rate of the first state is zero),
         ``"stroboscope"`` (at whole forcing periods) or ``"contacts"``. Not with two parameters.
     follow : bool

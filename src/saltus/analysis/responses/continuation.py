@@ -8,13 +8,11 @@ halved; two that do in a row are doubled. Allgower & Georg, Introduction to Nume
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 
-from saltus.analysis.orbits.polish import Closed, close
-from saltus.analysis.orbits.recurrence import LONGEST, SAME
-from saltus.analysis.orbits.steady import motion_range
+from saltus.analysis.orbits.find_responses import motion_range
+from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits
+from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.orbits.unforced import close_again
 from saltus.analysis.responses.grid import Grid
 from saltus.analysis.responses.responses import Found
@@ -33,10 +31,10 @@ HALVINGS, STEPS = 14, 400
 INEXACT = 0.05
 
 
-def closed_near(map_: Stroboscope, start: np.ndarray, period: np.ndarray, time: np.ndarray, scale: np.ndarray) -> Closed:
+def closed_near(map_: Stroboscope, start: np.ndarray, period: np.ndarray, time: np.ndarray, scale: np.ndarray) -> OrbitBatch:
     """Orbits of the stroboscope (time NaN), limit cycles and equilibria (time 0) near states float64[k, D], as a map_ has them."""
     if np.isnan(time).all():
-        return close(map_, start, period, scale, LONGEST, nearby=True)
+        return find_orbits(map_, start, period, scale, map_.noise_of(scale), max_slow=1)
     return close_again(map_, start, time, scale)
 
 
@@ -51,7 +49,7 @@ def _at_each_shift(p: np.ndarray, q: np.ndarray, scale: np.ndarray) -> np.ndarra
     return np.asarray(np.abs((p[None] - q[shifts]) / scale).max(axis=(1, 2)))
 
 
-def _in_phase(orbits: Closed, others: Closed, scale: np.ndarray) -> np.ndarray:
+def _in_phase(orbits: OrbitBatch, others: OrbitBatch, scale: np.ndarray) -> np.ndarray:
     """Let each orbit begin with the point that lies by the first of another; how far they are apart, float64[k], inf if they can't be."""
     apart = np.full(len(scale), np.inf)
     for i in np.flatnonzero((orbits.period == others.period) & (orbits.period > 0)):
@@ -76,7 +74,7 @@ class Follower:
 
     Attributes
     ----------
-    orbits : Closed
+    orbits : OrbitBatch
         The orbit that each has become.
     value : float64[k]
         The value of the parameter [SI] that it is of.
@@ -101,7 +99,7 @@ class Follower:
         if not method.exact and len(rows):
             exact, apart = self._near(np.arange(len(rows)), self.value, self.orbits)
             self.known = apart < INEXACT
-            self._put(np.flatnonzero(self.known), exact.rows(self.known))
+            self.orbits.put(np.flatnonzero(self.known), exact.rows(self.known))
 
     def to(self, target: np.ndarray, which: np.ndarray, halvings: int = HALVINGS) -> np.ndarray:
         """Follow those of ``which``, bool[k], to values float64[k] while they attract; which arrive, bool[k].
@@ -126,7 +124,7 @@ class Follower:
             self._measure(rows[counts & going[rows]])
         return np.asarray(which & self.known & (self.value == target))
 
-    def at(self, rows: np.ndarray, value: np.ndarray) -> tuple[Closed, np.ndarray]:
+    def at(self, rows: np.ndarray, value: np.ndarray) -> tuple[OrbitBatch, np.ndarray]:
         """What Newton's method finds near some rows int64[m] at values float64[m], and which of it is the same orbit, moved, bool[m]."""
         found, apart = self._near(rows, value, self.orbits.rows(rows))
         return found, apart < LINK
@@ -136,7 +134,7 @@ class Follower:
         n = int(self.orbits.period[row])
         return orbit_distance(self.orbits.points[row, :n], points, self._scale[row]) if len(points) == n else np.inf
 
-    def _near(self, rows: np.ndarray, value: np.ndarray, orbits: Closed) -> tuple[Closed, np.ndarray]:
+    def _near(self, rows: np.ndarray, value: np.ndarray, orbits: OrbitBatch) -> tuple[OrbitBatch, np.ndarray]:
         """The orbits at values float64[m] that Newton's method finds from others, in phase with these, and how far these lie apart."""
         scale = self._scale[rows]
         arrived = closed_near(self._at(rows, value), orbits.points[:, 0], orbits.period, orbits.time, scale)
@@ -156,11 +154,11 @@ class Follower:
         unsure = np.flatnonzero(counts & (moved > SURE))
         if len(unsure):
             counts[unsure] = self._by_halves(rows[unsure], value[unsure], here.rows(unsure), there.rows(unsure), moved[unsure])
-        self._put(rows[counts], there.rows(counts))
+        self.orbits.put(rows[counts], there.rows(counts))
         self.value[rows[counts]] = value[counts]
         return counts
 
-    def _by_halves(self, rows: np.ndarray, value: np.ndarray, here: Closed, there: Closed, moved: np.ndarray) -> np.ndarray:
+    def _by_halves(self, rows: np.ndarray, value: np.ndarray, here: OrbitBatch, there: OrbitBatch, moved: np.ndarray) -> np.ndarray:
         """Whether two steps of half the length arrive where one does, the middle one about halfway, bool[m]."""
         middle, apart = self._near(rows, 0.5 * (self.value[rows] + value), here)
         off = np.abs(middle.points - 0.5 * (here.points + there.points)) / self._scale[rows, None]
@@ -172,11 +170,6 @@ class Follower:
         result = np.zeros(len(rows), bool)
         result[right] = True
         return result
-
-    def _put(self, rows: np.ndarray, orbits: Closed) -> None:
-        """Write what some rows have become."""
-        for field in fields(Closed):
-            getattr(self.orbits, field.name)[rows] = getattr(orbits, field.name)
 
     def _measure(self, rows: np.ndarray) -> None:
         """Take the range of some motions anew. That of an equilibrium stays."""

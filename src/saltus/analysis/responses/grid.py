@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.axes import along
-from saltus.analysis.orbits.recurrence import LONGEST
+from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.starts import check_system, ensemble, looks_every, single
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole

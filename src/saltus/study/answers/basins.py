@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from saltus.study.answers.question import Question
-from saltus.study.run.kept import save_picture
-from saltus.study.run.running import Outcome, Running
-from saltus.study.tables.basins import Basins
+from saltus.analysis.basins.basins import map_of
+from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
+from saltus.study.answers.basins_rows import agreement_table, attractor_table
+from saltus.study.answers.question import Found, Question, Show
+from saltus.study.identity import identity
+from saltus.study.setting import quantities
+from saltus.study.setting.arguments import arguments
+from saltus.study.setting.inputs import Inputs
+from saltus.study.setting.setting import Setting, setting_of
+from saltus.study.tables.parts import slug
+from saltus.study.tables.questions import Map
+from saltus.study.tables.spec import Study
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.results.store import Store
-    from saltus.study.run.maps import MapJob
-    from saltus.study.setting.setting import Setting
+    from saltus.study.table import TextTable
+    from saltus.system import System
 
 #: Trajectories of attractors drawn in a gallery, and the periods of one that never repeats.
 GALLERY, PERIODS = 8, 24
@@ -23,96 +30,115 @@ GALLERY, PERIODS = 8, 24
 ATTRACTORS, AGREEMENT = "-attractors", "-agreement"
 
 
-# -- the question --------------------------------------------------------------------------------------------------------------
-def questions(table: Basins, setting: Setting) -> list[Question]:
-    """The question that the table asks: all its maps.
+def questions(table: Any, setting: Setting) -> list[Question]:
+    """The maps of the table, then where those agree that are compared. Raises StudyError, UnitError or ParameterError."""
+    maps = maps_of_setting(table, setting)
+    stems = {one.title: one.stem for one in maps}
+    return [*maps, *(Agreement(one, one.compare, stems[one.compare]) for one in maps if one.compare is not None)]
+
+
+def maps_of(study: Study, own: System | None = None) -> list[BasinMap]:
+    """The maps of a study with [basins], each with its plan.
 
     Raises
     ------
     StudyError, UnitError, ParameterError
-        If a map doesn't fit the system.
+        If the study doesn't fit its system.
     """
-    from saltus.study.run.maps import jobs_of_setting
-
-    return [Maps(setting.study.study.name, jobs_of_setting(table, setting))]
+    return maps_of_setting(study.basins, setting_of(study, own, Inputs(Path())))
 
 
-class Maps(Question):
-    """The maps of a study, each in a store of its own that survives anything."""
+def maps_of_setting(table: Any, setting: Setting) -> list[BasinMap]:
+    """The same, of a system that is known."""
+    name = setting.study.study.name
+    return [BasinMap(table, one, setting) for one in table.map or [Map(name=name)]]
 
-    shared = True
 
-    def __init__(self, title: str, jobs: list[MapJob]) -> None:
-        self.title, self.jobs = title, jobs
-        self.stems = tuple(f"{job.slug}{end}" for job in jobs for end in ("", ATTRACTORS, *([AGREEMENT] if job.compare else [])))
-        self._stores: dict[str, Store] = {}
+class BasinMap(Question):
+    """One map of a study.
 
-    def prepare(self, folder: Path) -> None:
-        """Open or make the stores. Raises StoreError if one was made from something else: names what differs."""
-        from saltus.study.run.maps import open_store
+    Attributes
+    ----------
+    plan : BasinPlan
+        What is computed, chunk by chunk.
+    compare : str or None
+        The title of the map that it is set beside.
+    """
 
-        self._stores = {job.name: open_store(job, folder) for job in self.jobs}
+    place, shared = "basins", True
 
-    def answer(self, at: Running) -> Outcome:
-        """Compute or resume each map, then its Dataset, table and pictures; then where maps agree."""
-        from saltus.study.run.maps import compute, finish
+    def __init__(self, table: Any, one: Map, setting: Setting) -> None:
+        self.title, self.group, self.compare = one.name, setting.study.study.name, one.compare
+        self.stem = slug(one.name) if table.map else "basins"
+        system, place = setting.system(one.values, "basins.map.values"), self.place
+        axes = quantities.axes(system, table.axes, f"{place}.axes")
+        asked = arguments(table, system, setting, place)
+        self.plan: BasinPlan = basin_plan(system, axes, asked["at"], setting.method(one.method), asked["periods"], asked["every"])
 
-        outcome, maps = Outcome(), {}
-        for job in self.jobs:
-            store = self._stores[job.name]
-            if not compute(job, store, at.resources, at.report, at.say):
-                outcome.waiting.append(job.name)
-                continue
-            ds = finish(job, store, at.resources.threads).assign_attrs(study=at.text, title=job.name)
-            maps[job.name] = ds
-            self._write_map(job, ds, at.folder, outcome, at.pictures)
-        for job in self.jobs:
-            if job.compare is not None and {job.name, job.compare} <= maps.keys():
-                self._write_agreement(job, maps[job.name], maps[job.compare], at.folder, outcome, at.pictures)
-        return outcome
+    @property
+    def stems(self) -> tuple[str, ...]:
+        """Of the map, and of the gallery of its attractors."""
+        return self.stem, f"{self.stem}{ATTRACTORS}"
 
-    def _write_map(self, job: MapJob, ds: xr.Dataset, folder: Path, outcome: Outcome, pictures: bool) -> None:
-        from saltus.results import save
-        from saltus.study.answers.basins_table import attractor_table
+    def identity(self) -> dict[str, str]:
+        """What must be the same to go on with a store."""
+        plan = self.plan
+        axes = {name: f"{float(values[0])!r} to {float(values[-1])!r} in {len(values)}" for name, values in plan.axes.items()}
+        asked = {"axes": axes, "at": dict(plan.fixed), "periods": plan.periods, "every": plan.every}
+        return identity(plan.system, plan.method, asked)
 
-        table = attractor_table(job.name, ds)
-        outcome.tables.append(table)
-        outcome.files += [save(ds, folder / f"{job.slug}.nc"), self.write_table(table, folder / f"{job.slug}.csv")]
-        if pictures:
-            from saltus import plot
+    def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
+        """The map, all at once: nothing is kept of it before it is done."""
+        return map_of(self.plan, threads, progress)
 
-            with plot.style():
-                axes = plot.basins(ds)
-                axes.set_title(": ".join(filter(None, (job.name, axes.get_title("left")))), loc="left")
-                outcome.files.append(save_picture(axes.figure, folder / f"{job.slug}.png"))
-                if ds.sizes["attractor"] > 0 and ds.attrs["method"] == "Taylor":
-                    figure = plot.gallery(ds, _motions(job, ds), attractors=list(range(min(ds.sizes["attractor"], GALLERY))))
-                    outcome.files.append(save_picture(figure, folder / f"{job.slug}{ATTRACTORS}.png"))
+    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
+        """A row for each attractor."""
+        return [attractor_table(self.title, ds)]
 
-    def _write_agreement(self, job: MapJob, ds: xr.Dataset, other: xr.Dataset, folder: Path, outcome: Outcome, pictures: bool) -> None:
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """The map, and the motions on its attractors."""
+        from saltus import plot
+
+        axes = plot.basins(ds)
+        axes.set_title(": ".join(filter(None, (self.title, axes.get_title("left")))), loc="left")
+        if ds.sizes["attractor"] == 0 or ds.attrs["method"] != "Taylor":
+            return {"": axes.figure}
+        shown = list(range(min(ds.sizes["attractor"], GALLERY)))
+        return {"": axes.figure, ATTRACTORS: plot.gallery(ds, self._motions(ds), attractors=shown)}
+
+    def _motions(self, ds: xr.Dataset) -> xr.Dataset:
+        """A motion on each attractor, long enough for its picture."""
+        from saltus.analysis.motion.simulate import simulate
+
+        system = self.plan.system
+        start = {name: ds[f"attractor_{name}"].values[:, 0] for name in system.states}
+        longest = max(int(ds["attractor_period"].max()), PERIODS)
+        if system.forced_at is None:
+            return simulate(system, start, t_end=longest * (self.plan.every or 1.0), progress=False)
+        return simulate(system, start, periods=longest, time_errors="local", progress=False)
+
+
+class Agreement(Question):
+    """Where two maps agree."""
+
+    place, shared = "basins", True
+
+    def __init__(self, one: BasinMap, other: str, other_stem: str) -> None:
+        self.title, self.group, self.names = f"{one.title} beside {other}", one.group, (other, one.title)
+        self.stem, self.needs = f"{one.stem}{AGREEMENT}", (other_stem, one.stem)
+
+    def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
+        """Set the maps beside each other, cell by cell."""
         from saltus.analysis.basins.compare import compare
-        from saltus.results import save
-        from saltus.study.answers.basins_table import agreement_table
 
-        both = compare(other, ds).assign_attrs(name_a=str(job.compare), name_b=job.name)
-        table = agreement_table(both)
-        name = f"{job.slug}{AGREEMENT}"
-        outcome.tables.append(table)
-        outcome.files += [save(both, folder / f"{name}.nc"), self.write_table(table, folder / f"{name}.csv")]
-        if pictures:
-            from saltus import plot
+        return compare(*(found[stem] for stem in self.needs)).assign_attrs(name_a=self.names[0], name_b=self.names[1])
 
-            with plot.style():
-                outcome.files.append(save_picture(plot.agreement(both)[0].figure, folder / f"{name}.png"))
+    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
+        """A row for each pair of attractors."""
+        return [agreement_table(ds)]
 
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """The cells on which they differ."""
+        from saltus import plot
 
-def _motions(job: MapJob, ds: xr.Dataset) -> xr.Dataset:
-    """A motion on each attractor, long enough for its picture."""
-    from saltus.analysis.motion.simulate import simulate
-
-    system = job.plan.system
-    start = {name: ds[f"attractor_{name}"].values[:, 0] for name in system.states}
-    longest = max(int(ds["attractor_period"].max()), PERIODS)
-    if system.forced_at is None:
-        return simulate(system, start, t_end=longest * (job.plan.every or 1.0), progress=False)
-    return simulate(system, start, periods=longest, time_errors="local", progress=False)
+        return {"": plot.agreement(ds)[0].figure}

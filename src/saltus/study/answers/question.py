@@ -1,113 +1,146 @@
-"""What every question of a study can do."""
+"""What every question of a study can do: compute its Dataset, say it in rows, draw it. Nothing here writes a file."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from saltus.errors import SaltusError, StudyError
 from saltus.study.identity import identity
-from saltus.study.run.kept import kept_or_computed, save_picture
-from saltus.study.run.running import Outcome, Running
+from saltus.study.setting.arguments import arguments, system_of_question
+from saltus.study.tables.signature import verb
+from saltus.study.tables.wording import fault
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.study.setting.inputs import Input
+    from saltus.study.setting.setting import Setting
     from saltus.study.table import TextTable
-    from saltus.system import System
+
+#: Datasets of a study by the stems of their files.
+Found = Mapping[str, "xr.Dataset"]
+#: What is called with the share done.
+Show = Callable[[float], None]
 
 
 class Question(ABC):
-    """A question of a study that fits its system: everything that could be checked before computing was.
+    """A question of a study whose answer is one Dataset: everything that could be checked before computing was.
 
     Attributes
     ----------
     title : str
         What it is called.
-    stems : tuple of str
-        Stems of the names of its files.
+    stem : str
+        Stem of the names of its files.
+    place : str
+        The table of the study that asks it.
+    group : str
+        What it may be called together with others, besides its table.
+    needs : tuple of str
+        Stems of the questions whose answers it takes.
     shared : bool
         Whether several jobs (shards) may work on it; else it is left to the first of them.
-    shared_inputs : list of Input
-        Files that take part in all answers: those of the system.
-    asked_as : str
-        The table of the study that asks it.
+    all_rows : str
+        End of the name of a CSV file of every row of the Dataset; "" if the table holds them all.
+    inputs : list of Input
+        Files that take part in the answer.
     """
 
     title: str
-    stems: tuple[str, ...]
+    stem: str
+    place: str = ""
+    group: str = ""
+    needs: tuple[str, ...] = ()
     shared: bool = False
-    shared_inputs: Sequence[Input] = ()
-    asked_as: str = ""
+    all_rows: str = ""
+    inputs: Sequence[Input] = ()
 
-    def inputs(self) -> list[Input]:
-        """Files that take part in the answer."""
-        return []
+    @property
+    def stems(self) -> tuple[str, ...]:
+        """Stems of all its files."""
+        return (self.stem,)
 
-    def write_table(self, table: TextTable, path: Path) -> Path:
-        """Write a table as CSV, with the hashes of the files that took part in it."""
-        return replace(table, notes=(*table.notes, *(file.note for file in (*self.shared_inputs, *self.inputs())))).write_csv(path)
-
-    def prepare(self, folder: Path) -> None:  # noqa: ARG002
-        """Refuse an output folder with which the question can't go on; called for all questions before anything is computed."""
-        return
+    def identity(self) -> dict[str, str] | None:
+        """What must be the same for a file to hold the answer; None if it follows at once from other answers."""
+        return None
 
     @abstractmethod
-    def answer(self, at: Running) -> Outcome:
-        """Compute what is missing, write the files, tell what came out."""
+    def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:
+        """The answer."""
+
+    @abstractmethod
+    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:
+        """The answer in rows: tables to print, the first of which is the CSV file."""
+
+    @abstractmethod
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """Figures by the end of their file names; the first one is the usual one."""
 
 
-class OneDataset(Question):
-    """A question whose answer is one Dataset in one file.
+class OneVerb(Question):
+    """A question that one function of the analyses answers, whose table was made from its parameters.
 
     Parameters
     ----------
-    title, stem : str
-        What it is called; stem of its files.
-    system : System
-        With the values of this question.
-    method : Taylor or ODE45
-        How to integrate.
-    arguments : mapping
-        What the analysis is called with, in SI; part of the identity.
+    table : Generated
+        What the study asks.
+    setting : Setting
+        Of the study.
+
+    Raises
+    ------
+    StudyError, UnitError, ParameterError
+        If it doesn't fit the system: told before anything is computed.
     """
 
-    def __init__(self, title: str, stem: str, system: System, method: Any, arguments: Mapping[str, Any]) -> None:
-        self.title, self.stems = title, (stem,)
-        self.system, self.method, self.arguments = system, method, dict(arguments)
+    #: Name of the function, and of its argument that says how to integrate.
+    function: ClassVar[str]
+    how: ClassVar[str] = "method"
+
+    def __init__(self, table: Any, setting: Setting) -> None:
+        self.title, self.stem = self.names(table, setting)
+        self.system = system_of_question(table, setting, self.place)
+        self.method = setting.method(getattr(table, self.how))
+        self.check_first(table)
+        self.arguments = arguments(table, self.system, setting, self.place)
+        try:
+            self.check(table, setting)
+        except StudyError:
+            raise
+        except SaltusError as error:
+            raise fault(self.place, error) from error
+
+    def names(self, table: Any, setting: Setting) -> tuple[str, str]:  # noqa: ARG002
+        """Title, and stem of the files."""
+        return table.title, table.stem
+
+    def check_first(self, table: Any) -> None:  # noqa: ARG002
+        """Refuse what doesn't fit the system before quantities are read."""
+        return
+
+    def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
+        """Refuse what doesn't fit the system, and complete the arguments."""
+        return
 
     def identity(self) -> dict[str, str]:
         """What must be the same for a file to hold the answer."""
         return identity(self.system, self.method, self.arguments)
 
-    @abstractmethod
-    def compute(self, threads: int | None, progress: Callable[[float], None]) -> xr.Dataset:
-        """The answer."""
+    def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
+        """Call the function."""
+        try:
+            return self.call({self.how: self.method, "threads": threads, "progress": progress})
+        except SaltusError as error:
+            raise fault(self.place, error) from error
 
-    @abstractmethod
-    def tables(self, ds: xr.Dataset) -> list[TextTable]:
-        """What to print; the first one is written as CSV."""
+    def call(self, how: dict[str, Any]) -> xr.Dataset:
+        """The answer; ``how`` are the method, the threads and where progress is told."""
+        ds: xr.Dataset = verb(self.function)(self.system, **(self.arguments | how))
+        return ds
 
-    @abstractmethod
-    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """Figures by the end of their file names."""
 
-    def answer(self, at: Running) -> Outcome:
-        """Compute the Dataset unless it is there, write it, its tables and pictures."""
-        (stem,) = self.stems
-        ds = kept_or_computed(stem, self.title, self.identity(), lambda show: self.compute(at.resources.threads, show), at)
-        tables = self.tables(ds)
-        files = [at.folder / f"{stem}.nc", self.write_table(tables[0], at.folder / f"{stem}.csv"), *self.more_files(ds, at.folder)]
-        if at.pictures:
-            from saltus import plot
-
-            with plot.style():
-                files += [save_picture(figure, at.folder / f"{stem}{end}.png") for end, figure in self.pictures(ds).items()]
-        return Outcome(tables, files)
-
-    def more_files(self, ds: xr.Dataset, folder: Path) -> list[Path]:  # noqa: ARG002
-        """Write what else there is; returns the files."""
-        return []
+def first_figure(axes: Any) -> Any:
+    """The figure of the Axes, or the array of them, that a picture returns."""
+    return (axes.flat[0] if hasattr(axes, "flat") else axes).figure

@@ -2,117 +2,100 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import ParameterError, StudyError
-from saltus.study.answers.question import Question
-from saltus.study.identity import identity
-from saltus.study.run.kept import kept_or_computed, save_picture
-from saltus.study.run.running import Outcome, Running
+from saltus.errors import StudyError
+from saltus.study.answers.compare import contact_table, exact_times, printed_rows
+from saltus.study.answers.question import Found, OneVerb, Question, first_figure
+from saltus.study.answers.simulate_rows import run_table
 from saltus.study.setting import quantities
-from saltus.study.tables.motions import REFERENCE, RUN, Simulate
-from saltus.study.tables.wording import fault
+from saltus.study.tables.questions import REFERENCE, RUN
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.answers.printed import Row
-    from saltus.study.setting.inputs import Input
     from saltus.study.setting.setting import Setting
+    from saltus.study.table import TextTable
 
 
-def questions(table: Simulate, setting: Setting) -> list[Question]:
-    """The question that the table asks.
+def questions(table: Any, setting: Setting) -> list[Question]:
+    """How given starts move, by the study's method, and by the second one that [compare] names before it.
 
     Raises
     ------
     StudyError, UnitError
-        If it doesn't fit the system.
+        If the table doesn't fit the system.
     """
-    batch, compare, system = quantities.is_batch(table.start or {}, table.values), setting.study.compare, setting.base
-    if batch and compare is not None:
-        raise StudyError("[compare] is for one start: let [simulate] start hold single values.")
-    if compare is not None and table.keep is not None:
-        raise StudyError("[compare] counts contacts from the start of the run: leave keep out of [simulate].")
-    if table.periods is not None and system.forced_at is None:
-        raise StudyError(f'[simulate] periods: {system.name} has no forcing period. Write t_end = "2 s" in place of it.')
-    arguments = {
-        "start": quantities.start_or_rest(system, table.start, "simulate"),
-        "periods": table.periods,
-        "t_end": None if table.t_end is None else quantities.number(table.t_end, "s", "simulate", "t_end"),
-        "t_start": quantities.number(table.t_start, "s", "simulate", "t_start"),
-        "samples": table.samples,
-        "keep": table.keep,
-        "values": quantities.varied(system, table.values) or None,
-    }
-    return [Motion(setting, arguments)]
+    motion, compare = Motion(table, setting), setting.study.compare
+    if compare is None or compare.reference is None:
+        return [motion]
+    motion.needs = (REFERENCE,)
+    return [Reference(table, setting), motion]
 
 
-class Motion(Question):
+class Motion(OneVerb):
     """How given starts move."""
 
-    def __init__(self, setting: Setting, arguments: Mapping[str, Any]) -> None:
-        self.title, self.stems = setting.study.study.name, (RUN, REFERENCE)
-        self.setting, self.arguments, self.compare = setting, dict(arguments), setting.study.compare
+    place, function = "simulate", "simulate"
 
-        self._inputs, self.printed, self.exact = self._read() if self.compare is not None else ([], [], {})
+    def names(self, table: Any, setting: Setting) -> tuple[str, str]:  # noqa: ARG002
+        """It is called as the study is."""
+        self.group = setting.study.study.name
+        return self.group, RUN
 
-    def _read(self) -> tuple[list[Input], list[Row], dict[int, float]]:
-        """The files of [compare], and what they say: read now, so that a fault is told before anything is computed."""
-        from saltus.study.answers.simulate_compare import exact_times, printed_rows
+    def check_first(self, table: Any) -> None:
+        """Periods are those of a forcing."""
+        if table.periods is not None and self.system.forced_at is None:
+            raise StudyError(f'[simulate] periods: {self.system.name} has no forcing period. Write t_end = "2 s" in place of it.')
 
-        assert self.compare is not None
-        names = [name for name in (self.compare.printed, self.compare.exact) if name is not None]
-        files = [self.setting.inputs.read(name, "compare") for name in names]
-        exact = exact_times(files[1].data, files[1].path) if self.compare.exact is not None else {}
-        return files, printed_rows(files[0].data, files[0].path), exact
-
-    def inputs(self) -> list[Input]:
-        """Printed and exact times."""
-        return self._inputs
-
-    def answer(self, at: Running) -> Outcome:
-        """Simulate with the study's method, and the reference's if there is one; compare, tell, draw."""
-        from saltus.study.answers.simulate_compare import contact_table
-        from saltus.study.answers.simulate_table import run_table
-
-        methods = {RUN: self.setting.method()}
-        if self.compare is not None and self.compare.reference is not None:
-            methods[REFERENCE] = self.setting.method(self.compare.reference)
-        runs = {stem: self._run(stem, method, at) for stem, method in methods.items()}
+    def check(self, table: Any, setting: Setting) -> None:
+        """Read the files of [compare] now, so that a fault is told before anything is computed."""
+        self.compare = setting.study.compare
         if self.compare is None:
-            table = run_table(self.title, runs[RUN])
-        else:
-            table = contact_table(self.title, runs[RUN], self.printed, self.exact, runs.get(REFERENCE))
-        files = [at.folder / f"{RUN}.nc", self.write_table(table, at.folder / f"{RUN}.csv")]
-        files += [at.folder / f"{REFERENCE}.nc"] * (REFERENCE in runs)
-        return Outcome([table], files + ([self._picture(runs[RUN], at.folder)] if at.pictures else []))
+            return
+        if quantities.is_batch(table.start or {}, table.values):
+            raise StudyError("[compare] is for one start: let [simulate] start hold single values.")
+        if table.keep is not None:
+            raise StudyError("[compare] counts contacts from the start of the run: leave keep out of [simulate].")
+        files = [setting.inputs.read(name, "compare") for name in (self.compare.printed, self.compare.exact) if name is not None]
+        self.printed = printed_rows(files[0].data, files[0].path)
+        self.exact = exact_times(files[1].data, files[1].path) if len(files) > 1 else {}
+        self.inputs = files
 
-    def _run(self, stem: str, method: Any, at: Running) -> xr.Dataset:
-        from saltus.analysis.motion.simulate import simulate
+    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:
+        """A row for each trajectory, or for each contact that was printed."""
+        if self.compare is None:
+            return [run_table(self.title, ds)]
+        return [contact_table(self.title, ds, self.printed, self.exact, found.get(REFERENCE))]
 
-        system = self.setting.base
-
-        def compute(show: Callable[[float], None]) -> xr.Dataset:
-            try:
-                return simulate(system, method=method, threads=at.resources.threads, progress=show, **self.arguments)
-            except ParameterError as error:
-                raise fault("simulate", error) from error
-
-        title = self.title if stem == RUN else f"{self.title}, reference"
-        return kept_or_computed(stem, title, identity(system, method, self.arguments), compute, at)
-
-    def _picture(self, run: xr.Dataset, folder: Path) -> Path:
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
         """Phase portrait, or time history of a system of one state; of a large batch the first trajectories."""
         from saltus import plot
         from saltus.plot.selection import MOST
-        from saltus.results.schema import states_of
+        from saltus.results.dataset.schema import states_of
 
-        draw = plot.phase if len(states_of(run)) > 1 else plot.history
-        some = {"trajectory": run["trajectory"].values[:MOST].tolist()} if "trajectory" in run.dims else {}
-        with plot.style():
-            axes = draw(run, **some)
-            first = axes.flat[0] if hasattr(axes, "flat") else axes
-            return save_picture(first.figure, folder / f"{RUN}.png")
+        draw = plot.phase if len(states_of(ds)) > 1 else plot.history
+        some = {"trajectory": ds["trajectory"].values[:MOST].tolist()} if "trajectory" in ds.dims else {}
+        return {"": first_figure(draw(ds, **some))}
+
+
+class Reference(Motion):
+    """The same by the second method of [compare], to be set beside it."""
+
+    def names(self, table: Any, setting: Setting) -> tuple[str, str]:
+        """Its file stands beside that of the run."""
+        return f"{super().names(table, setting)[0]}, reference", REFERENCE
+
+    def check(self, table: Any, setting: Setting) -> None:
+        """Its method is that of [compare]."""
+        super().check(table, setting)
+        assert self.compare is not None
+        self.method = setting.method(self.compare.reference)
+
+    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
+        """It stands in the table of the run."""
+        return []
+
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:  # noqa: ARG002
+        """None of its own."""
+        return {}

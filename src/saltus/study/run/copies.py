@@ -9,8 +9,8 @@ from typing import Any
 
 from saltus import fence
 from saltus.errors import StudyError
-from saltus.results.durable import seal, sha256, unseal
-from saltus.results.files import ResultFileError, replacing
+from saltus.results.files.atomic import ResultFileError, replacing
+from saltus.results.store.durable import seal, sha256, unseal
 from saltus.study.setting.inputs import Input, Inputs, KeptInputs
 
 #: Name of the copy of the study, of the seal that says what it was, and the folder of copies of files that it names.

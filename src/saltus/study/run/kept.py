@@ -8,7 +8,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from saltus.results.files import ResultFileError, replacing
+from saltus.interrupt import Interrupted
+from saltus.results import load, save
+from saltus.results.files.atomic import ResultFileError
 from saltus.results.provenance import to_json
 from saltus.study.run.running import Report, Running
 
@@ -52,8 +54,6 @@ def kept_or_computed(
 
 def _kept(file: Path, title: str, identity: Mapping[str, str], say: Callable[[str], None]) -> xr.Dataset | None:
     """The result in a file, if it is there, sound, and of this identity."""
-    from saltus.results import load
-
     if not file.exists():
         return None
     try:
@@ -72,8 +72,6 @@ def _kept(file: Path, title: str, identity: Mapping[str, str], say: Callable[[st
 def _computed(
     file: Path, title: str, identity: Mapping[str, str], compute: Callable[[Callable[[float], None]], xr.Dataset], at: Running
 ) -> xr.Dataset:
-    from saltus.flow import Interrupted
-    from saltus.results import save
 
     begin = time.perf_counter()
 
@@ -94,16 +92,3 @@ def _computed(
     partial.unlink(missing_ok=True)
     show(1.0, last=True)
     return ds
-
-
-def save_picture(figure: Any, file: Path) -> Path:
-    """Write a figure, in full or not at all, and forget it."""
-    import matplotlib.pyplot as plt
-
-    from saltus.plot.picture import keep_drawable
-
-    keep_drawable(figure)  # a title is the user's text
-    with replacing(file) as (part,):
-        figure.savefig(part, dpi=150, format=file.suffix[1:])
-    plt.close(figure)
-    return file

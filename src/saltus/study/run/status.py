@@ -14,7 +14,7 @@ from saltus.study.run.maps import STORES
 from saltus.study.table import TextTable
 
 if TYPE_CHECKING:
-    from saltus.results.store import StoreStatus
+    from saltus.results.store.store import StoreStatus
 
 _TIME = "%Y-%m-%d %H:%M:%S UTC"
 
@@ -44,7 +44,7 @@ class DamagedStore:
 
 def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
     """How far the stores of an output folder are, or a store itself; empty if there are none."""
-    from saltus.results.store import Store, StoreError
+    from saltus.results.store.store import Store, StoreError
 
     found: list[StoreStatus | DamagedStore] = []
     alone = (folder / "store.json").exists()

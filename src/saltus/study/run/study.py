@@ -2,41 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from saltus.errors import ParameterError, StudyError, TraceError, UnitError, nearest
-from saltus.results.files import remove_old_drafts
-from saltus.study.answers import basins, lyapunov, responses, simulate
-from saltus.study.answers.energy import Balance
-from saltus.study.answers.impacts import Statistics
-from saltus.study.answers.poincare import Section
-from saltus.study.answers.spectrum import Lines
+from saltus.results import save
+from saltus.results.files.atomic import remove_old_drafts
+from saltus.study.answers.ask import questions_of, told_of
+from saltus.study.answers.basins import BasinMap
 from saltus.study.run.copies import keep_copy
+from saltus.study.run.kept import kept_or_computed
+from saltus.study.run.maps import compute, finish, open_store
 from saltus.study.run.running import Outcome, Report, Resources, Running
+from saltus.study.run.write import write
 from saltus.study.setting.inputs import Inputs
-from saltus.study.setting.setting import Setting, setting_of
 from saltus.study.tables.spec import Study
-from saltus.study.tables.wording import fault
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from saltus.results.store.store import Store
     from saltus.study.answers.question import Question
     from saltus.system import System
-
-#: What makes a question of each table.
-_PLANS: dict[str, Callable[[Any, Setting], list[Question]]] = {
-    "simulate": simulate.questions,
-    "poincare": Section.questions,
-    "spectrum": Lines.questions,
-    "impacts": Statistics.questions,
-    "energy": Balance.questions,
-    "lyapunov": lyapunov.questions,
-    "frequency_response": responses.frequency_responses,
-    "bifurcation_diagram": responses.bifurcation_diagrams,
-    "basins": basins.questions,
-}
 
 
 def run_study(
@@ -89,54 +76,36 @@ def run_study(
         from saltus.study.run.cluster import check_scheduler
 
         check_scheduler(str(resources.scheduler))
-    for question in asked:
-        question.prepare(folder)
+    stores = {question.stem: open_store(question, folder) for question in asked if isinstance(question, BasinMap)}
     keep_copy(folder, text, inputs.taken)
     at, outcome = Running(folder, text, resources, report, say, pictures), Outcome()
+    found: dict[str, xr.Dataset] = {}
     for question in asked:
-        if resources.shard is None or resources.shard[0] == 0 or question.shared:
-            with _told_of(question.asked_as):
-                outcome.add(question.answer(at))
+        first = resources.shard is None or resources.shard[0] == 0
+        if (first or question.shared) and found.keys() >= set(question.needs):
+            with told_of(question.place):
+                ds = _answer(question, found, at, stores)
+                if ds is None:
+                    outcome.waiting.append(question.title)
+                    continue
+                found[question.stem] = ds
+                outcome.add(write(question, ds, found, at))
     return outcome
 
 
-@contextmanager
-def _told_of(table: str) -> Iterator[None]:
-    """What an analysis says of its arguments is said of a table of the study."""
-    try:
-        yield
-    except (ParameterError, TraceError, UnitError) as error:
-        raise fault(table, error) from error
-
-
-def questions_of(study: Study, own: System | None, inputs: Inputs, only: Sequence[str] = ()) -> list[Question]:
-    """The questions of a study, or some of them, checked against its system.
-
-    Raises
-    ------
-    StudyError, UnitError, ParameterError
-        If one doesn't fit the system, two would write the same files, or ``only`` names none.
-    """
-    setting = setting_of(study, own, inputs)
-    for_all = inputs.taken
-    asked: list[tuple[str, Question]] = []
-    for name, table in study.questions():
-        with _told_of(name):
-            asked += [(name, question) for question in _PLANS[name](table, setting)]
-    stems = [stem for _, question in asked for stem in question.stems]
-    twice = sorted({stem for stem in stems if stems.count(stem) > 1})
-    if twice:
-        raise StudyError(f"names of this study give the same file names, such as {twice[0]}. Let them differ in letters or digits.")
-    for name, question in asked:
-        question.shared_inputs, question.asked_as = for_all, name
-    chosen = [question for name, question in asked if not only or _names(name, question) & set(only)]
-    known = {name for one in asked for name in _names(*one)}
-    for name in only:
-        if name not in known:
-            raise StudyError(f"--only {name}: this study has no such question. {nearest(name, known)}")
-    return chosen
-
-
-def _names(table: str, question: Question) -> set[str]:
-    """What a question may be called on the command line."""
-    return {table, question.title, question.stems[0]}
+def _answer(question: Question, found: Mapping[str, xr.Dataset], at: Running, stores: Mapping[str, Store]) -> xr.Dataset | None:
+    """The answer, kept or computed; None if other shards have still to work on it."""
+    if (identity := question.identity()) is None:
+        ds = question.compute(found, at.resources.threads, lambda _: None)
+        save(ds, at.folder / f"{question.stem}.nc")
+        return ds
+    if not isinstance(question, BasinMap):
+        return kept_or_computed(
+            question.stem, question.title, identity, lambda show: question.compute(found, at.resources.threads, show), at
+        )
+    store = stores[question.stem]
+    if not compute(question, store, at.resources, at.report, at.say):
+        return None
+    ds = finish(question, store, at.resources.threads).assign_attrs(study=at.text, title=question.title)
+    save(ds, at.folder / f"{question.stem}.nc")
+    return ds

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.errors import SaltusError, StudyError
-from saltus.results.measured import columns
+from saltus.results.files.measured import columns
 from saltus.study.setting.inputs import Input
 from saltus.study.tables.parts import Curve
 from saltus.system.tables import Table, curve

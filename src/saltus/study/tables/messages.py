@@ -7,22 +7,18 @@ from collections.abc import Iterator
 from tomllib import TOMLDecodeError
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from saltus.errors import nearest
 from saltus.fence import SHOWN, shown
-from saltus.study.tables.basins import Axis, Basins, Map
-from saltus.study.tables.lyapunov import Lyapunov
-from saltus.study.tables.motions import Compare, Energy, Impacts, Poincare, Simulate, Spectrum
-from saltus.study.tables.parts import METHODS, Curve, Header, Output, Range, SystemTable
-from saltus.study.tables.responses import BifurcationDiagram, FrequencyResponse
-from saltus.study.tables.spec import Study
+from saltus.study.tables.methods import METHODS
+from saltus.study.tables.parts import Curve, Header, Output, Range, SystemTable, Table
+from saltus.study.tables.questions import Axis, Compare, Map
+from saltus.study.tables.spec import QUESTIONS, Study
 from saltus.study.tables.wording import toml
 
-TABLES: dict[str, type[BaseModel]] = {
-    "study": Header, "system": SystemTable, "simulate": Simulate, "compare": Compare, "basins": Basins, "map": Map, "axes": Axis,
-    "lyapunov": Lyapunov, "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram, "frequency": Range,
-    "vary": Range, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts, "energy": Energy,
+TABLES: dict[str, type[Table]] = QUESTIONS | {
+    "study": Header, "system": SystemTable, "compare": Compare, "map": Map, "axes": Axis, "frequency": Range, "vary": Range,
     "outputs": Output, "tables": Curve,
 }  # fmt: skip
 #: Parts of a place that name the branch of a union, not a key.
@@ -112,9 +108,9 @@ def _fault(place: tuple, details: list[dict], data: Any) -> str:
     return f"{where}{key} = {_given(first['input'])} must be {expected}." + _example(place)
 
 
-def _table(place: tuple) -> type[BaseModel] | None:
+def _table(place: tuple) -> type[Table] | None:
     """The class of the table at a place in a study."""
-    table: type[BaseModel] | None = Study
+    table: type[Table] | None = Study
     for part in place:
         nested = part in ("method", "flow", "reference") or isinstance(part, int) or table in (Axis, Range, Output, Curve)
         table = METHODS.get(part) or TABLES.get(part) or (table if nested else None)

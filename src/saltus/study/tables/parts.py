@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
-from saltus.fence import MOST_COUNT, MOST_PERIODS, has_control
+from saltus.fence import MOST_COUNT, has_control
 
 #: A quantity as written: a bare number if it has no dimension, else text with its unit.
 Quantity = float | str
@@ -120,28 +120,6 @@ class SystemTable(Table):
         return dict(self.__pydantic_extra__ or {})
 
 
-# -- methods -------------------------------------------------------------------------------------------------------------------
-class Taylor(Table):
-    """[method] name = "Taylor": machine precision, every contact."""
-
-    name: Literal["Taylor"]
-    order: int | None = Field(None, ge=6, le=40, description="Order of the series; by default chosen for speed.", examples=[20])
-    tolerance: float | None = Field(None, gt=0, description="Relative local error; by default machine precision.", examples=[1e-12])
-
-
-class ODE45(Table):
-    """[method] name = "ODE45": MATLAB's ode45, to the digit."""
-
-    name: Literal["ODE45"]
-    rtol: float = Field(1e-3, gt=0, description="RelTol.", examples=[1e-4])
-    atol: float = Field(1e-6, gt=0, description="AbsTol, in SI.", examples=[1e-7])
-    events: Literal["locate", "ignore"] = Field("locate", description="Restart at contacts, or step over them.", examples=["locate"])
-
-
-Method = Annotated[Taylor | ODE45, Field(discriminator="name")]
-METHODS: dict[str, type[Table]] = {"Taylor": Taylor, "ODE45": ODE45}
-
-
 # -- questions -----------------------------------------------------------------------------------------------------------------
 class Range(Table):
     """Values of a parameter: from one to another, ends included, or given one by one."""
@@ -190,7 +168,7 @@ class Named(Table):
         return slug(self.title)
 
 
-#: States at the start for analyses that follow many starts, or how starts are found.
+#: States at the start, or how starts are found.
 Starts = Annotated[
     Annotated[dict[str, Start], Tag("dict[str]")] | Annotated[str, Tag("str")],
     Discriminator(lambda given: "dict[str]" if isinstance(given, dict) else "str"),
@@ -212,25 +190,6 @@ def _alone(given: Any) -> Any:
 
 
 Outputs = dict[str, Annotated[Output, BeforeValidator(_alone, json_schema_input_type=str | Output)]]
-OUTPUTS: Any = Field(
-    default_factory=dict,
-    description="What to read off each response besides its states, by name: formulas.",
-    examples=[{"spring force": "k*x", "power": {"formula": "c*v**2", "unit": "W"}}],
-)
-VALUES: Any = Field(
-    default_factory=dict,
-    description="Values that differ from [system], for this question only.",
-    examples=[{"contact_stiffness": "25.5 kN/m"}],
-)
-METHOD = Field(None, description="How to integrate; the study's [method] by default.", examples=[{"name": "Taylor"}])
-START = Field(
-    None,
-    description='Every state at the start, the same at every value; "sweep_up", "sweep_down", "random 20" with box. At rest by default.',
-    examples=[{"x": ["0 mm", "2 mm"], "v": "0 m/s"}, "sweep_up"],
-)
-BOX = Field(None, description="Range of each state for random starts.", examples=[{"x": ["-5 mm", "5 mm"], "v": ["-1 m/s", "1 m/s"]}])
-PERIODS = Field(2000, ge=1, le=MOST_PERIODS, description="Forcing periods that a start is followed at most.", examples=[2000])
-SEED = Field(1, ge=0, description="Of random starts.", examples=[1])
 
 T = TypeVar("T", bound=Table)
 

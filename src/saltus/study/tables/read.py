@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,11 @@ def parse(text: str, name: str = "study") -> Study:
         raise StudyError(f"{name}, {syntax_fault(error, text)}") from None
     except fence.RefusedError as refused:
         raise StudyError(f"{name} {refused}") from None
+    return study_of(data, name)
+
+
+def study_of(data: Mapping[str, Any], name: str = "study") -> Study:
+    """A study from what its TOML holds. Raises StudyError as :func:`read` does."""
     try:
         return Study.model_validate(data)
     except ValidationError as error:

@@ -6,16 +6,30 @@ from collections.abc import Iterator
 
 from pydantic import Field, model_validator
 
-from saltus.study.tables.basins import Basins
-from saltus.study.tables.lyapunov import Lyapunov
-from saltus.study.tables.motions import REFERENCE, RUN, Compare, Energy, Impacts, Poincare, Simulate, Spectrum
-from saltus.study.tables.parts import Header, Method, Named, SystemTable, Table, Taylor, distinct_names, one_or_many
-from saltus.study.tables.responses import BifurcationDiagram, FrequencyResponse
+from saltus.study.tables.methods import Method, Taylor
+from saltus.study.tables.parts import Header, Named, SystemTable, Table, distinct_names, one_or_many
+from saltus.study.tables.questions import (
+    REFERENCE,
+    RUN,
+    Basins,
+    BifurcationDiagram,
+    Compare,
+    Energy,
+    FrequencyResponse,
+    Impacts,
+    Lyapunov,
+    Poincare,
+    Simulate,
+    Spectrum,
+)
 
 #: Tables that ask something, in the order in which they are answered: the quick ones first.
-QUESTIONS = ("simulate", "poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram", "basins")
+QUESTIONS: dict[str, type[Table]] = {
+    "simulate": Simulate, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts, "energy": Energy, "lyapunov": Lyapunov,
+    "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram, "basins": Basins,
+}  # fmt: skip
 #: Those that may be asked several times, as arrays of tables.
-SEVERAL = ("poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram")
+SEVERAL = tuple(name for name, table in QUESTIONS.items() if issubclass(table, Named))
 
 
 class Study(Table):

@@ -7,8 +7,8 @@ import xarray as xr
 from saltus.analysis.basins.compare import compare
 from saltus.analysis.basins.uncertainty import fractions
 from saltus.errors import ParameterError
+from saltus.intervals import wilson
 from saltus.results import AttractorTable, basins_dataset, describe, load, save
-from saltus.results.intervals import wilson
 
 X, V = np.linspace(-5e-3, 5e-3, 4), np.linspace(-1.0, 1.0, 3)
 #: Two orbits of period 1 and 2 and a chaotic motion: type, points, peak.
@@ -245,5 +245,5 @@ def test_rounding_of_the_grid_is_forgiven():
 
 
 def test_only_maps_can_be_compared():
-    with pytest.raises(ParameterError, match="this Dataset is from compare"):
+    with pytest.raises(ParameterError, match=r"this Dataset is from sl\.compare"):
         compare(basins(), compare(basins(), basins()))

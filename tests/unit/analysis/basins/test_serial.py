@@ -14,11 +14,11 @@ from saltus.analysis.basins.labels import Settling, settle
 from saltus.analysis.basins.serial import cell_types, found_data, found_from, settling_arrays, settling_from
 from saltus.analysis.orbits.aperiodic import Wandering
 from saltus.analysis.orbits.capture import Neighbourhoods
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.orbits import Orbit
-from saltus.analysis.orbits.recurrence import find
 from saltus.errors import SaltusError
-from saltus.results.durable import seal, unseal
+from saltus.results.store.durable import seal, unseal
 
 SCALE = np.array([3.0, 1.0])
 
@@ -40,7 +40,7 @@ def starts():
 def case(request):
     """A map, and the attractors that were found on it."""
     map_ = henon(1.4 if request.param == "chaotic" else 1.0, 0.3)
-    found = find(map_, starts(), SCALE, 256)[0]
+    found = find_attractors(map_, starts(), SCALE, 256)[0]
     assert [len(found.wandering), len(found.orbits)] == ([1, 0] if request.param == "chaotic" else [0, 1])
     return map_, found
 
@@ -57,10 +57,7 @@ def numbers(found):
         array = np.asarray(array)
         return array.dtype.str, array.shape, array.tobytes()
 
-    orbits = [
-        (told(o.points), told(o.monodromy), told(o.multipliers.astype(complex)), struct.pack("d", o.mismatch))
-        for o in (*found.orbits, *found.unstable)
-    ]
+    orbits = [(told(o.points), told(o.multipliers.astype(complex)), struct.pack("d", o.mismatch)) for o in (*found.orbits, *found.unstable)]
     wandering = [(w.kind, struct.pack("dd", w.exponent, w.exponent_error), told(w.points), told(w.scale)) for w in found.wandering]
     near = found.near
     return len(found.orbits), orbits, wandering, told(near.centres), told(near.weights), told(near.owners)
@@ -96,7 +93,7 @@ def test_numbers_that_text_may_lose():
     """Denormals, signed zero, infinity, not-a-number, 17 digits, complex multipliers, an orbit that doesn't attract."""
     odd = np.array([[5e-324, -0.0], [0.1 + 0.2, 1.7976931348623157e308], [np.inf, -np.inf], [np.nan, 1 / 3]])
     matrices = np.arange(16.0).reshape(4, 2, 2) / 7
-    orbit = Orbit(odd, matrices, np.array([0.3 + 0.4j, complex(-0.0, -0.4)]), np.float64(1e-17))
+    orbit = Orbit(odd, np.array([0.3 + 0.4j, complex(-0.0, -0.4)]), np.float64(1e-17))
     found = Found(
         Neighbourhoods(odd[:2].copy(), matrices[:2], np.array([0, 1])),
         [orbit],
@@ -137,7 +134,7 @@ def test_a_worker_gets_the_same_attractors(case):
         lambda data: data["near"].update(centres=[[float("nan")] * 2] * len(data["near"]["centres"])),
         lambda data: data["near"].update(centres=[[]]),
         lambda data: data.update(orbits=[]),
-        lambda data: data["orbits"][0].update(monodromy=[]),
+        lambda data: data["orbits"][0].update(points=[]),
         lambda data: data["orbits"][0].update(points=[["a", {}]]),
         lambda data: data["orbits"][0].update(multipliers=[[0.5, 0.0]]),
         lambda data: data.pop("wandering"),
@@ -154,7 +151,7 @@ def test_data_that_do_not_hold_together_are_refused(forge):
 
 
 def _periodic():
-    orbit = Orbit(np.zeros((2, 2)), np.zeros((2, 2, 2)), np.zeros(2, complex), 0.0)
+    orbit = Orbit(np.zeros((2, 2)), np.zeros(2, complex), 0.0)
     return Found(Neighbourhoods(np.zeros((2, 2)), np.stack([np.eye(2)] * 2), np.zeros(2, np.int64)), [orbit])
 
 

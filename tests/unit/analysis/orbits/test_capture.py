@@ -5,12 +5,11 @@ import warnings
 import numpy as np
 import pytest
 
-from function_maps import FunctionMap
+from function_maps import FunctionMap, orbit_near
 from saltus.analysis.basins.labels import settle
 from saltus.analysis.orbits.capture import Neighbourhoods, _alike, neighbourhoods, sphere
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
-from saltus.analysis.orbits.orbits import polish
-from saltus.analysis.orbits.recurrence import find
 
 
 def linear(matrix) -> FunctionMap:
@@ -88,7 +87,7 @@ def test_nothing_captures_nothing():
 # -- what is verified ----------------------------------------------------------------------------------------------------------
 def test_a_linear_contraction_is_verified_at_the_largest_radius():
     map_ = linear([[0.5, 0.4], [-0.4, 0.5]])
-    orbit = polish(map_, np.array([0.1, 0.1]), 1, np.ones(2))
+    orbit = orbit_near(map_, np.array([0.1, 0.1]), 1, np.ones(2))
     near = neighbourhoods(map_, orbit, 0, np.ones(2))
     assert near.capture(np.array([[[0.15, 0.15]]]))[0].tolist() == [0]
 
@@ -97,14 +96,14 @@ def test_a_linear_contraction_is_verified_at_the_largest_radius():
 def test_a_slow_attractor_has_a_neighbourhood_too(multiplier):
     """A linear map contracts everywhere, however slowly: its neighbourhood is limited by what is tried, not by the rate."""
     map_ = linear([[multiplier, 0.0], [0.0, 0.5]])
-    orbit = polish(map_, np.array([0.1, 0.1]), 1, np.ones(2))
+    orbit = orbit_near(map_, np.array([0.1, 0.1]), 1, np.ones(2))
     assert neighbourhoods(map_, orbit, 0, np.ones(2)).capture(np.array([[[1e-3, 1e-3]]]))[0].tolist() == [0]
 
 
 def test_a_strongly_sheared_contraction_is_verified():
     """It stretches by 20 before it contracts: the norm must be its own."""
     map_ = linear([[0.6, 20.0], [0.0, 0.6]])
-    orbit = polish(map_, np.array([0.1, 0.0]), 1, np.ones(2))
+    orbit = orbit_near(map_, np.array([0.1, 0.0]), 1, np.ones(2))
     near = neighbourhoods(map_, orbit, 0, np.ones(2))
     points = inside(near, 0, 500)
     assert np.ptp(points[:, 0]) > 1e-2
@@ -125,7 +124,7 @@ class Touching(FunctionMap):
 def test_a_neighbourhood_ends_where_the_contacts_change():
     plain = linear([[0.5, 0.0], [0.0, 0.5]])
     map_ = Touching(plain._function, "x y", plain._derivative)
-    orbit = polish(map_, np.array([0.1, 0.1]), 1, np.ones(2))
+    orbit = orbit_near(map_, np.array([0.1, 0.1]), 1, np.ones(2))
     edge = inside(neighbourhoods(map_, orbit, 0, np.ones(2)), 0, 2000)[:, 0]
     assert 0.002 < np.abs(edge).max() <= 0.01
     assert np.abs(inside(neighbourhoods(plain, orbit, 0, np.ones(2)), 0, 2000)[:, 0]).max() > 0.1
@@ -149,7 +148,7 @@ def test_every_point_of_the_shell_is_followed(point):
     plain = linear([[0.5, 0.0], [0.0, 0.5]])
     map_ = TouchingInAWedge(plain._function, "x y", plain._derivative)
     map_.direction = point * np.pi / 16
-    orbit = polish(plain, np.array([0.1, 0.1]), 1, np.ones(2))
+    orbit = orbit_near(plain, np.array([0.1, 0.1]), 1, np.ones(2))
     edge = inside(neighbourhoods(map_, orbit, 0, np.ones(2)), 0, 500)
     assert 0.002 < np.linalg.norm(edge, axis=1).max() <= 0.01
 
@@ -157,7 +156,7 @@ def test_every_point_of_the_shell_is_followed(point):
 def test_newton_s_map_every_point_of_a_neighbourhood_ends_on_its_root():
     map_, scale = newton(), np.array([4.0, 4.0])
     starts = np.random.default_rng(1).uniform(-2, 2, (100, 2))
-    found, _, _ = find(map_, starts, scale, 500)
+    found, _, _ = find_attractors(map_, starts, scale, 500)
     assert len(found) == 3
     for i, owner in enumerate(found.near.owners):
         points = inside(found.near, i, 2000)
@@ -172,7 +171,7 @@ def test_twins_of_the_cubic_map_are_told_apart_point_by_point(a):
     map_, scale = cubic(a), np.array([3.0])
     starts = np.linspace(-1.49, 1.49, 2001)[:, None]
     starts = starts[np.abs(starts[:, 0]) > 1e-3]
-    found, label, _ = find(map_, starts, scale, 2000)
+    found, label, _ = find_attractors(map_, starts, scale, 2000)
     assert len(found) == 2
     assert found.orbits[0].period == found.orbits[1].period == {1.5: 1, 2.1: 2, 2.25: 4, 2.29: 8}[a]
     end = map_.launch(starts, 4000).advance(4000)[:, -1]
@@ -183,7 +182,7 @@ def test_twins_of_the_cubic_map_are_told_apart_point_by_point(a):
 
 
 def test_neighbourhoods_of_different_attractors_do_not_overlap():
-    found, _, _ = find(cubic(2.29), np.random.default_rng(1).uniform(-1.5, 1.5, (200, 1)), np.array([3.0]), 2000)
+    found, _, _ = find_attractors(cubic(2.29), np.random.default_rng(1).uniform(-1.5, 1.5, (200, 1)), np.array([3.0]), 2000)
     for i, owner in enumerate(found.near.owners):
         label, _ = Neighbourhoods(found.near.centres, found.near.weights, found.near.owners).capture(inside(found.near, i, 500)[:, None, :])
         assert (label == owner).all()
@@ -226,7 +225,7 @@ def test_starts_that_escape_are_told_and_no_warning_is_given():
     starts = np.array([[0.4], [-0.4], [1.9], [-5.0], [1e200]])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found, label, _ = find(map_, starts, scale, 500)
+        found, label, _ = find_attractors(map_, starts, scale, 500)
         result = settle(map_, starts, found, 500)
     assert label.tolist() == [1, 0, -1, -1, -1] or label.tolist() == [0, 1, -1, -1, -1]
     np.testing.assert_array_equal(result.label[:2], label[:2])
@@ -237,7 +236,7 @@ def test_starts_that_escape_are_told_and_no_warning_is_given():
 def test_settling_takes_the_first_visit():
     """x -> x/2 from 1024: captured at the first iterate inside, whatever the size of the blocks."""
     map_ = linear([[0.5]])
-    orbit = polish(map_, np.array([0.1]), 1, np.array([1.0]))
+    orbit = orbit_near(map_, np.array([0.1]), 1, np.array([1.0]))
     found = Found(Neighbourhoods(np.zeros((1, 1)), np.array([[[1.0]]]), np.array([0])), [orbit])
     result = settle(map_, np.array([[1024.0], [1.5], [0.1], [-(2.0**20)]]), found, 100)
     assert result.label.tolist() == [0, 0, 0, 0]

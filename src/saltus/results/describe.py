@@ -1,0 +1,83 @@
+"""`describe`: a few lines on a result."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import xarray as xr
+
+from saltus.results.dataset.reader import reader
+from saltus.results.dataset.schema import STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
+from saltus.results.summary import summary
+from saltus.units import from_si
+
+
+@reader
+def describe(ds: xr.Dataset) -> str:
+    """A few lines on what a result holds and where it comes from.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What any function of saltus returned, or :func:`~saltus.results.load`.
+
+    Returns
+    -------
+    str
+        System, parameters, method, extent, contacts, status and hash, a line each; of attractors and basins what was found.
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` is no result of saltus.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> run = sl.simulate(rig, start=("1 mm", 0), periods=10)
+    >>> print(sl.describe(run).splitlines()[0][:37])
+    delangre: mass = 3 kg, damping_ratio
+    """
+    check(ds, caller="describe", kinds=list(TABLES))
+    lines = [f"{ds.attrs.get('system', 'system without a name')}: {_parameters(ds)}"]
+    if "method" in ds.attrs or kind_of(ds) in (TRAJECTORY, STROBOSCOPE):
+        lines.append(f"method   {ds.attrs.get('method', 'unknown')}{_options(ds)}, saltus {ds.attrs.get('saltus_version', 'unknown')}")
+    if kind_of(ds) in (TRAJECTORY, STROBOSCOPE):
+        lines += [f"extent   {_extent(ds)}", f"status   {_tally(ds['status'].values)}"]
+    else:
+        lines += summary(ds)
+    if "contact_kind" in ds:
+        lines.append(f"contacts {_tally(ds['contact_kind'].values) if ds.sizes['contact'] else 'none'}")
+    return "\n".join([*lines, f"hash     {ds.attrs.get('result_hash', 'none')[:16]}"])
+
+
+def _parameters(ds: xr.Dataset) -> str:
+    units = json.loads(ds.attrs.get("units", "{}"))
+    values = json.loads(ds.attrs.get("parameters", "{}"))
+    fixed = [f"{name} = {from_si(value, units.get(name, ''))}" for name, value in values.items()]
+    return ", ".join(fixed + [f"{name} varies" for name in json.loads(ds.attrs.get("varied_parameters", "[]"))])
+
+
+def _options(ds: xr.Dataset) -> str:
+    options = json.loads(ds.attrs.get("method_options", "{}"))
+    return f"({', '.join(f'{name}={value}' for name, value in options.items())})" if options else ""
+
+
+def _extent(ds: xr.Dataset) -> str:
+    trajectories = ds.sizes.get("trajectory", 1)
+    parts = [f"{trajectories} {'trajectory' if trajectories == 1 else 'trajectories'}"]
+    if "time" in ds and ds["time"].size:
+        parts.append(f"{ds['time'].shape[-1]} samples from {float(ds['time'].min()):g} to {float(ds['time'].max()):g} s")
+    if "period" in ds and ds["period"].size:
+        parts.append(f"periods {float(ds['period'].min()):g} to {float(ds['period'].max()):g}")
+    return ", ".join(parts)
+
+
+def _tally(words: np.ndarray) -> str:
+    """``3 ok, 1 graze_unresolved``; a single word stays itself."""
+    if words.ndim == 0:
+        return str(words)
+    found, counts = np.unique(words.astype(str), return_counts=True)
+    return ", ".join(f"{count} {word}" for word, count in zip(found, counts, strict=True))

@@ -1,0 +1,1 @@
+"""Results to files and back: netCDF, CSV, MATLAB, pandas; measured points."""

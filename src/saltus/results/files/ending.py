@@ -1,0 +1,110 @@
+"""The end of a result file: a checksum of all bytes before it, asked before any parser sees the file.
+
+netCDF-4 and netCDF-3 both say where their data end, and readers stop there: what follows is ours. A damaged HDF5 file can keep the HDF5
+library busy for ever, so a checksum inside comes too late. It says that a file is whole, not who wrote it: what this user's saltus didn't
+write here is tried in a process of its own first (see :mod:`saltus.results.files.known`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from saltus.fence import printable, shown
+from saltus.results.files.atomic import ResultFileError
+
+_ENDING = re.compile(rb"\nsaltus-sha256:([0-9a-f]{64})\n")
+_LENGTH = 80
+#: Time that reading a file without an ending may take [s], and how much of it is read in a second at the least [byte].
+PATIENCE, SLOWEST = 60.0, 1e7
+#: Memory that it may take: so many times its size, but this much at the least [byte].
+TIMES, LEAST = 8, 4 << 30
+#: What xarray reads by is tried, without xarray, which takes longer to load than most files.
+_TRIAL = """
+import contextlib, sys
+with contextlib.suppress(ImportError, ValueError, OSError):
+    import resource
+    resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[3]), int(sys.argv[3])))
+if sys.argv[2] == "h5netcdf":
+    import h5netcdf, h5py
+    with h5py.File(sys.argv[1]) as file:
+        for name in file:
+            one = file[name] if isinstance(file.get(name, getlink=True), h5py.HardLink) else None
+            if not isinstance(one, h5py.Dataset) or one.external or one.is_virtual:
+                raise ValueError("it holds folders, or leads to other files, which no result does")
+    file = h5netcdf.File(sys.argv[1], "r", decode_vlen_strings=True)
+else:
+    import scipy.io
+    file = scipy.io.netcdf_file(sys.argv[1], mmap=False)
+for one in file.variables.values():
+    one[...], dict(getattr(one, "attrs", {}))
+dict(getattr(file, "attrs", {}))
+"""
+
+
+def with_ending(content: bytes | memoryview) -> bytes:
+    """The bytes of a file with its ending."""
+    return bytes(content) + b"\nsaltus-sha256:" + hashlib.sha256(content).hexdigest().encode() + b"\n"
+
+
+def checksum_in(ended: bytes) -> str:
+    """The checksum that stands in what :func:`with_ending` returned."""
+    return ended[-65:-1].decode()
+
+
+def checksum(path: Path) -> str | None:
+    """The checksum at the end of a file, which is that of its bytes; None if there is none.
+
+    Raises
+    ------
+    ResultFileError
+        If it is that of other bytes.
+    """
+    with path.open("rb") as file:
+        left = max(os.fstat(file.fileno()).st_size - _LENGTH, 0)
+        file.seek(left)
+        ending = _ENDING.fullmatch(file.read())
+        if ending is None:
+            return None
+        digest = hashlib.sha256()
+        file.seek(0)
+        while left:
+            part = file.read(min(left, 1 << 20))
+            if not part:
+                break
+            digest.update(part)
+            left -= len(part)
+    if digest.hexdigest().encode() != ending[1]:
+        raise ResultFileError(f"{path} is damaged: the checksum at its end doesn't match. Restore it from a copy or compute it again.")
+    return ending[1].decode()
+
+
+def try_elsewhere(path: Path, engine: str) -> None:
+    """Read a file of unknown origin in a process that can be stopped, and that has not more memory than a result takes.
+
+    Raises
+    ------
+    ResultFileError
+        If that fails, comes to no end, or the file leads to others.
+    """
+    size = path.stat().st_size
+    patience = PATIENCE + size / SLOWEST
+    command = [sys.executable, "-P", "-c", _TRIAL, str(path.resolve()), engine, str(max(TIMES * size, LEAST))]
+    known = os.pathsep.join(place for place in sys.path if place)
+    try:
+        done = subprocess.run(
+            command, capture_output=True, timeout=patience, check=False, env={**os.environ, "PYTHONPATH": known}, stdin=subprocess.DEVNULL
+        )
+    except subprocess.TimeoutExpired:
+        raise ResultFileError(
+            f"{path} is damaged: reading it came to no end within {patience:.0f} s. Restore it from a copy or compute it again."
+        ) from None
+    except OSError as error:
+        raise ResultFileError(f"{path} can't be tried: {error.strerror or error}. Compute it again.") from error
+    if done.returncode:
+        why = (done.stderr.decode(errors="replace").strip().splitlines() or ["the reader crashed"])[-1]
+        raise ResultFileError(f"{path} is damaged: {shown(printable(why), 200)}. Restore it from a copy or compute it again.")

@@ -1,0 +1,1 @@
+"""A map on disk, chunk by chunk, that any process may be killed over."""

@@ -1,0 +1,76 @@
+"""A folder that appears under its name with everything in it, or not at all, and what is left of it when its maker is killed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+import uuid
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+
+from saltus.results.store.durable import StoreError, flush_names, write
+from saltus.results.store.lock import exclusive, is_held
+
+#: A folder takes a moment to make: a draft of one that is older than this [s], and not locked, was left by a process that was killed.
+_DRAFT_AGE = 60.0
+#: Lock file in a draft, held while it is filled: a clock that jumps ahead makes it look old, but not abandoned.
+_LOCK = Path("locks") / "draft"
+
+
+def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str]) -> None:
+    """Make a folder that appears under its name with everything in it, or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        Its name, not taken yet.
+    files : mapping of str to bytes
+        What is in it, by path in the folder.
+    folders : iterable of str
+        Folders in it; ``locks`` is one of them.
+
+    Raises
+    ------
+    StoreError
+        If something stands under the name, or the disk is full.
+    """
+    remove_old_drafts(path)
+    draft = path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part")
+    try:
+        for name in folders:
+            (draft / name).mkdir(parents=True)
+        with _locked(draft):
+            for name, data in files.items():
+                write(draft / name, data)
+            for place in [draft, *(place for place in draft.rglob("*") if place.is_dir())]:
+                flush_names(place)
+            os.rename(draft, path)
+        flush_names(path.parent)
+    except OSError as error:
+        raise StoreError(
+            f"{path} can't be made: {error.strerror or error}. Nothing was left behind; make room or choose another folder."
+        ) from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _locked(draft: Path) -> AbstractContextManager[object]:
+    """Hold the lock of a draft. Windows renames no folder with an open file in it: there the age alone must do."""
+    return nullcontext() if os.name == "nt" else exclusive(draft / _LOCK)
+
+
+def remove_old_drafts(path: Path) -> None:
+    """Remove what processes left that were killed within :func:`write_folder`."""
+    for draft in path.parent.iterdir():
+        if draft.name.startswith(f".{path.name}.") and draft.name.endswith(".part") and _abandoned(draft):
+            shutil.rmtree(draft, ignore_errors=True)
+
+
+def _abandoned(draft: Path) -> bool:
+    try:
+        old = time.time() - draft.stat().st_mtime > _DRAFT_AGE
+    except FileNotFoundError:  # it has just taken its name
+        return False
+    return old and not ((draft / _LOCK).exists() and is_held(draft / _LOCK))

@@ -1,0 +1,114 @@
+"""``store.json``: what a store holds and what it was made from. Its hash stands in every record, so that chunks know where they belong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from saltus.results.store.chunks import Chunks
+from saltus.results.store.durable import StoreError, read, seal, sha256, unseal, write_together
+from saltus.results.store.lock import exclusive
+
+#: Layout of the files. A store of another one is refused, not guessed at.
+FORMAT = 2
+#: Name of the file.
+HEAD = "store.json"
+#: Most cells of a map that a head may speak of: of more, not even the list of chunks is to be made.
+MOST_CELLS = 10**9
+_TYPES = {
+    "bool",
+    "float32",
+    "float64",
+    "complex64",
+    "complex128",
+    *(f"{kind}{bits}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)),
+}
+
+
+def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks) -> dict[str, Any]:
+    """What ``store.json`` says."""
+    return {
+        "format": FORMAT, "identity": dict(identity), "note": dict(note), "shape": list(chunks.shape), "chunk": chunks.chunk,
+        "arrays": {name: dtype.name for name, dtype in chunks.arrays.items()},
+    }  # fmt: skip
+
+
+def fingerprint(head: Mapping[str, Any]) -> str:
+    """SHA-256 of a head without its note, which is for people: equal for stores whose chunks may stand for each other."""
+    return sha256(seal({name: head[name] for name in ("format", "identity", "shape", "chunk", "arrays")}))
+
+
+def read_head(path: Path) -> dict[str, Any]:
+    """The head of the store in a folder.
+
+    Raises
+    ------
+    StoreError
+        If there is none, it is damaged, or of another layout.
+    """
+    data = read(path / HEAD)
+    if data is None:
+        what = "there is no store" if not path.exists() else "this is not a store of saltus, and it was left alone"
+        raise StoreError(f"{path}: {what}. Choose another path.")
+    head = _opened(data)
+    if head is None:
+        raise StoreError(f"{path / HEAD} is damaged. Go on with the study that made it: the file is written again, and all chunks stay.")
+    if head["format"] != FORMAT:
+        age = "a later" if head["format"] > FORMAT else "an earlier"
+        layout = f"layout {head['format']}, known: {FORMAT}"
+        raise StoreError(f"{path} was made by {age} saltus ({layout}). Use that one, or choose another path.")
+    return head
+
+
+def _opened(data: bytes) -> dict[str, Any] | None:
+    """What a head says; None if it is damaged, or holds what no head does. Another layout may say anything."""
+    head = unseal(data)
+    if head is None or not isinstance(head.get("format"), int):
+        return None
+    return head if head["format"] != FORMAT or _says_what_a_head_says(head) else None
+
+
+def _says_what_a_head_says(head: Mapping[str, Any]) -> bool:
+    shape, chunk, arrays = head.get("shape"), head.get("chunk"), head.get("arrays")
+    if not (_texts(head.get("identity")) and isinstance(head.get("note"), dict) and isinstance(shape, list)):
+        return False
+    if not (shape and all(isinstance(one, int) and 0 < one <= MOST_CELLS for one in (*shape, chunk))):
+        return False
+    return math.prod(shape) <= MOST_CELLS and isinstance(arrays, dict) and _texts(arrays) and set(arrays.values()) <= _TYPES
+
+
+def _texts(values: Any) -> bool:
+    return isinstance(values, dict) and all(isinstance(value, str) for value in values.values())
+
+
+def mend_head(path: Path, head: Mapping[str, Any]) -> None:
+    """Write ``store.json`` again where it is damaged, gone or another store's, if the chunks beside it were made under ``head``.
+
+    Raises
+    ------
+    StoreError
+        If it is damaged and the chunks were made from something else.
+    """
+    there = _opened(read(path / HEAD) or b"")
+    if there is not None and (there.get("format") != FORMAT or fingerprint(there) == fingerprint(head)):
+        return
+    makers = _makers(path)
+    if there is not None and makers != {fingerprint(head)}:
+        return  # an intact head that differs: the caller compares the two and says how
+    if there is None and not makers and not (path / HEAD).exists():
+        return  # an empty folder, or something else: not ours to write to
+    if makers and fingerprint(head) not in makers:
+        raise StoreError(
+            f"{path / HEAD} is damaged, and the chunks beside it were made from something else than what is asked for here. Nothing was "
+            "changed. Go on with the study that made them, which writes the file again, or choose another path."
+        )
+    with exclusive(path / "locks" / "head", patience=10.0):
+        write_together(path / "parts", "head", {path / HEAD: seal(head)})
+
+
+def _makers(path: Path) -> set[str]:
+    """Hashes of the heads under which the intact records of a folder were written."""
+    records = (unseal(read(file) or b"") for folder in ("done", "artifacts") for file in sorted((path / folder).glob("*.json")))
+    return {str(record["store"]) for record in records if record is not None and "store" in record}

@@ -1,0 +1,49 @@
+"""What a store was made from, and the refusal to add results of anything else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from saltus.errors import ParameterError, shown
+from saltus.results.store.durable import StoreError
+
+
+def texts(identity: Mapping[str, str]) -> dict[str, str]:
+    """An identity in one order.
+
+    Raises
+    ------
+    ParameterError
+        If a value isn't text: 1 and 1.0 would be equal or not, depending on who compares.
+    """
+    for name, value in identity.items():
+        if not isinstance(value, str):
+            raise ParameterError(f"identity {name!r} is {shown(value)}. Give it as text, so that it can be compared without doubt.")
+    return dict(sorted(identity.items()))
+
+
+def agree(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None:
+    """Compare the identity of a store with that of a computation that would resume it.
+
+    Raises
+    ------
+    StoreError
+        If a value differs, or only one of them has it: names each, with both values.
+    """
+    differ = [name for name in dict.fromkeys([*there, *here]) if there.get(name) != here.get(name)]
+    if differ:
+        both = [(name, _near(there.get(name), here.get(name)), _near(here.get(name), there.get(name))) for name in differ]
+        raise StoreError(
+            f"{path} was made from something else: {'; '.join(f'{name} was {old}, is {new}' for name, old, new in both)}. "
+            "Nothing was changed. Choose another path, or go back to what made it."
+        )
+
+
+def _near(text: str | None, other: str | None) -> str:
+    """A text, shortened to where it differs from another."""
+    if text is None:
+        return "not set"
+    same = next((i for i, (a, b) in enumerate(zip(text, other or "", strict=False)) if a != b), min(len(text), len(other or "")))
+    start = max(0, same - 12)
+    return repr(("…" if start else "") + text[start : start + 40] + ("…" if len(text) > start + 40 else ""))

@@ -1,0 +1,449 @@
+"""A store: a map computed chunk by chunk, by one process or many, killed and resumed as often as need be, with one outcome.
+
+::
+
+    store.json          identity, shape, what is kept                         written once, at creation
+    data.zarr/          a zarr 3 group, one flat array of cells per variable  one file per chunk and array
+    done/7.json         chunk 7 of this store is complete: SHA-256 of files   written last
+    artifacts/          small values that all chunks share                    a checksum inside
+    locks/, parts/      who is writing; drafts that a kill left behind        no part of the outcome
+
+Records and artifacts hold their number or name and the hash of ``store.json``: in another place, or another store, they count as damaged.
+No file holds a time, a host or an order, so a finished store is the same bit by bit however it came about.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.results.store.artifacts import get_artifact, has_artifact, put_artifact
+from saltus.results.store.chunks import Chunks, Codec
+from saltus.results.store.draft_folder import remove_old_drafts, write_folder
+from saltus.results.store.durable import (
+    StoreError,
+    flush_names,
+    read,
+    seal,
+    sha256,
+    size,
+    unseal,
+    write_together,
+)
+from saltus.results.store.head import HEAD, fingerprint, head_of, mend_head, read_head
+from saltus.results.store.identity import agree, texts
+from saltus.results.store.lock import WHOLE, exclusive, holders, locked
+
+__all__ = ["Store", "StoreError", "StoreStatus"]
+
+
+@dataclass(frozen=True)
+class StoreStatus:
+    """How far a store is.
+
+    Attributes
+    ----------
+    path : Path
+    identity, note : dict
+        As given at creation.
+    done, total : int
+        Chunks.
+    damaged : int
+        Chunks among ``done`` whose files aren't what was committed.
+    bytes : int
+        Size on the disk.
+    last_written : datetime or None
+        When the last chunk was committed (UTC); None before the first.
+    writers : tuple of str
+        Who holds a lock, since when.
+    """
+
+    path: Path
+    identity: dict[str, str]
+    note: dict[str, Any]
+    done: int
+    total: int
+    damaged: int
+    bytes: int
+    last_written: datetime | None
+    writers: tuple[str, ...]
+
+
+class Store:
+    """One map on the disk. Made by :meth:`create`, :meth:`open` or :meth:`create_or_resume`; reading needs no lock, writing does.
+
+    Attributes
+    ----------
+    path : Path
+    identity, note : dict
+    chunks : Chunks
+        Shape of the grid, cells in a chunk, arrays.
+    """
+
+    def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
+        self.path = path
+        self.identity: dict[str, str] = head["identity"]
+        self.note: dict[str, Any] = head["note"]
+        self.chunks = Chunks.checked(tuple(head["shape"]), head["chunk"], head["arrays"])
+        self._made_under = fingerprint(head)
+        self._codec = Codec(self.chunks, {"identity": self.identity, "shape": list(self.chunks.shape)})
+        self._shard: tuple[int, int] | None = None
+        self._process = 0
+
+    # -- making and opening ------------------------------------------------------------------------------------------------
+    @classmethod
+    def create(
+        cls,
+        path: str | os.PathLike[str],
+        identity: Mapping[str, str],
+        *,
+        shape: tuple[int, ...],
+        chunk: int,
+        arrays: Mapping[str, Any],
+        note: Mapping[str, Any] | None = None,
+    ) -> Store:
+        """Make an empty store. It appears under its name complete or not at all.
+
+        Parameters
+        ----------
+        path : str or path
+            A folder that isn't there yet, in one that is.
+        identity : mapping of str to str
+            What a process must agree on to add chunks: hashes of study and system, versions, options.
+        shape : tuple of int
+            Size of the grid along each dim.
+        chunk : int
+            Cells of the flattened grid (C order) that are one task.
+        arrays : mapping of str to dtype
+            What is kept of each cell.
+        note : mapping, optional
+            Anything else worth keeping with it, as plain values; never compared.
+
+        Raises
+        ------
+        StoreError
+            If something stands under the name, the folder around it is missing, or the disk is full.
+        ParameterError
+            If sizes, names or types can't be stored.
+        """
+        path = Path(path).resolve()
+        chunks = Chunks.checked(shape, chunk, arrays)
+        head = head_of(texts(identity), note or {}, chunks)
+        if not path.parent.is_dir():
+            raise StoreError(f"{path} can't be made: there is no folder {path.parent}. Make it first.")
+        if path.exists():
+            raise StoreError(f"{path} is there already. Resume it if it is a store, or choose another path; nothing is overwritten.")
+        store = cls(path, head)
+        files = {f"data.zarr/{name}": data for name, data in store._codec.metadata.items()} | {HEAD: seal(head)}
+        write_folder(path, files, folders=store._folders())
+        return store
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str], identity: Mapping[str, str] | None = None) -> Store:
+        """Open a store that is there.
+
+        Parameters
+        ----------
+        path : str or path
+            Its folder.
+        identity : mapping of str to str, optional
+            If given, it must be the store's.
+
+        Raises
+        ------
+        StoreError
+            If there is no store, its head is damaged, or the identity differs: names each value that does.
+        """
+        path = Path(path).resolve()
+        store = cls(path, read_head(path))
+        if identity is not None:
+            agree(path, store.identity, texts(identity))
+        return store
+
+    @classmethod
+    def create_or_resume(
+        cls,
+        path: str | os.PathLike[str],
+        identity: Mapping[str, str],
+        *,
+        shape: tuple[int, ...],
+        chunk: int,
+        arrays: Mapping[str, Any],
+        note: Mapping[str, Any] | None = None,
+    ) -> Store:
+        """:meth:`create` if there is nothing yet, else :meth:`open`; ``shape``, ``chunk`` and ``arrays`` must agree too.
+
+        A ``store.json`` that is damaged is written again if the chunks beside it were made from the same.
+        """
+        if not Path(path).exists():
+            try:
+                return cls.create(path, identity, shape=shape, chunk=chunk, arrays=arrays, note=note)
+            except StoreError:
+                if not Path(path).exists():  # else another process was faster
+                    raise
+        wanted = Chunks.checked(shape, chunk, arrays)
+        mend_head(Path(path).resolve(), head_of(texts(identity), note or {}, wanted))
+        store = cls.open(path)
+        agree(store.path, store.identity | store.chunks.as_text(), texts(identity) | wanted.as_text())
+        return store
+
+    # -- one writer --------------------------------------------------------------------------------------------------------
+    @contextmanager
+    def lock(self, shard: tuple[int, int] | None = None) -> Iterator[Store]:
+        """Be the only one who writes the store, or one shard of it, within a ``with`` block.
+
+        The operating system keeps the lock: it ends with the process, however that ends. What a killed writer left half-done is removed.
+
+        Parameters
+        ----------
+        shard : tuple of int, optional
+            (k, n): the chunks i with i % n == k. Writers of different shards may work at the same time.
+
+        Raises
+        ------
+        StoreError
+            If an overlapping lock is held: names host, process and since when.
+        """
+        shard = _checked(shard)
+        self._make_folders()
+        with locked(self.path / "locks", shard):
+            self._sweep(shard)
+            self._shard, self._process = shard, os.getpid()
+            try:
+                yield self
+            finally:
+                self._shard = None
+
+    def _folders(self) -> tuple[str, ...]:
+        return ("done", "artifacts", "locks", "parts", *(f"data.zarr/{array}/c" for array in self.chunks.arrays))
+
+    def _make_folders(self) -> None:
+        """Make those that are gone again: tools that copy trees leave empty ones out. A store that was deleted stays so."""
+        if not (self.path / HEAD).exists():
+            raise StoreError(f"{self.path} holds no {HEAD} any more. Was it moved or deleted? Start again to make it anew.")
+        try:
+            for name in self._folders():
+                (self.path / name).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StoreError(f"{self.path} can't be written to: {error}. Mend its permissions or the disk.") from error
+
+    def _sweep(self, shard: tuple[int, int]) -> None:
+        """Remove drafts of killed writers: those that only the holder of this lock may write."""
+        remove_old_drafts(self.path)
+        for draft in (self.path / "parts").iterdir():
+            owner = draft.name.split(".")[0]
+            if shard == WHOLE or (owner.isdecimal() and int(owner) % shard[1] == shard[0]):
+                draft.unlink(missing_ok=True)
+
+    def _held(self) -> tuple[int, int]:
+        if self._shard is None or self._process != os.getpid():
+            raise StoreError(f"{self.path} isn't locked by this process. Write within `with store.lock():`.")
+        return self._shard
+
+    # -- chunks ------------------------------------------------------------------------------------------------------------
+    def commit(self, index: int, values: Mapping[str, np.ndarray]) -> None:
+        """Write one chunk: all of it counts once its record is there, none of it before.
+
+        Committing the same values again does nothing.
+
+        Parameters
+        ----------
+        index : int
+            Number of the chunk.
+        values : mapping of str to ndarray (cells,)
+            Every array of the store, with the cells ``store.chunks.extent(index)``.
+
+        Raises
+        ------
+        StoreError
+            If the lock isn't held, the disk is full, or the chunk was committed with other values.
+        ParameterError
+            If an array is missing or unknown, or has the wrong size or type.
+        """
+        k, n = self._held()
+        index = int(index)
+        if index % n != k:
+            raise StoreError(f"chunk {index} of {self.path} belongs to shard {index % n} of {n}, and the lock is for shard {k}.")
+        if set(values) != set(self.chunks.arrays):
+            raise ParameterError(f"chunk {index} has the arrays {sorted(values)}, the store keeps {sorted(self.chunks.arrays)}.")
+        data = {name: self._codec.encode(index, name, values[name]) for name in self.chunks.arrays}
+        told = {name: {"bytes": len(file), "sha256": sha256(file)} for name, file in data.items()}
+        record = seal({"index": index, "store": self._made_under, "files": told})
+        earlier = read(self._record(index))
+        if earlier == record:
+            return
+        if earlier is not None:
+            raise StoreError(
+                f"chunk {index} of {self.path} is done, with other values. Either its record is damaged (verify() tells), "
+                "or the same cells came out differently on two machines: then compute all chunks on one kind of machine."
+            )
+        files = {self._file(index, name): file for name, file in data.items()}
+        write_together(self.path / "parts", str(index), {**files, self._record(index): record})
+
+    def done(self) -> np.ndarray:
+        """Which chunks are committed: bool (chunks,). One listing of a folder, so it serves as progress, from any machine too."""
+        done = np.zeros(self.chunks.count, dtype=bool)
+        try:
+            names = os.listdir(self.path / "done")
+        except OSError as error:
+            raise StoreError(f"{self.path} can't be read: {error.strerror}. Was it moved or deleted?") from error
+        done[[int(name[:-5]) for name in names if re.fullmatch(r"\d+\.json", name) and int(name[:-5]) < len(done)]] = True
+        return done
+
+    def missing(self, shard: tuple[int, int] | None = None) -> list[int]:
+        """Chunks that are not committed, those of one shard (k, n) only if given, in rising order."""
+        k, n = _checked(shard)
+        return [int(index) for index in np.flatnonzero(~self.done()) if index % n == k]
+
+    def read(self, index: int) -> dict[str, np.ndarray]:
+        """Values of one chunk, by array.
+
+        Raises
+        ------
+        StoreError
+            If it isn't committed, or isn't what was committed.
+        """
+        self.chunks.extent(index)
+        files = self._intact(index)
+        if files is None and not self._record(index).exists():
+            raise StoreError(f"chunk {index} of {self.path} isn't computed yet. Resume the store to compute it.")
+        if files is None:
+            raise StoreError(f"chunk {index} of {self.path} is damaged. verify() marks it as missing, so that resuming computes it again.")
+        return {name: self._codec.decode(index, name, data) for name, data in files.items()}
+
+    def read_all(self) -> dict[str, np.ndarray]:
+        """Values of all cells, by array: (cells,), the grid in C order.
+
+        Raises
+        ------
+        StoreError
+            If a chunk isn't committed or is damaged.
+        """
+        missing = self.missing()
+        if missing:
+            raise StoreError(
+                f"{self.path} isn't complete: {len(missing)} of {self.chunks.count} chunks are missing (first: {missing[0]}). Resume it."
+            )
+        values = {name: np.empty(self.chunks.cells, dtype) for name, dtype in self.chunks.arrays.items()}
+        for index in range(self.chunks.count):
+            for name, part in self.read(index).items():
+                values[name][self.chunks.extent(index)] = part
+        return values
+
+    def verify(self) -> list[int]:
+        """Check every committed chunk (of the shard whose lock is held) against its checksums; damaged ones become missing again.
+
+        Returns
+        -------
+        list of int
+            The damaged chunks.
+        """
+        k, n = self._held()
+        damaged = [index for index in self.damaged() if index % n == k]
+        for index in damaged:
+            self._record(index).unlink(missing_ok=True)
+        if damaged:
+            flush_names(self.path / "done")
+        for name, data in self._codec.metadata.items():  # nothing here reads these files, other readers of zarr do
+            if read(self.path / "data.zarr" / name) != data:
+                with exclusive(self.path / "locks" / "metadata", patience=10.0):
+                    write_together(self.path / "parts", "metadata", {self.path / "data.zarr" / name: data})
+        return damaged
+
+    def damaged(self, *, checksums: bool = True) -> list[int]:
+        """Committed chunks whose files aren't what was committed; without ``checksums`` only files that are gone or too short count."""
+        return [int(index) for index in np.flatnonzero(self.done()) if self._intact(int(index), checksums=checksums) is None]
+
+    def _intact(self, index: int, *, checksums: bool = True) -> dict[str, bytes] | None:
+        """The files of a chunk, by array; None if one is missing or isn't what was committed, or the record isn't this chunk's."""
+        record = unseal(read(self._record(index)) or b"")
+        if record is None or record.get("index") != index or record.get("store") != self._made_under:
+            return None
+        told = record.get("files")
+        if not isinstance(told, dict) or not all(isinstance(told.get(name), dict) for name in self.chunks.arrays):
+            return None
+        if not checksums:
+            sizes = {name: size(self._file(index, name)) for name in self.chunks.arrays}
+            return {} if sizes == {name: told[name].get("bytes") for name in sizes} else None
+        files = {name: read(self._file(index, name), self._codec.largest(name)) for name in self.chunks.arrays}
+        found = {name: data for name, data in files.items() if data is not None and sha256(data) == told[name].get("sha256")}
+        return found if len(found) == len(files) else None
+
+    def _record(self, index: int) -> Path:
+        return self.path / "done" / f"{index}.json"
+
+    def _file(self, index: int, name: str) -> Path:
+        return self.path / "data.zarr" / self._codec.key(index, name)
+
+    # -- artifacts ---------------------------------------------------------------------------------------------------------
+    def put(self, name: str, value: Any, *, existing: Literal["same", "keep", "replace"] = "same") -> Any:
+        """Keep a small value that belongs to all chunks: the table of attractors, what follows from the finished map.
+
+        Parameters
+        ----------
+        name : str
+            Letters, digits, ``_`` and ``-``.
+        value : bytes or plain values
+            As JSON has them: None, booleans, numbers, text, lists, dicts with text keys.
+        existing : {"same", "keep", "replace"}
+            If there is one: it must be the same; the first one stays; the new one takes its place (whole lock only). A damaged one counts
+            as none.
+
+        Returns
+        -------
+        bytes or plain values
+            What is kept now. With "keep" it may be what another shard put first.
+
+        Raises
+        ------
+        StoreError
+            If the lock isn't held, the disk is full, or another value is kept.
+        """
+        put_artifact(self.path, self._made_under, name, value, existing=existing, shard=self._held())
+        return self.get(name)
+
+    def get(self, name: str) -> Any:
+        """What :meth:`put` kept, lists where tuples were put; :class:`StoreError` if there is none, or it is damaged."""
+        return get_artifact(self.path, self._made_under, name)
+
+    def has(self, name: str) -> bool:
+        """Whether :meth:`get` would return something: kept, and not damaged."""
+        return has_artifact(self.path, self._made_under, name)
+
+    # -- for people --------------------------------------------------------------------------------------------------------
+    def status(self, *, checksums: bool = False) -> StoreStatus:
+        """How far the store is; no lock needed.
+
+        Parameters
+        ----------
+        checksums : bool
+            Read everything to count damaged chunks. Otherwise only files that are gone or too short are counted.
+        """
+        return StoreStatus(
+            path=self.path, identity=self.identity, note=self.note, done=int(self.done().sum()), total=self.chunks.count,
+            damaged=len(self.damaged(checksums=checksums)), bytes=sum(size(file) or 0 for file in self.path.rglob("*")),
+            last_written=self._last_written(), writers=tuple(holders(self.path / "locks")),
+        )  # fmt: skip
+
+    def _last_written(self) -> datetime | None:
+        times = []
+        for record in (self.path / "done").iterdir():
+            with suppress(FileNotFoundError):  # a writer that verifies has just dropped it
+                times.append(record.stat().st_mtime)
+        return datetime.fromtimestamp(max(times), UTC) if times else None
+
+
+def _checked(shard: tuple[int, int] | None) -> tuple[int, int]:
+    k, n = shard or WHOLE
+    if not 0 <= k < n:
+        raise ParameterError(f"shard {k} of {n}: they are numbered from 0 to n - 1.")
+    return int(k), int(n)

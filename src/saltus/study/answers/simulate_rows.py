@@ -1,0 +1,62 @@
+"""What a run has to say, as a table: a row for each trajectory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from saltus.analysis.motion.settled import settled
+from saltus.errors import ParameterError
+from saltus.kernels.status import STATUS
+from saltus.results.dataset.schema import end_name, period_text, states_of
+from saltus.study.table import ROWS, TextTable, quantity, table, varied, words
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def run_table(title: str, run: xr.Dataset) -> TextTable:
+    """A row for each trajectory: status, contacts, grazes, steps, state at the end and, for a forced system, what it settled to.
+
+    Parameters
+    ----------
+    title : str
+        Goes above the table.
+    run : Dataset
+        What ``simulate`` returned.
+    """
+    batch = run if "trajectory" in run.dims else run.expand_dims("trajectory")
+    counts = [
+        name for name in ("events", "grazes", "grazes_unresolved", "steps") if name == "events" or name == "steps" or batch[name].any()
+    ]
+    responses, total = response_texts(run), batch.sizes["trajectory"]
+    columns = [words("", range(total), "trajectory"), *(varied(run, run["trajectory"].values) if "trajectory" in run.dims else [])]
+    columns.append(words("status", batch["status"].values.astype(str)))
+    columns += [words({"events": "contacts"}.get(name, name.replace("_", " ")), batch[name].values) for name in counts]
+    columns += [
+        quantity(f"{name} at the end", batch[end_name(name)].values, batch[name].attrs.get("units", ""), 5) for name in states_of(run)
+    ]
+    columns += [words("response", responses)] * bool(responses)
+    return table(title, columns, _notes(batch, min(total, ROWS)))
+
+
+def response_texts(run: xr.Dataset) -> list[str]:
+    """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty if the system isn't forced or too little was kept."""
+    try:
+        found = settled(run)
+    except ParameterError:
+        return []
+    none = f"not periodic within {found.attrs['longest_period']}T"
+    return [period_text(int(n), none) for n in np.atleast_1d(found["response_period"].values)]
+
+
+def _notes(batch: xr.Dataset, shown: int) -> tuple[str, ...]:
+    notes = []
+    total = batch.sizes["trajectory"]
+    if shown < total:
+        notes.append(f"{total - shown} more trajectories are in the file.")
+    status, counts = np.unique(batch["status"].values.astype(str), return_counts=True)
+    sentences = dict(STATUS.values())
+    notes += [f"{count} of {total} {word}: {sentences.get(word, '')}." for word, count in zip(status, counts, strict=True) if word != "ok"]
+    return tuple(notes)

@@ -1,0 +1,49 @@
+"""Modules import in one direction: no circle, but by an import inside a function whose comment says why it stands there."""
+
+import ast
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import saltus
+
+SOURCE = Path(saltus.__file__).parents[1]
+MODULES = {
+    ".".join(file.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__"): file for file in SOURCE.rglob("saltus/**/*.py")
+}
+
+
+def imported(node):
+    """Modules of saltus that a statement imports: the module that is named in it, or that holds the name."""
+    if isinstance(node, ast.ImportFrom) and node.module:
+        for alias in node.names:
+            yield from [name for name in (f"{node.module}.{alias.name}", node.module) if name in MODULES][:1]
+    elif isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names if alias.name in MODULES)
+
+
+def statements(tree, inside=False):
+    """Import statements with whether they stand in a function; those for type checkers don't count."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node, inside
+        elif not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            yield from statements(node, inside or isinstance(node, ast.FunctionDef))
+
+
+def test_no_circle_of_imports():
+    graph, explained = {}, 0
+    for name, file in MODULES.items():
+        text = file.read_text(encoding="utf-8")
+        lines = text.splitlines()
+        graph[name] = set()
+        for node, inside in statements(ast.parse(text)):
+            if inside and "builds on this module" in lines[node.lineno - 1]:
+                explained += 1
+            else:
+                graph[name] |= {one for one in imported(node) if one != name}
+    try:
+        order = list(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        raise AssertionError(f"a circle: {' -> '.join(error.args[1])}") from None
+    assert len(order) == len(MODULES) > 300
+    assert explained < 10
