@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from saltus.plot.style import OKABE_ITO
-
-Data = Mapping[str, xr.Dataset]
 
 
 @dataclass(frozen=True)

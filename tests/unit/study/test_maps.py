@@ -181,7 +181,7 @@ def test_the_code_is_part_of_the_identity(tmp_path, monkeypatch):
     """A label that comes from other code isn't mixed with this one's: every file that a label depends on counts."""
     before = code.code_hash.__wrapped__()
     assert before == code.code_hash.__wrapped__() == job().identity()["code"]
-    for target in ("taylor_step.py", "labels.py", "engine.py", "trace.py", "recurrence.py", "capture.py", "maps.py", "module.py",
+    for target in ("taylor_step.py", "labels.py", "engine.py", "trace.py", "find_attractors.py", "capture.py", "maps.py", "module.py",
                    "assemble.py", "units.py"):  # fmt: skip
         with monkeypatch.context() as patch:
             edited_copy(tmp_path / target, target, patch)

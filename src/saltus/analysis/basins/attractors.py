@@ -11,12 +11,12 @@ import xarray as xr
 
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.halton import halton
-from saltus.analysis.basins.labels import UNCONVERGED, complete, settle_all
+from saltus.analysis.basins.labels import complete, settle_all
 from saltus.analysis.basins.pipeline import SCOUTS, memory
 from saltus.analysis.dataset_parts import gap_unit, provenance
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
-from saltus.analysis.orbits.recurrence import find
 from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, shown
@@ -27,6 +27,7 @@ from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporter
 from saltus.flow.room import check_room
 from saltus.results import attractors_dataset
+from saltus.results.dataset.kinds import Kind
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -102,12 +103,12 @@ def attractors(
     scale = _spread(map_, group.start)
     show, close = reporter(progress)
     try:
-        found, label, settled = find(map_, group.start, scale, periods, progress=show)
+        found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
     finally:
         close()
     return attractors_dataset(
         states=system.states, units=system.units, attractors=portraits(map_, found), gap_unit=gap_unit(system),
-        basin=np.where(label < 0, UNCONVERGED, label), periods_to_settle=settled,
+        basin=np.where(label < 0, Kind.UNCONVERGED, label), periods_to_settle=settled,
         attrs=provenance(system, map_.method, system.values) | {"periods": periods} | stray_attrs(found.astray),
     )  # fmt: skip
 
@@ -176,7 +177,7 @@ def basin_fractions(
     show, close = reporter(progress)
     try:
         scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
-        found = find(map_, scouts, scale, periods)[0]
+        found = find_attractors(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
     finally:
@@ -186,7 +187,7 @@ def basin_fractions(
         states=system.states, units=system.units, attractors=table, gap_unit=gap_unit(system), basin=result.label,
         periods_to_settle=result.periods, attrs=provenance(system, map_.method, system.values) | {"periods": periods},
     )  # fmt: skip
-    strays = stray_attrs(found.astray if (result.label == UNCONVERGED).any() else [])
+    strays = stray_attrs(found.astray if (result.label == Kind.UNCONVERGED).any() else [])
     return ds.assign_attrs(**strays, smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=samples, seed=seed)
 
 

@@ -14,8 +14,9 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.intervals import wilson
 from saltus.results.dataset.basins import agreement_dataset
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.reader import reader
-from saltus.results.dataset.schema import BASINS, NOISY, attractor_name, axes_of, check, states_of
+from saltus.results.dataset.schema import BASINS, attractor_name, axes_of, check, states_of
 
 #: Largest distance of two orbits that count as one, in units of the axis ranges: far above what methods differ by on one attractor,
 #: below what tells neighbours on the rig apart.
@@ -157,7 +158,8 @@ def _distances(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
     names, scale, levels = states_of(a), _scales(a, b), _level_distances(a, b)
     result = np.full(levels.shape, np.inf)
     points = [np.stack([ds[attractor_name(name)].values for name in names], axis=-1) / scale for ds in (a, b)]
-    types = [np.where(ds["attractor_type"].values == NOISY, "periodic", ds["attractor_type"].values) for ds in (a, b)]
+    types = [ds["attractor_type"].values for ds in (a, b)]
+    types = [np.where(own == Kind.NOISY_PERIODIC.word, Kind.PERIODIC.word, own) for own in types]
     periods = [ds["attractor_period"].values for ds in (a, b)]
     for i, j in np.ndindex(*levels.shape):
         n = int(periods[0][i])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.orbits.steady import motion_range
+from saltus.analysis.orbits.find_responses import motion_range
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st

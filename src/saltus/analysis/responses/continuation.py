@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from saltus.analysis.orbits.find_responses import motion_range
 from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits
-from saltus.analysis.orbits.steady import motion_range
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.orbits.unforced import close_again
 from saltus.analysis.responses.grid import Grid

@@ -13,6 +13,7 @@ from saltus.errors import ParameterError
 from saltus.results.dataset import schema
 from saltus.results.dataset.builder import Builder
 from saltus.results.dataset.finish import array_variable
+from saltus.results.dataset.kinds import WITHOUT_WORDS
 
 #: The largest count that ``grazes_unresolved`` holds; more are kept as this.
 _MOST_GRAZES = np.iinfo(np.int16).max
@@ -138,7 +139,7 @@ class _Builder(Builder):
 
 def basin_meanings(attractors: int) -> dict[int, str]:
     """Words for the labels of a map with so many attractors."""
-    return {**schema.NO_BASIN, **{i: f"attractor_{i}" for i in range(attractors)}}
+    return {**WITHOUT_WORDS, **{i: f"attractor_{i}" for i in range(attractors)}}
 
 
 def basins_dataset(

@@ -32,6 +32,7 @@ from saltus.results.dataset.assemble import Guards
 from saltus.results.dataset.basins import AttractorTable
 from saltus.results.dataset.builder import Builder
 from saltus.results.dataset.finish import array_variable
+from saltus.results.dataset.kinds import WITHOUT_WORDS, Kind
 
 #: What a bifurcation diagram may show of each response.
 SAMPLES = {
@@ -225,13 +226,13 @@ class _Builder(Builder):
 
     def put_grid(self, response_of: np.ndarray, table: AttractorTable, dims: tuple[str, ...]) -> None:
         """Add what each start leads to: the number of the response, and its columns looked up."""
-        self.put_flags("response_of", response_of, schema.NO_BASIN, dims)
+        self.put_flags("response_of", response_of, WITHOUT_WORDS, dims)
         nothing = {"rms": np.nan, "peak": np.nan, "contacts_per_period": np.nan, "period": 0}
         columns = {"rms": table.rms, "peak": table.peak, "contacts_per_period": _per_period(table), "period": table.period}
         for name, column in columns.items():
             self.put(name, np.append(column, nothing[name])[np.where(response_of < 0, len(table), response_of)], dims=dims)
-        words = np.array([schema.NO_BASIN[code] for code in range(schema.NOT_COMPUTED, 0)] + list(table.kind), dtype=np.str_)
-        self.put("type", words[response_of - schema.NOT_COMPUTED], dims=dims)
+        words = np.array([WITHOUT_WORDS[code] for code in range(min(Kind), 0)] + list(table.kind), dtype=np.str_)
+        self.put("type", words[response_of - min(Kind)], dims=dims)
 
     def put_responses(self, responses: Responses, axes: Mapping[str, np.ndarray]) -> None:
         """Add what is known of each response."""

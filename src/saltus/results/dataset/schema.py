@@ -28,6 +28,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results.dataset import motions
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.method_variables import METHODS_VARIABLES
 from saltus.results.dataset.response_variables import RESPONSES_VARIABLES
 from saltus.results.dataset.result import Result
@@ -50,12 +51,6 @@ MAKERS = {
 #: Kinds that hold the states under their own names.
 WITH_STATES = (TRAJECTORY, STROBOSCOPE, SECTION)
 
-# What stands in ``basin`` for a start that has no attractor.
-ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
-#: Meaning of these codes.
-NO_BASIN = {ESCAPED: "escaped", UNCONVERGED: "unconverged", FAILED: "failed", NOT_COMPUTED: "not_computed"}
-#: The kind of an orbit that errors of the method keep from closing.
-NOISY = "noisy_periodic"
 #: Meaning of the values of ``agreement``.
 AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
 
@@ -262,8 +257,8 @@ def period_text(n: int, none: str = "not periodic") -> str:
 def kind_text(kind: str, n: int) -> str:
     """A motion in a word: ``T``, ``3T``, ``noisy 24T``, ``quasi-periodic``, ``chaotic``, ``equilibrium``, ``limit cycle``."""
     if n > 0:
-        return f"noisy {period_text(n)}" if kind == NOISY else period_text(n)
-    return kind.replace("_", " " if kind == "limit_cycle" else "-")
+        return f"noisy {period_text(n)}" if kind == Kind.NOISY_PERIODIC.word else period_text(n)
+    return kind.replace("_", " " if kind == Kind.LIMIT_CYCLE.word else "-")
 
 
 def states_of(ds: xr.Dataset) -> tuple[str, ...]:
