@@ -114,13 +114,7 @@ def smeared(data: Data, period: int) -> dict[str, Any]:
     ds = data[f"fig13/{STIFF}, exact"]
     here = ds["attractor_period"].values == period
     largest = float(multipliers(ds)[here].max()) if here.any() else np.nan
-    return {
-        **_spread(data, period),
-        "name": kind_text("periodic", period),
-        "there": bool(here.any()),
-        "largest": largest,
-        "stable": largest < 1,
-    }
+    return {**_spread(data, period), "name": kind_text("periodic", period), "count": here.sum(), "largest": largest, "stable": largest < 1}
 
 
 def chaotic(data: Data) -> dict[str, Any]:
@@ -137,9 +131,10 @@ def chaotic(data: Data) -> dict[str, Any]:
 
 def coarse(data: Data, period: int) -> dict[str, Any]:
     """Which maps have an attractor of a period, and how it scatters."""
-    maps, name = three(data, f"fig13/{STIFF}"), kind_text("periodic", period)
-    return {**counted(maps), **{f"{end}_scatter": value for end, value in _spread(data, period).items()},
-            "there": name in names(maps["exact"]), "own": all(name in names(maps[end]) for end in ("on", "off"))}  # fmt: skip
+    maps = three(data, f"fig13/{STIFF}")
+    own = [name for name in names(maps["on"]) if name in names(maps["off"])]
+    scatter = {f"{end}_scatter": value for end, value in _spread(data, period).items()}
+    return {**counted(maps), **scatter, "names": names(maps["exact"]), "own_names": own}
 
 
 def exponents(data: Data) -> dict[str, Any]:

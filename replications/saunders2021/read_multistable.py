@@ -36,7 +36,7 @@ def step(data: Data) -> dict[str, Any]:
     reached = {name for name, share in zip(names(ds), shares, strict=True) if share > 0}
     return {
         "states": ds.sizes["trajectory"], "shares": listed(ds, shares), "reached": sorted(reached), "outcomes": len(reached),
-        "quiet": bool(((ds["attractor_period"] == 1) & (ds["attractor_contacts"] == 0)).any()), "more": len(reached) > 2,
+        "quiet": int(((ds["attractor_period"] == 1) & (ds["attractor_contacts"] == 0)).sum()), "more": len(reached) > 2,
     }  # fmt: skip
 
 
