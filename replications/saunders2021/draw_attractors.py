@@ -14,9 +14,10 @@ from matplotlib.figure import Figure
 from saltus.analysis.basins.compare import compare
 from saltus.plot import maps
 from saltus.plot.style import display_scale
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text
 
-from .looks import EXACT, LOOKS, OFF, ON, Data, Look, lag, periods_of, strobe
+from .looks import EXACT, LOOKS, OFF, ON, Look, lag, periods_of, strobe
 
 #: What stands in place of the deviations where there are none: ode45 lacks the attractor, or the exact map does.
 _ABSENT = ("ode45 doesn't find it", "no exact attractor to compare with")

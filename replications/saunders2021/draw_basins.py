@@ -18,9 +18,10 @@ from saltus.analysis.basins.compare import compare
 from saltus.plot import maps
 from saltus.plot.basins import paint
 from saltus.plot.palette import hues
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text
 
-from .looks import EXACT, OFF, ON, Data, Look
+from .looks import EXACT, OFF, ON, Look
 
 #: Columns: the paper's two ways, then the exact one.
 COLUMNS = (ON, OFF, EXACT)

@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from saltus import plot
 from saltus.plot import maps
 from saltus.plot.style import OKABE_ITO
+from saltus.replication.claims import Data
 from saltus.study.answers.compare import residuals
 
 from . import printed
-from .looks import Data
 
 #: Half-width of the zoom onto one contact [s].
 ZOOM = 1.2e-3

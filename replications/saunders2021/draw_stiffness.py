@@ -14,9 +14,10 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from saltus import plot
+from saltus.replication.claims import Data
 from saltus.replication.papers import folder_of
 
-from .looks import OFF, ON, Data
+from .looks import OFF, ON
 from .sameness import UNSETTLED, classes, running_median, running_share
 
 CASES = ("a1.5", "a4", "b1.5", "b4", "c1.5", "c4")

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text
 
 from .draw_attractors import Trio, deviations, trios
 from .looks import LOOKS, strobe
-from .reading import ENDS, Data, counted, listed, multipliers, names, parameter, place_of, three
+from .reading import ENDS, counted, listed, multipliers, names, parameter, place_of, three
 
 #: By the end of a job's name, what claims call this way of integrating.
 SHORT = {look.end: short for look, short in zip(LOOKS, ENDS, strict=True)}
@@ -113,13 +114,7 @@ def smeared(data: Data, period: int) -> dict[str, Any]:
     ds = data[f"fig13/{STIFF}, exact"]
     here = ds["attractor_period"].values == period
     largest = float(multipliers(ds)[here].max()) if here.any() else np.nan
-    return {
-        **_spread(data, period),
-        "name": kind_text("periodic", period),
-        "there": bool(here.any()),
-        "largest": largest,
-        "stable": largest < 1,
-    }
+    return {**_spread(data, period), "name": kind_text("periodic", period), "count": here.sum(), "largest": largest, "stable": largest < 1}
 
 
 def chaotic(data: Data) -> dict[str, Any]:
@@ -136,9 +131,10 @@ def chaotic(data: Data) -> dict[str, Any]:
 
 def coarse(data: Data, period: int) -> dict[str, Any]:
     """Which maps have an attractor of a period, and how it scatters."""
-    maps, name = three(data, f"fig13/{STIFF}"), kind_text("periodic", period)
-    return {**counted(maps), **{f"{end}_scatter": value for end, value in _spread(data, period).items()},
-            "there": name in names(maps["exact"]), "own": all(name in names(maps[end]) for end in ("on", "off"))}  # fmt: skip
+    maps = three(data, f"fig13/{STIFF}")
+    own = [name for name in names(maps["on"]) if name in names(maps["off"])]
+    scatter = {f"{end}_scatter": value for end, value in _spread(data, period).items()}
+    return {**counted(maps), **scatter, "names": names(maps["exact"]), "own_names": own}
 
 
 def exponents(data: Data) -> dict[str, Any]:

@@ -10,9 +10,10 @@ import xarray as xr
 
 from saltus.analysis.basins.compare import compare
 from saltus.plot.maps import share_text
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import period_text
 
-from .reading import Data, by_peak, certainty, count, counted, listed, names, parameter, place_of, three, unmatched
+from .reading import by_peak, certainty, count, counted, listed, names, parameter, place_of, three, unmatched
 
 #: Peaks within this share of the largest look alike.
 LEVEL = 0.02
@@ -153,7 +154,7 @@ def same_on_both_sides(data: Data, settings: Sequence[str], ends: Sequence[float
     periods = [period_text(int(n), "unsettled") for n in single["period"].values[here, 0]]
     return {
         "own": "; ".join(map(listed, own)), "exact": "; ".join(map(listed, exact)), "alone": alone, "periods": list(dict.fromkeys(periods)),
-        "several": len(set(periods)) if periods else None, "matched": not alone, "sure": certainty(exact),
+        "several": len(set(periods)) if periods else None, "sure": certainty(exact),
     }  # fmt: skip
 
 
@@ -190,6 +191,6 @@ def all_maps(data: Data, settings: Mapping[str, Sequence[str]], sure: Sequence[s
             )
     return {
         **{name: "; ".join(found[name]) or "none" for name in ("invented", "lost", "absent")}, "maps": found["maps"],
-        "nothing_invented": not found["invented"], "nothing_lost": not found["lost"], "most": max(1.0 - row["same"] for row in found["maps"]),
+        "inventions": len(found["invented"]), "losses": len(found["lost"]), "most": max(1.0 - row["same"] for row in found["maps"]),
         "sure": certainty([ds for figure in sure for setting in settings[figure] for ds in three(data, f"{figure}/{setting}").values()]),
     }  # fmt: skip

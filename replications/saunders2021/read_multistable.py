@@ -10,9 +10,10 @@ import xarray as xr
 
 from saltus.analysis.motion.settled import settled
 from saltus.plot.maps import share_text
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import period_text
 
-from .reading import Data, by_peak, certainty, count, counted, listed, multipliers, names, three
+from .reading import by_peak, certainty, count, counted, listed, multipliers, names, three
 
 #: Band around the gap in which a start is "near or within" it [m].
 NEAR = 0.2e-3
@@ -35,7 +36,7 @@ def step(data: Data) -> dict[str, Any]:
     reached = {name for name, share in zip(names(ds), shares, strict=True) if share > 0}
     return {
         "states": ds.sizes["trajectory"], "shares": listed(ds, shares), "reached": sorted(reached), "outcomes": len(reached),
-        "quiet": bool(((ds["attractor_period"] == 1) & (ds["attractor_contacts"] == 0)).any()), "more": len(reached) > 2,
+        "quiet": int(((ds["attractor_period"] == 1) & (ds["attractor_contacts"] == 0)).sum()), "more": len(reached) > 2,
     }  # fmt: skip
 
 

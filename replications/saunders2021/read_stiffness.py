@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 
 from saltus.plot.maps import share_text
-from saltus.replication.claims import power
+from saltus.replication.claims import Data, power
 from saltus.results.dataset.schema import period_text
 
-from .reading import Data, count, parameter, three
+from .reading import count, parameter, three
 from .sameness import SAME, SAME_ONE, classes, share_other
 
 #: Soft contact ends, hard contact begins [N/m]: the decades in which the paper sees the responses converge.

@@ -9,12 +9,13 @@ import numpy as np
 import xarray as xr
 
 from saltus.replication import folder_of
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import period_text
 from saltus.results.files.measured import read_measured
 from saltus.study.answers.compare import residuals
 
 from .printed import contacts
-from .reading import Data, between, either
+from .reading import between, either
 
 #: Rounding of frequencies of a grid [Hz].
 TICK = 1e-6
@@ -75,7 +76,7 @@ def isolated_branch(data: Data, cases: Sequence[str]) -> dict[str, Any]:
         apart, ratio = _isolated(ds, branch)
         own = [f"{f:g} Hz" for f in _branch(data[f"fig3/{case}, ode45"], 3, peak + 0.01, 30.0)]
         rows.append({
-            "case": case, "peak": peak, "band": _band(branch), "exists": bool(branch.size), "apart": apart, "ratio": ratio,
+            "case": case, "peak": peak, "band": _band(branch), "frequencies_3T": branch.size, "apart": apart, "ratio": ratio,
             "width": float(np.ptp(branch)) if branch.size else 0.0, "own": either(own, "none of the frequencies asked"),
         })  # fmt: skip
     return {
@@ -119,8 +120,8 @@ def responses_between(data: Data, cases: Sequence[str], low: float, high: float,
             here = between(ds, low, high)
             periods = np.unique(ds["response_period"].values[here])
             row[f"{prefix}chaotic"] = int((ds["response_type"].values[here] == "chaotic").sum())
-            row[f"{prefix}periods"], row[f"{prefix}long"] = _periods(periods[periods >= least]), bool((periods >= max(least, 2)).any())
-            row[f"{prefix}longer"] = bool((periods >= 3).any())
+            row[f"{prefix}periods"] = _periods(periods[periods >= least])
+            row |= {f"{prefix}long": int((periods >= 2).sum()), f"{prefix}longer": int((periods >= 3).sum())}
         rows.append(row)
     return {"cases": rows, "grid": _grid(data)}
 

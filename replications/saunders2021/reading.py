@@ -11,9 +11,9 @@ import xarray as xr
 
 from saltus.analysis.basins.compare import compare
 from saltus.plot.maps import share_text
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text, period_text
 
-Data = Mapping[str, xr.Dataset]
 #: What claims call the three ways of integrating: the ends of the names of their jobs.
 ENDS = {"exact": "exact", "on": "ode45 located", "off": "ode45 not located"}
 

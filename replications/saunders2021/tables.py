@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from saltus.replication.claims import Data
 from saltus.results.dataset.schema import kind_text
 from saltus.study.answers.compare import residuals
 from saltus.study.table import TextTable
 
 from . import printed
 from .draw_attractors import trios
-from .looks import LOOKS, Data
+from .looks import LOOKS
 
 #: A wider interval of an exponent says nothing [1/s].
 WIDEST = 100.0

@@ -59,9 +59,9 @@ def few_checks(monkeypatch):
 def brief(monkeypatch):
     """Few scouts, and little time for motions that never repeat: what comes out means nothing, but all of it is made."""
     monkeypatch.setattr(pipeline, "SCOUTS", 2)
-    monkeypatch.setattr("saltus.analysis.orbits.recurrence.WATCHED", 256)
+    monkeypatch.setattr("saltus.analysis.orbits.find_attractors.WATCHED", 256)
     monkeypatch.setattr("saltus.analysis.orbits.aperiodic.BLOCKS", 64)
-    for module in ("recurrence", "noisy", "steady"):
+    for module in ("find_attractors", "noisy", "find_responses"):
         monkeypatch.setattr(f"saltus.analysis.orbits.{module}.TRAIL", 256)
 
 

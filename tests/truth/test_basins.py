@@ -12,7 +12,7 @@ from saltus.analysis.basins import pipeline as plans
 from saltus.analysis.basins.labels import settle
 from saltus.analysis.basins.pipeline import basin_plan
 from saltus.analysis.orbits.capture import Neighbourhoods
-from saltus.analysis.orbits.recurrence import find
+from saltus.analysis.orbits.find_attractors import find_attractors
 
 ORBITS = {row["name"]: row for row in csv.DictReader((Path(__file__).parents[1] / "reference" / "orbits.csv").open())}
 B4 = sl.models.delangre("b")
@@ -214,7 +214,7 @@ def test_the_size_of_chunks_changes_nothing(coarse, few_scouts, monkeypatch, siz
 
 def test_chunks_of_a_chaotic_map_change_nothing(monkeypatch):
     monkeypatch.setattr(plans, "SCOUTS", 16)
-    monkeypatch.setattr("saltus.analysis.orbits.recurrence.WATCHED", 2048)  # periods that the chaotic ones are followed
+    monkeypatch.setattr("saltus.analysis.orbits.find_attractors.WATCHED", 2048)  # periods that the chaotic ones are followed
     system = duffing.with_values(damping=0.1, force=12.0)
     axes = dict(x=(-3, 3, 6), v=(-6, 6, 6), periods=256, progress=False)
     whole = sl.basins(system, **axes)
@@ -236,8 +236,8 @@ def test_ids_and_labels_do_not_depend_on_what_the_scouts_saw(coarse, monkeypatch
 def test_ids_do_not_depend_on_the_order_of_starts():
     plan = basin_plan(B16, {"x": (*SPAN_X, 10), "v": (*SPAN_V, 10)}, None, sl.Taylor(), 2000, None)
     starts, order = plan.starts(np.arange(100)), np.random.default_rng(3).permutation(100)
-    found, label, _ = find(plan.map(), starts, plan.scale, 2000)
-    again, label_again, _ = find(plan.map(), starts[order], plan.scale, 2000)
+    found, label, _ = find_attractors(plan.map(), starts, plan.scale, 2000)
+    again, label_again, _ = find_attractors(plan.map(), starts[order], plan.scale, 2000)
     assert [orbit.period for orbit in again.orbits] == [orbit.period for orbit in found.orbits]
     np.testing.assert_array_equal(label_again, label[order])
     for one, other in zip(found.orbits, again.orbits, strict=True):

@@ -88,8 +88,9 @@ def classify(lanes, g, h):
 
     A gap P (P/x where the root at 0 is known) is p0 + p1 x + p2 x^2 + p3 x^3 + rest on [0, 1]. If it is monotone or concave its end
     decides; if it is convex it crosses once where it ends below zero, and twice where its vertex is proven to be; else its quadratic part
-    less the bounds of what follows decides, or the part of the step up to the crossing that is predicted (`crosses_sooner`), or the slow
-    path does. What lies within the rounding error of the gap is never proven. How near clear gaps come, and when, goes to NEAREST, TURNED.
+    less the bounds of what follows decides. What that leaves open `with_more_terms` settles. Where all gaps read one series it is a step
+    in ten thousand (the rig's): the part of the step up to the crossing that is predicted is tried (`crosses_sooner`), then the slow path.
+    What lies within the rounding error of the gap is never proven. How near clear gaps come, and when, goes to NEAREST, TURNED.
     """
     j, on_boundary = BOUNDS * GUARD_SERIES[g], load(lanes.fresh, g, LANES) > 0.5
     a0, a1, a2, a3, end = terms_of_gap(lanes, g)
@@ -102,27 +103,95 @@ def classify(lanes, g, h):
     turns = (p1 < 0.0) & (p1 + 2.0 * p2 > 0.0)
     flat_at = -p1 / (2.0 * p2)  # where the quadratic part turns
     vertex = p0 + 0.5 * p1 * flat_at
-    lowest = select(turns, vertex, smaller(p0, p0 + p1 + p2)) + smaller(p3, 0.0)
+    least = select(turns, vertex, smaller(p0, p0 + p1 + p2)) + smaller(p3, 0.0) - (1.0 / 6.0) * rest
     falls, rises, concave, convex = one_way(p1, p2, p3, rest)
     dips = convex & turns & (6.0 * (vertex + larger(p3, 0.0) + noise) + rest < 0.0)
     inside = p0 > 0.0
-    clear = inside & (((falls | rises | concave) & (end > noise)) | (6.0 * (lowest - noise) > rest))
+    clear = inside & (((falls | rises | concave) & (end > noise)) | (least > noise))
     once = inside & (end < -noise) & (falls | concave | convex)
+    closes = (load(lanes.run, ACTIVE, LANES) > 0.5) & inside & (~clear)
+    undecided = ~inside
+    if NSERIES > 1:
+        store(lanes.found, RIVALS + g, splat(-1.0, LANES))
+    if any_lane(closes):
+        until, doubtful = select(once, splat(1.0, LANES), 0.0), closes & (~once) & (~dips)
+        if any_lane(doubtful):
+            if NSERIES > 1:
+                passes, leaves, returns, closest = with_more_terms(lanes, g, h, p0, p1, p2, p3, flat_at, end, noise)
+                clear, dips, least = clear | (doubtful & passes), dips | (doubtful & returns), select(doubtful, closest, least)
+                until = select(doubtful & leaves, splat(1.0, LANES), until)
+            else:
+                until = select(doubtful, crosses_sooner(on_boundary, p0, p1, p2, p3, rest, noise), until)
+        crosses = closes & (dips | (until > 0.0))
+        undecided = undecided | (closes & (~(clear | crosses)))
+        if any_lane(crosses):
+            undecided = undecided | choose(lanes, g, crosses, until, p0, p1, p2, p3, noise)
     slope_at_end = load(lanes.side, g, LANES) * GUARD_SIGN[g] * load(lanes.bounds, j + SLOPE_AT_END, LANES)
     rises_again = slope_at_end > 0.0
-    near = clear & (~on_boundary) & (a1 < 0.0) & (turns | rises_again) & (6.0 * (lowest - load(lanes.run, LEAST, LANES)) < rest)
+    near = clear & (~on_boundary) & (a1 < 0.0) & (turns | rises_again) & (least < load(lanes.run, LEAST, LANES))
     if any_lane(near):
         note_turn(lanes, g, near, rises_again, h * larger(smaller(flat_at, 1.0), 0.0), h)
-    until = select(once, splat(1.0, LANES), 0.0)
-    closes = (load(lanes.run, ACTIVE, LANES) > 0.5) & inside & (~clear)
-    if any_lane(closes):
-        sooner = closes & (~once) & (~dips)
-        if any_lane(sooner):
-            until = select(sooner, crosses_sooner(on_boundary, p0, p1, p2, p3, rest, noise), until)
-        crosses = closes & (dips | (until > 0.0))
-        unordered = choose(lanes, g, crosses, until, p0, p1, p2, p3, rest, noise) if any_lane(crosses) else crosses
-        return unordered | (~(clear | crosses))
-    return ~clear
+    return undecided
+
+
+@kernel
+def with_more_terms(lanes, g, h, p0, p1, p2, p3, place, end, noise):
+    """Where a gap is clear over the step, crosses once, crosses twice, by its terms to the seventh; and a bound of it from below.
+
+    A polynomial lies between its coefficients in Bernstein's form. Those of the second derivative, summed up, are those of the rate, and
+    of the gap. A convex gap lies above its tangents: above that near `place`, where it turns about. What follows the seventh term adds
+    W/56 at most, to its rate W/7, to its second derivative W, with W as in `bound_series` for k >= 8 (k(k-1) >= 7k >= 56 there).
+    """
+    work, row, on_boundary = lanes.work, GUARD_ROW[g], load(lanes.fresh, g, LANES) > 0.5
+    rest, h2 = splat(0.0, LANES), h * h
+    for k in range(ORDER, 7, -1):
+        rest = fma(rest, h, magnitude(load(work, row + k, LANES)) * (k * (k - 1.0)))
+    rest = rest * (h2 * h2) * (h2 * h2)
+    s4 = load(lanes.side, g, LANES) * GUARD_SIGN[g] * (h2 * h2)
+    t4, t5, t6 = s4 * load(work, row + 4, LANES), s4 * h * load(work, row + 5, LANES), s4 * h2 * load(work, row + 6, LANES)
+    t7 = splat(0.0, LANES)
+    if ORDER > 6:
+        t7 = s4 * h2 * h * load(work, row + 7, LANES)
+    p3, p4, p5 = select(on_boundary, t4, p3), select(on_boundary, t5, t4), select(on_boundary, t6, t5)
+    p6, p7 = select(on_boundary, t7, t6), select(on_boundary, 0.0, t7)
+    b0, b1, b2, b3, b4, b5 = second_derivative(p2, p3, p4, p5, p6, p7)
+    convex = smaller(smaller(smaller(b0, b1), smaller(b2, b3)), smaller(b4, b5)) - rest > 0.0
+    concave = larger(larger(larger(b0, b1), larger(b2, b3)), larger(b4, b5)) + rest < 0.0
+    rate, slowest, fastest, value, least = p1, p1, p1, p0, p0
+    for bend in (b0, b1, b2, b3, b4, b5):
+        value = fma(1.0 / 7.0, rate, value)
+        rate = fma(1.0 / 6.0, bend, rate)
+        least, slowest, fastest = smaller(value, least), smaller(rate, slowest), larger(rate, fastest)
+    least = smaller(fma(1.0 / 7.0, rate, value), least)
+    falls, rises = fastest + (1.0 / 7.0) * rest < 0.0, slowest - (1.0 / 7.0) * rest > 0.0
+    x = larger(smaller(place, 1.0), 0.0)
+    bend = fma(fma(fma(fma(fma(42.0 * p7, x, 30.0 * p6), x, 20.0 * p5), x, 12.0 * p4), x, 6.0 * p3), x, 2.0 * p2)
+    x = larger(smaller(x - rate_to_seventh(x, p1, p2, p3, p4, p5, p6, p7) / bend, 1.0), 0.0)
+    rate = rate_to_seventh(x, p1, p2, p3, p4, p5, p6, p7)
+    value = fma(fma(fma(fma(fma(fma(fma(p7, x, p6), x, p5), x, p4), x, p3), x, p2), x, p1), x, p0)
+    doubt = fma(1.0 / 56.0, rest, 4.0 * noise)  # of sums as long as these
+    least = select(convex, larger(value - larger(rate * x, rate * (x - 1.0)), least), least) - doubt
+    clear = ((falls | rises | concave) & (end > noise)) | (least > 0.0)
+    once = (end < -noise) & (falls | concave | convex)
+    twice = convex & (end > noise) & (value + doubt < 0.0)
+    return clear, once, twice, least
+
+
+@inner
+def second_derivative(p2, p3, p4, p5, p6, p7):
+    """Coefficients of 2 p2 + 6 p3 x + ... + 42 p7 x^5 on [0, 1] in Bernstein's form."""
+    b0, b1, b2, b3, b4, b5 = 2.0 * p2, 1.2 * p3, 1.2 * p4, 2.0 * p5, 6.0 * p6, 42.0 * p7
+    b5, b4, b3, b2, b1 = b5 + b4, b4 + b3, b3 + b2, b2 + b1, b1 + b0
+    b5, b4, b3, b2 = b5 + b4, b4 + b3, b3 + b2, b2 + b1
+    b5, b4, b3 = b5 + b4, b4 + b3, b3 + b2
+    b5, b4 = b5 + b4, b4 + b3
+    return b0, b1, b2, b3, b4, b5 + b4
+
+
+@inner
+def rate_to_seventh(x, p1, p2, p3, p4, p5, p6, p7):
+    """Derivative of p1 x + ... + p7 x^7."""
+    return fma(fma(fma(fma(fma(fma(7.0 * p7, x, 6.0 * p6), x, 5.0 * p5), x, 4.0 * p4), x, 3.0 * p3), x, 2.0 * p2), x, p1)
 
 
 @kernel
@@ -172,11 +241,18 @@ def first_root(p0, p1, p2):
 
 
 @inner
-def choose(lanes, g, crosses, until, p0, p1, p2, p3, rest, noise):
-    """Make guard g the one that a lane crosses, where it is the first; returns the lanes in which that isn't known.
+def predicted(p0, p1, p2, p3):
+    """About where a gap is zero first: where its quadratic part is, then one step of Newton's method on its cubic part."""
+    x = 2.0 * p0 / (root(larger(p1 * p1 - 4.0 * p0 * p2, 0.0)) - p1)
+    return x - fma(fma(fma(p3, x, p2), x, p1), x, p0) / fma(fma(3.0 * p3, x, 2.0 * p2), x, p1)
 
-    Gaps of one state, on the same side of it, differ by a constant: the nearer closes first. Of others one is proven to be below zero at a
-    place between the two crossings that are predicted, the other above zero at a later one: so they are no one event either.
+
+@inner
+def choose(lanes, g, crosses, until, p0, p1, p2, p3, noise):
+    """Make guard g the one that a lane crosses, where it is the first or is predicted to be; returns the lanes that stay undecided.
+
+    Gaps of one state, on the same side of it, differ by a constant: the nearer closes first. Of others `refine_crossings` proves which is
+    the first, if each of its rivals crosses once.
     """
     found, row = lanes.found, GUARD_ROW[g]
     s, fresh = load(lanes.side, g, LANES) * GUARD_SIGN[g], load(lanes.fresh, g, LANES)
@@ -186,28 +262,22 @@ def choose(lanes, g, crosses, until, p0, p1, p2, p3, rest, noise):
     parallel = same_series & (s * load(found, SIGN, LANES) > 0.0) & (magnitude(a0 - nearest) > 0.0) & (~(fresh > 0.5))
     first = crosses & ((~taken) | (parallel & (a0 < nearest)))
     unknown = crosses & taken & (~parallel)
-    if any_lane(unknown):
-        x, y = first_root(p0, p1, p2), first_root(load(found, P0, LANES), load(found, P1, LANES), load(found, P2, LANES))
-        near, far = 0.625 * x + 0.375 * y, 0.375 * x + 0.625 * y
-        apart = unknown & (magnitude(x - y) > TOGETHER)
-        ours, ours_at_most = enclosed(near, fresh > 0.5, p0, p1, p2, p3, rest, noise)
-        theirs, theirs_at_most = enclosed_chosen(found, far)
-        sooner = apart & (x < y) & (ours_at_most < 0.0) & (theirs > 0.0) & (far <= load(found, UNTIL, LANES))
-        later = apart & (x > y) & (theirs_at_most < 0.0) & (ours > 0.0) & (near <= until)
-        first, unknown = first | sooner, unknown & (~sooner) & (~later)
+    if NSERIES > 1:
+        store(lanes.found, RIVALS + g, select(crosses & (~(taken & parallel)), select(until > 0.0, noise, math.inf), -1.0))
+        if any_lane(unknown):
+            theirs = predicted(load(found, P0, LANES), load(found, P1, LANES), load(found, P2, LANES), load(found, P3, LANES))
+            first = first | (unknown & (predicted(p0, p1, p2, p3) < theirs))
+        unknown = splat(0.0, LANES) > 1.0
+        keep(found, P0, first, p0)
+        keep(found, P1, first, p1)
+        keep(found, P2, first, p2)
+        keep(found, P3, first, p3)
     keep(found, WHICH, first, splat(float(g), LANES))
     keep(found, SERIES, first, splat(float(row), LANES))
     keep(found, DEPTH, first, a0)
     keep(found, SIGN, first, s)
     keep(found, ONBOARD, first, fresh)
     keep(found, UNTIL, first, until)
-    if NGUARDS > 1:
-        keep(found, P0, first, p0)
-        keep(found, P1, first, p1)
-        keep(found, P2, first, p2)
-        keep(found, P3, first, p3)
-        keep(found, PREST, first, rest)
-        keep(found, PNOISE, first, noise)
     return unknown
 
 
@@ -215,21 +285,6 @@ def choose(lanes, g, crosses, until, p0, p1, p2, p3, rest, noise):
 def keep(rows, row, wanted, value):
     """Write a value to a row in the lanes wanted."""
     store(rows, row, select(wanted, value, load(rows, row, LANES)))
-
-
-@inner
-def enclosed(x, on_boundary, p0, p1, p2, p3, rest, noise):
-    """Between what a gap proven to be p0 + ... + rest lies at x in [0, 1], rounding and all."""
-    value = fma(fma(fma(p3, x, p2), x, p1), x, p0)
-    error = noise + (rest * x * x * x) * select(on_boundary, splat(1.0 / 12.0, LANES), x * (1.0 / 12.0))
-    return value - error, value + error
-
-
-@inner
-def enclosed_chosen(found, x):
-    """:func:`enclosed` of the gap chosen so far."""
-    p0, p1, p2, p3 = load(found, P0, LANES), load(found, P1, LANES), load(found, P2, LANES), load(found, P3, LANES)
-    return enclosed(x, load(found, ONBOARD, LANES) > 0.5, p0, p1, p2, p3, load(found, PREST, LANES), load(found, PNOISE, LANES))
 
 
 @inner
@@ -298,23 +353,43 @@ def newton_step(terms, base, x, s, depth, fresh, degree):
 
 @inner
 def refine_crossings(lanes, h, undecided):
-    """Newton's method in the lanes with one proven crossing; what doesn't converge joins the undecided."""
+    """Newton's method in the lanes whose first crossing is proven or predicted; what isn't found, or isn't the first, joins the undecided.
+
+    A rival crosses once. Where it is still above zero a thousandth of the step behind the crossing, it crosses later, and is no one event
+    with it.
+    """
     which = load(lanes.found, WHICH, LANES)
     crosses = which >= 0.0
     store(lanes.found, DELTA, h)
     if any_lane(crosses):
         if NSERIES > 1:
             gather_series(lanes)
-            x, slope, converged = newton(lanes.poly, 0, lanes.found, h, crosses)
+            x, slope, found = newton(lanes.poly, 0, lanes.found, h, crosses)
+            for g in range(NGUARDS):
+                noise = load(lanes.found, RIVALS + g, LANES)
+                rival = crosses & (noise >= 0.0) & (magnitude(which - g) > 0.5)
+                if any_lane(rival):
+                    found = found & ((~rival) | (gap_at(lanes, g, smaller(x + TOGETHER * h, h)) > noise))
         else:
-            x, slope, converged = newton(lanes.work, SERIES_ROW[0], lanes.found, h, crosses)
-        undecided = undecided | (crosses & (~converged))
-        crosses = crosses & converged
+            x, slope, found = newton(lanes.work, SERIES_ROW[0], lanes.found, h, crosses)
+        undecided = undecided | (crosses & (~found))
+        crosses = crosses & found
         on_boundary = load(lanes.found, ONBOARD, LANES) > 0.5
         store(lanes.found, DELTA, select(crosses, x, h))
         store(lanes.found, RATE, select(on_boundary, slope * x, slope))
         store(lanes.found, WHICH, select(crosses, which, -1.0))
     return undecided
+
+
+@inner
+def gap_at(lanes, g, d):
+    """A gap at time d into the step, positive on its side."""
+    row, side = GUARD_ROW[g], load(lanes.side, g, LANES)
+    value = load(lanes.work, row + ORDER, LANES)
+    for k in range(ORDER - 1, 0, -1):
+        value = fma(value, d, load(lanes.work, row + k, LANES))
+    begin = select(load(lanes.fresh, g, LANES) > 0.5, 0.0, load(lanes.work, GAP_ROW + g, LANES))
+    return side * fma(GUARD_SIGN[g] * value, d, begin)
 
 
 @kernel

@@ -44,8 +44,9 @@ RUN_ROWS = 20
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
 # Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when.
 # Of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1), the row of its series, the share of the step within
-# which it crosses just once (0: it crosses twice); P, or P/x if it is fresh, on [0, 1]: terms 0 to 3, bound of the rest, rounding error.
-DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, UNTIL, P0, P1, P2, P3, PREST, PNOISE, FOUND_ROWS = range(17)
+# which it crosses just once (0: it crosses twice); terms 0 to 3 of P on [0, 1], or of P/x if it is fresh. From RIVALS on, of each guard:
+# -1 if it needn't be asked whether the one chosen crosses before it; else its rounding error, or infinity if it may cross twice.
+DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, UNTIL, P0, P1, P2, P3, RIVALS = range(15)
 # Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that it found to cross (bits), guards on
 # which the state rests (bits), whether a harmonic of time has another phase in every period, whether this step isn't made of numbers.
 WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN = range(7)
@@ -127,7 +128,7 @@ def workspace():
     guards = max(NGUARDS, 1)
     rows = dict(
         y=NSTATES, side=guards + NSINGULAR, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
-        prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=FOUND_ROWS, probe_y=NSTATES,
+        prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=RIVALS + guards, probe_y=NSTATES,
         probe_clock=CLOCK_ROWS, probe_rate=(6 if NSINGULAR > 0 else 3) * NSTATES,
     )  # fmt: skip
     lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: rows_of_lanes(count) for name, count in rows.items()})

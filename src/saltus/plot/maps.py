@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from saltus.errors import ParameterError, shown
 from saltus.plot.palette import hues
 from saltus.plot.style import Scale, display_scale
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import kind_text
 from saltus.units import from_si
 
@@ -27,11 +28,11 @@ class Unsettled:
 
 
 #: Without hue, so that no shade is taken for them: near-black where nothing settled, grey where a start left, pale where nothing is known.
-UNSETTLED = {
-    -1: Unsettled("escaped", "#BDBDBD"),
-    -2: Unsettled("not settled", "#1E1E1E"),
-    -3: Unsettled("failed", "#3C3C3C"),
-    -4: Unsettled("not computed", "#E9E9E9"),
+UNSETTLED: dict[int, Unsettled] = {
+    Kind.ESCAPED: Unsettled("escaped", "#BDBDBD"),
+    Kind.UNCONVERGED: Unsettled("not settled", "#1E1E1E"),
+    Kind.FAILED: Unsettled("failed", "#3C3C3C"),
+    Kind.NOT_COMPUTED: Unsettled("not computed", "#E9E9E9"),
 }
 
 

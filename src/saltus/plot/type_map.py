@@ -16,11 +16,13 @@ from saltus.plot import kinds, maps
 from saltus.plot import response_points as points
 from saltus.plot.picture import caller, picture
 from saltus.plot.style import Scale
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import RESPONSES, parameters_of, start_name, states_of
 from saltus.units import from_si
 
 #: Where a start settles to nothing: white and pale greys, as chaos is dark.
-_UNSETTLED = {-1: ("escaped", "#FFFFFF"), -2: ("not settled", "#D2D2D2"), -3: ("failed", "#B9A9A0"), -4: ("not computed", "#F3F3F3")}
+_PALE = {Kind.ESCAPED: "#FFFFFF", Kind.UNCONVERGED: "#D2D2D2", Kind.FAILED: "#B9A9A0", Kind.NOT_COMPUTED: "#F3F3F3"}
+_UNSETTLED: dict[int, tuple[str, str]] = {code: (maps.UNSETTLED[code].label, color) for code, color in _PALE.items()}
 
 
 @picture(RESPONSES, needs=("type", "period", "response_of"))

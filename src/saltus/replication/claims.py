@@ -19,6 +19,8 @@ Data = Mapping[str, "xr.Dataset"]
 #: What a claim's reading of the data returns: numbers, texts, truths, and lists of such tables.
 Quantities = Mapping[str, Any]
 
+#: Quantities that every claim has.
+ALWAYS, NEVER = "always", "never"
 #: Formats of quantities in sentences, beside Python's own: ``{part:share}``.
 FORMATS: dict[str, Callable[[Any], str]] = {
     "share": lambda value: share_text(float(value)),
@@ -86,11 +88,11 @@ class Row:
 
     def judge(self, data: Data) -> Finding:
         """Read the data, apply the rules, and tell what was found."""
-        found = dict(self.read(data))
+        found = {ALWAYS: True, NEVER: False, **self.read(data)}
         for name, line in self.lines.items():
             found[name] = line.get("between", "; ").join(told(line["text"], one) for one in _each(line, found))
         checks = chain.from_iterable(((row, one) for one in _each(row, found)) for row in self.checks)
-        why = (row["text"] for row in self.why if found.get(row.get("when", ""), True) and not found.get(row.get("unless", ""), False))
+        why = (row["text"] for row in self.why if found[row.get("when", ALWAYS)] and not found[row.get("unless", NEVER)])
         return Finding(
             told(self.own, found), told(self.exact, found), tuple(Check(told(row["text"], one), passed(row, one)) for row, one in checks),
             told(self.sure, found), told(next(why, ""), found),

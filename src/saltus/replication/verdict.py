@@ -28,7 +28,7 @@ RULES: dict[str, Callable[[Any, Any], bool]] = {
     "inside": lambda value, ends: ends[0] < value < ends[1],
     "near": lambda value, limit: abs(value / limit[0] - 1) < limit[1],
     "same_set": lambda values, limit: sorted(values) == sorted(limit),
-    "contains": lambda values, limit: limit in values,
+    "contains": lambda values, limit: set(limit) <= set(values),
     "is": lambda value, limit: bool(value) is limit,
 }
 
@@ -101,7 +101,7 @@ def passed(row: Mapping[str, Any], quantities: Mapping[str, Any]) -> bool | None
     (rule,) = [name for name in row if name in RULES] or ["is"]
     limit = row.get(rule, True)
     if isinstance(limit, str):
-        limit = quantities.get(limit, limit)
+        limit = quantities[limit]
     return None if _unknown(value) or _unknown(limit) else bool(RULES[rule](value, limit))
 
 

@@ -8,8 +8,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.results.dataset.attractors import NOISY, UNCONVERGED
-from saltus.results.dataset.schema import AGREEMENT, BASINS, EXPONENTS, RESPONSES, axes_of, kind_of, kind_text, parameters_of, states_of
+from saltus.results.dataset.kinds import Kind
+from saltus.results.dataset.schema import (
+    AGREEMENT,
+    BASINS,
+    EXPONENTS,
+    RESPONSES,
+    axes_of,
+    kind_of,
+    kind_text,
+    parameters_of,
+    states_of,
+)
 from saltus.results.summary_motions import WRITERS
 
 #: Attractors that get a line of their own; the others are counted.
@@ -37,7 +47,7 @@ def summary(ds: xr.Dataset) -> list[str]:
     lines += _attractors(ds)
     if "basin" in ds:
         lines.append(f"settled  {_unsettled(ds['basin'])}")
-        words = own_errors(ds.attrs) if (ds["basin"].values == UNCONVERGED).any() else ""
+        words = own_errors(ds.attrs) if (ds["basin"].values == Kind.UNCONVERGED).any() else ""
         lines += [f"noise    {words}"] if words else []
     trust = [f"{words} {ds.attrs[name]:.3g}" for name, words in _TRUST.items() if name in ds.attrs]
     return lines + ([f"trust    {', '.join(trust)}"] if trust else [])
@@ -87,7 +97,7 @@ def _attractors(ds: xr.Dataset) -> list[str]:
         if kind == "limit_cycle" and "attractor_cycle" in one:
             name += f", period {float(one['attractor_cycle']):.4g} s"
         size = f"peak {float(one['attractor_peak']):.4g} {unit}".rstrip()
-        if kind == NOISY:
+        if kind == Kind.NOISY_PERIODIC.word:
             size += f", scatter {float(one['attractor_scatter']):.2g} {unit}".rstrip()
         words.append(f"{name}, {size}")
     lines = [f"found    {_count(count, 'attractor')}"]

@@ -11,12 +11,12 @@ import xarray as xr
 
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.halton import halton
-from saltus.analysis.basins.labels import UNCONVERGED, complete, settle_all
+from saltus.analysis.basins.labels import complete, settle_all
 from saltus.analysis.basins.pipeline import SCOUTS, memory
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
-from saltus.analysis.orbits.recurrence import find
 from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, shown
@@ -24,11 +24,12 @@ from saltus.flow.counts import whole
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
-from saltus.flow.progress import reporter
+from saltus.flow.progress import reporting
 from saltus.flow.room import check_room
 from saltus.results import AttractorTable, Subject, build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import basin_meanings
+from saltus.results.dataset.kinds import Kind
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -102,12 +103,9 @@ def attractors(
     group, periods = ensemble(system, start, None), whole(periods, "periods")
     map_ = Stroboscope(system, check_method(method), every=None if every is None else to_si(every, "s", "every"), threads=threads)
     scale = _spread(map_, group.start)
-    show, close = reporter(progress)
-    try:
-        found, label, settled = find(map_, group.start, scale, periods, progress=show)
-    finally:
-        close()
-    starts = {"trajectory": np.arange(group.size), "basin": np.where(label < 0, UNCONVERGED, label), "periods_to_settle": settled}
+    with reporting(progress) as show:
+        found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
+    starts = {"trajectory": np.arange(group.size), "basin": np.where(label < 0, Kind.UNCONVERGED, label), "periods_to_settle": settled}
     attrs = provenance(system, map_.method, system.values) | {"periods": periods} | stray_attrs(found.astray)
     return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
 
@@ -173,18 +171,15 @@ def basin_fractions(
     map_ = Stroboscope(system, check_method(method), every=None if every is None else to_si(every, "s", "every"), threads=threads)
     start = fill(system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed)
     scale = _spread(map_, start[:SPREAD_STARTS])
-    show, close = reporter(progress)
-    try:
+    with reporting(progress) as show:
         scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
-        found = find(map_, scouts, scale, periods)[0]
+        found = find_attractors(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
-    finally:
-        close()
     table = replace(portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found)))
     starts = {"trajectory": np.arange(samples), "basin": result.label, "periods_to_settle": result.periods}
     ds = attractors_dataset(subject(system, provenance(system, map_.method, system.values) | {"periods": periods}), table, starts)
-    strays = stray_attrs(found.astray if (result.label == UNCONVERGED).any() else [])
+    strays = stray_attrs(found.astray if (result.label == Kind.UNCONVERGED).any() else [])
     return ds.assign_attrs(**strays, smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=samples, seed=seed)
 
 

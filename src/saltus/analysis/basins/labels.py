@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.analysis.orbits.find_attractors import find_attractors, wanders_on
 from saltus.analysis.orbits.found import Found
-from saltus.analysis.orbits.recurrence import find, wanders_on
 from saltus.flow.maps import Map, Travel
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
+from saltus.results.dataset.kinds import Kind
 
-#: Codes of cells that belong to no attractor.
-ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
-#: Not captured by any attractor known so far: for the post-pass.
-OPEN = -5
+#: Not captured by any attractor known so far, beside the codes of :class:`Kind`: for the post-pass.
+OPEN = min(Kind) - 1
 #: Iterates between two looks at who has been captured.
 BLOCK = 8
 #: Starts that one thread follows at a time.
@@ -54,7 +53,7 @@ class Settling:
     @classmethod
     def empty(cls, count: int, size: int) -> Settling:
         """Nothing computed yet."""
-        label, periods = np.full(count, NOT_COMPUTED, np.int64), np.full(count, -1, np.int64)
+        label, periods = np.full(count, Kind.NOT_COMPUTED, np.int64), np.full(count, -1, np.int64)
         return cls(label, periods, np.full(count, st.NOT_COMPUTED, np.int64), np.zeros(count, np.int64), np.full((count, size), np.nan))
 
     def put(self, where: np.ndarray | slice, other: Settling) -> None:
@@ -80,7 +79,9 @@ def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
                 label[here], periods[here] = len(found.orbits) + on[here], travel.age
         going = travel.going & (label < 0)
         leaves = np.flatnonzero(~going)
-        label[leaves] = np.where(label[leaves] >= 0, label[leaves], np.where(travel.status[leaves] == st.NONFINITE, ESCAPED, FAILED))
+        label[leaves] = np.where(
+            label[leaves] >= 0, label[leaves], np.where(travel.status[leaves] == st.NONFINITE, Kind.ESCAPED, Kind.FAILED)
+        )
         _write(result, who[leaves], label[leaves], periods[leaves], travel, leaves)
         travel.keep(going)
         who, trail = who[going], trail[going]
@@ -113,13 +114,13 @@ def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most:
     if not len(opened):
         return found
     sample = np.sort(np.random.default_rng(0).choice(opened, min(SAMPLE, len(opened)), replace=False))
-    wider, _, _ = find(map_, result.end[sample], scale, most, found)
+    wider, _, _ = find_attractors(map_, result.end[sample], scale, most, found)
     _renumber(result.label, found, wider)
     more = settle_all(map_, result.end[opened], wider, most, threads)
     more.periods[more.periods >= 0] += most
     more.unresolved[:] += result.unresolved[opened]
     still = more.label == OPEN
-    more.label[still], more.status[still] = UNCONVERGED, st.LONG_TRANSIENT
+    more.label[still], more.status[still] = Kind.UNCONVERGED, st.LONG_TRANSIENT
     result.put(opened, more)
     return wider
 

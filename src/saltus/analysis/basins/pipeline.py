@@ -16,12 +16,12 @@ import xarray as xr
 from saltus.analysis.axes import along
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.halton import halton
-from saltus.analysis.basins.labels import OPEN, UNCONVERGED, Settling, complete, settle
+from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
-from saltus.analysis.orbits.recurrence import find
 from saltus.analysis.starts import check_system, fill, fixed_states
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
@@ -33,6 +33,7 @@ from saltus.kernels import status as st
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import basin_meanings
+from saltus.results.dataset.kinds import Kind
 from saltus.results.provenance import to_json
 from saltus.system.system import System
 from saltus.units import to_si
@@ -118,7 +119,7 @@ class BasinPlan:
         unit = halton(self.scouts, 2)
         low, high = (np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max))
         drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
-        return find(self.map(threads), fill(self.system, drawn, self.fixed), self.scale, self.periods, progress=progress)[0]
+        return find_attractors(self.map(threads), fill(self.system, drawn, self.fixed), self.scale, self.periods, progress=progress)[0]
 
     def sample(self, count: int) -> np.ndarray:
         """Some of the cells, drawn at random, always the same ones: int64[count at most], ascending."""
@@ -136,7 +137,7 @@ class BasinPlan:
     def dataset(self, result: Settling, found: Found, threads: int | None = None) -> xr.Dataset:
         """The Dataset of what is known; what is still open counts as unconverged. Changes ``result``."""
         map_ = self.map(threads)
-        result.label[result.label == OPEN] = UNCONVERGED
+        result.label[result.label == OPEN] = Kind.UNCONVERGED
         labels = result.label.reshape(self.shape)
         table = replace(portraits(map_, found), fractions=uncertainty.fractions(labels, len(found)))
         values = {
@@ -148,7 +149,7 @@ class BasinPlan:
         flags = {"basin": basin_meanings(len(table)), "status": {code: name for code, (name, _) in st.STATUS.items()}}
         words = {"<when>": table.points_when}
         ds = build(schema.BASINS, subject(self.system, self.attrs()), values, grid=tuple(self.axes), words=words, flags=flags)
-        strays = found.astray if (labels == UNCONVERGED).any() else []
+        strays = found.astray if (labels == Kind.UNCONVERGED).any() else []
         return ds.assign_attrs(uncertainty.measure(ds), **stray_attrs(strays), flip_rate=np.nan, flip_checked=0)
 
     def attrs(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.intervals import wilson
-from saltus.results.dataset.attractors import NOT_COMPUTED
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import BASINS, check
 
 #: -ln(0.05): a share p stays unseen in N random cells with probability (1-p)^N < 5 % if p > 3/N.
@@ -48,7 +48,7 @@ def fractions(labels: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.nd
         NaN if nothing was computed.
     """
     labels = np.asarray(labels)
-    cells = int((labels != NOT_COMPUTED).sum())
+    cells = int((labels != Kind.NOT_COMPUTED).sum())
     count = np.bincount(labels[labels >= 0], minlength=m)
     if len(count) > m:
         raise ParameterError(f"the labels go up to {len(count) - 1}, but there are {m} attractors, 0 to {m - 1}. Give m={len(count)}.")
@@ -185,7 +185,7 @@ def measure(ds: xr.Dataset) -> dict[str, float | int]:
     entropy, boundary_entropy = basin_entropy(labels)
     exponent, error, dimension = uncertainty_exponent(labels)
     return {
-        "smallest_basin_seen": smallest_basin(int((labels != NOT_COMPUTED).sum())),
+        "smallest_basin_seen": smallest_basin(int((labels != Kind.NOT_COMPUTED).sum())),
         "basin_entropy": entropy,
         "boundary_basin_entropy": boundary_entropy,
         "uncertainty_exponent": exponent,

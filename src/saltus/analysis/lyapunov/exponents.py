@@ -17,6 +17,7 @@ from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.statistics import CONFIDENCE, running_ends
 from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
+from saltus.results.dataset.kinds import Kind
 
 #: Numbers that the tangents of one segment of a group may hold: 32 MB, and some copies of it.
 GROUP = 4_000_000
@@ -83,7 +84,7 @@ class Exponents:
         self._running[rows], self._running_half[rows] = found.running.mean, found.running.half_width
         self._volume[rows], self._batches[rows], self._kind[rows] = found.volume, found.batches, found.kinds
         self._period[rows] = [
-            orbit.period if orbit and kind == "periodic" else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)
+            orbit.period if orbit and kind == Kind.PERIODIC.word else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)
         ]
         self._status[rows] = segment.status
         self._grazes[rows], self._unresolved[rows], self._margin[rows] = segment.grazes, segment.unresolved, segment.margin
@@ -160,7 +161,7 @@ def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -
         own = still.eigenvalues[i]
         found.exponents[i] = own.real * every
         found.errors[i] = found.half_width[i] = rounding * np.abs(own).max() * every
-        found.batches[i], found.kinds[i] = 0, "equilibrium"
+        found.batches[i], found.kinds[i] = 0, Kind.EQUILIBRIUM.word
         found.volume[i] = flow.rows(np.array([i])).divergences(still.place[[i]][:, None])[0, 0]
 
 

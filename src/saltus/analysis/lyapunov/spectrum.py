@@ -14,10 +14,11 @@ import numpy as np
 from saltus.analysis.lyapunov.qr import GOOD, Growth, carry, grow
 from saltus.analysis.lyapunov.segments import TangentFlow
 from saltus.analysis.orbits.aperiodic import SURE
-from saltus.analysis.orbits.orbits import Orbit, find_orbits
-from saltus.analysis.orbits.recurrence import recurrence
+from saltus.analysis.orbits.orbits import Orbit
+from saltus.analysis.orbits.recurrence import recurring_orbits
 from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
 from saltus.analysis.statistics import BOUNDED, UNCLEAR, Means, batch_means, running_ends
+from saltus.results.dataset.kinds import Kind
 
 #: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the rounding of the faster: three digits are left.
 LOST = 29.0
@@ -87,7 +88,7 @@ def spectrum(
         if orbit is None:
             kinds.append(kind_of(rates[i], errors[i], forced))
             continue
-        kinds.append("periodic" if forced else "equilibrium")
+        kinds.append((Kind.PERIODIC if forced else Kind.EQUILIBRIUM).word)
         exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i])
         half_width[i], batches[i] = errors[i], 0
         volume[i] = _volume(flow, i, orbit)
@@ -104,25 +105,22 @@ def _told(rates: np.ndarray) -> np.ndarray:
 # -- orbits --------------------------------------------------------------------------------------------------------------------
 def _orbits(flow: TangentFlow, growth: Growth) -> list[Orbit | None]:
     """The stable periodic orbit to which each trajectory has come, None for the others."""
-    points, scale, noise = growth.segment.points, growth.scale, flow.map.noise_of(growth.scale)
-    near = np.maximum(NEAR, 4.0 * noise)
-    with np.errstate(invalid="ignore"):  # those that ran away
-        period, apart = recurrence(points[:, -ROUND - 1 :], scale)
+    points, scale = growth.segment.points, growth.scale
+    orbits, _, noise = recurring_orbits(flow.map, points[:, -ROUND - 1 :], scale, NEAR)
+    good = orbits.stable & np.isin(growth.segment.status, GOOD)
     found: list[Orbit | None] = [None] * len(points)
-    rows = np.flatnonzero(np.isin(growth.segment.status, GOOD) & (apart <= near))
-    orbits = find_orbits(flow.map.rows(rows), points[rows, -1], period[rows], scale[rows], noise[rows])
-    for row, orbit, stable in zip(rows, orbits, orbits.stable, strict=True):
-        if stable and _arrives(points[row], orbit, scale[row], float(noise[row]), float(near[row])):
-            found[row] = orbit
+    for row in np.flatnonzero(good).tolist():
+        if _arrives(points[row], orbits[row], scale[row], float(noise[row])):
+            found[row] = orbits[row]
     return found
 
 
-def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float, near: float) -> bool:
+def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float) -> bool:
     """Whether a trajectory float64[m, D] lies on an orbit at its end, or comes closer to it all the time."""
     n, half = orbit.period, len(points) // 2
     distance = np.abs((points[:, None] - orbit.points[None]) / scale).max(axis=2).min(axis=1)
     early, late = distance[max(half - n, 0) : half + 1].max(), distance[-n:].max()
-    return bool(late <= max(SAME, 4.0 * noise) or (late <= near and late < GAINED * early))
+    return bool(late <= max(SAME, 4.0 * noise) or (late <= max(NEAR, 4.0 * noise) and late < GAINED * early))
 
 
 def _of_orbit(flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -166,9 +164,8 @@ def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
         return "unclear"
     limit = np.maximum(SURE * errors, BOUNDED / len(rates))
     if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # not one that was chaotic only at first
-        return "chaotic"
+        return Kind.CHAOTIC.word
     if abs(second[0]) > min(limit[0], 2 * BOUNDED / len(rates)):  # zero only if what grew stays bounded, however wide the error is
         return "unclear"
-    if forced:
-        return "quasi_periodic"
-    return "quasi_periodic" if len(mean) > 2 and abs(second[1]) <= limit[1] else "limit_cycle"
+    torus = forced or (len(mean) > 2 and abs(second[1]) <= limit[1])
+    return (Kind.QUASI_PERIODIC if torus else Kind.LIMIT_CYCLE).word

@@ -14,6 +14,7 @@ import numpy as np
 
 from saltus.analysis.statistics import BOUNDED, UNCLEAR
 from saltus.flow.maps import Map
+from saltus.results.dataset.kinds import Kind
 
 #: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its way.
 BLOCK, BLOCKS, ALIGNING = 8, 192, 48
@@ -152,9 +153,9 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
     if error > UNCLEAR:
         return None
     if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():  # growth like t looks positive at first
-        return "chaotic", exponent, error
+        return Kind.CHAOTIC.word, exponent, error
     zero = max(FLOOR, min(SURE * error, BOUNDED / (len(second) * BLOCK)))
-    return ("quasi_periodic", exponent, error) if abs(second.mean()) <= zero else None
+    return (Kind.QUASI_PERIODIC.word, exponent, error) if abs(second.mean()) <= zero else None
 
 
 def kinds_of(

@@ -10,9 +10,7 @@ from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.analysis.orbits.tolerances import NEAR, ROUND
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
-
-#: Name of the kind.
-LIMIT_CYCLE = "limit_cycle"
+from saltus.results.dataset.kinds import Kind
 
 
 def limit_cycles(map_: Stroboscope, state: np.ndarray, window: float, scale: np.ndarray) -> list[Wandering]:
@@ -36,7 +34,7 @@ def limit_cycles(map_: Stroboscope, state: np.ndarray, window: float, scale: np.
         return []
     once = map_.rows(rows).with_period(cycles.time[rows])
     points = once.run(cycles.points[rows, 0], 1, Schedule.even(1, TRAIL)).samples
-    return [Wandering(LIMIT_CYCLE, 0.0, 0.0, one, scale) for one in points]
+    return [Wandering(Kind.LIMIT_CYCLE.word, 0.0, 0.0, one, scale) for one in points]
 
 
 def cycle_of(map_: Stroboscope, one: Wandering) -> OrbitBatch:

@@ -16,7 +16,7 @@ from saltus.analysis.orbits.aperiodic import TRAIL, Wandering
 from saltus.analysis.orbits.orbits import Orbit
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Map, Stroboscope
-from saltus.results.dataset.attractors import NOISY
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import period_text
 
 #: Largest distance from the orbit, in units of the range of the motion, that is still scatter about it. Returns of ode45 on the rig scatter
@@ -114,7 +114,7 @@ def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
     if not stray <= NARROW:
         return None
     scatter = size * np.sqrt(np.mean(distance**2, axis=(0, 1)))
-    return Noisy(NOISY, orbit.exponent, 0.0, orbit.points, scale, orbit, size, scatter, stray)
+    return Noisy(Kind.NOISY_PERIODIC.word, orbit.exponent, 0.0, orbit.points, scale, orbit, size, scatter, stray)
 
 
 def motion_size(map_: Map, orbit: Orbit, scale: np.ndarray) -> np.ndarray:

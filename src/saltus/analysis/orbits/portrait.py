@@ -7,17 +7,18 @@ import numpy as np
 from saltus.analysis.orbits.aperiodic import Wandering
 from saltus.analysis.orbits.equilibria import autonomous, find_equilibria
 from saltus.analysis.orbits.found import Found
-from saltus.analysis.orbits.limit_cycles import LIMIT_CYCLE, cycle_of
+from saltus.analysis.orbits.limit_cycles import cycle_of
 from saltus.analysis.orbits.noisy import Noisy
 from saltus.analysis.orbits.orbit_measures import Measures, measure, unknown
 from saltus.analysis.orbits.unforced import rest
 from saltus.flow.maps import Map, Stroboscope
 from saltus.results import AttractorTable
+from saltus.results.dataset.kinds import Kind
 
 #: Periods of an attractor that never repeats: what its numbers are taken from, and what is kept of it.
 WANDERED = 256
-#: Name of what rests; and a point of a limit cycle at which the first state doesn't turn: it is least at point 0.
-EQUILIBRIUM, ASIDE = "equilibrium", 23
+#: A point of a limit cycle at which the first state doesn't turn: it is least at point 0.
+ASIDE = 23
 
 
 def portraits(map_: Map, found: Found) -> AttractorTable:
@@ -44,7 +45,7 @@ def portraits(map_: Map, found: Found) -> AttractorTable:
     if len(noisy) and map_.exact_map is not None:
         numbers.put(noisy, _numbers(map_.exact_map, start[noisy], period[noisy], [points[i] for i in noisy]))
     return AttractorTable(
-        kind=[*("periodic" for _ in found.orbits), *(one.kind for one in found.wandering)],
+        kind=[*(Kind.PERIODIC.word for _ in found.orbits), *(one.kind for one in found.wandering)],
         period=period,
         contacts=numbers.contacts * np.maximum(period, 1),
         itinerary=numbers.itinerary,
@@ -67,7 +68,7 @@ def _first(one: Wandering) -> np.ndarray:
 def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
     """The table of a system without forcing: equilibria, limit cycles, and what never repeats."""
     size, rests = len(map_.states), len(found.orbits)
-    kind = np.array([*(EQUILIBRIUM for _ in found.orbits), *(one.kind for one in found.wandering)], dtype=np.str_)
+    kind = np.array([*(Kind.EQUILIBRIUM.word for _ in found.orbits), *(one.kind for one in found.wandering)], dtype=np.str_)
     start = np.array([*(orbit.points[0] for orbit in found.orbits), *(one.points[-1] for one in found.wandering)]).reshape(-1, size)
     points = [*(orbit.points[:1] for orbit in found.orbits), *(one.points[:WANDERED] for one in found.wandering)]
     cycle, multipliers, eigenvalues = np.full(len(kind), np.nan), *np.full((2, len(kind), size), np.nan + 0j)
@@ -77,11 +78,11 @@ def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
     for i in range(rests):
         points[i] = start[i : i + 1] = still.place[i : i + 1] if np.isfinite(still.place[i]).all() else start[i : i + 1]
         eigenvalues[i], exponent[i] = still.eigenvalues[i], still.eigenvalues[i, 0].real
-    for i in np.flatnonzero(kind == LIMIT_CYCLE).tolist():
+    for i in np.flatnonzero(kind == Kind.LIMIT_CYCLE.word).tolist():
         one = cycle_of(map_, found.wandering[i - rests])
         cycle[i], multipliers[i], points[i], start[i] = one.time[0], one.multipliers[0], one.points[0], one.points[0, ASIDE]
     own = map_.rows(np.arange(len(kind))).with_period(np.where(np.isfinite(cycle), cycle, map_.period))
-    numbers = measure(own, start, np.isin(kind, (EQUILIBRIUM, LIMIT_CYCLE)).astype(np.int64), WANDERED)
+    numbers = measure(own, start, np.isin(kind, (Kind.EQUILIBRIUM.word, Kind.LIMIT_CYCLE.word)).astype(np.int64), WANDERED)
     rest(map_.rows(np.arange(rests)), start[:rests], np.arange(rests), numbers)
     return AttractorTable(
         kind=kind.tolist(),

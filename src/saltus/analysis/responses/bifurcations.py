@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.orbits.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE
-from saltus.analysis.responses.continuation import LINK, Follower, orbit_distance
+from saltus.analysis.orbits.orbits import orbit_distance
+from saltus.analysis.responses.continuation import LINK, Follower
 from saltus.analysis.responses.followed import Followed
 from saltus.analysis.responses.responses import Found
+from saltus.results.dataset.kinds import CLOSED, Kind
 
 #: A complex leading multiplier is on its way to the unit circle beyond this, if it grew by so much in the last step of the parameter that
 #: it is there after AHEAD more of them. Being near isn't enough: of a lightly damped oscillator all multipliers are, and stay there.
@@ -73,7 +74,7 @@ def why_they_end(found: Found, followed: Followed, values: np.ndarray, ends: np.
     """
     beyond = found.place[ends] + way
     inside = (beyond >= 0) & (beyond < len(values)) & np.isin(found.kind[ends], CLOSED)
-    inside[inside] = ~(found.of[beyond[inside]] == -4).all(axis=1)
+    inside[inside] = ~(found.of[beyond[inside]] == Kind.NOT_COMPUTED).all(axis=1)
     inside[inside] = ~followed.goes_on[followed.index(ends[inside], way)]
     branch = np.flatnonzero(inside)
     ends, beyond = ends[branch], beyond[branch]
@@ -89,7 +90,7 @@ def why_they_end(found: Found, followed: Followed, values: np.ndarray, ends: np.
 def _leading(found: Found, response: int) -> complex:
     """Leading multiplier; of a limit cycle the largest but the trivial one, of an equilibrium the leading eigenvalue [1/s]."""
     multipliers = found.steady.orbits.multipliers[found.row[response]]
-    return complex(multipliers[1 if found.kind[response] == LIMIT_CYCLE and len(multipliers) > 1 else 0])
+    return complex(multipliers[1 if found.kind[response] == Kind.LIMIT_CYCLE and len(multipliers) > 1 else 0])
 
 
 def _told_by_neighbours(found: Found, last: int, beyond: int, multiplier: complex) -> str:
@@ -102,9 +103,9 @@ def _told_by_neighbours(found: Found, last: int, beyond: int, multiplier: comple
     if doubled and multiplier.real < 0:
         return "period_doubling"
     starts = np.flatnonzero((found.of[here] >= 0) & (found.of[here] == last))
-    if len(starts) and (found.steady.kind.reshape(found.of.shape)[beyond, starts] == CHAOTIC).any():
+    if len(starts) and (found.steady.kind.reshape(found.of.shape)[beyond, starts] == Kind.CHAOTIC).any():
         return "chaos"
-    if found.kind[last] != EQUILIBRIUM and abs(multiplier.imag) > 1e-9 and _turns(found, last, 2 * here - beyond, abs(multiplier)):
+    if found.kind[last] != Kind.EQUILIBRIUM and abs(multiplier.imag) > 1e-9 and _turns(found, last, 2 * here - beyond, abs(multiplier)):
         return "neimark_sacker"
     return "end"
 
@@ -125,9 +126,9 @@ def _is_twice(found: Found, longer: int, shorter: int) -> bool:
     """Whether one response takes twice as long as another."""
     if found.kind[longer] != found.kind[shorter]:
         return False
-    if found.kind[longer] == LIMIT_CYCLE:
+    if found.kind[longer] == Kind.LIMIT_CYCLE:
         return bool(abs(found.time[longer] / (2 * found.time[shorter]) - 1.0) < 0.2)
-    return bool(found.kind[longer] != EQUILIBRIUM and found.period[longer] == 2 * found.period[shorter])
+    return bool(found.kind[longer] != Kind.EQUILIBRIUM and found.period[longer] == 2 * found.period[shorter])
 
 
 def _covers(found: Found, longer: int, shorter: int) -> bool:
@@ -153,8 +154,8 @@ def _located(found: Found, follower: Follower, rows: np.ndarray, values: np.ndar
     _, beyond = follower.at(rows, last + 2.0 * width)
     result = []
     for i, end in enumerate(ends):
-        rests = found.kind[end] == EQUILIBRIUM
-        column = 1 if found.kind[end] == LIMIT_CYCLE and near.multipliers.shape[1] > 1 else 0
+        rests = found.kind[end] == Kind.EQUILIBRIUM
+        column = 1 if found.kind[end] == Kind.LIMIT_CYCLE and near.multipliers.shape[1] > 1 else 0
         one, other = complex(near.multipliers[i, column]), complex(far.multipliers[i, column])
         oscillates = abs(one.imag) > 1e-9 * abs(one)
         distance = np.abs([one.real, other.real]) if rests else np.abs([1.0 - one, 1.0 - other])

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from saltus.analysis.orbits.steady import CLOSED
 from saltus.analysis.responses.bifurcations import Event, middle, why_they_end
 from saltus.analysis.responses.continuation import LINK
 from saltus.analysis.responses.followed import Followed
 from saltus.analysis.responses.grid import Grid
 from saltus.analysis.responses.responses import Found
 from saltus.results import AttractorTable
+from saltus.results.dataset.kinds import CLOSED
 
 #: Values over which a motion that never repeats may be missing.
 MISSED = 3

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.analysis.orbits.steady import CLOSED
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.responses.continuation import HALVINGS, INEXACT, Follower
 from saltus.analysis.responses.grid import Grid
 from saltus.analysis.responses.responses import Found
 from saltus.flow.methods import Method
+from saltus.results.dataset.kinds import CLOSED
 
 #: Values over which a response is followed at most to meet one that was found.
 FARTHEST = 16

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.orbits.aperiodic import Wandering, alike
+from saltus.analysis.orbits.find_responses import Steady, settle_each
 from saltus.analysis.orbits.orbit_measures import Measures, measure
-from saltus.analysis.orbits.steady import CHAOTIC, CLOSED, EQUILIBRIUM, LIMIT_CYCLE, PERIODIC, QUASI_PERIODIC, Steady, settle_each
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.orbits.unforced import multipliers_and_eigenvalues, rest
 from saltus.analysis.outputs import Outputs
@@ -18,11 +18,8 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.intervals import wilson
 from saltus.results import AttractorTable
+from saltus.results.dataset.kinds import CLOSED, Kind
 
-#: Words for the kinds of motion.
-KINDS = {
-    PERIODIC: "periodic", QUASI_PERIODIC: "quasi_periodic", CHAOTIC: "chaotic", EQUILIBRIUM: "equilibrium", LIMIT_CYCLE: "limit_cycle",
-}  # fmt: skip
 #: Point of a limit cycle at which the first state doesn't turn: it is least at point 0.
 ASIDE = 23
 #: Points kept of a motion that never repeats.
@@ -77,7 +74,7 @@ class Found:
 
     def start(self, aside: bool = False) -> np.ndarray:
         """A state on each, float64[m, D]; ``aside``: not where a limit cycle turns."""
-        index = np.where(aside & (self.kind == LIMIT_CYCLE), ASIDE, 0)
+        index = np.where(aside & (self.kind == Kind.LIMIT_CYCLE), ASIDE, 0)
         return np.array([self.points(i)[index[i]] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
 
 
@@ -135,7 +132,7 @@ def _same(result: Steady, a: int, b: int, tolerance: float) -> bool:
     """Whether two trajectories at one value settled to the same response."""
     if result.kind[a] != result.kind[b] or result.orbits.period[a] != result.orbits.period[b]:
         return False
-    if result.kind[a] == LIMIT_CYCLE and abs(result.orbits.time[a] / result.orbits.time[b] - 1.0) > tolerance:
+    if result.kind[a] == Kind.LIMIT_CYCLE and abs(result.orbits.time[a] / result.orbits.time[b] - 1.0) > tolerance:
         return False
     if result.kind[a] in CLOSED:
         return bool(result.orbits.distance(result.orbits.points[[b], 0], result.scale[[a]], [a])[0] < tolerance)
@@ -155,7 +152,7 @@ def numbers_of(found: Found, outputs: Outputs, grid: Grid, method: Method, threa
     """The numbers of each response."""
     map_, times = grid.map(method, threads).rows(found.place), own_times(found, grid)
     numbers = measure(map_ if times is None else map_.with_period(times), found.start(aside=True), spans_of(found), outputs=outputs)
-    rests = np.flatnonzero(found.kind == EQUILIBRIUM)
+    rests = np.flatnonzero(found.kind == Kind.EQUILIBRIUM)
     if len(rests):
         rest(map_.rows(rests), found.start()[rests], rests, numbers)
     return numbers
@@ -165,13 +162,13 @@ def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> Att
     """What is known of each response."""
     map_ = grid.map(method).rows(found.place)
     kind, s = found.kind, found.steady
-    period = np.where(kind == PERIODIC, found.period, 0)
-    multipliers, eigenvalues = multipliers_and_eigenvalues(s.orbits.multipliers[found.row], kind == EQUILIBRIUM)
+    period = np.where(kind == Kind.PERIODIC, found.period, 0)
+    multipliers, eigenvalues = multipliers_and_eigenvalues(s.orbits.multipliers[found.row], kind == Kind.EQUILIBRIUM)
     hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
     low, high = wilson(hits, len(grid.starts))
     shares = (hits / len(grid.starts), low, high) if grid.drawn else None
     return AttractorTable(
-        kind=[KINDS[int(code)] for code in kind],
+        kind=[Kind(code).word for code in kind],
         period=period,
         contacts=numbers.contacts * np.maximum(period, 1),
         itinerary=[""] * len(found),
@@ -183,13 +180,13 @@ def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> Att
         exponent_error=s.exponent_error[found.row] / map_.period,
         points=[found.points(i)[: int(known)] for i, known in enumerate(np.where(found.period > 0, found.period, WANDERED))],
         fractions=shares,
-        **({} if grid.every is None else {"cycle": np.where(kind == LIMIT_CYCLE, found.time, np.nan), "eigenvalues": eigenvalues}),
+        **({} if grid.every is None else {"cycle": np.where(kind == Kind.LIMIT_CYCLE, found.time, np.nan), "eigenvalues": eigenvalues}),
     )
 
 
 def spans_of(found: Found) -> np.ndarray:
     """Periods of each response, int64[m]: n of an nT, 1 of a limit cycle or an equilibrium, 0 of one that never repeats."""
-    return np.where(found.kind == PERIODIC, found.period, np.where(found.period > 0, 1, 0))
+    return np.where(found.kind == Kind.PERIODIC, found.period, np.where(found.period > 0, 1, 0))
 
 
 def own_times(found: Found, grid: Grid) -> np.ndarray | None:

@@ -8,14 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from saltus.results.dataset.kinds import WITHOUT_WORDS
 from saltus.results.dataset.variable import TRAJECTORY_NUMBER, Variable
 
-# What stands in ``basin`` for a start that has no attractor.
-ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
-#: Meaning of these codes.
-NO_BASIN = {ESCAPED: "escaped", UNCONVERGED: "unconverged", FAILED: "failed", NOT_COMPUTED: "not_computed"}
-#: The kind of an orbit that errors of the method keep from closing.
-NOISY = "noisy_periodic"
 #: Meaning of the values of ``agreement``.
 AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
 #: Ends of the names of a share and of its interval.
@@ -189,4 +184,4 @@ def padded(points: Sequence[np.ndarray], size: int) -> np.ndarray:
 
 def basin_meanings(attractors: int) -> dict[int, str]:
     """Words for the labels of a map with so many attractors."""
-    return {**NO_BASIN, **{i: f"attractor_{i}" for i in range(attractors)}}
+    return {**WITHOUT_WORDS, **{i: f"attractor_{i}" for i in range(attractors)}}

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.results.dataset.attractors import ENDS, NO_BASIN, NOT_COMPUTED, AttractorTable, padded
+from saltus.results.dataset.attractors import ENDS, AttractorTable, padded
+from saltus.results.dataset.kinds import WITHOUT_WORDS, Kind
 from saltus.results.dataset.variable import GUARDS, Variable
 
 #: What a bifurcation diagram may show of each response.
@@ -27,7 +28,7 @@ _OUTPUT = ("response", "output")
 #: the gaps; ``<output>``: that in ``output_units``, which an output has of its own.
 RESPONSES_VARIABLES = {
     "<parameter>": Variable(("<parameter>",), "<parameter>", "<parameter>", coord=True),
-    "response_of": Variable(_GRID, "1", "response that the start leads to", "i4", flags=NO_BASIN),
+    "response_of": Variable(_GRID, "1", "response that the start leads to", "i4", flags=WITHOUT_WORDS),
     "rms": Variable(_GRID, "<first>", "root mean square of the first state in the response"),
     "peak": Variable(_GRID, "<first>", "largest magnitude of the first state in the response"),
     "type": Variable(_GRID, "", "kind of motion, or what became of the start", "str"),
@@ -90,8 +91,8 @@ def grid_values(response_of: np.ndarray, table: AttractorTable) -> dict[str, np.
     at = np.where(response_of < 0, len(table), response_of)
     columns = {"rms": table.rms, "peak": table.peak, "contacts_per_period": _per_period(table), "period": table.period}
     found = {name: np.append(column, 0 if name == "period" else np.nan)[at] for name, column in columns.items()}
-    words = np.array([NO_BASIN[code] for code in range(NOT_COMPUTED, 0)] + list(table.kind), dtype=np.str_)
-    return {"response_of": response_of, **found, "type": words[response_of - NOT_COMPUTED]}
+    words = np.array([WITHOUT_WORDS[code] for code in range(min(Kind), 0)] + list(table.kind), dtype=np.str_)
+    return {"response_of": response_of, **found, "type": words[response_of - min(Kind)]}
 
 
 def response_values(table: AttractorTable, branch: np.ndarray, parameters: dict[str, np.ndarray], size: int) -> dict[str, Any]:

@@ -15,8 +15,9 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results.dataset import motions
-from saltus.results.dataset.attractors import AGREEMENT_VARIABLES, ATTRACTOR_VARIABLES, ATTRACTORS_VARIABLES, BASINS_VARIABLES, NOISY
+from saltus.results.dataset.attractors import AGREEMENT_VARIABLES, ATTRACTOR_VARIABLES, ATTRACTORS_VARIABLES, BASINS_VARIABLES
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.methods import METHODS_VARIABLES
 from saltus.results.dataset.responses import RESPONSES_VARIABLES
 from saltus.results.dataset.result import Result
@@ -115,8 +116,8 @@ def period_text(n: int, none: str = "not periodic") -> str:
 def kind_text(kind: str, n: int) -> str:
     """A motion in a word: ``T``, ``3T``, ``noisy 24T``, ``quasi-periodic``, ``chaotic``, ``equilibrium``, ``limit cycle``."""
     if n > 0:
-        return f"noisy {period_text(n)}" if kind == NOISY else period_text(n)
-    return kind.replace("_", " " if kind == "limit_cycle" else "-")
+        return f"noisy {period_text(n)}" if kind == Kind.NOISY_PERIODIC.word else period_text(n)
+    return kind.replace("_", " " if kind == Kind.LIMIT_CYCLE.word else "-")
 
 
 def states_of(ds: xr.Dataset) -> tuple[str, ...]:

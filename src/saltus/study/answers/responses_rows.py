@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.results.dataset.attractors import NO_BASIN
+from saltus.results.dataset.kinds import told
 from saltus.results.dataset.schema import event_name, kind_text, parameters_of, response_name, states_of
 from saltus.study.table import ROWS, Column, TextTable, interval, number, quantity, table, words
 from saltus.units import from_si
@@ -79,9 +79,7 @@ def _notes(ds: xr.Dataset, more: int) -> tuple[str, ...]:
     notes = [f"{ds.sizes['response']} different responses from {of.size} starts at {math.prod(of.shape[:-1])} values."]
     if more:
         notes.append(f"{more} shorter branches are in the file.")
-    unsettled = {word.replace("_", " "): int((of == code).sum()) for code, word in NO_BASIN.items()}
-    notes += [f"Starts {word}: {count}." for word, count in unsettled.items() if count]
-    return tuple(notes)
+    return (*notes, *told(of))
 
 
 def _events(title: str, ds: xr.Dataset) -> TextTable:

@@ -14,9 +14,9 @@ from saltus.analysis.basins.labels import Settling, settle
 from saltus.analysis.basins.serial import cell_types, found_data, found_from, settling_arrays, settling_from
 from saltus.analysis.orbits.aperiodic import Wandering
 from saltus.analysis.orbits.capture import Neighbourhoods
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.orbits import Orbit
-from saltus.analysis.orbits.recurrence import find
 from saltus.errors import SaltusError
 from saltus.results.store.durable import seal, unseal
 
@@ -40,7 +40,7 @@ def starts():
 def case(request):
     """A map, and the attractors that were found on it."""
     map_ = henon(1.4 if request.param == "chaotic" else 1.0, 0.3)
-    found = find(map_, starts(), SCALE, 256)[0]
+    found = find_attractors(map_, starts(), SCALE, 256)[0]
     assert [len(found.wandering), len(found.orbits)] == ([1, 0] if request.param == "chaotic" else [0, 1])
     return map_, found
 

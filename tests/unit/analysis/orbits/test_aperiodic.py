@@ -8,7 +8,8 @@ import pytest
 from function_maps import FunctionMap
 from saltus.analysis.basins.labels import complete, settle
 from saltus.analysis.orbits.aperiodic import Wandering, growth_rates, kind_of_growth, kinds_of, merge
-from saltus.analysis.orbits.recurrence import find, recurrence
+from saltus.analysis.orbits.find_attractors import find_attractors
+from saltus.analysis.orbits.recurrence import recurrence
 
 GOLDEN = math.pi * (math.sqrt(5) - 1)
 
@@ -109,7 +110,7 @@ def test_exponents_do_not_depend_on_units(unit):
 def test_henon_is_chaotic_and_what_runs_away_is_told():
     map_, scale, start = henon(1.4), np.array([2.5, 0.8]), drawn((-1.4, -0.3), (1.4, 0.3), 200)
     with np.errstate(all="ignore"):
-        found, label, _ = find(map_, start, scale, 1000)
+        found, label, _ = find_attractors(map_, start, scale, 1000)
         result = settle(map_, start, found, 1000)
     assert kinds(found) == ["chaotic"]
     one = found.wandering[0]
@@ -125,7 +126,7 @@ def test_henon_is_chaotic_and_what_runs_away_is_told():
 )
 def test_periods_of_the_logistic_map(r, period):
     with np.errstate(all="ignore"):
-        found, label, _ = find(logistic(r), drawn(0.05, 0.95), np.array([1.0]), 2000)
+        found, label, _ = find_attractors(logistic(r), drawn(0.05, 0.95), np.array([1.0]), 2000)
     assert [orbit.period for orbit in found.orbits] == [period]
     assert kinds(found) == ["periodic"]
     assert (label == 0).all()
@@ -134,7 +135,7 @@ def test_periods_of_the_logistic_map(r, period):
 @pytest.mark.parametrize("r", [3.001, 2.999])
 def test_slow_attractors_near_a_period_doubling_are_settled_to(r):
     """Multipliers 0.998 and -0.999: a residue of 1 falls to 1e-6 in 14 000 iterates at worst."""
-    found, label, _ = find(logistic(r), drawn(0.05, 0.95), np.array([1.0]), 20_000)
+    found, label, _ = find_attractors(logistic(r), drawn(0.05, 0.95), np.array([1.0]), 20_000)
     assert [orbit.period for orbit in found.orbits] == [2 if r > 3 else 1]
     assert kinds(found) == ["periodic"]
     assert (label == 0).all()
@@ -142,7 +143,7 @@ def test_slow_attractors_near_a_period_doubling_are_settled_to(r):
 
 @pytest.mark.parametrize("r", [3.58, 3.6, 3.678, 3.9, 4.0])
 def test_chaotic_logistic_maps(r):
-    found, label, _ = find(logistic(r), drawn(0.05, 0.95), np.array([1.0]), 500)
+    found, label, _ = find_attractors(logistic(r), drawn(0.05, 0.95), np.array([1.0]), 500)
     assert kinds(found) == ["chaotic"]
     assert (label == 0).all()
 
@@ -150,7 +151,7 @@ def test_chaotic_logistic_maps(r):
 @pytest.mark.parametrize("r", [3.8284, 3.57361, 3.57723, 3.85185])
 def test_a_weakly_chaotic_attractor_is_one(r):
     """The logistic map has one attractor. Exponents (2e4 iterates) are 0.06 to 0.13; their errors are large, that makes no second type."""
-    found, label, _ = find(logistic(r), drawn(0.05, 0.95, 24), np.array([1.0]), 1000)
+    found, label, _ = find_attractors(logistic(r), drawn(0.05, 0.95, 24), np.array([1.0]), 1000)
     assert len(found) == 1
     assert kinds(found) == ["chaotic"]
     assert (label == label[0]).all()
@@ -158,7 +159,7 @@ def test_a_weakly_chaotic_attractor_is_one(r):
 
 @pytest.mark.parametrize("contraction", [0.5, 0.9, 0.99, 0.995])
 def test_a_rotation_is_quasi_periodic_however_slowly_it_attracts(contraction):
-    found, label, _ = find(circle(contraction), drawn((-2, -2), (2, 2), 30), np.array([4.0, 4.0]), 4000)
+    found, label, _ = find_attractors(circle(contraction), drawn((-2, -2), (2, 2), 30), np.array([4.0, 4.0]), 4000)
     assert kinds(found) == ["quasi_periodic"]
     assert (label == 0).all()
     assert abs(found.wandering[0].exponent) < 1e-2
@@ -168,7 +169,7 @@ def test_a_rotation_is_quasi_periodic_however_slowly_it_attracts(contraction):
 @pytest.mark.parametrize("parts", [4, 7])
 def test_a_rotation_by_a_part_of_a_turn_has_no_attractor_that_is_chaotic(parts):
     """Every point of the circle is on an orbit of its own, with the multiplier 1: nothing attracts, nothing is chaotic."""
-    found, _, _ = find(circle(0.5, 2 * math.pi / parts), drawn((-2, -2), (2, 2), 30), np.array([4.0, 4.0]), 1000)
+    found, _, _ = find_attractors(circle(0.5, 2 * math.pi / parts), drawn((-2, -2), (2, 2), 30), np.array([4.0, 4.0]), 1000)
     assert "chaotic" not in kinds(found)
 
 
@@ -185,18 +186,18 @@ def test_a_conservative_rotation_with_shear_is_not_chaotic():
         w = image(z)
         return turn + 2 * np.stack([-w[:, 1], w[:, 0]], axis=1)[:, :, None] * z[:, None, :]
 
-    found, _, _ = find(FunctionMap(image, "x y", derivative), drawn((0.5, 0.5), (1, 1), 8), np.array([2.0, 2.0]), 500)
+    found, _, _ = find_attractors(FunctionMap(image, "x y", derivative), drawn((0.5, 0.5), (1, 1), 8), np.array([2.0, 2.0]), 500)
     assert "chaotic" not in kinds(found)
 
 
 @pytest.mark.parametrize(("map_", "place"), [(logistic(4.0), [0.0]), (logistic(3.2), [0.0])])
 def test_a_trajectory_that_stays_on_an_unstable_point_is_on_no_attractor(map_, place):
     """x = 0 is mapped to itself exactly, with multiplier r > 1."""
-    found, label, _ = find(map_, np.array([place]), np.array([1.0]), 500)
+    found, label, _ = find_attractors(map_, np.array([place]), np.array([1.0]), 500)
     assert kinds(found) == []
     assert label.tolist() == [-1]
     start = np.concatenate([[place], drawn(0.05, 0.95)])
-    both, label, _ = find(map_, start, np.array([1.0]), 500)
+    both, label, _ = find_attractors(map_, start, np.array([1.0]), 500)
     assert len(both) == 1
     assert label[0] == -1
     result = settle(map_, start, both, 500)
@@ -208,7 +209,7 @@ def test_a_trajectory_that_stays_on_an_unstable_point_is_on_no_attractor(map_, p
 def test_a_chaotic_saddle_is_not_an_attractor():
     """r = 3.83: the chaotic set beside the 3-cycle holds trajectories for a while, all leave it."""
     with np.errstate(all="ignore"):
-        found, label, _ = find(logistic(3.83), drawn(0.05, 0.95, 500), np.array([1.0]), 128)
+        found, label, _ = find_attractors(logistic(3.83), drawn(0.05, 0.95, 500), np.array([1.0]), 128)
     assert kinds(found) == ["periodic"]
     assert (label == 0).all()
 
@@ -219,7 +220,7 @@ def wandering(points, kind="chaotic") -> Wandering:
 
 
 def test_a_chaotic_attractor_of_four_states_is_one():
-    found = find(henons(1.4, 1.35), drawn([-0.3] * 4, [0.3] * 4, 12), np.array([2.5, 0.75, 2.5, 0.75]), 2000)[0]
+    found = find_attractors(henons(1.4, 1.35), drawn([-0.3] * 4, [0.3] * 4, 12), np.array([2.5, 0.75, 2.5, 0.75]), 2000)[0]
     assert kinds(found) == ["chaotic"]  # however many starts lead there: 4096 points in boxes of 1/64 would be another set for each
 
 

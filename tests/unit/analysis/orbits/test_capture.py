@@ -8,8 +8,8 @@ import pytest
 from function_maps import FunctionMap, orbit_near
 from saltus.analysis.basins.labels import settle
 from saltus.analysis.orbits.capture import Neighbourhoods, _alike, neighbourhoods, sphere
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
-from saltus.analysis.orbits.recurrence import find
 
 
 def linear(matrix) -> FunctionMap:
@@ -156,7 +156,7 @@ def test_every_point_of_the_shell_is_followed(point):
 def test_newton_s_map_every_point_of_a_neighbourhood_ends_on_its_root():
     map_, scale = newton(), np.array([4.0, 4.0])
     starts = np.random.default_rng(1).uniform(-2, 2, (100, 2))
-    found, _, _ = find(map_, starts, scale, 500)
+    found, _, _ = find_attractors(map_, starts, scale, 500)
     assert len(found) == 3
     for i, owner in enumerate(found.near.owners):
         points = inside(found.near, i, 2000)
@@ -171,7 +171,7 @@ def test_twins_of_the_cubic_map_are_told_apart_point_by_point(a):
     map_, scale = cubic(a), np.array([3.0])
     starts = np.linspace(-1.49, 1.49, 2001)[:, None]
     starts = starts[np.abs(starts[:, 0]) > 1e-3]
-    found, label, _ = find(map_, starts, scale, 2000)
+    found, label, _ = find_attractors(map_, starts, scale, 2000)
     assert len(found) == 2
     assert found.orbits[0].period == found.orbits[1].period == {1.5: 1, 2.1: 2, 2.25: 4, 2.29: 8}[a]
     end = map_.launch(starts, 4000).advance(4000)[:, -1]
@@ -182,7 +182,7 @@ def test_twins_of_the_cubic_map_are_told_apart_point_by_point(a):
 
 
 def test_neighbourhoods_of_different_attractors_do_not_overlap():
-    found, _, _ = find(cubic(2.29), np.random.default_rng(1).uniform(-1.5, 1.5, (200, 1)), np.array([3.0]), 2000)
+    found, _, _ = find_attractors(cubic(2.29), np.random.default_rng(1).uniform(-1.5, 1.5, (200, 1)), np.array([3.0]), 2000)
     for i, owner in enumerate(found.near.owners):
         label, _ = Neighbourhoods(found.near.centres, found.near.weights, found.near.owners).capture(inside(found.near, i, 500)[:, None, :])
         assert (label == owner).all()
@@ -225,7 +225,7 @@ def test_starts_that_escape_are_told_and_no_warning_is_given():
     starts = np.array([[0.4], [-0.4], [1.9], [-5.0], [1e200]])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found, label, _ = find(map_, starts, scale, 500)
+        found, label, _ = find_attractors(map_, starts, scale, 500)
         result = settle(map_, starts, found, 500)
     assert label.tolist() == [1, 0, -1, -1, -1] or label.tolist() == [0, 1, -1, -1, -1]
     np.testing.assert_array_equal(result.label[:2], label[:2])

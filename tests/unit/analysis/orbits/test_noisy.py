@@ -11,9 +11,9 @@ from function_maps import FunctionMap, orbit_near
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
 from saltus.analysis.basins.serial import found_data, found_from
 from saltus.analysis.orbits.capture import Neighbourhoods
+from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
-from saltus.analysis.orbits.noisy import NARROW, NOISY, ROOM, Noisy, apart, blurred
-from saltus.analysis.orbits.recurrence import find
+from saltus.analysis.orbits.noisy import NARROW, ROOM, Noisy, apart, blurred
 
 WIDE = np.array([1.0])
 SCALE = np.array([3.0, 1.0])
@@ -53,7 +53,7 @@ def starts(count=12, size=1):
 def cycle():
     """The exact 4-cycle."""
     exact = henon(0.0).exact_map
-    found, _, _ = find(exact, starts(size=2), SCALE, 256)
+    found, _, _ = find_attractors(exact, starts(size=2), SCALE, 256)
     assert [orbit.period for orbit in found.orbits] == [4]
     return found.orbits[0]
 
@@ -62,7 +62,7 @@ def cycle():
 def searched():
     """A blurred map, what was found on it, and where the starts lead."""
     map_ = henon(1e-3)
-    found, label, _ = find(map_, starts(size=2), SCALE, 256)
+    found, label, _ = find_attractors(map_, starts(size=2), SCALE, 256)
     return map_, found, label
 
 
@@ -72,8 +72,8 @@ def test_the_scatter_of_a_linear_map_is_that_of_its_errors_added_up(slope):
     """x' = a x + e u with independent u of variance 1/2: the variance of x is e^2/2 / (1 - a^2)."""
     scatter = []
     for error in (1e-3, 4e-3):
-        found, label, _ = find(linear(slope, error), starts(), WIDE, 256)
-        assert [(one.kind, one.orbit.period) for one in found.wandering] == [(NOISY, 1)]
+        found, label, _ = find_attractors(linear(slope, error), starts(), WIDE, 256)
+        assert [(one.kind, one.orbit.period) for one in found.wandering] == [("noisy_periodic", 1)]
         assert not found.orbits
         assert not found.astray
         assert set(label) == {0}
@@ -109,13 +109,13 @@ def test_what_scouts_miss_is_found_by_the_post_pass():
     result = settle(map_, starts(40, 2), nothing, 256)
     assert set(result.label) == {OPEN}
     found = complete(map_, result, nothing, SCALE, 256, 1)
-    assert [one.kind for one in found.wandering] == [NOISY]
+    assert [one.kind for one in found.wandering] == ["noisy_periodic"]
     assert set(result.label) == {0}
 
 
 def test_the_starts_do_not_decide_the_scatter(searched):
     """But for the last bits of the orbit, which errors of this kind amplify: 4 trails of 4096 points tell the scatter to some per cent."""
-    few, many = find(henon(1e-3), starts(2, 2), SCALE, 256)[0].wandering[0], searched[1].wandering[0]
+    few, many = find_attractors(henon(1e-3), starts(2, 2), SCALE, 256)[0].wandering[0], searched[1].wandering[0]
     np.testing.assert_allclose(few.scatter, many.scatter, rtol=0.05)
 
 
@@ -123,8 +123,8 @@ def test_an_exact_map_is_never_noisy():
     """The same function, taken for exact: its motion is no orbit, and nothing is told of it."""
     blurred_ = henon(1e-3)
     plain = FunctionMap(blurred_._function, "x y", blurred_._derivative)
-    found, label, _ = find(plain, starts(size=2), SCALE, 256)
-    assert NOISY not in [one.kind for one in found.wandering]
+    found, label, _ = find_attractors(plain, starts(size=2), SCALE, 256)
+    assert "noisy_periodic" not in [one.kind for one in found.wandering]
     assert not found.astray
     assert set(label) == {-1}
 
@@ -166,8 +166,8 @@ def test_loops_that_errors_make_are_scatter_about_the_exact_orbit():
     exact = FunctionMap(lambda z: -0.5 * z, "x", derivative)
     map_ = FunctionMap(lambda z: -0.5 * z - error * np.where(z < 0, -1.0, 1.0), "x", derivative, 1e-5, exact)
     assert orbit_near(map_, np.array([2.1 * error]), 2, WIDE).period == 2
-    found, label, _ = find(map_, starts(), WIDE, 256)
-    assert [(one.kind, one.orbit.period) for one in found.wandering] == [(NOISY, 1)]
+    found, label, _ = find_attractors(map_, starts(), WIDE, 256)
+    assert [(one.kind, one.orbit.period) for one in found.wandering] == [("noisy_periodic", 1)]
     assert found.wandering[0].scatter.item() == pytest.approx(2 * error, rel=1e-3)
     assert not found.orbits
     assert set(label) == {0}
@@ -176,7 +176,7 @@ def test_loops_that_errors_make_are_scatter_about_the_exact_orbit():
 def test_an_orbit_that_errors_only_shift_stays_periodic():
     derivative = lambda z: np.full((len(z), 1, 1), 0.5)  # noqa: E731
     map_ = FunctionMap(lambda z: 0.5 * z + 1e-3, "x", derivative, 1e-5, FunctionMap(lambda z: 0.5 * z, "x", derivative))
-    found, label, _ = find(map_, starts(), WIDE, 256)
+    found, label, _ = find_attractors(map_, starts(), WIDE, 256)
     assert [orbit.period for orbit in found.orbits] == [1]
     assert not found.wandering
     assert found.orbits[0].points.item() == pytest.approx(2e-3)
@@ -210,7 +210,7 @@ def test_cells_that_have_a_label_keep_their_attractor_when_it_turns_out_to_be_no
 
 def test_errors_that_carry_the_motion_too_far_leave_it_without_a_type():
     """0.02/(1 - 0.9) is a fifth of the range: no scatter about a point. What it would be, and how far it strays, is told."""
-    found, label, _ = find(linear(0.9, 0.02), starts(), WIDE, 256)
+    found, label, _ = find_attractors(linear(0.9, 0.02), starts(), WIDE, 256)
     assert len(found) == 0
     assert set(label) == {-1}
     assert {stray.period for stray in found.astray} == {1}

@@ -11,7 +11,7 @@ from made_results import Responses, Starts
 from saltus.errors import ParameterError
 from saltus.results import Guards, content_hash, describe, load, save
 from saltus.results.dataset import schema
-from saltus.results.dataset.attractors import NO_BASIN
+from saltus.results.dataset.kinds import Kind
 
 from .responses_data import NO_RESPONSE, RESPONSE_OF, TABLE, responses, two_parameters
 
@@ -71,7 +71,7 @@ def test_the_grid_is_looked_up_in_the_responses():
 @pytest.mark.parametrize("code", [-1, -2, -3, -4])
 def test_a_start_without_a_response_is_named(code):
     ds = responses(response_of=np.where(RESPONSE_OF == 4, code, RESPONSE_OF))
-    assert ds["type"].values[2, 1] == NO_BASIN[code]
+    assert ds["type"].values[2, 1] == Kind(code).word
     assert np.isnan(ds["rms"].values[2, 1])
 
 

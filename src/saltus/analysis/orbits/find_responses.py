@@ -15,19 +15,15 @@ import numpy as np
 from saltus.analysis.orbits import unforced
 from saltus.analysis.orbits.aperiodic import kinds_of
 from saltus.analysis.orbits.equilibria import autonomous
-from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits
-from saltus.analysis.orbits.recurrence import recurrence
+from saltus.analysis.orbits.orbits import OrbitBatch
+from saltus.analysis.orbits.recurrence import recurrence, recurring_orbits
 from saltus.analysis.orbits.tolerances import BESIDE, NEAR, RESTS, ROUND, SETTLED
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
+from saltus.results.dataset.kinds import Kind
 
-#: Kinds of motion, and why there may be none.
-PERIODIC, QUASI_PERIODIC, CHAOTIC, EQUILIBRIUM, LIMIT_CYCLE = 0, 1, 2, 3, 4
-#: Kinds that Newton's method closes.
-CLOSED = (PERIODIC, EQUILIBRIUM, LIMIT_CYCLE)
-ESCAPED, UNCONVERGED, FAILED, NOT_COMPUTED = -1, -2, -3, -4
 #: Trajectories that one thread follows at a time.
 PIECE = 512
 #: Periods and looks a period from which the range of a motion is taken.
@@ -43,7 +39,7 @@ class Steady:
     Attributes
     ----------
     kind : int64[k]
-        ``PERIODIC``, ``QUASI_PERIODIC``, ``CHAOTIC``; of a system without forcing ``EQUILIBRIUM``, ``LIMIT_CYCLE``; or a code below zero.
+        What it settles to, or why to nothing: :class:`saltus.results.dataset.kinds.Kind`.
     orbits : OrbitBatch
         The orbits of the periodic ones, verified; elsewhere nothing.
     exponent, exponent_error : float64[k]
@@ -72,7 +68,7 @@ class Steady:
         """Nothing computed yet."""
         nothing = np.full(count, np.nan)
         return cls(
-            np.full(count, NOT_COMPUTED, np.int64), OrbitBatch.none(count, size), nothing.copy(), nothing.copy(),
+            np.full(count, Kind.NOT_COMPUTED, np.int64), OrbitBatch.none(count, size), nothing.copy(), nothing.copy(),
             np.full(count, -1, np.int64), np.ones((count, size)), {}, np.full((count, size), np.nan),
         )  # fmt: skip
 
@@ -118,7 +114,7 @@ def _settle(map_: Stroboscope, start: np.ndarray, most: int) -> Steady:
         who = _wander(map_, result.end, who, result)
     if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
         who = _follow(map_, result.end, who, most, result, NEAR)
-        result.kind[who] = UNCONVERGED
+        result.kind[who] = Kind.UNCONVERGED
     return result
 
 
@@ -130,7 +126,7 @@ def _follow(map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, re
         going = flight.going
         result.end[who] = flight.state
         ended = who[~going]
-        result.kind[ended] = np.where(flight.status[~going] == st.NONFINITE, ESCAPED, FAILED)
+        result.kind[ended] = np.where(flight.status[~going] == st.NONFINITE, Kind.ESCAPED, Kind.FAILED)
         stay = going.copy()
         if going.any():
             rows = np.flatnonzero(going)
@@ -147,22 +143,13 @@ def _settled(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float
     """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes the orbits."""
     if autonomous(map_.system):
         return _settled_unforced(map_.rows(who), points, who, near, result)
-    scale = result.scale[who]
-    period, apart = recurrence(points, scale)
-    done = np.zeros(len(who), bool)
-    noise = map_.rows(who).noise_of(scale)
-    ready = np.flatnonzero(apart < np.maximum(near, noise))
-    if not len(ready):
-        return done
-    orbits = find_orbits(map_.rows(who[ready]), points[ready, -1], period[ready], scale[ready], noise[ready])
-    tolerance = BESIDE * np.maximum(apart[ready], noise[ready])
-    right = orbits.stable & (orbits.distance(points[ready, -1], scale[ready]) <= tolerance)
-    done[ready[right]] = True
-    chosen = who[ready[right]]
-    result.orbits.put(chosen, orbits.rows(right))
-    result.kind[chosen], result.exponent_error[chosen] = PERIODIC, 0.0
+    orbits, apart, noise = recurring_orbits(map_.rows(who), points, result.scale[who], near)
+    beside = orbits.distance(points[:, -1], result.scale[who]) <= BESIDE * np.maximum(apart, noise)
+    done = orbits.stable & beside
+    result.orbits.put(who[done], orbits.rows(done))
+    result.kind[who[done]], result.exponent_error[who[done]] = Kind.PERIODIC, 0.0
     with np.errstate(divide="ignore"):
-        result.exponent[chosen] = np.log(np.abs(orbits.multipliers[right, 0])) / orbits.period[right]
+        result.exponent[who[done]] = np.log(np.abs(orbits.multipliers[done, 0])) / orbits.period[done]
     return done
 
 
@@ -176,7 +163,7 @@ def _settled_unforced(map_: Stroboscope, points: np.ndarray, who: np.ndarray, ne
     result.orbits.put(chosen, found.orbits.rows(done))
     result.scale[chosen] = found.scale[done]
     rests = found.orbits.time[done] == 0
-    result.kind[chosen], result.exponent_error[chosen] = np.where(rests, EQUILIBRIUM, LIMIT_CYCLE), 0.0
+    result.kind[chosen], result.exponent_error[chosen] = np.where(rests, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE), 0.0
     leading = found.orbits.multipliers[done, 0].real * map_.period[done]
     result.exponent[chosen] = np.where(rests, leading, 0.0)  # along a limit cycle nothing grows or dies
     return done
@@ -194,19 +181,19 @@ def _wander(map_: Stroboscope, start: np.ndarray, who: np.ndarray, result: Stead
     if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
         recurs |= unforced.nearly_recurs(maps, flight.state, ROUND * float(map_.period[0]))
         away = unforced.runs_away(trail)
-        result.kind[who[away]] = ESCAPED
+        result.kind[who[away]] = Kind.ESCAPED
     for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2))):
         kind = kinds[i]
         if (
-            result.kind[who[i]] != ESCAPED
+            result.kind[who[i]] != Kind.ESCAPED
             and kind is not None
-            and not (recurs[i] and (kind[0] != "chaotic" or not autonomous(map_.system)))
+            and not (recurs[i] and (kind[0] != Kind.CHAOTIC.word or not autonomous(map_.system)))
         ):
             unclear[i], row = False, who[i]
-            result.kind[row] = CHAOTIC if kind[0] == "chaotic" else QUASI_PERIODIC
+            result.kind[row] = Kind[kind[0].upper()]
             result.exponent[row], result.exponent_error[row] = kind[1:]
             result.trail[int(row)], result.settled[row] = trail[i], -1
-    return who[unclear & (result.kind[who] != ESCAPED)]
+    return who[unclear & (result.kind[who] != Kind.ESCAPED)]
 
 
 def motion_range(map_: Stroboscope, state: np.ndarray) -> np.ndarray:

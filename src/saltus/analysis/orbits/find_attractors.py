@@ -1,0 +1,265 @@
+"""From trajectories of a map to its attractors: settle, notice what recurs, polish it, and find out what never does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from saltus.analysis.orbits.aperiodic import REPEATS, TRAIL, Wandering, merge, mismatch, survey
+from saltus.analysis.orbits.capture import Neighbourhoods
+from saltus.analysis.orbits.equilibria import autonomous
+from saltus.analysis.orbits.found import INSIDE, Found, is_about
+from saltus.analysis.orbits.limit_cycles import limit_cycles
+from saltus.analysis.orbits.noisy import Noisy, Stray, blurred, keep_to, stray_of
+from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
+from saltus.analysis.orbits.recurrence import recurrence
+from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
+from saltus.flow.maps import Map, Stroboscope, Travel
+from saltus.results.dataset.kinds import Kind
+
+#: Orbits tried in one round; what isn't tried has its turn in the next.
+TRIES = 12
+#: Trajectories that never recur whose motion is surveyed.
+SURVEYED = 24
+#: Iterates that they are watched, and what their repeats come to, in units of the scale, when they are on an orbit after all.
+WATCHED, ARRIVED = 32 * 1024, 1e-5
+
+
+def find_attractors(
+    map_: Map,
+    start: np.ndarray,
+    scale: np.ndarray,
+    most: int,
+    known: Found | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Found, np.ndarray, np.ndarray]:
+    """The attractors that trajectories from given starts settle to.
+
+    Parameters
+    ----------
+    map_ : Map
+        The map.
+    start : float64[k, D]
+        Starts.
+    scale : float64[D]
+        Range of each state.
+    most : int
+        Iterates after which a trajectory that hasn't settled is surveyed for chaos.
+    known : Found, optional
+        Attractors that are known already.
+    progress : callable, optional
+        Called with the share done.
+
+    Returns
+    -------
+    found : Found
+        Known and new attractors, in the order of their ids.
+    label : int64[k]
+        The attractor of each start; -1 where none was established.
+    settled : int64[k]
+        Iterates after which it was captured; -1 if it wasn't.
+    """
+    found = known or Found(Neighbourhoods.none(start.shape[1]))
+    found = Found(found.near, list(found.orbits), list(found.wandering), list(found.unstable))
+    owner: list[Orbit | Wandering | None] = [None] * len(start)
+    settled = np.full(len(start), -1, np.int64)
+    travel, going = map_.launch(start, most), np.arange(len(start))
+    turns = isinstance(map_, Stroboscope) and autonomous(map_.system)
+    while len(going) and travel.age < most:
+        points = travel.advance(ROUND)
+        here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
+        here = here[~_keeping(found, Kind.NOISY_PERIODIC.word, points[here], going[here], travel.age, owner, settled)]
+        while len(here) and _add_orbits(map_, points[here], scale, found, most):
+            here = here[~_keeping(found, Kind.NOISY_PERIODIC.word, points[here], going[here], travel.age, owner, settled)]
+            here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
+        if turns and len(here):
+            here = here[~_on_cycles(map_, found, points[here], going[here], travel, here, scale, owner, settled)]
+        stay = np.zeros(len(going), bool)
+        stay[here] = travel.going[here]
+        travel.keep(stay)
+        going = going[stay]
+        if progress:
+            progress(max(1.0 - len(going) / len(start), travel.age / most))
+    if len(going):
+        _survey(map_, travel, going, scale, found, owner, settled, most)
+    result = found.ordered(scale)
+    label = np.array([-1 if one is None else result.index(one) for one in owner], np.int64)
+    return result, label, settled
+
+
+def _captured(found: Found, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray) -> np.ndarray:
+    """Note which of the trajectories are captured, and after how many iterates."""
+    label, when = found.near.capture(points)
+    caught = label >= 0
+    for i, orbit, at in zip(who[caught], label[caught], when[caught], strict=True):
+        owner[i], settled[i] = found.orbits[orbit], age + at + 1
+    return caught
+
+
+def _keeping(found: Found, kind: str, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray) -> np.ndarray:
+    """Note which trajectories float64[k, m, D] keep to an attractor of a kind that is known by where it goes, bool[k]."""
+    ones = [one for one in found.wandering if one.kind == kind]
+    on = keep_to(ones, points, INSIDE)
+    for i in np.flatnonzero(on >= 0):
+        owner[who[i]], settled[who[i]] = ones[on[i]], age
+    return on >= 0
+
+
+def _add_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, most: int) -> bool:
+    """Add the attracting orbits not known yet that some of the trajectories float64[k, ROUND, D] follow; whether there are any."""
+    period, apart = recurrence(points, scale)
+    near = max(NEAR, map_.noise)
+    tried: list[int] = []
+    for i in np.argsort(apart, kind="stable")[: np.count_nonzero(apart < near)]:
+        known = any(_lies_on(points[i, -1], orbit, scale, 10 * apart[i]) for orbit in found.unstable)
+        if not known and not any(np.abs((points[i, -1] - points[j, -1]) / scale).max() < near for j in tried):
+            tried.append(i)
+        if len(tried) == TRIES:
+            break
+    place, k = points[tried, -1], len(tried)
+    orbits = find_orbits(map_, place, period[tried], np.broadcast_to(scale, place.shape), np.full(k, map_.noise))
+    right = (orbits.period > 0) & (orbits.distance(place, np.broadcast_to(scale, place.shape)) < 100 * near)
+    added = False
+    for i in np.flatnonzero(right).tolist():
+        orbit = orbits[i]
+        if any(is_about(one, orbit) for one in found.wandering):
+            continue
+        known_ones = found.orbits if orbits.stable[i] else found.unstable
+        if any(same(orbit, one, scale, max(SAME, 4 * map_.noise)) for one in known_ones):
+            continue
+        if not orbits.stable[i]:
+            found.unstable.append(orbit)
+            continue
+        noisy = _behind(map_, orbit, scale, most)
+        if noisy is None:
+            found.add(map_, orbit, scale)
+        else:
+            found.add_wandering(noisy)
+        added = True
+    return added
+
+
+def _behind(map_: Map, orbit: Orbit, scale: np.ndarray, most: int) -> Noisy | None:
+    """The exact orbit of another period about which an inexact map's orbit is scatter: its loops are made, or lost, by errors."""
+    exact = _exactly(map_, orbit.points[:1], scale, most)[0] if _blurs(map_) else None
+    noisy = None if exact is None or exact.period == orbit.period else blurred(map_, exact, scale)
+    return noisy if noisy is not None and is_about(noisy, orbit) else None
+
+
+def _blurs(map_: Map) -> bool:
+    """Whether errors of a map are more than rounding, and periods are there to be blurred."""
+    return map_.exact_map is not None and not (isinstance(map_, Stroboscope) and autonomous(map_.system))
+
+
+def _exactly(map_: Map, state: np.ndarray, scale: np.ndarray, most: int) -> list[Orbit | None]:
+    """The orbits to which the exact map settles from float64[k, D]."""
+    assert map_.exact_map is not None
+    exact, label, _ = find_attractors(map_.exact_map, state, scale, most)
+    return [exact.orbits[i] if 0 <= i < len(exact.orbits) else None for i in label]
+
+
+def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: float) -> bool:
+    return bool(np.abs((orbit.points - place) / scale).max(axis=1).min() < tolerance)
+
+
+def _on_cycles(
+    map_: Map, found: Found, points: np.ndarray, who: np.ndarray, travel: Travel, rows: np.ndarray, scale: np.ndarray, owner: list,
+    settled: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are looked for. Notes their owners."""
+    cycles = [one for one in found.wandering if one.kind == Kind.LIMIT_CYCLE.word]
+    alone = np.flatnonzero(keep_to(cycles, points, INSIDE) < 0)
+    some = alone[np.unique(np.linspace(0, len(alone) - 1, min(TRIES, len(alone))).astype(int))] if len(alone) else alone
+    some = some[travel.going[rows[some]]]
+    if len(some) and isinstance(map_, Stroboscope):
+        fresh = limit_cycles(map_, points[some, -1], ROUND * float(map_.period[0]), scale)
+        found.wandering = merge([*found.wandering, *fresh])
+    return _keeping(found, Kind.LIMIT_CYCLE.word, points, who, travel.age, owner, settled)
+
+
+def _survey(
+    map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: Found, owner: list, settled: np.ndarray, most: int
+) -> None:  # fmt: skip
+    """Find out what the trajectories do that never settled: watch them much longer, and call an attractor only what none of them leaves.
+
+    A chaotic saddle holds trajectories for thousands of periods too; what is seen to leave it betrays it.
+    """
+    survivors, points, leavers = _watch(travel, going, found, owner, settled)
+    if not len(survivors):
+        return
+    chosen = np.unique(np.linspace(0, len(survivors) - 1, min(SURVEYED, len(survivors))).astype(int))
+    noisy, strays = _blurred(map_, travel.state[chosen], points[chosen], scale, most)
+    keeps = keep_to(noisy, points[chosen], INSIDE) >= 0
+    rests = np.array([mismatch(points[i, -ROUND:], scale) < ARRIVED for i in chosen])  # stays on an orbit that doesn't attract
+    free = chosen[~keeps & ~rests]
+    seen = [*noisy, *survey(map_, travel.state[free], points[free], scale)]
+    if seen:
+        moves = chosen[keeps | ~rests]
+        leavers.append(points[moves][_leave(map_, travel.state[moves], found, noisy, scale), -ROUND:])
+    for one in seen:
+        if not any((one.share(trail) >= INSIDE).any() for trail in leavers if len(trail)):
+            found.add_wandering(one)
+    label = wanders_on(found, points[:, -ROUND:], scale) if found.wandering else np.full(len(survivors), -1)
+    for i, one in zip(going[survivors], label, strict=True):
+        if one >= 0:
+            owner[i] = found.wandering[one]
+    found.astray = [stray for stray, one in zip(strays, label[chosen], strict=True) if one < 0] if strays else []
+
+
+def _watch(
+    travel: Travel, going: np.ndarray, found: Found, owner: list, settled: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
+    """Those of some trajectories that settle to nothing for TRAIL iterates more, int64[k], where they were, and where those that did."""
+    survivors = np.arange(len(going))
+    trails: list[np.ndarray] = []
+    leavers: list[np.ndarray] = []
+    for _ in range(TRAIL // ROUND):
+        points = travel.advance(ROUND)
+        caught = _captured(found, points, going[survivors], travel.age - ROUND, owner, settled)
+        leavers += [trail[caught] for trail in trails]
+        stays = ~caught & travel.going
+        travel.keep(stays)
+        survivors, trails = survivors[stays], [*(trail[stays] for trail in trails), points[stays]]
+        if not len(survivors):
+            break
+    return survivors, np.concatenate(trails, axis=1), leavers
+
+
+def _blurred(map_: Map, state: np.ndarray, trails: np.ndarray, scale: np.ndarray, most: int) -> tuple[list[Noisy], list[Stray]]:
+    """The noisy orbits that trajectories float64[k, TRAIL, D] keep to, and how far each strays from an exact one; nothing of an exact map.
+
+    They stand at float64[k, D].
+    """
+    if not _blurs(map_):
+        return [], []
+    orbits = _exactly(map_, state, scale, most)
+    strays = [stray_of(map_, orbit, trail, scale) for orbit, trail in zip(orbits, trails, strict=True)]
+    about = [blurred(map_, orbit, scale) for orbit in {id(orbit): orbit for orbit in orbits if orbit is not None}.values()]
+    return [one for one in about if one is not None and (one.share(trails) >= INSIDE).any()], strays
+
+
+def _leave(map_: Map, state: np.ndarray, found: Found, noisy: list[Noisy], scale: np.ndarray) -> np.ndarray:
+    """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]; those beside a noisy one don't."""
+    travel, going = map_.launch(state, WATCHED), np.arange(len(state))
+    left = np.zeros(len(state), bool)
+    while len(going) and travel.age < WATCHED:
+        points = travel.advance(ROUND)
+        arrives = found.near.capture(points)[0] >= 0
+        if travel.age % (8 * ROUND) == 0:
+            arrives |= [mismatch(trail, scale) < ARRIVED for trail in points] & (keep_to(noisy, points, INSIDE) < 0)
+        left[going[arrives]] = True
+        stays = ~arrives & travel.going
+        travel.keep(stays)
+        going = going[stays]
+    return left
+
+
+def wanders_on(found: Found, trails: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """For trajectories float64[k, m, D]: which attractor of those that never repeat each keeps to, -1 if none; none if it repeats."""
+    shares = np.stack([one.share(trails) for one in found.wandering], axis=1)
+    _, apart = recurrence(trails, scale)
+    best = shares.argmax(axis=1)
+    recurring = (Kind.LIMIT_CYCLE.word, Kind.NOISY_PERIODIC.word)  # iterates on these may recur
+    turns = np.array([one.kind in recurring for one in found.wandering])
+    return np.where((shares.max(axis=1) >= INSIDE) & ((apart > REPEATS) | turns[best]), best, -1)

@@ -1,0 +1,48 @@
+"""Kinds of motion, and why a start may lead to none: one code and one word for each, wherever they are told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import IntEnum
+
+import numpy as np
+
+
+class Kind(IntEnum):
+    """A kind of motion; below zero, why a start leads to none."""
+
+    PERIODIC = 0
+    QUASI_PERIODIC = 1
+    CHAOTIC = 2
+    EQUILIBRIUM = 3
+    LIMIT_CYCLE = 4
+    #: An orbit that errors of the method keep from closing.
+    NOISY_PERIODIC = 5
+    ESCAPED = -1
+    UNCONVERGED = -2
+    FAILED = -3
+    NOT_COMPUTED = -4
+
+    @property
+    def word(self) -> str:
+        """As it stands in Datasets."""
+        return self.name.lower()
+
+
+#: Kinds that Newton's method closes.
+CLOSED = (Kind.PERIODIC, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE)
+#: What became of starts that lead to no attractor, as the end of a sentence.
+WITHOUT: Mapping[Kind, str] = {
+    Kind.ESCAPED: "escaped: their motion grew beyond all numbers",
+    Kind.UNCONVERGED: "lead to no known attractor within the periods allowed",
+    Kind.FAILED: "failed: the integration ended early, and status says why",
+    Kind.NOT_COMPUTED: "weren't computed: the run was stopped",
+}
+#: The words for them by their codes.
+WITHOUT_WORDS = {int(kind): kind.word for kind in WITHOUT}
+
+
+def told(labels: np.ndarray) -> list[str]:
+    """A sentence for each reason why starts lead to no attractor, with how many they are: labels int[...] of attractors, or codes."""
+    counts = {kind: int(np.count_nonzero(labels == kind)) for kind in WITHOUT}
+    return [f"{count} starts {WITHOUT[kind]}." for kind, count in counts.items() if count]
