@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.orbits.orbits import phase_distances
 from saltus.plot.style import OKABE_ITO
 
 
@@ -44,5 +45,4 @@ def strobe(run: xr.Dataset, trajectory: int) -> np.ndarray:
 def lag(reference: np.ndarray, points: np.ndarray, n: int) -> int:
     """By how many periods ``points`` must be rolled back to lie best on an nT orbit ``reference``."""
     scale = np.maximum(np.ptp(reference, axis=0), 1e-3 * np.abs(reference).max(axis=0))
-    misses = [np.abs((np.roll(points[:n], -shift, axis=0) - reference[:n]) / scale).max() for shift in range(n)]
-    return int(np.argmin(misses))
+    return int(phase_distances(reference[:n], points[:n], scale).argmin())

@@ -18,7 +18,7 @@ from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
 from saltus.flow.threads import on_threads
 from saltus.interrupt import Stop, check_stop, ctrl_c_waits, no_ctrl_c_is_lost
-from saltus.results.dataset.schema import NOT_COMPUTED
+from saltus.results.dataset.kinds import Kind
 
 START = {"x": np.linspace(-4e-3, 4e-3, 24), "v": np.linspace(-0.5, 0.5, 24)}
 
@@ -146,7 +146,7 @@ def test_a_map_ends_on_request_as_it_does_on_ctrl_c(monkeypatch):
     part = holding.partial(
         lambda: sl.basins(rig, **axes, threads=1, progress=lambda share: share > basins.SCOUTING and labelled.set()), labelled
     )
-    there = part.basin.values != NOT_COMPUTED
+    there = part.basin.values != Kind.NOT_COMPUTED
     assert 24 <= there.sum() <= 72
     np.testing.assert_array_equal(part.basin.values[there], whole.basin.values[there])
     assert set(part.data_vars) <= set(whole.data_vars)

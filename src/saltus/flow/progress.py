@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,21 +17,31 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 
-def reporter(progress: bool | Callable[[float], None] | None) -> tuple[Callable[[float], None] | None, Callable[[], None]]:
-    """A progress callable and what to call at the end: the user's own, a bar after two seconds on a terminal, lines elsewhere.
+@contextmanager
+def reporting(progress: bool | Callable[[float], None] | None) -> Iterator[Callable[[float], None] | None]:
+    """Within, what is to be called with the share done: the user's own, a bar after two seconds on a terminal, lines elsewhere.
 
     Raises ParameterError if it is neither a callable, nor True, False or None.
     """
-    if callable(progress):
-        return progress, lambda: None
-    if not (progress is None or isinstance(progress, bool | np.bool_)):
+    if not (callable(progress) or progress is None or isinstance(progress, bool | np.bool_)):
         raise ParameterError(f"progress must be True, False or a function of the share done, not {progress!r:.80}.")
-    if progress is not None and not progress:
-        return None, lambda: None
-    if progress is None and not os.isatty(2):
-        return Lines(_to_stderr).show, lambda: None
-    bar = _Bar()
-    return bar.show, bar.close
+    if callable(progress):
+        yield progress
+    elif progress is not None and not progress:
+        yield None
+    elif progress is None and not os.isatty(2):
+        yield Lines(_to_stderr).show
+    else:
+        bar = _Bar()
+        try:
+            yield bar.show
+        finally:
+            bar.close()
+
+
+def stage(show: Callable[[float], None] | None, begin: float, end: float) -> Callable[[float], None] | None:
+    """Progress of one stage as a part of the whole."""
+    return None if show is None else lambda share: show(begin + (end - begin) * share)
 
 
 def _to_stderr(text: str) -> None:

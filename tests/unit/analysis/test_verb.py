@@ -6,7 +6,7 @@ import pytest
 import saltus as sl
 from saltus.analysis.verb import verb
 from saltus.codegen.announce import announce
-from saltus.flow.progress import Lines, reporter
+from saltus.flow.progress import Lines, reporting
 
 rig = sl.models.delangre("b")
 
@@ -166,10 +166,12 @@ def test_the_time_left_does_not_count_what_came_before_the_work():
 
 
 def test_what_progress_may_be():
-    assert reporter(False)[0] is None
-    assert reporter(print)[0] is print
-    with pytest.raises(sl.SaltusError, match="progress must be"):
-        reporter("bar")
+    with reporting(False) as show:
+        assert show is None
+    with reporting(print) as show:
+        assert show is print
+    with pytest.raises(sl.SaltusError, match="progress must be"), reporting("bar"):
+        pass
 
 
 @pytest.mark.parametrize(

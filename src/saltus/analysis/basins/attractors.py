@@ -24,7 +24,7 @@ from saltus.flow.counts import whole
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
-from saltus.flow.progress import reporter
+from saltus.flow.progress import reporting
 from saltus.flow.room import check_room
 from saltus.results import attractors_dataset
 from saltus.results.dataset.kinds import Kind
@@ -101,11 +101,8 @@ def attractors(
     group, periods = ensemble(system, start, None), whole(periods, "periods")
     map_ = Stroboscope(system, check_method(method), every=None if every is None else to_si(every, "s", "every"), threads=threads)
     scale = _spread(map_, group.start)
-    show, close = reporter(progress)
-    try:
+    with reporting(progress) as show:
         found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
-    finally:
-        close()
     return attractors_dataset(
         states=system.states, units=system.units, attractors=portraits(map_, found), gap_unit=gap_unit(system),
         basin=np.where(label < 0, Kind.UNCONVERGED, label), periods_to_settle=settled,
@@ -174,14 +171,11 @@ def basin_fractions(
     map_ = Stroboscope(system, check_method(method), every=None if every is None else to_si(every, "s", "every"), threads=threads)
     start = fill(system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed)
     scale = _spread(map_, start[:SPREAD_STARTS])
-    show, close = reporter(progress)
-    try:
+    with reporting(progress) as show:
         scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
         found = find_attractors(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
-    finally:
-        close()
     table = replace(portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found)))
     ds = attractors_dataset(
         states=system.states, units=system.units, attractors=table, gap_unit=gap_unit(system), basin=result.label,

@@ -12,7 +12,7 @@ from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.verb import verb
 from saltus.flow.methods import Method, check_method
-from saltus.flow.progress import reporter
+from saltus.flow.progress import reporting, stage
 from saltus.flow.threads import on_threads
 from saltus.interrupt import Interrupted
 from saltus.system.system import System
@@ -90,18 +90,17 @@ def basins(
 
 def map_of(plan: BasinPlan, threads: int | None, progress: bool | Callable[[float], None] | None) -> xr.Dataset:
     """The Dataset of a planned map, as :func:`basins` returns it. Raises Interrupted on Ctrl-C."""
-    show, close = reporter(progress)
     result = Settling.empty(plan.cells, len(plan.system.states))
     found = None
-    try:
-        found = plan.scout(threads, _part(show, 0.0, SCOUTING))
-        label_all(plan, found, range(plan.chunks), lambda i, part: result.put(plan.cells_of(i), part), threads, _part(show, SCOUTING, 1.0))
-        return plan.finish(result, found, threads)
-    except KeyboardInterrupt:
-        scouted = found
-        raise Interrupted(None if scouted is None else lambda: plan.dataset(result, scouted, threads)) from None
-    finally:
-        close()
+    with reporting(progress) as show:
+        try:
+            found = plan.scout(threads, stage(show, 0.0, SCOUTING))
+            chunks, rest = range(plan.chunks), stage(show, SCOUTING, 1.0)
+            label_all(plan, found, chunks, lambda i, part: result.put(plan.cells_of(i), part), threads, rest)
+            return plan.finish(result, found, threads)
+        except KeyboardInterrupt:
+            scouted = found
+            raise Interrupted(None if scouted is None else lambda: plan.dataset(result, scouted, threads)) from None
 
 
 def label_all(
@@ -116,8 +115,3 @@ def label_all(
     map_ = plan.map(1)
     map_.launch(plan.starts(plan.cells_of(0)[:1]), 1)  # compiles before threads ask for it
     on_threads(lambda index: plan.chunk(index, found, map_), chunks, done, threads, progress)
-
-
-def _part(show: Callable[[float], None] | None, begin: float, end: float) -> Callable[[float], None] | None:
-    """Progress of one stage as a part of the whole."""
-    return None if show is None else lambda share: show(begin + (end - begin) * share)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import linear_sum_assignment
 
+from saltus.analysis.orbits.orbits import orbit_distance
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.intervals import wilson
@@ -165,7 +166,7 @@ def _distances(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
         n = int(periods[0][i])
         if types[0][i] != types[1][j] or n != periods[1][j]:
             continue
-        result[i, j] = _orbit_distance(points[0][i, :n], points[1][j, :n]) if n else levels[i, j]
+        result[i, j] = orbit_distance(points[0][i, :n], points[1][j, :n]) if n else levels[i, j]
     return np.where(np.isnan(result), np.inf, result)
 
 
@@ -173,13 +174,6 @@ def _level_distances(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:
     """Difference in peak or rms, the larger, of every attractor of a from every one of b, in units of the first axis' range."""
     levels = [np.stack([ds["attractor_peak"].values, ds["attractor_rms"].values], axis=-1) / _scales(a, b)[0] for ds in (a, b)]
     return np.abs(levels[0][:, None] - levels[1][None]).max(axis=2)
-
-
-def _orbit_distance(p: np.ndarray, q: np.ndarray) -> float:
-    """Largest difference of the points of two orbits, float64[n, D], at the best shift of the phase."""
-    if len(p) != len(q):
-        return np.inf
-    return min(float(np.abs(p - np.roll(q, shift, axis=0)).max()) for shift in range(len(p)))
 
 
 def _scales(a: xr.Dataset, b: xr.Dataset) -> np.ndarray:

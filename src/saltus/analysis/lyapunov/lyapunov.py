@@ -19,7 +19,7 @@ from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
-from saltus.flow.progress import reporter
+from saltus.flow.progress import reporting
 from saltus.interrupt import Interrupted
 from saltus.results import exponents_dataset
 from saltus.system.system import System
@@ -127,18 +127,16 @@ def lyapunov(
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))
     block = None if every is None else to_si(every, "s", "every")
     map_ = Stroboscope(system, flow, rows, block, threads)
-    show, close = reporter(progress)
     work = (Exponents if method == "variational" else NeighbourExponents)(map_, group.start, periods, transient, block)
 
     def dataset() -> xr.Dataset:
         return _dataset(system, flow, group, work, unit)
 
-    try:
-        work.run(show)
-    except KeyboardInterrupt as stop:
-        raise Interrupted(dataset) from stop
-    finally:
-        close()
+    with reporting(progress) as show:
+        try:
+            work.run(show)
+        except KeyboardInterrupt as stop:
+            raise Interrupted(dataset) from stop
     result = dataset()
     warn(result)
     return result

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.orbits.find_responses import motion_range
+from saltus.analysis.orbits.orbits import orbit_distance
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
@@ -63,7 +64,7 @@ def _apart(a: xr.Dataset, first: np.ndarray, i: int, b: xr.Dataset, second: np.n
     p, q = first[i, :n], second[j, :n]
     scale = np.maximum(np.abs(p).max(axis=0), 1e-300)
     scale[0] = float(a["response_peak"].values[i])
-    return min(float(np.abs((p - np.roll(q, m, axis=0)) / scale).max()) for m in range(n))
+    return orbit_distance(p, q, scale)
 
 
 def response_noise(system: System, method: Method, exact: xr.Dataset) -> np.ndarray:

@@ -20,7 +20,7 @@ from saltus.flow import engine
 from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method, check_method
-from saltus.flow.progress import reporter
+from saltus.flow.progress import reporting
 from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.results import trajectory_dataset
@@ -116,21 +116,19 @@ def simulate(
     def so_far(outcome: Outcome) -> xr.Dataset:
         return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
 
-    show, close = reporter(progress)
     outcome, request = None, plan.request(group, length)
-    try:
-        if time_errors == "measured" and system.guards and method.records_contacts:
-            outcome, errors = measure.measured(system, method, request, threads, show)
-        else:
-            outcome = engine.run(system, method.suited_to(group.size), request, threads, show)
-            errors = measure.local(outcome)
-        result = _dataset(system, method, group, length, plan, outcome, errors)
-    except KeyboardInterrupt as stop:
-        if outcome is not None:
-            raise Interrupted(partial(so_far, outcome)) from None
-        raise stop.then(so_far) if isinstance(stop, engine.RunInterrupted) else stop from None
-    finally:
-        close()
+    with reporting(progress) as show:
+        try:
+            if time_errors == "measured" and system.guards and method.records_contacts:
+                outcome, errors = measure.measured(system, method, request, threads, show)
+            else:
+                outcome = engine.run(system, method.suited_to(group.size), request, threads, show)
+                errors = measure.local(outcome)
+            result = _dataset(system, method, group, length, plan, outcome, errors)
+        except KeyboardInterrupt as stop:
+            if outcome is not None:
+                raise Interrupted(partial(so_far, outcome)) from None
+            raise stop.then(so_far) if isinstance(stop, engine.RunInterrupted) else stop from None
     warn(result, length, system)
     return result
 

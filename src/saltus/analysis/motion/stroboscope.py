@@ -9,15 +9,14 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis import dataset_parts
+from saltus.analysis.motion.window import computed
 from saltus.analysis.outcome_messages import warn
 from saltus.analysis.starts import ensemble, span
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
-from saltus.flow import engine
 from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
-from saltus.flow.progress import reporter
 from saltus.flow.room import check_room
 from saltus.results import stroboscope_dataset
 from saltus.system.system import System
@@ -97,12 +96,6 @@ def stroboscope(
             **{**dataset_parts.common(system, method, group, outcome), "batch": True},
         )
 
-    show, close = reporter(progress)
-    try:
-        result = dataset(engine.run(system, method.suited_to(group.size), request, threads, show))
-    except engine.RunInterrupted as stop:
-        raise stop.then(dataset) from None
-    finally:
-        close()
+    result = computed(system, method.suited_to(group.size), request, dataset, threads, progress)
     warn(result)
     return result

@@ -16,7 +16,7 @@ from saltus.flow import engine
 from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method
-from saltus.flow.progress import reporter
+from saltus.flow.progress import reporting
 from saltus.kernels import status as st
 from saltus.system.system import System
 from saltus.units import to_si
@@ -98,13 +98,11 @@ def computed(
     progress: bool | Callable[[float], None] | None,
 ) -> xr.Dataset:
     """The Dataset of a request; on Ctrl-C the one so far, in the ``partial`` of the exception."""
-    show, close = reporter(progress)
-    try:
-        return dataset(engine.run(system, method, request, threads, show))
-    except engine.RunInterrupted as stop:
-        raise stop.then(dataset) from None
-    finally:
-        close()
+    with reporting(progress) as show:
+        try:
+            return dataset(engine.run(system, method, request, threads, show))
+        except engine.RunInterrupted as stop:
+            raise stop.then(dataset) from None
 
 
 def common(seen: Stretch, system: System, method: Method, outcome: Outcome) -> dict[str, Any]:

@@ -250,3 +250,14 @@ def same(a: Orbit, b: Orbit, scale: np.ndarray, tolerance: float) -> bool:
         return False
     distances = np.abs((a.points[:, None] - b.points[None]) / scale).max(axis=2).min(axis=1)
     return bool(distances.max() < tolerance)
+
+
+def phase_distances(p: np.ndarray, q: np.ndarray, scale: np.ndarray | float = 1.0) -> np.ndarray:
+    """Largest difference of the points of two orbits of one period, float64[n, D], where q begins with its point 0, 1, ...: float64[n]."""
+    phases = (np.arange(len(q))[:, None] + np.arange(len(q))) % len(q)
+    return np.asarray(np.abs((p[None] - q[phases]) / scale).max(axis=(1, 2)))
+
+
+def orbit_distance(p: np.ndarray, q: np.ndarray, scale: np.ndarray | float = 1.0) -> float:
+    """Largest difference of the points of two orbits, float64[n, D], at the best phase, in units of the scale; inf if periods differ."""
+    return float(phase_distances(p, q, scale).min()) if len(p) == len(q) else np.inf

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.responses.continuation import LINK, Follower, orbit_distance
+from saltus.analysis.orbits.orbits import orbit_distance
+from saltus.analysis.responses.continuation import LINK, Follower
 from saltus.analysis.responses.followed import Followed
 from saltus.analysis.responses.responses import Found
 from saltus.results.dataset.kinds import CLOSED, Kind

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.analysis.orbits.find_responses import motion_range
-from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits
+from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits, orbit_distance, phase_distances
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.orbits.unforced import close_again
 from saltus.analysis.responses.grid import Grid
@@ -38,23 +38,12 @@ def closed_near(map_: Stroboscope, start: np.ndarray, period: np.ndarray, time: 
     return close_again(map_, start, time, scale)
 
 
-def orbit_distance(p: np.ndarray, q: np.ndarray, scale: np.ndarray) -> float:
-    """Largest distance of the points of two orbits float64[n, D] of the same period, at the best phase shift, in units of the scale."""
-    return float(_at_each_shift(p, q, scale).min())
-
-
-def _at_each_shift(p: np.ndarray, q: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Largest distance of p from q that begins with its point 0, 1, ..., float64[n]."""
-    shifts = (np.arange(len(q))[:, None] + np.arange(len(q))) % len(q)
-    return np.asarray(np.abs((p[None] - q[shifts]) / scale).max(axis=(1, 2)))
-
-
 def _in_phase(orbits: OrbitBatch, others: OrbitBatch, scale: np.ndarray) -> np.ndarray:
     """Let each orbit begin with the point that lies by the first of another; how far they are apart, float64[k], inf if they can't be."""
     apart = np.full(len(scale), np.inf)
     for i in np.flatnonzero((orbits.period == others.period) & (orbits.period > 0)):
         n = int(orbits.period[i])
-        distance = _at_each_shift(others.points[i, :n], orbits.points[i, :n], scale[i])
+        distance = phase_distances(others.points[i, :n], orbits.points[i, :n], scale[i])
         orbits.points[i, :n] = np.roll(orbits.points[i, :n], -int(distance.argmin()), axis=0)
         apart[i] = distance.min()
     return apart
@@ -132,7 +121,7 @@ class Follower:
     def beside(self, row: int, points: np.ndarray) -> float:
         """How far a row's orbit lies from that with points float64[n, D], in units of its range."""
         n = int(self.orbits.period[row])
-        return orbit_distance(self.orbits.points[row, :n], points, self._scale[row]) if len(points) == n else np.inf
+        return orbit_distance(self.orbits.points[row, :n], points, self._scale[row])
 
     def _near(self, rows: np.ndarray, value: np.ndarray, orbits: OrbitBatch) -> tuple[OrbitBatch, np.ndarray]:
         """The orbits at values float64[m] that Newton's method finds from others, in phase with these, and how far these lie apart."""

@@ -17,7 +17,7 @@ from saltus.analysis.responses.responses import Found, find, numbers_of, table_o
 from saltus.analysis.responses.samples import sampled
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
-from saltus.flow.progress import reporter
+from saltus.flow.progress import reporting
 from saltus.interrupt import Interrupted
 from saltus.results import Events, OutputNumbers, Responses, Starts, responses_dataset
 
@@ -34,11 +34,8 @@ def respond(
     """The Dataset of a grid's responses. Raises Interrupted, with the Dataset of what is known, on Ctrl-C."""
     method, periods = check_method(method), whole(periods, "periods")
     wanted = outputs_of(grid.system, outputs)
-    show, close = reporter(progress)
-    try:
+    with reporting(progress) as show:
         found = find(grid, method, periods, threads, show)
-    finally:
-        close()
     if not found.complete:
         raise Interrupted(lambda: _dataset(grid, method, periods, found, threads, sample, wanted))
     return _dataset(grid, method, periods, found, threads, sample, wanted)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from function_maps import FunctionMap, attracts, orbit_near
-from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
+from saltus.analysis.orbits.orbits import Orbit, find_orbits, orbit_distance, phase_distances, same
 
 UNIT = np.array([1.0, 1.0])
 
@@ -116,3 +116,13 @@ def test_an_orbit_of_an_inexact_map_does_not_depend_on_the_others_of_its_batch()
     alone = find_orbits(map_, start[:1], np.array([1]), scale[:1], np.full(1, map_.noise))
     assert both.period[0] == alone.period[0] == 1
     assert both.points[0, 0] == alone.points[0, 0]
+
+
+def test_the_distance_of_two_orbits_is_that_at_the_best_phase():
+    p, scale = np.random.default_rng(5).normal(size=(5, 2)), np.array([2.0, 0.5])
+    q = p + 0.01 * scale * np.array([[1, -1], [-1, 1], [1, 1], [0, 0], [-1, -1]])
+    for shift in range(5):
+        assert orbit_distance(p, np.roll(q, shift, axis=0), scale) == pytest.approx(0.01, rel=1e-12)
+        assert phase_distances(p, np.roll(q, shift, axis=0), scale).argmin() == shift
+    assert orbit_distance(p, q[::-1], scale) > 0.1
+    assert orbit_distance(p, q[:4], scale) == np.inf
