@@ -97,24 +97,13 @@ def gap_unit(system: System) -> str:
 
 def contacts(system: System, outcome: Outcome, time_error: np.ndarray) -> dict[str, Any]:
     """The table of contacts."""
-    integers, floats = outcome.record_integers, outcome.record_floats
-    kinds = np.array([st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))])
+    table = outcome.contacts
     names = np.array([guard.name for guard in system.guards] or [""], dtype=np.str_)
+    columns = ("direction", "velocity", "kind", "mode_before", "mode_after", "steps", "trajectory")
     return {
-        "contact_time": contact_times(outcome),
+        "contact_time": table.time,
         "contact_time_error": time_error,
-        "contact_guard": names[integers[:, st.REC_GUARD]],
-        "contact_direction": integers[:, st.REC_DIRECTION],
-        "contact_velocity": floats[:, st.REC_VELOCITY],
-        "contact_kind": kinds[integers[:, st.REC_KIND]],
-        "contact_mode_before": integers[:, st.REC_MODE_BEFORE],
-        "contact_mode_after": integers[:, st.REC_MODE_AFTER],
-        "contact_steps": integers[:, st.REC_STEPS],
-        "contact_trajectory": integers[:, st.REC_TRAJECTORY],
-        "contact_<state>": floats[:, st.RECORD_FLOATS : st.RECORD_FLOATS + len(system.states)],
+        "contact_guard": names[table.guard],
+        **{f"contact_{name}": table.kind_name if name == "kind" else getattr(table, name) for name in columns},
+        "contact_<state>": table.state[:, : len(system.states)],
     }
-
-
-def contact_times(outcome: Outcome) -> np.ndarray:
-    """Absolute times of the contacts [s]."""
-    return outcome.record_floats[:, -1]
