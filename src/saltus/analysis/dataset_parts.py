@@ -88,23 +88,7 @@ def gap_unit(system: System) -> str:
 
 def contacts(outcome: Outcome, states: int, time_error: np.ndarray) -> Contacts:
     """The table of contacts."""
-    integers, floats = outcome.record_integers, outcome.record_floats
-    kinds = np.array([st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))])
-    return Contacts(
-        trajectory=integers[:, st.REC_TRAJECTORY],
-        time=contact_times(outcome),
-        time_error=time_error,
-        guard=integers[:, st.REC_GUARD],
-        direction=integers[:, st.REC_DIRECTION],
-        velocity=floats[:, st.REC_VELOCITY],
-        kind=kinds[integers[:, st.REC_KIND]],
-        states=floats[:, st.RECORD_FLOATS : st.RECORD_FLOATS + states],
-        mode_before=integers[:, st.REC_MODE_BEFORE],
-        mode_after=integers[:, st.REC_MODE_AFTER],
-        steps=integers[:, st.REC_STEPS],
-    )
-
-
-def contact_times(outcome: Outcome) -> np.ndarray:
-    """Absolute times of the contacts [s]."""
-    return outcome.record_floats[:, -1]
+    table = outcome.contacts
+    same = ("trajectory", "time", "guard", "direction", "velocity", "mode_before", "mode_after", "steps")
+    columns = {name: getattr(table, name) for name in same}
+    return Contacts(**columns, time_error=time_error, kind=table.kind_name, states=table.state[:, :states])

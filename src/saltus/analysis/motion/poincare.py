@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis import dataset_parts
 from saltus.analysis.motion.window import Stretch, common, computed, stretch, with_each
 from saltus.analysis.outcome_messages import warn
 from saltus.analysis.starts import check_system
@@ -17,7 +16,6 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
-from saltus.kernels import status as st
 from saltus.results import motion_dataset
 from saltus.results.dataset import schema
 from saltus.system.guards import equation_of
@@ -159,30 +157,27 @@ def _last(system: System, unit: str, text: str) -> Crossed:
 
 def _dataset(system: System, method: Method, seen: Stretch, crossed: Crossed, direction: int, outcome: Outcome) -> xr.Dataset:
     """The crossings that were asked for, under their names."""
-    table, numbers = outcome.record_integers, outcome.record_floats
-    who, guard = table[:, st.REC_TRAJECTORY], table[:, st.REC_GUARD]
-    time = dataset_parts.contact_times(outcome)
+    table = outcome.contacts
+    who, guard, time, flips = table.trajectory, table.guard, table.time, table.changes_side
     late = time > seen.begin[who]
-    flips = ((table[:, st.REC_MODE_BEFORE] ^ table[:, st.REC_MODE_AFTER]) >> guard) & 1 == 1
     ours = late & (guard == crossed.guard)
-    wanted = ours & flips & ((direction == 0) | (table[:, st.REC_DIRECTION] == direction))
-    kept, rows = np.flatnonzero(wanted), who[wanted]
-    kinds = np.array([st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))])
+    wanted = ours & flips & ((direction == 0) | (table.direction == direction))
+    kept, rows = table.rows(wanted), who[wanted]
 
     def count(of: np.ndarray) -> np.ndarray:
         return np.bincount(who[of], minlength=seen.group.size)
 
     arguments = common(seen, system, method, outcome)
     arguments["attrs"] |= {"surface": crossed.text, "direction": direction, "transient": _transient(seen)}
-    states = {name: numbers[kept, st.RECORD_FLOATS + i] for i, name in enumerate(system.states)}
+    states = {name: kept.state[:, i] for i, name in enumerate(system.states)}
     columns = {
-        "crossing_time": time[kept],
-        "crossing_time_error": numbers[kept, st.REC_TIME_ERROR],
-        "crossing_period": table[kept, st.REC_PERIOD],
-        "crossing_phase": _phases(seen, numbers[kept, st.REC_PHASE], rows),
-        "crossing_direction": table[kept, st.REC_DIRECTION],
-        "crossing_rate": numbers[kept, st.REC_VELOCITY],
-        "crossing_kind": kinds[table[kept, st.REC_KIND]],
+        "crossing_time": kept.time,
+        "crossing_time_error": kept.time_error,
+        "crossing_period": kept.period,
+        "crossing_phase": _phases(seen, kept.phase, rows),
+        "crossing_direction": kept.direction,
+        "crossing_rate": kept.velocity,
+        "crossing_kind": kept.kind_name,
         "crossing_trajectory": rows,
     }
     contacts = late & flips & np.isin(guard, acting_guards(system))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -141,8 +141,7 @@ class _Plan:
     first: int
 
     def request(self, group: Ensemble, length: Span) -> Request:
-        begin, end = length.t_start, length.t_end
-        return Request(group.start, group.parameters, length.period, begin, length.count, length.phase, self.schedule, self.first, end)
+        return replace(length.request(group.start, group.parameters, self.schedule, self.first), t_end=length.t_end)
 
 
 def _plan(system: System, group: Ensemble, length: Span, samples: int | None, keep: int | None) -> _Plan:

@@ -15,7 +15,7 @@ from saltus.analysis.starts import ensemble, span
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
-from saltus.flow.engine import Outcome, Request, Schedule
+from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.room import check_room
 from saltus.results import stroboscope_dataset
@@ -84,7 +84,7 @@ def stroboscope(
     check_room(size, f"{group.size} trajectories with {count} periods each", "Give keep= (last periods).")
     kept = np.arange(first, whole_periods + 1, dtype=np.int64)
     schedule = Schedule(kept, np.zeros(len(kept)))
-    request = Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, schedule, None)
+    request = length.request(group.start, group.parameters, schedule, None)
 
     def dataset(outcome: Outcome) -> xr.Dataset:
         reached = slice(outcome.reached())

@@ -62,11 +62,7 @@ class Stretch:
         """The request for this system, or one with more states: those start at zero."""
         more = len(system.states) - self.group.start.shape[1]
         start = np.pad(self.group.start, ((0, 0), (0, more)))
-        length = self.length
-        return Request(
-            start, self.group.parameters, length.period, length.t_start, length.count, length.phase, schedule,
-            self.skipped if record else None,
-        )  # fmt: skip
+        return self.length.request(start, self.group.parameters, schedule, self.skipped if record else None)
 
 
 def stretch(system: System, start: Any, values: Any, periods: Any, t_end: Any, t_start: Any, transient: Any) -> Stretch:
