@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from functools import cache
 from importlib import metadata
 from typing import Any
@@ -71,7 +71,7 @@ def attributes(
         "units": to_json(dict(units)),
         "method": method,
         "method_options": to_json(dict(method_options)),
-        "versions": to_json(versions()),
+        "versions": _versions(),
     }
 
 
@@ -89,6 +89,11 @@ def version(package: str) -> str:
         return "not installed"
 
 
+@cache
+def _versions() -> str:
+    return to_json(versions())
+
+
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that a result rests on."""
     return {"python": platform.python_version()} | {package: version(package) for package in _PACKAGES}
@@ -101,11 +106,15 @@ def content_hash(ds: xr.Dataset) -> str:
     Attributes are left out, and so is the width in which a file format keeps an integer or a text: the same numbers have the same hash,
     whichever file they went through. Every bit of a float counts, the sign of a zero included.
     """
-    digest, variables = hashlib.sha256(), ds.variables
-    for name in sorted(map(str, variables)):
-        variable = variables[name]
-        digest.update(f"{name} {variable.dims} {variable.shape}\n".encode())
-        digest.update(_canonical(np.asarray(variable.values)))
+    return hash_of({str(name): (variable.dims, np.asarray(variable.values)) for name, variable in ds.variables.items()})
+
+
+def hash_of(variables: Mapping[str, tuple[tuple[Hashable, ...], np.ndarray]]) -> str:
+    """:func:`content_hash` of variables that are no Dataset yet: dims and values by name."""
+    digest = hashlib.sha256()
+    for name, (dims, values) in sorted(variables.items()):
+        digest.update(f"{name} {dims} {values.shape}\n".encode())
+        digest.update(_canonical(values))
     return digest.hexdigest()
 
 

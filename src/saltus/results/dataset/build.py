@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from saltus.errors import ParameterError
 from saltus.results.dataset import schema
 from saltus.results.dataset.result import Result
 from saltus.results.dataset.variable import Variable
-from saltus.results.provenance import content_hash, to_json
+from saltus.results.provenance import hash_of, to_json
 
 _TWICE = "{!r} would stand for two things in the result. Rename the state, or the parameter, of this name."
 #: Where a name of the system would collide with one of the table, another is taken.
@@ -221,6 +222,8 @@ class _Building:
 
     def _dims(self, dims: tuple[str, ...], of: Mapping[str, tuple[str, str, str]] | None, count: int) -> tuple[str, ...]:
         """The dims of a row for an array of so many axes."""
+        if _is_plain(dims) and not self.along:
+            return dims
         found = tuple(self._named(dims, of))
         for dim in [dim for dim in found if dim.endswith("?")][::-1]:
             if len(found) > count:
@@ -233,6 +236,12 @@ class _Building:
                 yield from (one + dim[3:] for one in self.grid)
             else:
                 yield of[dim][0] if of and dim in of else self.along.get(dim, dim)
+
+
+@cache
+def _is_plain(dims: tuple[str, ...]) -> bool:
+    """Whether these dims are the same in every result of the kind."""
+    return not any(dim[0] in ".<" or dim[-1] == "?" for dim in dims)
 
 
 def _array(name: str, spec: Variable, values: Any) -> np.ndarray:
@@ -261,21 +270,32 @@ def _common(units: Iterable[str]) -> str:
 
 def array_variable(dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str, Any]) -> xr.Variable:
     """A variable that holds this very array."""
-    return xr.Variable(dims, np.asarray(values), dict(attrs), fastpath=True)
+    return xr.Variable(dims, values, attrs, fastpath=True)
 
 
-def finish(data: Mapping[str, xr.Variable], coords: Mapping[str, xr.Variable], attrs: Mapping[str, Any]) -> Result:
+def finish(data: dict[str, xr.Variable], coords: dict[str, xr.Variable], attrs: Mapping[str, Any]) -> Result:
     """The Dataset of these variables; attributes that are neither text nor number become JSON text."""
     plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
-    ds = Result(data, indexed(coords), plain)
-    ds.attrs["result_hash"] = content_hash(ds)
-    return ds
+    plain["result_hash"] = hash_of({name: (one.dims, one.values) for name, one in (data | coords).items()})
+    return Result(data, indexed(coords), plain)
 
 
 def indexed(coords: Mapping[str, xr.Variable]) -> xr.Coordinates:
     """Coordinates, with an index for each that has the name of its dim."""
-    indexes = {name: xr.indexes.PandasIndex(pd.Index(one.values), name, one.dtype) for name, one in coords.items() if one.dims == (name,)}
+    indexes = {name: _index(name, one.values) for name, one in coords.items() if one.dims == (name,)}
     variables: dict[str, Any] = dict(coords)
     for name, index in indexes.items():
         variables |= index.create_variables({name: coords[name]})
     return xr.Coordinates(variables, indexes)
+
+
+def _index(name: str, values: np.ndarray) -> xr.indexes.PandasIndex:
+    """What a coordinate is looked up by; numbers stay where they are."""
+    if values.dtype.kind == "U":
+        return _text_index(name, values.dtype, tuple(values.tolist()))
+    return xr.indexes.PandasIndex(pd.Index(values, copy=False), name, values.dtype)
+
+
+@lru_cache(maxsize=64)  # the names of guards are the same in every run, and take longer to index than all numbers
+def _text_index(name: str, dtype: np.dtype, words: tuple[str, ...]) -> xr.indexes.PandasIndex:
+    return xr.indexes.PandasIndex(pd.Index(np.array(words, dtype)), name, dtype)
