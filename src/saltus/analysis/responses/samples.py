@@ -56,7 +56,5 @@ def sampled(sample: str, numbers: Measures, grid: Grid, method: Method, found: F
 
 def _crossings(outcome: Outcome, count: int) -> list[np.ndarray]:
     """States at the crossings of all guards, of each trajectory."""
-    table = outcome.record_integers
-    chosen = table[:, st.REC_KIND] == st.CROSSING
-    states = outcome.record_floats[chosen, st.RECORD_FLOATS : -1]
-    return np.split(states, np.searchsorted(table[chosen, st.REC_TRAJECTORY], np.arange(1, count)))
+    crossings = outcome.contacts.rows(outcome.contacts.kind == st.CROSSING)
+    return np.split(crossings.state, crossings.begins(count)[1:-1])
