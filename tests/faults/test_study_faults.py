@@ -32,14 +32,13 @@ from saltus.cli.commands import app
 from saltus.kernels import status as st
 from saltus.results import load
 from saltus.results.store.store import Store
-from saltus.study.answers.basins import maps_of
 from saltus.study.answers.basins_rows import attractor_table
 from saltus.study.run import maps
 from saltus.study.run.maps import compute, finish, open_store
 from saltus.study.run.running import Resources
 from saltus.study.tables.read import parse
 from small_maps import small_maps
-from small_study import small_study
+from small_study import maps_of, small_study
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and fork are POSIX")
 
