@@ -1,4 +1,4 @@
-"""From trajectories of a map to its attractors: settle, notice what recurs, polish it, and find out what never does."""
+"""From trajectories of a map to its attractors: let them settle, close what recurs, and find out what never does."""
 
 from __future__ import annotations
 
