@@ -75,8 +75,7 @@ def ours(name: str) -> Callable[[], object]:
         system = tangent_system(system) if name.endswith("_tangent") else system
         method = sl.ODE45(1e-4, 1e-7) if name.endswith("_ode45") else sl.Taylor()
         start, values = np.full((1, len(system.states)), 1e-3), np.array([list(system.values.values())])
-        period = np.array([system.period() or 1.0])
-        request = engine.Request(start, values, period, 0.0, np.ones(1, np.int64), np.zeros(1), engine.Schedule.none(), None)
+        request = engine.Request.periods(start, values, system.period() or 1.0, 1)
         return engine.run(system, method, request, threads=1)
 
     return job

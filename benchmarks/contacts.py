@@ -57,10 +57,8 @@ def problems() -> list[tuple[str, sl.System, Any, np.ndarray]]:
 
 def ours(system: sl.System, start: np.ndarray, periods: int) -> engine.Outcome:
     """A run of all starts by the default method."""
-    n, period = len(start), system.period()
     values = np.array([list(system.values.values())])
-    whole = np.full(n, periods, np.int64)
-    request = engine.Request(start, values, np.full(n, period), 0.0, whole, np.zeros(n), engine.Schedule.none(), None)
+    request = engine.Request.periods(start, values, system.period(), periods)
     return engine.run(system, sl.Taylor(), request, threads=1)
 
 

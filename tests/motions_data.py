@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from saltus.results import Guards, motion_dataset, spectrum_dataset
+import made_results
+from saltus.results import Guards
 from saltus.results.dataset import schema
 
 GUARDS = Guards(["lower_gap", "upper_gap"], ["x", "x"], np.array([0.0, 4e-4]))
@@ -30,7 +31,7 @@ def section(count=1, rows=4):
         "crossing_trajectory": index % count,
     }  # fmt: skip
     kept = each(count, crossings=np.full(count, rows // count), tangencies=np.zeros(count), contacts=np.full(count, 2))
-    ds = motion_dataset(schema.SECTION, **common(count), each=kept, table=table, table_units={"crossing_rate": "m/s"})
+    ds = made_results.motion(schema.SECTION, **common(count), each=kept, table=table, words={"<surface rate>": "m/s"})
     return ds.assign_attrs(surface="x = 0.3 mm", direction=0)
 
 
@@ -41,23 +42,23 @@ def impacts(count=1):
     table |= {"contact_trajectory": np.array([0]), "contact_side": np.array([-1, 1])}
     kept = each(count, **dict.fromkeys(names, zeros + 0.5), contacts=zeros + 1, speed_histogram=np.ones((count, 2, 3)))
     edges = {"speed_low": np.arange(3) * 0.1, "speed_high": np.arange(1, 4) * 0.1}
-    return motion_dataset(schema.IMPACTS, **common(count), each=kept, table=table, coords=edges)
+    return made_results.motion(schema.IMPACTS, **common(count), each=kept, table=table | edges)
 
 
 def energy(count=1, along=None):
     parts = {name: np.full((count, 5), value) for name, value in zip(("energy", "change", "supplied"), (2e-3, 1e-3, 3e-3), strict=True)}
     parts |= {"dissipated": np.full((count, 5), 2e-3), "residual": np.zeros((count, 5)), "imbalance": np.full(count, 1e-15)}
     coords = {"time": np.arange(5) * 0.1} if along else {"period": np.arange(1, 6)}
-    return motion_dataset(schema.ENERGY, **common(count), each=each(count, **parts), table={}, along=along, coords=coords)
+    return made_results.motion(schema.ENERGY, **common(count), each=each(count, **parts), table=coords, along=along)
 
 
 def spectrum(count=1, own=False, window="none"):
     order = np.arange(9) / 2
     amplitude = {name: np.tile(10.0 ** -np.arange(9), (count, 1)) for name in ("x", "v")}
     frequency = np.outer([2.0, 4.0], order) if own else order * 2.0
-    return spectrum_dataset(
+    return made_results.spectrum(
         states=("x", "v"), units=UNITS, frequency=frequency, order=order, amplitude=amplitude, phase=amplitude, batch=count > 1,
         each={"window": [window] * count, "noise_bandwidth": [1.0] * count, "response_period": [2 if window == "none" else 0] * count,
               "status": ["ok"] * count},
-        forcing_period=np.array([0.5, 0.25]) if own else 0.5, varied={}, attrs={"system": "rig"},
+        forcing_period=np.array([0.5, 0.25]) if own else 0.5, attrs={"system": "rig"},
     )  # fmt: skip

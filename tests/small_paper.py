@@ -5,10 +5,11 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
+import made_results
 from saltus import models
 from saltus.flow import Taylor
 from saltus.replication import Check, Claim, Finding, Job, Numbers, Paper, Picture
-from saltus.results import AttractorTable, attractors_dataset
+from saltus.results import AttractorTable
 from saltus.study.table import TextTable
 
 
@@ -19,7 +20,7 @@ def small_result(value):
         margin=np.array([1.0]), multipliers=np.array([[0.5, 0.1]]), exponent=np.array([-1.0]), exponent_error=np.array([0.0]),
         points=[np.array([[value, 0.0]])],
     )  # fmt: skip
-    return attractors_dataset(states=("x", "v"), units={"x": "m", "v": "m/s"}, attractors=table)
+    return made_results.attractors(states=("x", "v"), units={"x": "m", "v": "m/s"}, attractors=table)
 
 
 def compute(system, *inputs, value, progress, **_):

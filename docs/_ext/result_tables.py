@@ -11,22 +11,6 @@ from sphinx.util.docutils import SphinxDirective
 from saltus.results.dataset import schema
 from saltus.results.dataset.variable import Variable
 
-#: What stands in a batch or a map before the dims of one trajectory, by kind of result.
-_BATCHES = (schema.TRAJECTORY, schema.STROBOSCOPE, schema.SECTION, schema.SPECTRUM, schema.IMPACTS, schema.ENERGY)
-#: What a result holds beside its table, by kind.
-_BESIDE = {
-    schema.TRAJECTORY: "Each state under its own name along `time`, at the contacts as `contact_<state>`, at the end as `end_<state>`.",
-    schema.STROBOSCOPE: "Each state under its own name along `period`.",
-    schema.SECTION: "Each state under its own name along `crossing`.",
-    schema.BASINS: "The two states of the map as dims, and the points of the attractors as `attractor_<state>` (attractor, phase).",
-    schema.ATTRACTORS: "The starts as `start_<state>`, and the points of the attractors as `attractor_<state>` (attractor, phase).",
-    schema.RESPONSES: "The parameters as dims, of each response as `response_<parameter>`; its points as `response_<state>` (response, "
-    "phase); a diagram's sampled values as `sample_<state>` (response, sample). What has no dim below has those of the parameters and "
-    "`start`.",
-    schema.SPECTRUM: "`<state>_amplitude` and `<state>_phase` of each state along `frequency`.",
-    schema.AGREEMENT: "The two states of the maps as dims.",
-}
-
 
 def markdown() -> str:
     """A section for each kind of result."""
@@ -37,22 +21,18 @@ def _section(kind: str, table: dict[str, Variable]) -> Iterator[str]:
     makers = " and ".join(f"`sl.{name}`" for name in schema.MAKERS[kind].split(" or "))
     yield f"## {kind.replace('_', ' ').capitalize()}"
     yield ""
-    yield " ".join(filter(None, [f"From {makers}.", _BESIDE.get(kind, ""), _batch(kind)]))
+    yield f"From {makers}."
     yield ""
     yield "| variable | dims | unit | meaning |"
     yield "|---|---|---|---|"
     for name, one in table.items():
         unit = {"": "text" if one.dtype == "str" else "", "1": ""}.get(one.units, one.units)
-        yield f"| `{name}` | {', '.join(one.dims)} | {_cell(unit)} | {_cell(one.long_name)} |"
+        yield f"| `{name}` | {_cell(', '.join(one.dims))} | {_cell(unit)} | {_cell(one.long_name)} |"
 
 
 def _cell(text: str) -> str:
     """A text that neither ends a cell nor begins a tag."""
     return text.replace("<", "&lt;").replace("|", "\N{DIVIDES}")
-
-
-def _batch(kind: str) -> str:
-    return "A batch adds the dim `trajectory` in front." if kind in _BATCHES else ""
 
 
 class ResultTables(SphinxDirective):

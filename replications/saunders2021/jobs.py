@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.basins.attractors import attractors
+from saltus.analysis.basins.attractors import attractors, attractors_dataset
 from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import basin_plan
-from saltus.analysis.dataset_parts import gap_unit, provenance
+from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.lyapunov.lyapunov import lyapunov
-from saltus.analysis.methods.compare_methods import compare_methods, method_label
+from saltus.analysis.methods.compare_methods import compare_methods, method_label, methods_dataset
 from saltus.analysis.methods.method_errors import one_period_errors
 from saltus.analysis.motion.simulate import simulate
 from saltus.analysis.motion.stroboscope import stroboscope
@@ -29,7 +29,6 @@ from saltus.flow import ODE45, Taylor
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.replication import Job
-from saltus.results import attractors_dataset, methods_dataset
 from saltus.study.setting.setting import method_of, system_of
 from saltus.study.tables.read import read
 from saltus.study.tables.spec import Study
@@ -261,10 +260,7 @@ def halved(system: System, found: xr.Dataset, *, method: Method, threads: int | 
         if not any(same(orbit, one, scale, SAME) and orbit.period == one.period for one in orbits):
             orbits.append(orbit)
     table = portraits(map_, Found(Neighbourhoods.none(len(system.states)), orbits))
-    return attractors_dataset(
-        states=system.states, units=system.units, attractors=table, gap_unit=gap_unit(system),
-        attrs=provenance(system, map_.method, system.values),
-    )  # fmt: skip
+    return attractors_dataset(subject(system, provenance(system, map_.method, system.values)), table)
 
 
 def compared(system: System, *three: xr.Dataset, analysis: str, method: Method, **how: Any) -> xr.Dataset:

@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from saltus.errors import SaltusError
     from saltus.flow import ODE45, Interrupted, Taylor
     from saltus.interrupt import Stop
-    from saltus.results import contacts, describe, load, samples, save, to_csv, to_mat
+    from saltus.results import contacts, load, samples, save, to_csv, to_mat
+    from saltus.results.describe import describe
     from saltus.system import (
         System,
         abs,

@@ -12,7 +12,7 @@ from saltus.analysis.starts import Ensemble
 from saltus.flow.engine import Outcome
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
-from saltus.results import Contacts, Guards, attributes
+from saltus.results import Guards, Subject, attributes
 from saltus.system.dimensions import units_of
 from saltus.system.evaluate import evaluate
 from saltus.system.system import System
@@ -50,19 +50,28 @@ def _gap_units(system: System) -> tuple[str, ...]:
     return tuple(unit if guard.state is None else system.units[guard.state] for guard, unit in zip(system.guards, found, strict=True))
 
 
-def common(system: System, method: Method, group: Ensemble, outcome: Outcome) -> dict[str, Any]:
-    """The arguments that every Dataset of trajectories takes."""
-    return dict(
-        states=system.states,
-        units=system.units,
-        guards=guards(system, group),
-        status=[st.STATUS[int(code)][0] for code in outcome.status],
-        counters={name: outcome.counters[:, i] for i, name in enumerate(st.COUNTERS)},
-        minima={name: outcome.minima[:, i] for i, name in enumerate(st.MINIMA)},
-        varied=group.varied,
-        batch=group.batch,
-        attrs=provenance(system, method, shared_values(system, group), group.varied),
-    )
+def subject(system: System, attrs: Mapping[str, Any], guards: Guards | None = None, varied: Mapping[str, Any] | None = None) -> Subject:
+    """What a Dataset of this system is about."""
+    return Subject(system.states, system.units, attrs, guards, gap_unit(system), varied or {})
+
+
+def trajectories(system: System, method: Method, group: Ensemble, forcing_period: float | np.ndarray | None) -> Subject:
+    """What the Datasets of some trajectories are about."""
+    return Subject(
+        states=system.states, units=system.units, guards=guards(system, group), varied=group.varied, batch=group.batch,
+        forcing_period=forcing_period, attrs=provenance(system, method, shared_values(system, group), group.varied),
+    )  # fmt: skip
+
+
+def endings(outcome: Outcome, counters: Iterable[str] = st.COUNTERS) -> dict[str, Any]:
+    """How each trajectory ended, and what was counted on the way."""
+    status = {"status": [st.STATUS[int(code)][0] for code in outcome.status]}
+    return status | {name: outcome.counters[:, st.COUNTERS.index(name)] for name in counters}
+
+
+def minima(outcome: Outcome) -> dict[str, np.ndarray]:
+    """The smallest values of each trajectory."""
+    return {name: outcome.minima[:, i] for i, name in enumerate(st.MINIMA)}
 
 
 def provenance(system: System, method: Method, values: Mapping[str, float], varied: Iterable[str] = ()) -> dict[str, Any]:
@@ -86,25 +95,15 @@ def gap_unit(system: System) -> str:
     return units.pop() if len(units) == 1 else ""
 
 
-def contacts(outcome: Outcome, states: int, time_error: np.ndarray) -> Contacts:
+def contacts(system: System, outcome: Outcome, time_error: np.ndarray) -> dict[str, Any]:
     """The table of contacts."""
-    integers, floats = outcome.record_integers, outcome.record_floats
-    kinds = np.array([st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))])
-    return Contacts(
-        trajectory=integers[:, st.REC_TRAJECTORY],
-        time=contact_times(outcome),
-        time_error=time_error,
-        guard=integers[:, st.REC_GUARD],
-        direction=integers[:, st.REC_DIRECTION],
-        velocity=floats[:, st.REC_VELOCITY],
-        kind=kinds[integers[:, st.REC_KIND]],
-        states=floats[:, st.RECORD_FLOATS : st.RECORD_FLOATS + states],
-        mode_before=integers[:, st.REC_MODE_BEFORE],
-        mode_after=integers[:, st.REC_MODE_AFTER],
-        steps=integers[:, st.REC_STEPS],
-    )
-
-
-def contact_times(outcome: Outcome) -> np.ndarray:
-    """Absolute times of the contacts [s]."""
-    return outcome.record_floats[:, -1]
+    table = outcome.contacts
+    names = np.array([guard.name for guard in system.guards] or [""], dtype=np.str_)
+    columns = ("direction", "velocity", "kind", "mode_before", "mode_after", "steps", "trajectory")
+    return {
+        "contact_time": table.time,
+        "contact_time_error": time_error,
+        "contact_guard": names[table.guard],
+        **{f"contact_{name}": table.kind_name if name == "kind" else getattr(table, name) for name in columns},
+        "contact_<state>": table.state[:, : len(system.states)],
+    }

@@ -12,6 +12,7 @@ import numpy as np
 from saltus.analysis.axes import along
 from saltus.errors import ParameterError, SaltusError, nearest, shown
 from saltus.flow.counts import whole
+from saltus.flow.engine import Request, Schedule
 from saltus.flow.maps import NO_PERIOD
 from saltus.system import expression as ex
 from saltus.system.overlaps import check_overlaps
@@ -277,6 +278,13 @@ class Span:
     count: np.ndarray
     phase: np.ndarray
     t_end: float = math.inf
+
+    def request(self, start: np.ndarray, parameters: np.ndarray, schedule: Schedule, record_from: int | None) -> Request:
+        """A run of this length, with samples at a schedule; contacts from period ``record_from`` on are kept, or none."""
+        return Request(
+            start=start, parameters=parameters, period=self.period, end_count=self.count, end_phase=self.phase, origin=self.t_start,
+            schedule=schedule, record_from=record_from,
+        )  # fmt: skip
 
 
 def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any) -> Span:

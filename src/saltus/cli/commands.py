@@ -354,12 +354,12 @@ def cache_show() -> None:
 
     Example: `saltus cache show`
     """
+    from saltus import cache as kept
     from saltus.cli import screen
-    from saltus.codegen import cache as kernels
     from saltus.study.table import TextTable
 
-    rows = tuple((entry.name[:12], entry.system, f"{entry.size_bytes / 1e6:.2f}") for entry in kernels.entries())
-    screen.show(TextTable(f"Kernels in {kernels.folder()}", ("entry", "system", "MB"), rows))
+    rows = tuple((entry.name[:12], entry.system, f"{entry.size_bytes / 1e6:.2f}") for entry in kept.kernels())
+    screen.show(TextTable(f"Kernels in {kept.folder()}", ("entry", "system", "MB"), rows))
 
 
 @cache.command("clear")
@@ -373,16 +373,16 @@ def cache_clear(
 
     Example: `saltus cache clear`
     """
+    from saltus import cache as kept
     from saltus.cli import screen
-    from saltus.codegen import cache as kernels
     from saltus.results.files import known
 
-    count = kernels.clear()
-    screen.say(f"deleted {count} {'entry' if count == 1 else 'entries'} from {kernels.folder()}")
+    count = kept.clear()
+    screen.say(f"deleted {count} {'entry' if count == 1 else 'entries'} from {kept.folder()}")
     if everything:
         screen.say(f"forgot {_result_files(known.forget())}")
-    elif kept := known.count():
-        screen.say(f"kept the checksums of {_result_files(kept)}, which are loaded at once; --all forgets them")
+    elif left := known.count():
+        screen.say(f"kept the checksums of {_result_files(left)}, which are loaded at once; --all forgets them")
 
 
 def _result_files(count: int) -> str:

@@ -38,11 +38,11 @@ class Check:
 
 def machine() -> TextTable:
     """Versions, processor, lanes, threads and cache of this installation."""
-    from saltus.codegen import cache
+    from saltus import cache
     from saltus.codegen.module import lane_width
     from saltus.results.provenance import versions
 
-    entries = cache.entries()
+    entries = cache.kernels()
     rows = [
         *versions().items(),
         ("processor", f"{processor()}, {os.cpu_count()} threads, {_usable()} usable"),

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from saltus.codegen import cache, machine, templates
+from saltus import cache
+from saltus.codegen import machine, templates
 from saltus.codegen.announce import announce
 from saltus.codegen.asker import ASKED_BY
 from saltus.errors import CacheError

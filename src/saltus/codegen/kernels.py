@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from saltus.codegen import cache, machine, templates
+from saltus import cache
+from saltus.codegen import machine, templates
 from saltus.codegen.building import Order, built
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.interface import Interface

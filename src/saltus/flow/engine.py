@@ -9,12 +9,14 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from saltus.codegen.clocks import table_data
 from saltus.codegen.module import Flow
 from saltus.errors import SaltusWarning
+from saltus.flow.contact_table import ContactTable
 from saltus.flow.counts import whole as whole_number
 from saltus.flow.methods import Method
 from saltus.flow.pace import marks, resume
@@ -60,7 +62,7 @@ class Schedule:
         return cls(index // per_period, (index % per_period) / per_period)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Request:
     """What to compute. n trajectories, D states, P parameters.
 
@@ -92,13 +94,22 @@ class Request:
     start: np.ndarray
     parameters: np.ndarray
     period: np.ndarray
-    origin: float
     end_count: np.ndarray
     end_phase: np.ndarray
-    schedule: Schedule
-    record_from: int | None
+    origin: float = 0.0
+    schedule: Schedule = field(default_factory=Schedule.none)
+    record_from: int | None = None
     t_end: float = np.inf
     checks: int = 0
+
+    @classmethod
+    def periods(
+        cls, start: np.ndarray, parameters: np.ndarray, period: float | np.ndarray, count: int | np.ndarray, **more: Any
+    ) -> Request:
+        """Whole periods from time zero, one period and count for all or one each; ``more`` as above."""
+        n = len(start)
+        length, ends = np.broadcast_to(np.asarray(period, float), n).copy(), np.broadcast_to(np.asarray(count, np.int64), n).copy()
+        return cls(start=start, parameters=parameters, period=length, end_count=ends, end_phase=np.zeros(n), **more)
 
 
 @dataclass
@@ -113,8 +124,7 @@ class Outcome:
     minima: np.ndarray
     samples: np.ndarray
     sample_mode: np.ndarray
-    record_integers: np.ndarray
-    record_floats: np.ndarray
+    contacts: ContactTable
     complete: bool = True
 
     def reached(self) -> int:
@@ -125,11 +135,9 @@ class Outcome:
 
     def of(self, first: int, last: int) -> Outcome:
         """That of some of the trajectories, as if they had been moved alone."""
-        rows = slice(*np.searchsorted(self.record_integers[:, st.REC_TRAJECTORY], (first, last)))
-        integers = self.record_integers[rows].copy()
-        integers[:, st.REC_TRAJECTORY] -= first
+        begins = self.contacts.begins(last - first, first)
         each = {name: getattr(self, name)[first:last] for name in _EACH}
-        return replace(self, **each, record_integers=integers, record_floats=self.record_floats[rows])
+        return replace(self, **each, contacts=self.contacts.rows(slice(begins[0], begins[-1])).moved(-first))
 
 
 #: Arrays of an outcome that have a row for each trajectory.
@@ -148,7 +156,7 @@ class _Chunk:
     arrays: dict[str, np.ndarray]
     keeps_contacts: bool
     due: float | None
-    contacts: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    contacts: list[ContactTable] = field(default_factory=list)
 
 
 def run(
@@ -239,7 +247,7 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
     }
     outcome = Outcome(
         whole["state"], whole["phase"], whole["status"], whole["mode"], whole["counters"], whole["minima"], whole["samples"],
-        whole["sample_mode"], np.zeros((0, st.RECORD_INTEGERS), np.int64), np.zeros((0, st.RECORD_FLOATS + states + 1)),
+        whole["sample_mode"], ContactTable.empty(0, states),
     )  # fmt: skip
     return outcome, whole
 
@@ -265,17 +273,14 @@ def _cut(request: Request, whole: dict[str, np.ndarray], first: int, data: np.nd
 def _open_tables(chunk: _Chunk, module: Flow) -> None:
     """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no memory."""
     size = RECORDS + module.STEP_RECORDS if chunk.keeps_contacts else 0
-    chunk.arrays["rec_i"] = np.empty((size, st.RECORD_INTEGERS), np.int64)  # what isn't used is never read
-    chunk.arrays["rec_f"] = np.empty((size, st.RECORD_FLOATS + chunk.arrays["state"].shape[1] + 1))
+    chunk.arrays["rec_i"], chunk.arrays["rec_f"] = ContactTable.empty(size, chunk.arrays["state"].shape[1]).arrays
 
 
 def _empty_table(chunk: _Chunk, room: Contacts) -> None:
     """Move a chunk's contacts from its table to its list."""
     arrays, used = chunk.arrays, int(chunk.arrays["rec_used"][0])
     if used:
-        integers = arrays["rec_i"][:used].copy()
-        integers[:, st.REC_TRAJECTORY] += chunk.first
-        chunk.contacts.append((integers, arrays["rec_f"][:used].copy()))
+        chunk.contacts.append(ContactTable(arrays["rec_i"][:used], arrays["rec_f"][:used].copy()).moved(chunk.first))
         room.take(used)
         arrays["rec_used"][0] = 0
 
@@ -285,24 +290,20 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
     outcome.time = np.minimum(whole["origin"] + whole["count"] * whole["period"] + whole["phase"], t_end)
     running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
-    if contacts := [part for chunk in chunks for part in chunk.contacts]:
-        table, numbers = (np.concatenate(half) if len(half) > 1 else half[0] for half in zip(*contacts, strict=True))
-        order = np.argsort(table[:, st.REC_TRAJECTORY], kind="stable")
-        table, numbers = table[order], numbers[order]
+    if parts := [part for chunk in chunks for part in chunk.contacts]:
+        contacts = ContactTable.joined(parts)
         if (outcome.status == st.SLIDING).any():
-            kept = ~_returns_where_sliding_begins(table, numbers, outcome.status)
-            table, numbers = table[kept], numbers[kept]
-        outcome.record_integers, outcome.record_floats = table, numbers
-        times = outcome.record_floats[:, -1]
-        np.minimum(times, outcome.time[outcome.record_integers[:, st.REC_TRAJECTORY]], out=times)
+            contacts = contacts.rows(~_returns_where_sliding_begins(contacts, outcome.status))
+        np.minimum(contacts.time, outcome.time[contacts.trajectory], out=contacts.time)
+        outcome.contacts = contacts
     return outcome
 
 
-def _returns_where_sliding_begins(table: np.ndarray, numbers: np.ndarray, status: np.ndarray) -> np.ndarray:
+def _returns_where_sliding_begins(contacts: ContactTable, status: np.ndarray) -> np.ndarray:
     """The last contact of a trajectory that slides, where it is the return from the one before it at the same instant: bool[contacts]."""
-    who, guard, direction = (table[:, column] for column in (st.REC_TRAJECTORY, st.REC_GUARD, st.REC_DIRECTION))
+    who, guard, direction, time = contacts.trajectory, contacts.guard, contacts.direction, contacts.time
     last = (status[who] == st.SLIDING) & (np.append(who[1:], -1) != who)
-    back = (who[1:] == who[:-1]) & (guard[1:] == guard[:-1]) & (direction[1:] == -direction[:-1]) & (numbers[1:, -1] == numbers[:-1, -1])
+    back = (who[1:] == who[:-1]) & (guard[1:] == guard[:-1]) & (direction[1:] == -direction[:-1]) & (time[1:] == time[:-1])
     return last & np.append(False, back)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.flow.engine import ARGUMENTS, Request, Schedule, allocate, options_of, slice_of, tables_of
+from saltus.flow.contact_table import ContactTable
+from saltus.flow.engine import ARGUMENTS, Request, allocate, options_of, slice_of, tables_of
 from saltus.flow.methods import Method
 from saltus.flow.pace import marks, resume
 from saltus.interrupt import check_stop
@@ -53,7 +54,7 @@ class Flight:
     def __init__(self, system: System, method: Method, start: np.ndarray, parameters: np.ndarray, period: np.ndarray, longest: float):
         count = len(start)
         self._module = method.kernels(system.origin)
-        request = Request(start, parameters, period, 0.0, np.zeros(count, np.int64), np.zeros(count), Schedule.none(), None)
+        request = Request.periods(start, parameters, period, 0)
         _, self._arrays = allocate(request, start.shape[1], self._module)
         self._arrays["param"] = np.ascontiguousarray(parameters, float)
         self._arrays["options"] = options_of(method, longest, count)
@@ -101,9 +102,9 @@ class Flight:
             arrays, stride=np.int64(0 if len(arrays["param"]) == 1 else 1), cursor=np.zeros(k, np.int64), samples=samples,
             sample_count=np.arange(self.age + 1, self.age + periods + 1, dtype=np.int64), sample_fraction=np.zeros(periods),
             sample_mode=np.zeros((k, periods), np.int64), rec_first=np.zeros(k, np.int64),
-            rec_i=np.zeros((0, st.RECORD_INTEGERS), np.int64),
-            rec_f=np.zeros((0, st.RECORD_FLOATS + states + 1)), rec_used=np.zeros(1, np.int64), data=self._data,
+            rec_used=np.zeros(1, np.int64), data=self._data,
         )  # fmt: skip
+        call["rec_i"], call["rec_f"] = ContactTable.empty(0, states).arrays
         steps, workspace = slice_of(states), self._module.workspace()
         outcome, went_on = st.PAUSED, False
         while outcome == st.PAUSED or went_on:

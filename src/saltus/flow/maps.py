@@ -201,10 +201,7 @@ class Stroboscope:
         self, start: np.ndarray, periods: np.ndarray | int, schedule: Schedule | None = None, record: int | None = None
     ) -> engine.Outcome:
         """Trajectories of so many periods each, with samples at a schedule; contacts from period ``record`` on are kept."""
-        k = len(start)
-        ends = np.broadcast_to(np.asarray(periods, np.int64), k).copy()
-        period = np.broadcast_to(self.period, k).copy()
-        request = Request(start, self.parameters, period, 0.0, ends, np.zeros(k), schedule or Schedule.none(), record)
+        request = Request.periods(start, self.parameters, self.period, periods, schedule=schedule or Schedule.none(), record_from=record)
         return engine.run(self.system, self.method, request, self.threads)
 
     def tangent(self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -222,6 +219,6 @@ class Stroboscope:
             outcome = self.run(start, count, Schedule.even(count, MODE_SAMPLES))
             return outcome.state, [row[np.flatnonzero(np.diff(row, prepend=-1))] for row in outcome.sample_mode]
         outcome = self.run(start, count, record=0)
-        table = outcome.record_integers
-        codes = np.ravel_multi_index((table[:, st.REC_KIND], table[:, st.REC_DIRECTION] + 1, table[:, st.REC_GUARD]), (3, 3, 2**31))
-        return outcome.state, np.split(codes, np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(1, len(start))))
+        contacts = outcome.contacts
+        codes = np.ravel_multi_index((contacts.kind, contacts.direction + 1, contacts.guard), (3, 3, 2**31))
+        return outcome.state, np.split(codes, contacts.begins(len(start))[1:-1])

@@ -17,7 +17,6 @@ from saltus.flow import polynomials
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.motion_series import MotionSeries, Nodes, Pieces
-from saltus.kernels import status as st
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
 from saltus.system.system import System
@@ -89,15 +88,15 @@ def _pieces(map_: Stroboscope, start: np.ndarray, periods: int, watched: System,
 def _nodes(map_: Stroboscope, outcome: Outcome, periods: int, schedule: Schedule, cubic: bool) -> Nodes:
     """Samples and contacts in one list, without what lies at one instant with the next."""
     k, m, size = outcome.samples.shape
-    table, numbers = outcome.record_integers, outcome.record_floats
+    contacts = outcome.contacts
     whole = np.isfinite(outcome.samples).all(axis=(1, 2)) & (m > 0)
     nodes = Nodes(
-        np.concatenate([np.repeat(np.arange(k), m), table[:, st.REC_TRAJECTORY]]),
-        np.concatenate([np.tile(schedule.count, k), table[:, st.REC_PERIOD]]),
-        np.concatenate([(map_.period[:, None] * schedule.fraction).ravel(), numbers[:, st.REC_PHASE]]),
-        np.repeat([0.0, 1.0], [k * m, len(table)]),  # for now: whether it is a contact
-        np.concatenate([outcome.samples.reshape(-1, size), numbers[:, st.RECORD_FLOATS : st.RECORD_FLOATS + size]]),
-        np.concatenate([outcome.sample_mode.ravel(), table[:, st.REC_MODE_AFTER]]),
+        np.concatenate([np.repeat(np.arange(k), m), contacts.trajectory]),
+        np.concatenate([np.tile(schedule.count, k), contacts.period]),
+        np.concatenate([(map_.period[:, None] * schedule.fraction).ravel(), contacts.phase]),
+        np.repeat([0.0, 1.0], [k * m, len(contacts)]),  # for now: whether it is a contact
+        np.concatenate([outcome.samples.reshape(-1, size), contacts.state]),
+        np.concatenate([outcome.sample_mode.ravel(), contacts.mode_after]),
     )
     period = map_.period[nodes.motion]
     order = np.lexsort((nodes.length, nodes.period * period + nodes.phase, nodes.motion))  # a sample before a contact at one instant

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.results.provenance import content_hash
+from saltus.study.code import statement_hash
 from saltus.study.identity import identity
 from saltus.study.run.kept import kept_or_computed
 from saltus.study.tables.parts import slug
@@ -76,5 +76,5 @@ class Job:
 
 @cache
 def _own_code(module: str) -> str:
-    """SHA-256 of the file of a module that isn't saltus's; the code of saltus counts in every identity."""
-    return "" if module.startswith("saltus.") else hashlib.sha256(Path(str(sys.modules[module].__file__)).read_bytes()).hexdigest()
+    """Hash of the statements of a module that isn't saltus's; the code of saltus counts in every identity."""
+    return "" if module.startswith("saltus.") else statement_hash(Path(str(sys.modules[module].__file__)).read_bytes())

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, nearest
 from saltus.replication.claims import Data, Row
-from saltus.study.identity import PACKAGE
+from saltus.study.code import PACKAGE
 
 if TYPE_CHECKING:
     from saltus.replication.job import Job

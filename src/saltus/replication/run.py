@@ -170,7 +170,7 @@ def _make(result: Replication, report: Callable[[Report], None], say: Callable[[
     for figure in result.figures:
         names = closure(jobs, wanted_by(result.paper, figure))
         for number, name in enumerate(names, 1):
-            if name not in result.data:
+            if name not in result.data and name not in result.failures:
                 _compute(result, jobs[name], replace(at, report=partial(_counted, report, f"{number} of {len(names)}")))
         say(_finish(result, figure))
     result.seconds = time.perf_counter() - begin

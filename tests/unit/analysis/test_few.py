@@ -65,14 +65,16 @@ def test_checks_move_as_the_companion_moves_them_and_are_not_sampled(method):
     start = np.array([[1e-3, 0.0], [2e-3, 0.0], [-1e-3, 0.5]])
     schedule = engine.Schedule(np.arange(8), np.full(8, 0.25))
     values, period, count = np.array([list(RIG.values.values())]), np.full(3, RIG.period()), np.full(3, 8)
-    request = engine.Request(start, values, period, 0.0, count, np.zeros(3), schedule, 0, checks=2)
+    request = engine.Request.periods(start, values, period, count, schedule=schedule, record_from=0, checks=2)
     whole = engine.run(RIG, method, request)
     for first, last, mover in ((0, 1, method), (1, 3, method.companion())):
         n = last - first
         one = replace(request, start=start[first:last], period=period[:n], end_count=count[:n], end_phase=np.zeros(n), checks=0)
         alone, part = engine.run(RIG, mover, one), whole.of(first, last)
-        for name in ("state", "time", "status", "mode", "counters", "minima", "record_integers", "record_floats"):
+        for name in ("state", "time", "status", "mode", "counters", "minima"):
             np.testing.assert_array_equal(getattr(part, name), getattr(alone, name), err_msg=name)
+        for ours, theirs in zip(part.contacts.arrays, alone.contacts.arrays, strict=True):
+            np.testing.assert_array_equal(ours, theirs)
         assert len(part.samples) == (1 if first == 0 else 0)
         np.testing.assert_array_equal(part.samples, alone.samples[: len(part.samples)])
     assert whole.counters[0, st.STEPS] != engine.run(RIG, method.companion(), replace(request, checks=0)).counters[0, st.STEPS]

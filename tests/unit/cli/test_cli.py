@@ -10,9 +10,9 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
+from saltus.cache import entry
 from saltus.cli import commands
 from saltus.cli.commands import app
-from saltus.codegen import entry
 from saltus.results.files import known
 
 COMMANDS = ["demo", "run", "status", "resume", "plot", "reproduce", "models", "doctor", "schema", "cache", "cache show", "cache clear"]

@@ -15,7 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from saltus.codegen import building, cache, entry, machine, templates
+from saltus import cache
+from saltus.cache import entry
+from saltus.codegen import building, machine, templates
 from saltus.codegen.announce import silent
 from saltus.codegen.building import Order
 from saltus.errors import CacheError, SaltusWarning
@@ -90,7 +92,7 @@ def test_an_entry_is_made_once_and_then_loaded(folder, long, capfd):
     assert load().propagate(2) == 3
     assert stamp(folder) == before
     assert capfd.readouterr().err == ""
-    (one,) = cache.entries()
+    (one,) = cache.kernels()
     assert (one.name, one.system, one.path) == (KEY, "one line", kernel(folder))
     assert one.size_bytes == kernel(folder).stat().st_size
     assert [path.name for path in folder.iterdir()] == [kernel(folder).name]
@@ -140,7 +142,7 @@ DAMAGES = {
 def test_a_damaged_entry_is_built_again(folder, damage):
     load()
     DAMAGES[damage](reopened(kernel(folder)))
-    cache.entries()  # shows what is there without failing
+    cache.kernels()  # shows what is there without failing
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         assert load().propagate(1) == 2
@@ -153,7 +155,7 @@ def test_a_damaged_entry_is_built_again(folder, damage):
         before = stamp(folder)
         assert load().propagate(1) == 2
     assert stamp(folder) == before  # whole again: loaded, not built
-    assert [one.system for one in cache.entries()] == ["one line"]
+    assert [one.system for one in cache.kernels()] == ["one line"]
     assert not list(folder.glob(".building-*"))
 
 
@@ -273,7 +275,7 @@ def test_four_processes_that_start_cold_at_once(folder):
         process.stdin = None
     answers = [process.communicate(timeout=120) for process in processes]
     assert [(out.strip(), process.returncode) for (out, _), process in zip(answers, processes, strict=True)] == [("2", 0)] * 4, answers
-    assert [one.name for one in cache.entries()] == [KEY]
+    assert [one.name for one in cache.kernels()] == [KEY]
     assert [path.name for path in folder.iterdir()] == [kernel(folder).name]
     before = stamp(folder)
     assert load().propagate(1) == 2
@@ -292,7 +294,7 @@ def test_what_takes_long_is_compiled_by_another_process(folder, long, monkeypatc
     monkeypatch.setattr(building, "made", lambda *_: pytest.fail("compiled here"))
     first, second = in_threads(SOURCE, SOURCE.replace(", 1", ", 2"))
     assert (first.propagate(1), second.propagate(1)) == (2, 3)
-    assert len(cache.entries()) == len(list(folder.iterdir())) == 2
+    assert len(cache.kernels()) == len(list(folder.iterdir())) == 2
 
 
 def test_where_no_process_can_be_started_this_one_compiles(folder, long, monkeypatch):
@@ -386,7 +388,7 @@ def test_a_folder_that_cannot_be_written_costs_time_not_the_run(tmp_path, monkey
         one = load()
     assert one.propagate(1) == 2
     forget()
-    assert cache.entries() == []
+    assert cache.kernels() == []
     assert cache.clear() == 0
 
 
@@ -422,7 +424,7 @@ def test_clear_takes_entries_and_leftovers_and_nothing_else(folder):
     (folder / "yours.txt").write_text("keep")
     assert cache.clear() == 1
     assert sorted(path.name for path in folder.iterdir()) == ["yours", "yours.txt"]
-    assert cache.entries() == []
+    assert cache.kernels() == []
 
 
 def test_the_folder_is_the_users_cache_by_default(monkeypatch):

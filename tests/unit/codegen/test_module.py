@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.codegen import building, cache, kernels, machine, module, templates
+from saltus import cache
+from saltus.codegen import building, kernels, machine, module, templates
 from saltus.codegen.kernels import FULL, GENERIC, TIERS, Call
 
 needs_jit = pytest.mark.skipif(module.jit_disabled(), reason="nothing is compiled with the JIT off")
@@ -173,7 +174,7 @@ def test_edited_templates_are_made_into_bitcode_and_said(edited, capfd):
     assert "edited since" in capfd.readouterr().err
     assert building.bitcode("capture")[:2] == b"BC"
     assert capfd.readouterr().err == ""
-    assert [entry.system for entry in cache.entries()] == ["capture, bitcode"]
+    assert [entry.system for entry in cache.kernels()] == ["capture, bitcode"]
 
 
 def test_edited_templates_without_numba_are_refused_in_a_sentence(edited, monkeypatch, capfd):

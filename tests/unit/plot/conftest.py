@@ -10,7 +10,9 @@ from scipy.integrate import solve_ivp
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-from saltus.results import Contacts, Guards, attributes, stroboscope_dataset, trajectory_dataset
+import made_results
+from made_results import Contacts
+from saltus.results import Guards, attributes
 
 STARTS = (1.0e-3, 0.2e-3, 0.4e-3, 2.0e-3)
 GAPS = (0.0, 0.4e-3)
@@ -81,7 +83,7 @@ def rig_run(starts=STARTS[:1], periods=40, samples=100, batch=False, kinds=None,
         mode_after=rows[:, 6],
         steps=np.arange(len(rows)),
     )  # fmt: skip
-    return trajectory_dataset(
+    return made_results.trajectory(
         states=("x", "v"), units=UNITS, time=runs[0][0], period=np.arange(periods * samples + 1) / samples, forcing_period=PERIOD,
         values={name: np.stack([run[1][:, i] for run in runs]) for i, name in enumerate("xv")}, mode=np.stack([run[2] for run in runs]),
         contacts=contacts, guards=Guards(("lower_gap", "upper_gap"), ("x", "x"), np.array(GAPS)), status=[status] * len(starts),
@@ -113,7 +115,7 @@ def batch():
 def points(batch):
     """The batch at whole periods, as ``stroboscope`` would return it."""
     whole = batch.isel(time=slice(None, None, 100))
-    return stroboscope_dataset(
+    return made_results.stroboscope(
         states=("x", "v"), units=UNITS, period=np.arange(21), values={name: whole[name].values for name in "xv"}, status=["ok"] * 4,
         guards=Guards(("lower_gap", "upper_gap"), ("x", "x"), np.array(GAPS)), forcing_period=PERIOD, attrs=PROVENANCE,
     )  # fmt: skip

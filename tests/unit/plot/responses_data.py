@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.results import AttractorTable, Events, Guards, Responses, Starts, attributes, responses_dataset
+import made_results
+from made_results import Events, Responses, Starts
+from saltus.results import AttractorTable, Guards, attributes
 
 UNITS = {"x": "m", "v": "m/s", "frequency": "Hz", "contact_stiffness": "N/m", "gap": "m", "growth": "1"}
 PROVENANCE = attributes(
@@ -35,7 +37,7 @@ def responses(values, rows, axis="frequency", sample="", **more):
         "responses": Responses(table, np.array(place, dtype=int)[:, None], np.array(branch, dtype=int), states if sample else None),
         "gap_unit": "m", "attrs": PROVENANCE,
     }  # fmt: skip
-    return responses_dataset(**{**arguments, **more})
+    return made_results.responses(**{**arguments, **more})
 
 
 def resonance(count=141, shift=0.0):
@@ -94,7 +96,7 @@ def kinds_map(n1=40, n2=30, log=True):
     response_of = np.arange(m).reshape(n1, n2, 1)
     response_of[:3, :3] = -1
     response_of[-3:, :3] = -2
-    return responses_dataset(
+    return made_results.responses(
         states=("x", "v"), units=UNITS, axes={"frequency": f, "contact_stiffness": k}, starts=Starts({"x": [3.2e-4], "v": [0.0]}),
         response_of=response_of, responses=Responses(table, np.stack([i, j], axis=-1), np.arange(m)), gap_unit="m", attrs=PROVENANCE,
     )  # fmt: skip

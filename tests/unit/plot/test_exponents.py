@@ -4,9 +4,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import made_results
 from saltus.errors import ParameterError
 from saltus.plot import exponents
-from saltus.results import exponents_dataset
 
 from .conftest import PROVENANCE
 
@@ -24,7 +24,7 @@ def converging(kinds=("chaotic",), unit="1/s", values=(5.98, -7.86), half=0.26, 
         "lyapunov_error": 0 * exact + half / 2, "lyapunov_low": exact - half, "lyapunov_high": exact + half, "status": ["ok"] * k,
         "running_time": time, "running_exponent": running, "running_low": running - width, "running_high": running + width,
     }  # fmt: skip
-    return exponents_dataset(columns=columns, rate=unit, states=("x", "v"), attrs=PROVENANCE)
+    return made_results.exponents(columns=columns, rate=unit, states=("x", "v"), attrs=PROVENANCE)
 
 
 def test_a_curve_with_its_interval_for_each_exponent():

@@ -6,8 +6,8 @@ import pytest
 import xarray as xr
 
 from saltus import plot
+from saltus.analysis.methods.compare_methods import methods_dataset
 from saltus.errors import ParameterError
-from saltus.results import methods_dataset
 
 VALUES = np.geomspace(1e3, 1e9, 64)
 
@@ -22,7 +22,7 @@ def side_by_side(values=VALUES):
     error = np.outer([0.0, 1e-3, 1e-6], np.ones(len(values)))
     fields = {"agrees": agrees, "known": agrees, "step_error": error, "steps_per_period": np.outer([20, 60, 200], np.ones(len(values)))}
     columns = {"method_cpu_seconds": np.array([1.0, np.nan, 3.0])}
-    return methods_dataset(base=base, labels=["Taylor", "ode45 a", "ode45 b"], columns=columns, fields=fields)
+    return methods_dataset(base, ["Taylor", "ode45 a", "ode45 b"], columns, fields, {})
 
 
 def test_three_panels_share_a_logarithmic_axis_with_its_unit():

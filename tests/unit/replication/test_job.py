@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import shutil
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import saltus
 from saltus.flow import ODE45
 from saltus.replication import job as jobs
 from saltus.replication import papers
-from saltus.study import identity
+from saltus.study import code
 from saltus.study.run.running import Resources, Running
 from small_paper import compute, small_job, small_result
 
@@ -83,10 +84,12 @@ def test_other_code_is_another_result(at, monkeypatch):
 def test_the_file_of_a_paper_s_own_function_is_part_of_its_identity(tmp_path, monkeypatch):
     copied = Path(shutil.copy(__file__, tmp_path))
     before = jobs._own_code.__wrapped__(__name__)
-    monkeypatch.setattr("sys.modules", {__name__: type("module", (), {"__file__": str(copied)})})
-    assert jobs._own_code.__wrapped__(__name__) == before
-    copied.write_text(copied.read_text(encoding="utf-8") + "#")
-    assert jobs._own_code.__wrapped__(__name__) != before
+    monkeypatch.setitem(sys.modules, "copied", type("module", (), {"__file__": str(copied)}))
+    assert jobs._own_code.__wrapped__("copied") == before
+    copied.write_text(copied.read_text(encoding="utf-8") + "# a remark\n", encoding="utf-8")
+    assert jobs._own_code.__wrapped__("copied") == before
+    copied.write_text(copied.read_text(encoding="utf-8") + "EDITED = True\n", encoding="utf-8")
+    assert jobs._own_code.__wrapped__("copied") != before
 
 
 def test_the_code_of_saltus_is_no_paper_s_own():
@@ -95,7 +98,7 @@ def test_the_code_of_saltus_is_no_paper_s_own():
 
 # -- what a result depends on ----------------------------------------------------------------------------------------------------
 #: Packages that take no part in numbers: messages, what kinds arguments may be of, the end of work, and pictures of what was computed.
-NO_NUMBERS = ("cache_folder", "errors", "arguments", "interrupt", "plot")
+NO_NUMBERS = ("errors", "arguments", "interrupt", "plot")
 #: What only says which system, method and arguments: these are in the identity themselves.
 SAYS_WHAT = ("replication.Job", "study.tables", "study.setting")
 
@@ -122,15 +125,15 @@ def strangers(files, known):
 
 
 def test_the_hash_of_a_study_covers_all_that_its_code_calls():
-    files = [file for place in identity.COMPUTING for file in sources(place)]
+    files = [file for place in code.COMPUTING for file in sources(place)]
     assert len(files) > 80
-    assert strangers(files, (*identity.COMPUTING, *NO_NUMBERS)) == set()
+    assert strangers(files, (*code.COMPUTING, *NO_NUMBERS)) == set()
 
 
 @pytest.mark.parametrize("paper", papers.names())
 def test_the_identity_of_a_job_covers_all_that_its_code_calls(paper):
     """Its own file counts, so it may call none beside it."""
-    assert strangers([papers.folder_of(paper) / "jobs.py"], (*identity.COMPUTING, *NO_NUMBERS, *SAYS_WHAT)) == set()
+    assert strangers([papers.folder_of(paper) / "jobs.py"], (*code.COMPUTING, *NO_NUMBERS, *SAYS_WHAT)) == set()
 
 
 def test_errors_of_further_methods_are_kept(at):

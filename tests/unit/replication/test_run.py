@@ -59,6 +59,19 @@ def test_a_job_that_fails_costs_only_what_needs_it(tmp_path):
     assert page(result).count("no such luck") == 3  # picture, table and claim
 
 
+def test_a_job_that_two_figures_need_fails_once(tmp_path):
+    tried = []
+
+    def failing(*_, **__):
+        tried.append(1)
+        raise ZeroDivisionError
+
+    paper = small_paper(compute=failing)
+    both = replace(paper, claims=tuple(replace(claim, needs=("fig2/first",)) for claim in paper.claims))
+    assert set(verdicts(reproduce(both, tmp_path)).values()) == {UNDECIDED}
+    assert len(tried) == 1
+
+
 def test_what_failed_is_tried_again_and_only_that(tmp_path):
     reproduce(small_paper(compute=broken), tmp_path)
     again = reproduce(small_paper(), tmp_path)

@@ -8,7 +8,9 @@ import sys
 import numpy as np
 import pytest
 
-from saltus.results import Contacts, Guards, attributes, stroboscope_dataset, trajectory_dataset
+import made_results
+from made_results import Contacts
+from saltus.results import Guards, attributes
 
 GAP = 1e-3
 UNITS = {"x": "m", "v": "m/s", "gap": "m", "frequency": "Hz"}
@@ -46,7 +48,7 @@ def sine_run(amplitudes=(2e-3,), periods=3, samples=16, batch=False, frequencies
         "end": {"x": x[:, -1], "v": v[:, -1]}, "attrs": PROVENANCE, "batch": batch,
         "varied": None if frequencies is None else {"frequency": f},
     }  # fmt: skip
-    return trajectory_dataset(**{**arguments, **changes})
+    return made_results.trajectory(**{**arguments, **changes})
 
 
 def sine_points(**changes):
@@ -57,7 +59,7 @@ def sine_points(**changes):
         "status": ["ok", "resting"],
         "guards": Guards(("gap",), ("x",), np.array([GAP])), "forcing_period": 1.0, "attrs": PROVENANCE,
     }  # fmt: skip
-    return stroboscope_dataset(**{**arguments, **changes})
+    return made_results.stroboscope(**{**arguments, **changes})
 
 
 @pytest.fixture

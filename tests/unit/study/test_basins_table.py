@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from saltus.results import AttractorTable, basins_dataset
+import made_results
+from saltus.results import AttractorTable
 from saltus.study.answers.basins_rows import attractor_table
 
 SCATTER = 4.3e-6 / 3
@@ -24,7 +25,7 @@ NOISY = dataclasses.replace(TABLE, kind=["periodic", "noisy_periodic"], scatter=
 def made(table=TABLE, basin=((0, 0), (0, 1)), **attrs):
     basin = np.array(basin)
     trust = {"smallest_basin_seen": 0.1, "flip_checked": 0, "uncertainty_exponent": math.nan, "unresolved_cells": 0, "method": "ODE45"}
-    return attractor_table("made up", basins_dataset(
+    return attractor_table("made up", made_results.basins(
         states=("x", "v"), units={"x": "m", "v": "m/s"}, axes={"x": np.array([0.0, 1.0]), "v": np.array([0.0, 1.0])}, basin=basin,
         periods_to_settle=0 * basin, status=0 * basin + 2, status_meanings={2: "ok"}, grazes_unresolved=0 * basin, attractors=table,
         gap_unit="m", attrs={**trust, "unsettled_cells": int((basin < 0).sum()), **attrs},

@@ -8,14 +8,14 @@ import json
 import pytest
 
 from edited_copy import edited_copy
-from saltus.errors import SaltusError, StudyError, UnitError
-from saltus.study import identity
+from saltus.errors import SaltusError, StudyError
+from saltus.study import code
 from saltus.study.answers.ask import questions_of
-from saltus.study.answers.basins import BasinMap, maps_of
+from saltus.study.answers.basins import BasinMap
 from saltus.study.run.running import Report, Resources, shard_of
 from saltus.study.setting.inputs import Inputs
 from saltus.study.tables.read import parse
-from small_study import small_study
+from small_study import maps_of, small_study
 
 BASE = small_study(6, 4)
 MAPS = BASE + '[[basins.map]]\nname = "first"\n[[basins.map]]\nname = "second"\n'
@@ -120,7 +120,7 @@ def test_a_grid_beyond_memory_is_refused():
 
 
 def test_a_wrong_unit():
-    with pytest.raises(UnitError, match=r"\[basins\.axes\] x"):
+    with pytest.raises(StudyError, match=r"\[basins\.axes\] x"):
         job(replaced('"-5 mm"', '"-5 m/s"'))
 
 
@@ -179,13 +179,13 @@ def test_what_changes_nothing_does_not(text):
 
 def test_the_code_is_part_of_the_identity(tmp_path, monkeypatch):
     """A label that comes from other code isn't mixed with this one's: every file that a label depends on counts."""
-    before = identity.code_hash.__wrapped__()
-    assert before == identity.code_hash.__wrapped__() == job().identity()["code"]
+    before = code.code_hash.__wrapped__()
+    assert before == code.code_hash.__wrapped__() == job().identity()["code"]
     for target in ("taylor_step.py", "labels.py", "engine.py", "trace.py", "find_attractors.py", "capture.py", "maps.py", "module.py",
                    "assemble.py", "units.py"):  # fmt: skip
         with monkeypatch.context() as patch:
             edited_copy(tmp_path / target, target, patch)
-            assert identity.code_hash.__wrapped__() != before, target
+            assert code.code_hash.__wrapped__() != before, target
 
 
 def test_the_identity_is_read_by_people():

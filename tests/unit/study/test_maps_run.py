@@ -12,7 +12,6 @@ from saltus.errors import StudyError
 from saltus.results import load
 from saltus.results.store.store import Store, StoreError
 from saltus.study import identity
-from saltus.study.answers.basins import maps_of
 from saltus.study.run import copies, maps
 from saltus.study.run.copies import copy_of
 from saltus.study.run.running import Resources
@@ -20,7 +19,7 @@ from saltus.study.run.status import status_table, status_tables, stores
 from saltus.study.run.study import run_study
 from saltus.study.tables.read import parse
 from small_maps import small_maps
-from small_study import small_study
+from small_study import maps_of, small_study
 
 #: 576 starts in 12 chunks; four attractors.
 STUDY = small_study(24)

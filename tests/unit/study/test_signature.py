@@ -9,6 +9,7 @@ import pytest
 
 import saltus as sl
 from saltus.errors import StudyError
+from saltus.study.answers.ask import ask
 from saltus.study.tables import questions
 from saltus.study.tables.kinds import KINDS
 from saltus.study.tables.methods import METHODS
@@ -63,3 +64,16 @@ def test_a_parameter_that_no_kind_describes_is_refused(monkeypatch):
     monkeypatch.delitem(KINDS, "force")
     with pytest.raises(TypeError, match=r"force.*no kind says how it is written in a study file"):
         table("impacts", ["impact_statistics"], KINDS)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('[method]\nname = "Taylor"\norder = 50\n[simulate]\nperiods = 3\n', r"\[method\] order must be at most 40, not 50"),
+        ('[simulate]\nperiods = 3\nmethod = { name = "Taylor", lanes = 3 }\n', r"\[simulate\.method\] lanes must be 2, 4, 8 or 16"),
+        ('[lyapunov]\nflow = { name = "Taylor", order = 2 }\n', r"\[lyapunov\.flow\] order must be a whole number of at least 6"),
+    ],
+)
+def test_what_a_method_refuses_is_told_of_its_table(text, told):
+    with pytest.raises(StudyError, match=told):
+        ask(HEAD + '[system]\nmodel = "delangre"\n' + text)

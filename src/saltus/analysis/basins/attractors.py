@@ -13,7 +13,7 @@ from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.halton import halton
 from saltus.analysis.basins.labels import complete, settle_all
 from saltus.analysis.basins.pipeline import SCOUTS, memory
-from saltus.analysis.dataset_parts import gap_unit, provenance
+from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
@@ -26,7 +26,9 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.flow.room import check_room
-from saltus.results import attractors_dataset
+from saltus.results import AttractorTable, Subject, build
+from saltus.results.dataset import schema
+from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
 from saltus.system.system import System
 from saltus.units import to_si
@@ -103,11 +105,9 @@ def attractors(
     scale = _spread(map_, group.start)
     with reporting(progress) as show:
         found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
-    return attractors_dataset(
-        states=system.states, units=system.units, attractors=portraits(map_, found), gap_unit=gap_unit(system),
-        basin=np.where(label < 0, Kind.UNCONVERGED, label), periods_to_settle=settled,
-        attrs=provenance(system, map_.method, system.values) | {"periods": periods} | stray_attrs(found.astray),
-    )  # fmt: skip
+    starts = {"trajectory": np.arange(group.size), "basin": np.where(label < 0, Kind.UNCONVERGED, label), "periods_to_settle": settled}
+    attrs = provenance(system, map_.method, system.values) | {"periods": periods} | stray_attrs(found.astray)
+    return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
 
 
 @verb
@@ -177,12 +177,16 @@ def basin_fractions(
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
     table = replace(portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found)))
-    ds = attractors_dataset(
-        states=system.states, units=system.units, attractors=table, gap_unit=gap_unit(system), basin=result.label,
-        periods_to_settle=result.periods, attrs=provenance(system, map_.method, system.values) | {"periods": periods},
-    )  # fmt: skip
+    starts = {"trajectory": np.arange(samples), "basin": result.label, "periods_to_settle": result.periods}
+    ds = attractors_dataset(subject(system, provenance(system, map_.method, system.values) | {"periods": periods}), table, starts)
     strays = stray_attrs(found.astray if (result.label == Kind.UNCONVERGED).any() else [])
     return ds.assign_attrs(**strays, smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=samples, seed=seed)
+
+
+def attractors_dataset(subject: Subject, table: AttractorTable, starts: Mapping[str, Any] | None = None) -> xr.Dataset:
+    """The Dataset of some attractors, and where they are kept of the starts: ``trajectory``, ``basin``, ``periods_to_settle``."""
+    values = {**(starts or {}), **table.values(len(subject.states))}
+    return build(schema.ATTRACTORS, subject, values, words={"<when>": table.points_when}, flags={"basin": basin_meanings(len(table))})
 
 
 def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, float]]:

@@ -14,10 +14,11 @@ from saltus.analysis.orbits.orbits import orbit_distance
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.intervals import wilson
-from saltus.results.dataset.basins import agreement_dataset
+from saltus.results import Subject, build
+from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.reader import reader
-from saltus.results.dataset.schema import BASINS, attractor_name, axes_of, check, states_of
+from saltus.results.dataset.schema import AGREEMENT, BASINS, attractor_name, axes_of, check, states_of
 
 #: Largest distance of two orbits that count as one, in units of the axis ranges: far above what methods differ by on one attractor,
 #: below what tells neighbours on the rig apart.
@@ -89,26 +90,21 @@ def compare(map_a: xr.Dataset, map_b: xr.Dataset, *, tolerance: float = TOLERANC
     settled = (a >= 0) & (b >= 0)
     agreement = np.where(settled, (a == b).astype(np.int64), -1)
     match = {
-        "a": ids_a,
-        "b": ids_b,
-        "type": _column(map_a, map_b, ids_a, ids_b, "attractor_type"),
-        "period": _column(map_a, map_b, ids_a, ids_b, "attractor_period"),
-        "fraction_a": _shares(map_a, ids_a),
-        "fraction_b": _shares(map_b, ids_b),
-        "agreeing_cells": np.bincount(a[agreement == 1], minlength=len(ids_a)),
-        "orbit_distance": np.concatenate([distance, np.full(len(ids_a) - len(distance), np.nan)]),
+        "match_a": ids_a,
+        "match_b": ids_b,
+        "match_type": _column(map_a, map_b, ids_a, ids_b, "attractor_type"),
+        "match_period": _column(map_a, map_b, ids_a, ids_b, "attractor_period"),
+        "match_fraction_a": _shares(map_a, ids_a),
+        "match_fraction_b": _shares(map_b, ids_b),
+        "match_agreeing_cells": np.bincount(a[agreement == 1], minlength=len(ids_a)),
+        "match_orbit_distance": np.concatenate([distance, np.full(len(ids_a) - len(distance), np.nan)]),
     }
     axes = axes_of(map_a)
-    return agreement_dataset(
-        states=states_of(map_a),
-        units={name: map_a[name].attrs.get("units", "") for name in axes},
-        axes={name: map_a[name].values for name in axes},
-        agreement=agreement,
-        basin_a=a,
-        basin_b=b,
-        match=match,
-        attrs={**_numbers(agreement), "tolerance": tolerance, **_provenance(map_a, map_b)},
-    )
+    attrs = {**_numbers(agreement), "tolerance": tolerance, **_provenance(map_a, map_b)}
+    subject = Subject(states_of(map_a), {name: map_a[name].attrs.get("units", "") for name in axes}, attrs)
+    labels = {"agreement": agreement, "basin_a": a, "basin_b": b}
+    values = {"<state>": {name: map_a[name].values for name in axes}, "pair": np.arange(len(ids_a)), **labels, **match}
+    return build(AGREEMENT, subject, values, grid=axes, flags=dict.fromkeys(("basin_a", "basin_b"), basin_meanings(len(ids_a))))
 
 
 # -- the grids -----------------------------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from saltus.analysis.axes import along
 from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.halton import halton
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
-from saltus.analysis.dataset_parts import gap_unit, provenance
+from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.noisy import stray_attrs
@@ -30,7 +30,9 @@ from saltus.flow.methods import Method
 from saltus.flow.room import check_room
 from saltus.intervals import wilson
 from saltus.kernels import status as st
-from saltus.results import basins_dataset
+from saltus.results import build
+from saltus.results.dataset import schema
+from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
 from saltus.results.provenance import to_json
 from saltus.system.system import System
@@ -138,13 +140,15 @@ class BasinPlan:
         result.label[result.label == OPEN] = Kind.UNCONVERGED
         labels = result.label.reshape(self.shape)
         table = replace(portraits(map_, found), fractions=uncertainty.fractions(labels, len(found)))
-        ds = basins_dataset(
-            states=self.system.states, units=self.system.units, axes=self.axes, basin=labels,
-            periods_to_settle=result.periods.reshape(self.shape), status=result.status.reshape(self.shape),
-            status_meanings={code: name for code, (name, _) in st.STATUS.items()},
-            grazes_unresolved=result.unresolved.reshape(self.shape), attractors=table,
-            gap_unit=gap_unit(self.system), attrs=self.attrs(),
-        )  # fmt: skip
+        values = {
+            "<state>": self.axes, "basin": labels, "periods_to_settle": result.periods.reshape(self.shape),
+            "status": result.status.reshape(self.shape),
+            "grazes_unresolved": result.unresolved.reshape(self.shape),
+            **table.values(len(self.system.states)),
+        }  # fmt: skip
+        flags = {"basin": basin_meanings(len(table)), "status": {code: name for code, (name, _) in st.STATUS.items()}}
+        words = {"<when>": table.points_when}
+        ds = build(schema.BASINS, subject(self.system, self.attrs()), values, grid=tuple(self.axes), words=words, flags=flags)
         strays = found.astray if (labels == Kind.UNCONVERGED).any() else []
         return ds.assign_attrs(uncertainty.measure(ds), **stray_attrs(strays), flip_rate=np.nan, flip_checked=0)
 

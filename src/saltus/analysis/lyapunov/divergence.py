@@ -49,7 +49,7 @@ class Divergence:
             start = np.concatenate([start, np.zeros((len(start), 1))], axis=1)
         outcome = map_.of_system(self._extended if integrated else self._system).run(start, 1, record=0)
         total = outcome.state[:, -1].copy() if integrated else self._constant(map_) if constant else self._dwelling(map_, outcome)
-        np.add.at(total, outcome.record_integers[:, st.REC_TRAJECTORY], self._jumps(map_, outcome))
+        np.add.at(total, outcome.contacts.trajectory, self._jumps(map_, outcome))
         return np.where(np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED)), total, np.nan)
 
     def _constant(self, map_: Stroboscope) -> np.ndarray:
@@ -58,12 +58,11 @@ class Divergence:
 
     def _dwelling(self, map_: Stroboscope, outcome: Outcome) -> np.ndarray:
         """A trace that is constant in each mode: its values times the times in the modes."""
-        table, times = outcome.record_integers, outcome.record_floats[:, -1]
-        row = table[:, st.REC_TRAJECTORY]
+        row, times = outcome.contacts.trajectory, outcome.contacts.time
         first = np.diff(row, prepend=-1) != 0
         begun = np.where(first, 0.0, np.roll(times, 1))
         total = np.zeros(len(map_))
-        np.add.at(total, row, (times - begun) * self._in_mode(map_, row, table[:, st.REC_MODE_BEFORE]))
+        np.add.at(total, row, (times - begun) * self._in_mode(map_, row, outcome.contacts.mode_before))
         last = np.zeros(len(map_))
         last[row] = times  # sorted by time: the last one stays
         return total + (map_.period - last) * self._in_mode(map_, np.arange(len(map_)), outcome.mode)
@@ -77,20 +76,19 @@ class Divergence:
 
     def _jumps(self, map_: Stroboscope, outcome: Outcome) -> np.ndarray:
         """Logarithm of the determinant of the saltation matrix at each contact."""
-        system, table = self._system, outcome.record_integers
-        row, states = table[:, st.REC_TRAJECTORY], outcome.record_floats[:, st.RECORD_FLOATS : st.RECORD_FLOATS + len(system.states)]
+        system, contacts = self._system, outcome.contacts
         here: dict[str, Any] = {
-            "t": outcome.record_floats[:, -1],
-            "states": dict(zip(system.states, states.T, strict=True)),
-            "values": {name: column[row] for name, column in map_.values.items()},
+            "t": contacts.time,
+            "states": dict(zip(system.states, contacts.state.T, strict=False)),  # an integral may follow them
+            "values": {name: column[contacts.trajectory] for name, column in map_.values.items()},
         }
-        before, after = (self._bits(table[:, column]) for column in (st.REC_MODE_BEFORE, st.REC_MODE_AFTER))
+        before, after = self._bits(contacts.mode_before), self._bits(contacts.mode_after)
         fields = [evaluate(system.field, bits=bits, **here) for bits in (before, after)]
-        logarithm = np.zeros(len(table))
+        logarithm = np.zeros(len(contacts))
         for g, guard in enumerate(system.guards):
             *normal, drift = evaluate([*gradient(guard.gap, system.states), time_derivative(guard.gap)], bits=before, **here)
             rates = [sum((n * f for n, f in zip(normal, field, strict=True)), start=drift) for field in fields]
-            mine = (table[:, st.REC_GUARD] == g) & (table[:, st.REC_KIND] == st.CROSSING)
+            mine = (contacts.guard == g) & (contacts.kind == st.CROSSING)
             with np.errstate(all="ignore"):
                 logarithm = np.where(mine, np.log(np.abs(rates[1] / rates[0])), logarithm)
         return logarithm

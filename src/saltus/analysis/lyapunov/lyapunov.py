@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.dataset_parts import gap_unit, provenance, shared_values
+from saltus.analysis.dataset_parts import provenance, shared_values, subject
 from saltus.analysis.lyapunov.exponents import Exponents
 from saltus.analysis.lyapunov.wolf_on_flow import NeighbourExponents
 from saltus.analysis.outcome_messages import warn
@@ -21,7 +21,8 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.interrupt import Interrupted
-from saltus.results import exponents_dataset
+from saltus.results import build
+from saltus.results.dataset import schema
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -162,12 +163,5 @@ def _dataset(system: System, flow: Method, group: Ensemble, work: Exponents | Ne
     per_period, logarithm = UNITS[unit]
     factor = (1.0 if per_period else 1.0 / work.map.period) / logarithm
     attrs = provenance(system, flow, shared_values(system, group), group.varied) | work.settings() | {"unit": unit}
-    return exponents_dataset(
-        columns=work.columns(np.broadcast_to(factor, group.size)),
-        rate=unit,
-        states=system.states,
-        units=system.units,
-        gap_unit=gap_unit(system),
-        varied=group.varied,
-        attrs=attrs,
-    )
+    columns = {"trajectory": np.arange(group.size), **work.columns(np.broadcast_to(factor, group.size))}
+    return build(schema.EXPONENTS, subject(system, attrs, varied=group.varied), columns, words={"<rate>": unit})

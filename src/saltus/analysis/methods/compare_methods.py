@@ -21,7 +21,9 @@ from saltus.errors import ParameterError, among, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
 from saltus.intervals import wilson
-from saltus.results import methods_dataset
+from saltus.results import Subject, build
+from saltus.results.dataset.attractors import basin_meanings
+from saltus.results.dataset.schema import BASINS, METHODS, attractor_name, axes_of, kind_of, parameters_of, states_of
 from saltus.system.system import System
 
 #: The question of Saunders et al. (2021): ode45 as it comes, with and without event location.
@@ -115,6 +117,30 @@ def compare_methods(
         fields=parts,
         attrs=provenance(system, everything[0], system.values) | {"analysis": name},
     )  # fmt: skip
+
+
+def methods_dataset(
+    base: xr.Dataset, labels: list[str], columns: Mapping[str, np.ndarray], fields: Mapping[str, np.ndarray], attrs: Mapping[str, Any]
+) -> xr.Dataset:
+    """The Dataset of one analysis by several methods.
+
+    Parameters
+    ----------
+    base : Dataset
+        The analysis by the reference: its coordinates, parameters or states, and starts.
+    labels : list of str, length k
+        A name for each method, the reference first.
+    columns, fields : mapping of str to array, shape (k,) or (k, n...)
+        What belongs to a method, and what to a method and a place of the grid, with or without the dim ``start``.
+    attrs : mapping
+        Provenance.
+    """
+    states, dims = states_of(base), axes_of(base) if kind_of(base) == BASINS else parameters_of(base)
+    first = base["peak" if "peak" in base else attractor_name(states[0])].attrs.get("units", "")
+    labelled = {"basin": basin_meanings(int(fields["basin"].max(initial=-1)) + 1)} if "basin" in fields else {}
+    carried = {str(name): base[name].variable for name in base.coords if set(base[name].dims) <= {*dims, "start"}}
+    values = {"method": labels, **columns, **fields}
+    return build(METHODS, Subject(states, {states[0]: first}, attrs), values, grid=dims, flags=labelled, carried=carried)
 
 
 def method_label(method: Method) -> str:

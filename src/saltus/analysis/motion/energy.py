@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.motion.window import Stretch, common, computed, stretch, with_each
+from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
@@ -18,7 +19,6 @@ from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.room import check_room
-from saltus.results import motion_dataset
 from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Expr
@@ -108,10 +108,8 @@ def energy_balance(
     seen = stretch(system, start, values, periods, t_end, t_start, transient)
     schedule = _schedule(seen, intervals)
 
-    def dataset(outcome: Outcome) -> xr.Dataset:
-        return _dataset(system, method, seen, whole_system, stored, schedule, outcome)
-
-    result = computed(whole_system, method, seen.request(whole_system, schedule, record=False), dataset, threads, progress)
+    answer = partial(_dataset, system, method, seen, whole_system, stored, schedule)
+    result = computed(whole_system, method, seen.request(whole_system, schedule, record=False), answer, threads, progress)
     warn(result)
     return result
 
@@ -158,14 +156,9 @@ def _dataset(
     residual = supplied - dissipated - change
     parts = {"energy": energy[:, 1:], "change": change, "supplied": supplied, "dissipated": dissipated, "residual": residual}
     forced = system.forced_at is not None
-    arguments = common(seen, system, method, outcome)
-    return motion_dataset(
-        schema.ENERGY,
-        **with_each(arguments, **parts, imbalance=_imbalance(parts)),
-        table={},
-        along=None if forced else "time",
-        coords={"period": schedule.count[1:]} if forced else {"time": time[0, 1:]},
-    )
+    intervals = {"period": schedule.count[1:]} if forced else {"time": time[0, 1:]}
+    each = {**parts, "imbalance": _imbalance(parts)}
+    return dataset(schema.ENERGY, seen, system, method, outcome, intervals, each, along={} if forced else {"period": "time"})
 
 
 def _imbalance(parts: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -10,14 +10,13 @@ import xarray as xr
 
 from saltus.analysis.motion import touchdowns
 from saltus.analysis.motion.touchdowns import Touchdowns
-from saltus.analysis.motion.window import Stretch, common, computed, stretch, with_each
+from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
-from saltus.results import motion_dataset
 from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate
 from saltus.system.quantity import Quantity, with_integrals
@@ -116,11 +115,11 @@ def impact_statistics(
     seen = stretch(system, start, values, periods, t_end, t_start, transient)
     begin = Schedule(np.array([seen.skipped]), np.zeros(1))
 
-    def dataset(outcome: Outcome) -> xr.Dataset:
+    def answer(outcome: Outcome) -> xr.Dataset:
         found = touchdowns.find(seen, outcome, sides, {guard: len(system.states) + i for i, guard in enumerate(forces)})
         return _dataset(system, method, seen, sides, found, bins, outcome)
 
-    result = computed(extended, method, seen.request(extended, begin, record=True), dataset, threads, progress)
+    result = computed(extended, method, seen.request(extended, begin, record=True), answer, threads, progress)
     warn(result)
     return result
 
@@ -177,13 +176,8 @@ def _dataset(
     }  # fmt: skip
     if found.impulse is not None:
         columns["contact_impulse"] = found.impulse
-    arguments = common(seen, system, method, outcome)
-    return motion_dataset(
-        schema.IMPACTS,
-        **with_each(arguments, **each),
-        table={**columns, "contact_side": sides},
-        coords={"speed_low": edges[:-1], "speed_high": edges[1:]},
-    )
+    columns |= {"contact_side": sides, "speed_low": edges[:-1], "speed_high": edges[1:]}
+    return dataset(schema.IMPACTS, seen, system, method, outcome, columns, each)
 
 
 def _edges(bins: Any, speed: np.ndarray) -> np.ndarray:

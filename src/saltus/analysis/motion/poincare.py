@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from saltus.analysis import dataset_parts
-from saltus.analysis.motion.window import Stretch, common, computed, stretch, with_each
+from saltus.analysis.motion.window import Stretch, computed, dataset, stretch
 from saltus.analysis.outcome_messages import warn
 from saltus.analysis.starts import check_system
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
-from saltus.kernels import status as st
-from saltus.results import motion_dataset
 from saltus.results.dataset import schema
 from saltus.system.guards import equation_of
 from saltus.system.quantity import Quantity, acting_guards, turning_surface, with_level, with_surface
@@ -109,10 +107,14 @@ def poincare(
     found = crossed(system, surface, values if isinstance(values, Mapping) else {})
     seen = stretch(found.system, start, values, periods, t_end, t_start, transient)
 
-    def dataset(outcome: Outcome) -> xr.Dataset:
-        return _dataset(system, method, seen, found, direction, outcome)
-
-    result = computed(found.system, method, seen.request(found.system, Schedule.none(), record=True), dataset, threads, progress)
+    result = computed(
+        found.system,
+        method,
+        seen.request(found.system, Schedule.none(), record=True),
+        partial(_dataset, system, method, seen, found, direction),
+        threads,
+        progress,
+    )
     warn(result)
     return result
 
@@ -159,41 +161,34 @@ def _last(system: System, unit: str, text: str) -> Crossed:
 
 def _dataset(system: System, method: Method, seen: Stretch, crossed: Crossed, direction: int, outcome: Outcome) -> xr.Dataset:
     """The crossings that were asked for, under their names."""
-    table, numbers = outcome.record_integers, outcome.record_floats
-    who, guard = table[:, st.REC_TRAJECTORY], table[:, st.REC_GUARD]
-    time = dataset_parts.contact_times(outcome)
+    table = outcome.contacts
+    who, guard, time, flips = table.trajectory, table.guard, table.time, table.changes_side
     late = time > seen.begin[who]
-    flips = ((table[:, st.REC_MODE_BEFORE] ^ table[:, st.REC_MODE_AFTER]) >> guard) & 1 == 1
     ours = late & (guard == crossed.guard)
-    wanted = ours & flips & ((direction == 0) | (table[:, st.REC_DIRECTION] == direction))
-    kept, rows = np.flatnonzero(wanted), who[wanted]
-    kinds = np.array([st.CONTACT_KIND[i] for i in range(len(st.CONTACT_KIND))])
+    wanted = ours & flips & ((direction == 0) | (table.direction == direction))
+    kept, rows = table.rows(wanted), who[wanted]
 
     def count(of: np.ndarray) -> np.ndarray:
         return np.bincount(who[of], minlength=seen.group.size)
 
-    arguments = common(seen, system, method, outcome)
-    arguments["attrs"] |= {"surface": crossed.text, "direction": direction, "transient": _transient(seen)}
-    states = {name: numbers[kept, st.RECORD_FLOATS + i] for i, name in enumerate(system.states)}
     columns = {
-        "crossing_time": time[kept],
-        "crossing_time_error": numbers[kept, st.REC_TIME_ERROR],
-        "crossing_period": table[kept, st.REC_PERIOD],
-        "crossing_phase": _phases(seen, numbers[kept, st.REC_PHASE], rows),
-        "crossing_direction": table[kept, st.REC_DIRECTION],
-        "crossing_rate": numbers[kept, st.REC_VELOCITY],
-        "crossing_kind": kinds[table[kept, st.REC_KIND]],
+        "<state>": kept.state[:, : len(system.states)],
+        "crossing_time": kept.time,
+        "crossing_time_error": kept.time_error,
+        "crossing_period": kept.period,
+        "crossing_phase": _phases(seen, kept.phase, rows),
+        "crossing_direction": kept.direction,
+        "crossing_rate": kept.velocity,
+        "crossing_kind": kept.kind_name,
         "crossing_trajectory": rows,
     }
     contacts = late & flips & np.isin(guard, acting_guards(system))
-    return motion_dataset(
-        schema.SECTION,
-        **with_each(
-            arguments, crossings=count(wanted), tangencies=count(_distinct(seen, who, time, ours & ~flips)), contacts=count(contacts)
-        ),
-        table={**states, **columns},
-        table_units={"crossing_rate": schema.rate_unit(crossed.unit)},
-    )
+    counts = {"crossings": wanted, "tangencies": _distinct(seen, who, time, ours & ~flips), "contacts": contacts}
+    return dataset(
+        schema.SECTION, seen, system, method, outcome, columns, {name: count(rows) for name, rows in counts.items()},
+        {"surface": crossed.text, "direction": direction, "transient": _transient(seen)},
+        words={"<surface rate>": schema.rate_unit(crossed.unit)},
+    )  # fmt: skip
 
 
 def _distinct(seen: Stretch, who: np.ndarray, time: np.ndarray, touches: np.ndarray) -> np.ndarray:

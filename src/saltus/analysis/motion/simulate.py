@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,8 @@ from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
-from saltus.results import trajectory_dataset
+from saltus.results import build
+from saltus.results.dataset import schema
 from saltus.system.system import System
 
 #: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
@@ -141,8 +142,7 @@ class _Plan:
     first: int
 
     def request(self, group: Ensemble, length: Span) -> Request:
-        begin, end = length.t_start, length.t_end
-        return Request(group.start, group.parameters, length.period, begin, length.count, length.phase, self.schedule, self.first, end)
+        return replace(length.request(group.start, group.parameters, self.schedule, self.first), t_end=length.t_end)
 
 
 def _plan(system: System, group: Ensemble, length: Span, samples: int | None, keep: int | None) -> _Plan:
@@ -182,14 +182,19 @@ def _dataset(
     own_periods = forced and bool(np.ptp(length.period) > 0)
     scale = length.period[:, None] if own_periods else length.period[0]
     time = np.minimum(length.t_start + (count * scale + fraction * scale), length.t_end)
-    return trajectory_dataset(
-        time=time,
-        values={name: outcome.samples[:, reached, i] for i, name in enumerate(system.states)},
-        mode=outcome.sample_mode[:, reached],
-        contacts=dataset_parts.contacts(outcome, len(system.states), errors),
-        end_time=outcome.time,
-        end={name: outcome.state[:, i] for i, name in enumerate(system.states)},
-        period=count + fraction if forced else None,
-        forcing_period=(length.period if own_periods else float(length.period[0])) if forced else None,
-        **dataset_parts.common(system, method, group, outcome),
+    subject = dataset_parts.trajectories(
+        system, method, group, (length.period if own_periods else float(length.period[0])) if forced else None
     )
+    values = {
+        "trajectory": np.arange(group.size),
+        **({"period": count + fraction} if forced else {}),
+        "time": time,
+        "<state>": outcome.samples[:, reached, : len(system.states)],
+        "mode": outcome.sample_mode[:, reached],
+        **dataset_parts.contacts(system, outcome, errors),
+        **dataset_parts.endings(outcome),
+        **dataset_parts.minima(outcome),
+        "end_time": outcome.time,
+        "end_<state>": outcome.state,
+    }
+    return build(schema.TRAJECTORY, subject, values, along={"time": "period"} if own_periods else {})

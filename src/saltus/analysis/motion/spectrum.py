@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from saltus.analysis.motion.settled import settled
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole as whole_number
-from saltus.results import spectrum_dataset
+from saltus.results import Subject, build
 from saltus.results.dataset import schema
 from saltus.results.dataset.reader import reader
 
@@ -98,24 +98,26 @@ def spectrum(
     told = json.loads(run.attrs.get("varied_parameters", "[]")) if batch else []  # a varied frequency shows in the lines
     varied = {name: run[name].values for name in told if name in run.coords and name not in ("frequency", "order")}
     own = stretch.frequency.ndim == 2
-    return spectrum_dataset(
+    subject = Subject(
         states=names,
         units={name: run[name].attrs.get("units", "") for name in (*names, *varied)},
-        frequency=stretch.frequency,
-        order=stretch.order,
-        amplitude={name: np.abs(line) for name, line in lines.items()},
-        phase={name: np.angle(line) for name, line in lines.items()},
-        each={
-            "window": chosen,
-            "noise_bandwidth": np.mean(weights**2, axis=1) / np.mean(weights, axis=1) ** 2,
-            "response_period": stretch.response,
-            "status": np.atleast_1d(run["status"].values),
-        },
         forcing_period=np.atleast_1d(run["forcing_period"].values) if own else run.attrs.get("forcing_period_s"),
         varied=varied,
         attrs={key: value for key, value in run.attrs.items() if key not in ("result_hash", "forcing_period_s")},
         batch=batch,
     )
+    places = {"trajectory": np.arange(len(chosen)), "frequency": stretch.frequency}
+    if stretch.order is not None:
+        places["order"] = stretch.order
+    each = {
+        "window": chosen,
+        "noise_bandwidth": np.mean(weights**2, axis=1) / np.mean(weights, axis=1) ** 2,
+        "response_period": stretch.response,
+        "status": np.atleast_1d(run["status"].values),
+    }
+    parts: dict[str, Callable[[np.ndarray], np.ndarray]] = {"<state>_amplitude": np.abs, "<state>_phase": np.angle}
+    spectra = [(row, {name: of(line)}) for name, line in lines.items() for row, of in parts.items()]
+    return build(schema.SPECTRUM, subject, [*places.items(), *spectra, *each.items()], along={"frequency": "order"} if own else {})
 
 
 # -- which samples -------------------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,11 @@ from saltus.analysis.starts import ensemble, span
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
-from saltus.flow.engine import Outcome, Request, Schedule
+from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.flow.room import check_room
-from saltus.results import stroboscope_dataset
+from saltus.results import build
+from saltus.results.dataset import schema
 from saltus.system.system import System
 
 
@@ -84,17 +86,20 @@ def stroboscope(
     check_room(size, f"{group.size} trajectories with {count} periods each", "Give keep= (last periods).")
     kept = np.arange(first, whole_periods + 1, dtype=np.int64)
     schedule = Schedule(kept, np.zeros(len(kept)))
-    request = Request(group.start, group.parameters, length.period, length.t_start, length.count, length.phase, schedule, None)
+    request = length.request(group.start, group.parameters, schedule, None)
 
     def dataset(outcome: Outcome) -> xr.Dataset:
         reached = slice(outcome.reached())
         own_periods = bool(np.ptp(length.period) > 0)
-        return stroboscope_dataset(
-            period=kept[reached],
-            values={name: outcome.samples[:, reached, i] for i, name in enumerate(system.states)},
-            forcing_period=length.period if own_periods else float(length.period[0]),
-            **{**dataset_parts.common(system, method, group, outcome), "batch": True},
-        )
+        subject = dataset_parts.trajectories(system, method, group, length.period if own_periods else float(length.period[0]))
+        values = {
+            "trajectory": np.arange(group.size),
+            "period": kept[reached],
+            "<state>": outcome.samples[:, reached, : len(system.states)],
+            **dataset_parts.endings(outcome),
+            **dataset_parts.minima(outcome),
+        }
+        return build(schema.STROBOSCOPE, replace(subject, batch=True), values)
 
     result = computed(system, method.suited_to(group.size), request, dataset, threads, progress)
     warn(result)

@@ -11,7 +11,6 @@ import numpy as np
 from saltus.flow import engine
 from saltus.flow.engine import Outcome, Request, RunInterrupted, Schedule
 from saltus.flow.methods import Method
-from saltus.kernels import status as st
 from saltus.system import expression as ex
 from saltus.system.evaluate import evaluate
 from saltus.system.system import System
@@ -31,7 +30,7 @@ SEED = 20
 
 def local(outcome: Outcome) -> np.ndarray:
     """What one step's own error means for the time of its contact [s]."""
-    return outcome.record_floats[:, st.REC_TIME_ERROR]
+    return outcome.contacts.time_error
 
 
 def measured(
@@ -61,7 +60,7 @@ def measured(
     else:
         outcome, distance = _one_by_one(system, method, request, runs, threads, show)
     error = (SAFETY if method.exact else SAFETY_OF_EXACT_COMPANION) * distance
-    return outcome, np.maximum(error, local(outcome) + 4.0 * np.spacing(np.abs(outcome.record_floats[:, -1])))
+    return outcome, np.maximum(error, local(outcome) + 4.0 * np.spacing(np.abs(outcome.contacts.time)))
 
 
 def _in_one_call(
@@ -90,7 +89,7 @@ def _one_by_one(
     n = len(request.start)
     outcome = engine.run(system, method.suited_to(n), request, threads, part(0.0, BY_ITSELF))
     companion, share = method.companion().suited_to(n), (1.0 - BY_ITSELF) / len(runs)
-    distance = np.zeros(len(outcome.record_integers))
+    distance = np.zeros(len(outcome.contacts))
     try:
         for done, one in enumerate(runs):
             check = engine.run(system, companion, one, threads, part(BY_ITSELF + done * share, share))
@@ -160,19 +159,20 @@ def _distances(outcome: Outcome, check: Outcome, offset: int) -> np.ndarray:
 
     The k-th contact is compared with the k-th; from the first at which the two runs meet different guards on, it is infinite.
     """
-    distance = np.full(len(outcome.record_integers), np.inf)
-    bounds_ours, bounds_theirs = _bounds(outcome, 0, len(outcome.status)), _bounds(check, offset, len(outcome.status))
-    for i in range(len(outcome.status)):
+    distance = np.full(len(outcome.contacts), np.inf)
+    count = len(outcome.status)
+    bounds_ours, bounds_theirs = outcome.contacts.begins(count), check.contacts.begins(count, offset)
+    for i in range(count):
         a, b = slice(*bounds_ours[i : i + 2]), slice(*bounds_theirs[i : i + 2])
-        times, same = _in_order(_events(outcome, a), _events(check, b), check.record_floats[b, -1].copy())
+        times, same = _in_order(_events(outcome, a), _events(check, b), check.contacts.time[b].copy())
         here = slice(a.start, a.start + same)
-        distance[here] = np.maximum.accumulate(np.abs(outcome.record_floats[here, -1] - times[:same]))
+        distance[here] = np.maximum.accumulate(np.abs(outcome.contacts.time[here] - times[:same]))
     return distance
 
 
 def _events(outcome: Outcome, rows: slice) -> np.ndarray:
     """Guard and direction of contacts, int64[k, 2]."""
-    return outcome.record_integers[rows][:, [st.REC_GUARD, st.REC_DIRECTION]]
+    return np.stack([outcome.contacts.guard[rows], outcome.contacts.direction[rows]], axis=1)
 
 
 def _in_order(ours: np.ndarray, theirs: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, int]:
@@ -187,8 +187,3 @@ def _in_order(ours: np.ndarray, theirs: np.ndarray, times: np.ndarray) -> tuple[
             return times, k
         times[k : k + 2], first = times[k : k + 2][::-1].copy(), k + 2
     return times, shared
-
-
-def _bounds(outcome: Outcome, first: int, count: int) -> np.ndarray:
-    """Where the contacts of ``count`` trajectories from ``first`` on begin in a sorted table, and where the last ends."""
-    return np.searchsorted(outcome.record_integers[:, st.REC_TRAJECTORY], first + np.arange(count + 1))

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis import dataset_parts
 from saltus.analysis.motion.window import Stretch
 from saltus.flow.engine import Outcome
-from saltus.kernels import status as st
 
 
 @dataclass(frozen=True)
@@ -61,18 +59,16 @@ def find(seen: Stretch, outcome: Outcome, sides: np.ndarray, integrals: Mapping[
     integrals : mapping of int to int
         For guards with a force: the state that holds its integral.
     """
-    table, numbers = outcome.record_integers, outcome.record_floats
-    time = dataset_parts.contact_times(outcome)
-    who, guard = table[:, st.REC_TRAJECTORY], table[:, st.REC_GUARD]
-    flips = ((table[:, st.REC_MODE_BEFORE] ^ table[:, st.REC_MODE_AFTER]) >> guard) & 1 == 1
-    usable = flips & (time > seen.begin[who])
-    ends = np.searchsorted(who, np.arange(seen.group.size + 1))
+    contacts = outcome.contacts
+    time, who, guard = contacts.time, contacts.trajectory, contacts.guard
+    usable = contacts.changes_side & (time > seen.begin[who])
+    ends = contacts.begins(seen.group.size)
     parts, spells = [], {}
     for i in range(seen.group.size):
         mine = ends[i] + np.flatnonzero(usable[ends[i] : ends[i + 1]])
         for g, side in enumerate(sides):
             rows = mine[guard[mine] == g]
-            enters = table[rows, st.REC_DIRECTION] == side
+            enters = contacts.direction[rows] == side
             part = _pairs(rows, enters)
             parts.append(part)
             end = min(float(seen.begin[i] + seen.duration[i]), float(outcome.time[i]))
@@ -82,7 +78,7 @@ def find(seen: Stretch, outcome: Outcome, sides: np.ndarray, integrals: Mapping[
     pairs = pairs[np.lexsort((guard[pairs[:, 0]], time[pairs[:, 0]], who[pairs[:, 0]]))]
     first, final = pairs.T
     ended = final >= 0
-    speed = np.abs(numbers[:, st.REC_VELOCITY])
+    speed = np.abs(contacts.velocity)
     return Touchdowns(
         trajectory=who[first],
         guard=guard[first],
@@ -90,7 +86,7 @@ def find(seen: Stretch, outcome: Outcome, sides: np.ndarray, integrals: Mapping[
         end=np.where(ended, time[final], np.nan),
         speed=speed[first],
         exit_speed=np.where(ended, speed[final], np.nan),
-        impulse=_impulses(numbers, guard, first, final, integrals) if integrals else None,
+        impulse=_impulses(contacts.state, guard, first, final, integrals) if integrals else None,
         spells=spells,
     )
 
@@ -120,11 +116,11 @@ def _spells(time: np.ndarray, enters: np.ndarray, touching: bool, begin: float, 
     return np.stack([starts, ends], axis=1)
 
 
-def _impulses(numbers: np.ndarray, guard: np.ndarray, first: np.ndarray, final: np.ndarray, integrals: Mapping[int, int]) -> np.ndarray:
+def _impulses(states: np.ndarray, guard: np.ndarray, first: np.ndarray, final: np.ndarray, integrals: Mapping[int, int]) -> np.ndarray:
     """Difference of the integral of the force between the two ends of each contact."""
     impulse = np.full(len(first), np.nan)
     for g, number in integrals.items():
         rows = (guard[first] == g) & (final >= 0)
-        column = numbers[:, st.RECORD_FLOATS + number]
+        column = states[:, number]
         impulse[rows] = column[final[rows]] - column[first[rows]]
     return impulse

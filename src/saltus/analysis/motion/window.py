@@ -17,7 +17,7 @@ from saltus.flow.counts import whole
 from saltus.flow.engine import Outcome, Request, Schedule
 from saltus.flow.methods import Method
 from saltus.flow.progress import reporting
-from saltus.kernels import status as st
+from saltus.results import build
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -62,11 +62,7 @@ class Stretch:
         """The request for this system, or one with more states: those start at zero."""
         more = len(system.states) - self.group.start.shape[1]
         start = np.pad(self.group.start, ((0, 0), (0, more)))
-        length = self.length
-        return Request(
-            start, self.group.parameters, length.period, length.t_start, length.count, length.phase, schedule,
-            self.skipped if record else None,
-        )  # fmt: skip
+        return self.length.request(start, self.group.parameters, schedule, self.skipped if record else None)
 
 
 def stretch(system: System, start: Any, values: Any, periods: Any, t_end: Any, t_start: Any, transient: Any) -> Stretch:
@@ -109,28 +105,22 @@ def computed(
             raise stop.then(dataset) from None
 
 
-def common(seen: Stretch, system: System, method: Method, outcome: Outcome) -> dict[str, Any]:
-    """The arguments of every Dataset of a stretch: of the system itself, not of the guards and states that were added to it."""
-    own = dataset_parts.guards(seen.system, seen.group)
-    count = len(system.guards)
-    names = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
-    return dict(
-        states=system.states,
-        units=seen.system.units,
-        guards=own.first(count),
-        status=[st.STATUS[int(code)][0] for code in outcome.status],
-        each={**{name: outcome.counters[:, st.COUNTERS.index(name)] for name in names}, "end_time": outcome.time},
-        end={name: outcome.state[:, i] for i, name in enumerate(system.states)},
-        forcing_period=seen.forcing_period,
-        varied=seen.group.varied,
-        batch=seen.group.batch,
-        attrs=dataset_parts.provenance(seen.system, method, dataset_parts.shared_values(seen.system, seen.group), seen.group.varied),
-    )
+def dataset(
+    kind: str, seen: Stretch, system: System, method: Method, outcome: Outcome, values: Mapping[str, Any], each: Mapping[str, Any],
+    attrs: Mapping[str, Any] | None = None, **options: Any,
+) -> xr.Dataset:  # fmt: skip
+    """The Dataset of a stretch: of the system itself, not of the guards and states that were added to it.
 
-
-def with_each(arguments: Mapping[str, Any], **each: Any) -> dict[str, Any]:
-    """The arguments with more variables that every trajectory has."""
-    return {**arguments, "each": {**arguments["each"], **each}}
+    ``values`` are tables, ``each`` what belongs to each trajectory; how it ended stands between them. ``attrs`` are settings beside the
+    provenance, ``options`` as for :func:`saltus.results.build`.
+    """
+    own = dataset_parts.trajectories(seen.system, method, seen.group, seen.forcing_period)
+    guards = None if own.guards is None else own.guards.first(len(system.guards))
+    subject = replace(own, states=system.states, guards=guards, attrs={**own.attrs, **(attrs or {})})
+    counters = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
+    ending = {**dataset_parts.endings(outcome, counters), "end_time": outcome.time}
+    ends = {"end_<state>": outcome.state[:, : len(system.states)]}
+    return build(kind, subject, {"trajectory": np.arange(seen.group.size), **values, **ending, **each, **ends}, **options)
 
 
 def extended(seen: Stretch, system: System) -> Stretch:

@@ -7,6 +7,7 @@ locates no contacts is known at its samples and by the cubics between them.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -21,7 +22,7 @@ from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 
 #: Forcing periods of a motion that never repeats from which its numbers are taken, where there are many such motions.
-WANDERED = 64
+APERIODIC_PERIODS = 64
 #: Nodes that a thread holds at a time: some 20 MB.
 HELD = 8192
 #: Places of Gauss's rule on a piece: exact for the square of a polynomial of degree 20.
@@ -103,7 +104,9 @@ def unknown(m: int, size: int, outputs: int | None = None) -> Measures:
     return Measures(maximum, minimum, mean, deviation, harmonic, margin, span, contacts, [""] * m, turning)
 
 
-def measure(map_: Stroboscope, start: np.ndarray, periods: np.ndarray, window: int = WANDERED, outputs: Outputs | None = None) -> Measures:
+def measure(
+    map_: Stroboscope, start: np.ndarray, periods: np.ndarray, window: int = APERIODIC_PERIODS, outputs: Outputs | None = None
+) -> Measures:
     """The numbers of the motions from states float64[m, D], row i by row i of the map.
 
     Parameters
@@ -233,7 +236,6 @@ def _means(map_: Stroboscope, whole: Pieces, first: np.ndarray, output: int, res
 
 def _itineraries(names: list[str], outcome: Outcome) -> list[str]:
     """Guards met by each motion and the ways they were crossed; grazes left out."""
-    table = outcome.record_integers[outcome.record_integers[:, st.REC_KIND] != st.GRAZE]
-    texts = [f"{names[row[st.REC_GUARD]]}{'+' if row[st.REC_DIRECTION] > 0 else '-'}" for row in table]
-    ends = np.searchsorted(table[:, st.REC_TRAJECTORY], np.arange(len(outcome.status) + 1))
-    return [" ".join(texts[ends[i] : ends[i + 1]]) for i in range(len(outcome.status))]
+    contacts = outcome.contacts.rows(outcome.contacts.kind != st.GRAZE)
+    texts = [f"{names[guard]}{'+' if way > 0 else '-'}" for guard, way in zip(contacts.guard, contacts.direction, strict=True)]
+    return [" ".join(texts[i:j]) for i, j in itertools.pairwise(contacts.begins(len(outcome.status)))]

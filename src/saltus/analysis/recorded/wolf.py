@@ -18,7 +18,8 @@ from saltus.analysis.statistics import BOUNDED, CONFIDENCE, UNCLEAR, batch_means
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, SaltusWarning, among, nearest, shown
 from saltus.flow.counts import whole
-from saltus.results import exponents_dataset
+from saltus.results import Subject, build
+from saltus.results.dataset import schema
 
 #: Default of the largest distance at most, as a share of the range: beyond it growth isn't that of small deviations. Wolf's rule.
 WIDEST = 0.1
@@ -170,7 +171,8 @@ def wolf(
         "samples": len(columns), "dimension": size, "delay_samples": lag if single else 0, "evolve_samples": steps,
         "exclude_samples": apart, "smallest_distance": search.smallest, "largest_distance": search.largest, "false_neighbours": false,
     }  # fmt: skip
-    return exponents_dataset(columns=_table(found, interval * steps, UNITS[unit], false), rate=unit, attrs=settings)
+    values = {"trajectory": np.arange(1), **_table(found, interval * steps, UNITS[unit], false)}
+    return build(schema.EXPONENTS, Subject((), attrs=settings), values, words={"<rate>": unit})
 
 
 def measure(points: np.ndarray, interval: float, search: Search) -> Growing:

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.dataset_parts import gap_unit, guards_over, provenance
+from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.analysis.responses import branches
+from saltus.analysis.responses.bifurcations import Event
 from saltus.analysis.responses.followed import Followed
 from saltus.analysis.responses.grid import Grid
 from saltus.analysis.responses.responses import Found, find, numbers_of, table_of
@@ -19,7 +20,10 @@ from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.interrupt import Interrupted
-from saltus.results import Events, OutputNumbers, Responses, Starts, responses_dataset
+from saltus.results import build
+from saltus.results.dataset import schema
+from saltus.results.dataset.attractors import padded
+from saltus.results.dataset.responses import SAMPLES, grid_values, response_values
 
 
 def respond(
@@ -49,27 +53,38 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
         followed = Followed(found, grid, method, threads)
         branch = branches.follow(found, followed, grid.places)
         happened = branches.events(found, table, branch, followed, grid, method.exact)
-    (name, *_) = grid.axes
-    system = grid.system
+    system, size = grid.system, len(grid.system.states)
     fixed = {key: value for key, value in system.values.items() if key not in grid.axes}
     varied = dict(zip(grid.axes, np.meshgrid(*grid.axes.values(), indexing="ij"), strict=True))
-    return responses_dataset(
-        states=system.states,
-        units=system.units,
-        axes=grid.axes,
-        starts=Starts({key: grid.starts[:, i] for i, key in enumerate(system.states)}, grid.sweeps),
-        response_of=found.of.reshape(*grid.shape, len(grid.starts)),
-        responses=Responses(
-            table, np.stack(np.unravel_index(found.place, grid.shape), axis=1), branch,
-            sampled(sample, numbers, grid, method, found, threads) if sample else None,
-            OutputNumbers(outputs.names, outputs.units, numbers.by_name()),
-        ),
-        events=Events(
-            {name: np.array([event.value for event in happened])}, [event.kind for event in happened],
-            np.array([event.branch for event in happened], np.int64),
-        ) if len(grid.axes) == 1 else None,
-        guards=guards_over(system, fixed | varied, grid.shape),
-        sample=sample,
-        gap_unit=gap_unit(system),
-        attrs=provenance(system, method, fixed, grid.axes) | {"periods": periods, "random_starts": int(grid.drawn)},
-    )  # fmt: skip
+    place = np.unravel_index(found.place, grid.shape)
+    at = {name: values[index] for (name, values), index in zip(grid.axes.items(), place, strict=True)}
+    values = {
+        "<parameter>": grid.axes,
+        "start": np.arange(len(grid.starts)),
+        **({"start_direction": list(grid.sweeps)} if grid.sweeps else {}),
+        "start_<state>": grid.starts,
+        **grid_values(found.of.reshape(*grid.shape, len(grid.starts)), table),
+        **response_values(table, branch, at, size),
+        "output": list(outputs.names),
+        "output_units": list(outputs.units),
+        **{f"output_{name}": column for name, column in numbers.by_name().items()},
+        **({"sample_<state>": padded(sampled(sample, numbers, grid, method, found, threads), size)} if sample else {}),
+        **(_events(happened, grid) if len(table) else {}),  # netCDF-3 has room for one empty dim only
+    }
+    output = outputs.units[0] if len(set(outputs.units)) == 1 else ""
+    words = {"<when>": table.points_when, "<output>": output, "<sampled>": SAMPLES.get(sample, "")}
+    attrs = provenance(system, method, fixed, grid.axes) | {"periods": periods, "random_starts": int(grid.drawn)}
+    about = subject(
+        system, attrs | ({"sample": sample} if sample else {}), guards_over(system, fixed | varied, grid.shape) if system.guards else None
+    )
+    return build(schema.RESPONSES, about, values, grid=tuple(grid.axes), words=words)
+
+
+def _events(happened: list[Event], grid: Grid) -> dict[str, Any]:
+    """What happens to the branches between neighbouring values."""
+    return {
+        "event": np.arange(len(happened)),
+        "event_kind": [event.kind for event in happened],
+        "event_branch": np.array([event.branch for event in happened], np.int64),
+        "event_<parameter>": {name: np.array([event.value for event in happened], float) for name in grid.axes},
+    }

@@ -1,80 +1,39 @@
-"""Arrays in, Dataset out, for Lyapunov exponents."""
+"""The table of what ``lyapunov`` and ``wolf`` return."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from saltus.results.dataset.variable import MINIMA, STATUS, TRAJECTORY_NUMBER, VARIED, Variable
 
-import numpy as np
-import xarray as xr
-
-from saltus.errors import ParameterError
-from saltus.results.dataset import schema
-from saltus.results.dataset.finish import array_variable, finish
-
+_EACH = ("trajectory",)
 #: Meaning of the values of ``near_graze``.
-_NEAR = {0: "clear_of_grazes", 1: "near_graze"}
+NEAR = {0: "clear_of_grazes", 1: "near_graze"}
 
-
-def exponents_dataset(
-    *,
-    columns: Mapping[str, Any],
-    rate: str,
-    states: Sequence[str] = (),
-    units: Mapping[str, str] | None = None,
-    gap_unit: str = "",
-    varied: Mapping[str, np.ndarray] | None = None,
-    attrs: Mapping[str, Any] | None = None,
-) -> xr.Dataset:
-    """Assemble what ``lyapunov`` and ``wolf`` return.
-
-    Parameters
-    ----------
-    columns : mapping of str to array
-        The variables, by their names and with the dims of :data:`saltus.results.dataset.schema.EXPONENTS_VARIABLES`. Variables that make
-        no sense for a method may be left out.
-    rate : str
-        Unit of the exponents.
-    states : sequence of str
-        Names, in the order of the system; none for a recorded series.
-    units : mapping of str to str, optional
-        Units of the varied parameters.
-    gap_unit : str
-        Unit of the guards' gaps.
-    varied : mapping of str to array, shape (trajectory,), optional
-        Parameters that differ between trajectories [SI].
-    attrs : mapping, optional
-        Provenance and settings; values that are neither text nor number become JSON text.
-
-    Returns
-    -------
-    Dataset
-        Dims ``trajectory``, ``exponent``, ``running``, and ``flow_exponent`` where the flow's convention is given.
-
-    Raises
-    ------
-    ParameterError
-        If a varied parameter has the name of a variable of the result.
-    """
-    table = schema.EXPONENTS_VARIABLES
-    data = {}
-    for name, values in columns.items():
-        spec = table[name]
-        labels: dict[str, Any] = {"units": {"<rate>": rate, "<gap>": gap_unit}.get(spec.units, spec.units), "long_name": spec.long_name}
-        if name == "near_graze":
-            labels |= {"flag_values": np.array(sorted(_NEAR), dtype=np.int8), "flag_meanings": " ".join(_NEAR.values())}
-        data[name] = array_variable(spec.dims, np.asarray(values, dtype={"str": np.str_}.get(spec.dtype, spec.dtype)), labels)
-    coords = {"trajectory": _index(len(data["kind"]))}
-    for name, column in (varied or {}).items():
-        if name in table:
-            raise ParameterError(f"the parameter {name!r} has the name of something else in the result. Rename it in the system.")
-        coords[name] = array_variable(
-            ("trajectory",), np.asarray(column, float), {"units": (units or {}).get(name, ""), "long_name": name.replace("_", " ")}
-        )
-    own = {"saltus_result": schema.EXPONENTS, "schema_version": schema.VERSION, "states": " ".join(states)}
-    return finish(data, coords, {**(attrs or {}), **own})
-
-
-def _index(count: int) -> xr.Variable:
-    spec = schema.EXPONENTS_VARIABLES["trajectory"]
-    return array_variable(spec.dims, np.arange(count), {"units": spec.units, "long_name": spec.long_name})
+#: Variables of what ``lyapunov`` and ``wolf`` return: exponents in descending order, and running means. ``<rate>``: the unit that was asked
+#: for, such as ``bit/period``.
+EXPONENTS_VARIABLES = {
+    **TRAJECTORY_NUMBER,
+    "kind": Variable(_EACH, "", "kind of motion", "str"),
+    "response_period": Variable(_EACH, "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
+    "lyapunov_exponent": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent"),
+    "lyapunov_error": Variable(("trajectory", "exponent"), "<rate>", "standard error of the Lyapunov exponent"),
+    "lyapunov_low": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, lower end of the 95 % interval"),
+    "lyapunov_high": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, upper end of the 95 % interval"),
+    "flow_lyapunov_exponent": Variable(("trajectory", "flow_exponent"), "<rate>", "Lyapunov exponent of the flow, its phase included"),
+    "exponent_sum": Variable(_EACH, "<rate>", "sum of the Lyapunov exponents"),
+    "mean_divergence": Variable(_EACH, "<rate>", "mean rate at which volumes grow"),
+    "independent_batches": Variable(_EACH, "1", "batches that the error of the largest exponent comes from", "i8"),
+    "near_graze": Variable(_EACH, "1", "whether the motion grazes a boundary, or nearly so", "i1", flags=NEAR),
+    "grazes": Variable(_EACH, "1", "grazes after the transient", "i8"),
+    "grazes_unresolved": Variable(_EACH, "1", "grazes shallower than the local error, after the transient", "i8"),
+    "smallest_gap_margin": MINIMA["smallest_gap_margin"],
+    "block_time": Variable(_EACH, "s", "time of a block: the forcing period, or the time between two looks"),
+    "status": STATUS,
+    "replacements": Variable(_EACH, "1", "replacements of the neighbour", "i8"),
+    "replaced_distance": Variable(_EACH, "1", "mean distance at replacement, as a share of the range of the motion"),
+    "replaced_angle": Variable(_EACH, "rad", "mean angle between old and new neighbour"),
+    "running_time": Variable(("trajectory", "running"), "s", "time since the end of the transient"),
+    "running_exponent": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far"),
+    "running_low": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, lower end of the 95 % interval"),
+    "running_high": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, upper end of the 95 % interval"),
+    **VARIED,
+}

@@ -1,67 +1,32 @@
-"""Arrays in, Dataset out, for one analysis by several methods side by side."""
+"""The table of what ``compare_methods`` returns."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
 
-import numpy as np
-import xarray as xr
+from saltus.results.dataset.attractors import AGREEING
+from saltus.results.dataset.responses import RESPONSES_VARIABLES
+from saltus.results.dataset.variable import Variable
 
-from saltus.results.dataset import schema
-from saltus.results.dataset.basins import basin_meanings
-from saltus.results.dataset.builder import Builder
+#: What belongs to a method and a place of the grid, and may belong to a start there.
+_FIELD = ("method", "...", "start?")
 
-
-def methods_dataset(
-    *,
-    base: xr.Dataset,
-    labels: Sequence[str],
-    columns: Mapping[str, np.ndarray],
-    fields: Mapping[str, np.ndarray],
-    attrs: Mapping[str, Any] | None = None,
-) -> xr.Dataset:
-    """Assemble what ``compare_methods`` returns.
-
-    Parameters
-    ----------
-    base : Dataset
-        The analysis by the reference: its coordinates, parameters or states, and starts.
-    labels : sequence of str, length k
-        A name for each method, the reference first.
-    columns : mapping of str to array, shape (k,)
-        What belongs to a method; see the table of the schema.
-    fields : mapping of str to array, shape (k, n...)
-        What belongs to a method and a place of the grid, with or without the dim ``start``.
-    attrs : mapping, optional
-        Provenance.
-
-    Returns
-    -------
-    Dataset
-        Dims ``method``, those of the grid, and ``start``.
-    """
-    units = {str(name): base[name].attrs.get("units", "") for name in base.variables}
-    states = schema.states_of(base)
-    build = Builder(schema.METHODS, states, {**units, states[0]: _first_unit(base, states[0])})
-    maps = schema.kind_of(base) == schema.BASINS
-    dims = schema.axes_of(base) if maps else schema.parameters_of(base)
-    build.coords |= {str(name): base[name].variable for name in base.coords if set(base[name].dims) <= {*dims, "start"}}
-    build.put("method", list(labels), coord=True)
-    for name, column in columns.items():
-        build.put(name, column, dims=("method",))
-    for name, field in fields.items():
-        own = ("method", *dims) if field.ndim == 1 + len(dims) else ("method", *dims, "start")
-        if name == "basin":
-            build.put_flags(name, field, basin_meanings(int(field.max(initial=-1)) + 1), own)
-        elif name in ("agrees", "known"):
-            build.put_flags(name, field, schema.AGREEING, own)
-        else:
-            build.put(name, field, dims=own)
-    return build.dataset(attrs or {})
-
-
-def _first_unit(base: xr.Dataset, state: str) -> str:
-    """Unit of the first state, wherever it stands."""
-    name = "peak" if "peak" in base else schema.attractor_name(state)
-    return str(base[name].attrs.get("units", ""))
+#: Variables of what ``compare_methods`` returns, beside the coordinates of the analysis.
+METHODS_VARIABLES = {
+    "method": Variable(("method",), "", "method, the reference first", "str", coord=True),
+    "method_cpu_seconds": Variable(("method",), "s", "processor time, all threads, without compiling"),
+    "method_agreement": Variable(("method",), "1", "share of the settled starts with the reference's answer"),
+    "method_agreement_low": Variable(("method",), "1", "the same, lower end of the 95 % interval"),
+    "method_agreement_high": Variable(("method",), "1", "the same, upper end of the 95 % interval"),
+    **{name: RESPONSES_VARIABLES[name] for name in ("start", "start_direction")},
+    **{name: replace(RESPONSES_VARIABLES[name], dims=_FIELD) for name in ("rms", "peak", "type", "period")},
+    "basin": Variable(_FIELD, "1", "attractor, in the numbers of the reference", "i2"),
+    "agrees": Variable(_FIELD, "1", "whether the start has the reference's answer", "i1", flags=AGREEING),
+    "known": Variable(_FIELD, "1", "whether the reference has this response at that value, from any start", "i1", flags=AGREEING),
+    "orbit_distance": Variable(_FIELD, "1", "distance from the reference's response, in units of its size"),
+    "step_error": Variable(
+        _FIELD, "1", "largest error of one forcing period from the reference's responses, in units of the motion's range"
+    ),
+    "step_error_rms": Variable(_FIELD, "1", "root mean square error of one forcing period, in units of the motion's range"),
+    "steps_per_period": Variable(_FIELD, "1", "steps tried in one forcing period"),
+}

@@ -1,19 +1,6 @@
-"""What every variable of a result is: one table for each kind of Dataset.
+"""What every variable of a result is: one table for each kind of Dataset, and what is read off a Dataset by them.
 
-The tables name the dims without ``trajectory``, which a batch adds in front. Units in angle brackets follow the system: ``<state>`` is the
-state's unit, ``<gap>`` that of the guards' gap functions, ``<gap rate>`` the same per second.
-
-Dims: ``time`` (samples), ``contact`` (one table for all trajectories), ``guard``, ``trajectory``. When the trajectories of a batch have
-periods of their own, the samples share phases instead of times: the dim is then ``period``, and ``time`` has dims (trajectory, period).
-
-Exponents have the dims ``trajectory``, ``exponent`` (in descending order), ``flow_exponent`` and ``running`` (times at which running means
-are kept); ``<rate>`` is the unit that the caller asked for, such as ``bit/period``.
-
-Results about attractors have the dims ``attractor``, ``phase`` (points of an orbit, one a forcing period) and ``multiplier``. What belongs
-to one start has no dims in the table: a map adds the two states that it is drawn over, a list of starts ``trajectory``.
-
-Results about steady responses over one or two parameters have these parameters as dims, ``start``, ``response`` (all of them, at all
-values), ``multiplier``, ``phase``, ``sample`` (sampled values of a bifurcation diagram) and ``event``.
+The rows are :class:`saltus.results.dataset.variable.Variable`; :func:`saltus.results.dataset.build.build` makes Datasets by them.
 """
 
 from __future__ import annotations
@@ -28,11 +15,13 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results.dataset import motions
+from saltus.results.dataset.attractors import AGREEMENT_VARIABLES, ATTRACTOR_VARIABLES, ATTRACTORS_VARIABLES, BASINS_VARIABLES
+from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
-from saltus.results.dataset.method_variables import METHODS_VARIABLES
-from saltus.results.dataset.response_variables import RESPONSES_VARIABLES
+from saltus.results.dataset.methods import METHODS_VARIABLES
+from saltus.results.dataset.responses import RESPONSES_VARIABLES
 from saltus.results.dataset.result import Result
-from saltus.results.dataset.variable import COUNTERS, FORCING_PERIOD, GUARDS, MINIMA, STATUS, TRAJECTORY_NUMBER, Variable
+from saltus.results.dataset.trajectories import STROBOSCOPE_VARIABLES, TRAJECTORY_VARIABLES
 
 #: Version of the tables below, kept in every result as ``schema_version``.
 VERSION = 1
@@ -47,136 +36,6 @@ MAKERS = {
     SECTION: "sl.poincare", SPECTRUM: "sl.spectrum", IMPACTS: "sl.impact_statistics", ENERGY: "sl.energy_balance",
     EXPONENTS: "sl.lyapunov or sl.wolf",
 }  # fmt: skip
-
-#: Kinds that hold the states under their own names.
-WITH_STATES = (TRAJECTORY, STROBOSCOPE, SECTION)
-
-#: Meaning of the values of ``agreement``.
-AGREEING = {-1: "not_settled", 0: "differ", 1: "agree"}
-
-
-#: Variables of what ``simulate`` returns, beside the states.
-TRAJECTORY_VARIABLES = {
-    "time": Variable(("time",), "s", "time"),
-    "period": Variable(("time",), "1", "time in forcing periods"),
-    "mode": Variable(("time",), "1", "sides of the guards: bit i is set where gap i is positive", "i8"),
-    "contact_time": Variable(("contact",), "s", "time of the contact"),
-    "contact_time_error": Variable(("contact",), "s", "estimated error of the time of the contact"),
-    "contact_guard": Variable(("contact",), "", "guard that was met", "str"),
-    "contact_direction": Variable(("contact",), "1", "+1 where the gap becomes positive, -1 where it becomes negative", "i1"),
-    "contact_velocity": Variable(("contact",), "<gap rate>", "rate of the gap at the contact"),
-    "contact_kind": Variable(("contact",), "", "kind of contact", "str"),
-    "contact_mode_before": Variable(("contact",), "1", "mode before the contact", "i8"),
-    "contact_mode_after": Variable(("contact",), "1", "mode after the contact", "i8"),
-    "contact_steps": Variable(("contact",), "1", "accepted steps from the start to the contact", "i8"),
-    "contact_trajectory": Variable(("contact",), "1", "trajectory that the contact belongs to", "i8"),
-    "status": STATUS,
-    **COUNTERS,
-    **MINIMA,
-    **GUARDS,
-    "end_time": Variable((), "s", "time at the end"),
-    "forcing_period": FORCING_PERIOD,
-    "trajectory": TRAJECTORY_NUMBER,
-}
-
-#: Variables of what ``stroboscope`` returns, beside the states.
-STROBOSCOPE_VARIABLES = {
-    "period": Variable(("period",), "1", "whole forcing periods since the start", "i8"),
-    "status": STATUS,
-    **COUNTERS,
-    **MINIMA,
-    **GUARDS,
-    "forcing_period": FORCING_PERIOD,
-    "trajectory": TRAJECTORY_NUMBER,
-}
-
-#: What is known of each attractor, beside the points ``attractor_<state>``. ``<first>``: the unit of the first state.
-ATTRACTOR_VARIABLES = {
-    "attractor": Variable(("attractor",), "1", "attractor", "i8"),
-    "attractor_type": Variable(("attractor",), "", "kind of motion", "str"),
-    "attractor_period": Variable(("attractor",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
-    "attractor_contacts": Variable(
-        ("attractor",), "1", "contacts in one period of the response (in a forcing period if it doesn't repeat)"
-    ),
-    "attractor_itinerary": Variable(("attractor",), "", "modes in the order in which they are visited", "str"),
-    "attractor_peak": Variable(("attractor",), "<first>", "largest magnitude of the first state"),
-    "attractor_rms": Variable(("attractor",), "<first>", "root mean square of the first state"),
-    "attractor_margin": Variable(("attractor",), "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"),
-    "attractor_multiplier_real": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, real part"),
-    "attractor_multiplier_imag": Variable(("attractor", "multiplier"), "1", "Floquet multiplier, imaginary part"),
-    "attractor_scatter": Variable(
-        ("attractor",), "<first>", "root mean square distance of a noisy motion from its exact orbit, first state; NaN of others"
-    ),
-    "attractor_cycle": Variable(("attractor",), "s", "period of a limit cycle"),
-    "attractor_eigenvalue_real": Variable(("attractor", "multiplier"), "1/s", "eigenvalue of the Jacobian of an equilibrium, real part"),
-    "attractor_eigenvalue_imag": Variable(
-        ("attractor", "multiplier"), "1/s", "eigenvalue of the Jacobian of an equilibrium, imaginary part"
-    ),
-    "attractor_exponent": Variable(("attractor",), "1/s", "largest Lyapunov exponent"),
-    "attractor_exponent_error": Variable(("attractor",), "1/s", "error of the largest Lyapunov exponent"),
-    "attractor_fraction": Variable(("attractor",), "1", "share of the starts"),
-    "attractor_fraction_low": Variable(("attractor",), "1", "share of the starts, lower end of the 95 % interval"),
-    "attractor_fraction_high": Variable(("attractor",), "1", "share of the starts, upper end of the 95 % interval"),
-}
-_SETTLED = {
-    "basin": Variable((), "1", "attractor", "i2"),
-    "periods_to_settle": Variable((), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"),
-}
-
-#: Variables of what ``basins`` returns, beside the two states that the map is drawn over.
-BASINS_VARIABLES = {
-    **_SETTLED,
-    "status": Variable((), "1", "how the trajectory ended", "i1"),
-    "grazes_unresolved": Variable((), "1", "grazes shallower than the local error", "i2"),
-    **ATTRACTOR_VARIABLES,
-}
-
-#: Variables of what ``attractors`` and ``basin_fractions`` return.
-ATTRACTORS_VARIABLES = {"trajectory": Variable(("trajectory",), "1", "trajectory", "i8"), **_SETTLED, **ATTRACTOR_VARIABLES}
-
-#: Variables of what ``compare`` returns, beside the two states.
-AGREEMENT_VARIABLES = {
-    "agreement": Variable((), "1", "whether the two maps agree", "i1"),
-    "basin_a": Variable((), "1", "attractor in the first map", "i2"),
-    "basin_b": Variable((), "1", "attractor in the second map, in the numbers of the first", "i2"),
-    "pair": Variable(("pair",), "1", "attractor: those of the first map, then those that only the second has", "i8"),
-    "match_a": Variable(("pair",), "1", "number in the first map, -1 if it isn't there", "i8"),
-    "match_b": Variable(("pair",), "1", "number in the second map, -1 if it isn't there", "i8"),
-    "match_type": Variable(("pair",), "", "kind of motion", "str"),
-    "match_period": Variable(("pair",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
-    "match_fraction_a": Variable(("pair",), "1", "share of the starts in the first map"),
-    "match_fraction_b": Variable(("pair",), "1", "share of the starts in the second map"),
-    "match_agreeing_cells": Variable(("pair",), "1", "starts that lead to it in both maps", "i8"),
-    "match_orbit_distance": Variable(("pair",), "1", "distance of the two orbits in units of the axis ranges"),
-}
-
-#: Variables of what ``lyapunov`` and ``wolf`` return.
-EXPONENTS_VARIABLES = {
-    "trajectory": Variable(("trajectory",), "1", "trajectory", "i8"),
-    "kind": Variable(("trajectory",), "", "kind of motion", "str"),
-    "response_period": Variable(("trajectory",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
-    "lyapunov_exponent": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent"),
-    "lyapunov_error": Variable(("trajectory", "exponent"), "<rate>", "standard error of the Lyapunov exponent"),
-    "lyapunov_low": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, lower end of the 95 % interval"),
-    "lyapunov_high": Variable(("trajectory", "exponent"), "<rate>", "Lyapunov exponent, upper end of the 95 % interval"),
-    "flow_lyapunov_exponent": Variable(("trajectory", "flow_exponent"), "<rate>", "Lyapunov exponent of the flow, its phase included"),
-    "exponent_sum": Variable(("trajectory",), "<rate>", "sum of the Lyapunov exponents"),
-    "mean_divergence": Variable(("trajectory",), "<rate>", "mean rate at which volumes grow"),
-    "independent_batches": Variable(("trajectory",), "1", "batches that the error of the largest exponent comes from", "i8"),
-    "near_graze": Variable(("trajectory",), "1", "whether the motion grazes a boundary, or nearly so", "i1"),
-    "grazes": Variable(("trajectory",), "1", "grazes after the transient", "i8"),
-    "grazes_unresolved": Variable(("trajectory",), "1", "grazes shallower than the local error, after the transient", "i8"),
-    "smallest_gap_margin": MINIMA["smallest_gap_margin"].along("trajectory"),
-    "block_time": Variable(("trajectory",), "s", "time of a block: the forcing period, or the time between two looks"),
-    "status": STATUS.along("trajectory"),
-    "replacements": Variable(("trajectory",), "1", "replacements of the neighbour", "i8"),
-    "replaced_distance": Variable(("trajectory",), "1", "mean distance at replacement, as a share of the range of the motion"),
-    "replaced_angle": Variable(("trajectory",), "rad", "mean angle between old and new neighbour"),
-    "running_time": Variable(("trajectory", "running"), "s", "time since the end of the transient"),
-    "running_exponent": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far"),
-    "running_low": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, lower end of the 95 % interval"),
-    "running_high": Variable(("trajectory", "exponent", "running"), "<rate>", "Lyapunov exponent so far, upper end of the 95 % interval"),
-}
 
 #: The table of each kind of result.
 TABLES = {
@@ -345,8 +204,6 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
     """The Dataset with the types of the tables: netCDF-3 keeps 32-bit integers, and readers differ on text and attributes."""
     table = TABLES[kind_of(ds)]
     dtypes = {name: table[name].dtype for name in map(str, ds.variables) if name in table}
-    if kind_of(ds) == TRAJECTORY:
-        dtypes["period"] = "f8"
     variables = {}
     for name, variable in ds.variables.items():
         dtype = dtypes.get(str(name), "f8")

@@ -2,56 +2,68 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Variable:
-    """What one variable of a result is.
+    """What one variable of a result is: a row of the table of its kind.
+
+    The name of a row may hold ``<state>`` or ``<parameter>``: it then stands for one variable a state, or a parameter.
 
     Attributes
     ----------
     dims : tuple of str
-        Dims of one trajectory.
+        Its dims. ``trajectory`` is left out of a result that holds one trajectory only; ``...`` stands for those of the grid, which are
+        named after its states or parameters; one with ``?`` is there only where the values need it.
     units : str
-        SI unit, ``"1"`` for a plain number, ``""`` for text.
+        SI unit, ``"1"`` for a plain number, ``""`` for text. In angle brackets, what follows the system or the caller.
     long_name : str
         A few words, as on an axis.
     dtype : str
         ``f8``, ``i8``, ``i4``, ``i2``, ``i1`` or ``str``.
+    coord : bool
+        Whether it is a coordinate.
+    flags : mapping of int to str, optional
+        Meaning of each value of a variable of codes, where it is always the same.
+    clipped : bool
+        Whether a number that the type can't hold is kept as its largest; else it is refused.
     """
 
     dims: tuple[str, ...]
     units: str
     long_name: str
     dtype: str = "f8"
+    coord: bool = False
+    flags: Mapping[int, str] | None = None
+    clipped: bool = False
 
-    def along(self, dim: str) -> Variable:
-        """The same variable with one more dim in front."""
-        return replace(self, dims=(dim, *self.dims))
 
-
-#: Of each trajectory.
-STATUS = Variable((), "", "how the trajectory ended", "str")
+_EACH = ("trajectory",)
+TRAJECTORY_NUMBER = {"trajectory": Variable(_EACH, "1", "trajectory", "i8", coord=True)}
+VARIED = {"<parameter>": Variable(_EACH, "<parameter>", "<parameter>", coord=True)}
+STATUS = Variable(_EACH, "", "how the trajectory ended", "str")
 COUNTERS = {
-    "events": Variable((), "1", "contacts", "i8"),
-    "grazes": Variable((), "1", "grazes", "i8"),
-    "grazes_unresolved": Variable((), "1", "grazes shallower than the local error", "i8"),
-    "steps": Variable((), "1", "accepted steps", "i8"),
-    "rejected_steps": Variable((), "1", "rejected steps", "i8"),
-    "mode_violations": Variable((), "1", "accepted steps that ended on the wrong side of a guard", "i8"),
+    "events": Variable(_EACH, "1", "contacts", "i8"),
+    "grazes": Variable(_EACH, "1", "grazes", "i8"),
+    "grazes_unresolved": Variable(_EACH, "1", "grazes shallower than the local error", "i8"),
+    "steps": Variable(_EACH, "1", "accepted steps", "i8"),
+    "rejected_steps": Variable(_EACH, "1", "rejected steps", "i8"),
+    "mode_violations": Variable(_EACH, "1", "accepted steps that ended on the wrong side of a guard", "i8"),
 }
 MINIMA = {
-    "smallest_contact_speed": Variable((), "<gap rate>", "smallest gap rate at a contact"),
-    "smallest_gap_margin": Variable((), "<gap>", "smallest distance of a turning point of the gap from a guard"),
+    "smallest_contact_speed": Variable(_EACH, "<gap rate>", "smallest gap rate at a contact"),
+    "smallest_gap_margin": Variable(_EACH, "<gap>", "smallest distance of a turning point of the gap from a guard"),
 }
-#: The guards of the system.
+END_TIME = {"end_time": Variable(_EACH, "s", "time at the end")}
+END_STATES = {"end_<state>": Variable(_EACH, "<state>", "<state> at the end")}
+#: The guards of the system; a boundary has the dims that move it.
 GUARDS = {
-    "guard": Variable(("guard",), "", "guard", "str"),
+    "guard": Variable(("guard",), "", "guard", "str", coord=True),
     "guard_state": Variable(("guard",), "", "state that the guard bounds", "str"),
-    "guard_boundary": Variable(("guard",), "<gap>", "value of the state on the guard"),
     "guard_units": Variable(("guard",), "", "unit of the gap", "str"),
+    "guard_boundary": Variable(("guard", "trajectory?"), "<gap>", "value of the state on the guard"),
 }
-
-TRAJECTORY_NUMBER = Variable((), "1", "trajectory", "i8")
-FORCING_PERIOD = Variable((), "s", "forcing period")
+#: What stands at the end of every table of trajectories: a period that all share is the attribute ``forcing_period_s``.
+SHARED = {"forcing_period": Variable(_EACH, "s", "forcing period", coord=True), **VARIED, **TRAJECTORY_NUMBER}

@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from saltus.cache_folder import cache_folder
+from saltus.cache import folder as cache_folder
 
 #: Names that are kept: where there are more when a process writes its first, all of them are forgotten.
 MOST = 20_000

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.analysis.basins.basins import map_of
@@ -12,17 +11,14 @@ from saltus.study.answers.question import Found, Question, Show
 from saltus.study.identity import identity
 from saltus.study.setting import quantities
 from saltus.study.setting.arguments import arguments
-from saltus.study.setting.inputs import Inputs
-from saltus.study.setting.setting import Setting, setting_of
+from saltus.study.setting.setting import Setting
 from saltus.study.tables.parts import slug
 from saltus.study.tables.questions import Map
-from saltus.study.tables.spec import Study
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from saltus.study.table import TextTable
-    from saltus.system import System
 
 #: Trajectories of attractors drawn in a gallery, and the periods of one that never repeats.
 GALLERY, PERIODS = 8, 24
@@ -32,26 +28,9 @@ ATTRACTORS, AGREEMENT = "-attractors", "-agreement"
 
 def questions(table: Any, setting: Setting) -> list[Question]:
     """The maps of the table, then where those agree that are compared. Raises StudyError, UnitError or ParameterError."""
-    maps = maps_of_setting(table, setting)
+    maps = [BasinMap(table, one, setting) for one in table.map or [Map(name=setting.study.study.name)]]
     stems = {one.title: one.stem for one in maps}
     return [*maps, *(Agreement(one, one.compare, stems[one.compare]) for one in maps if one.compare is not None)]
-
-
-def maps_of(study: Study, own: System | None = None) -> list[BasinMap]:
-    """The maps of a study with [basins], each with its plan.
-
-    Raises
-    ------
-    StudyError, UnitError, ParameterError
-        If the study doesn't fit its system.
-    """
-    return maps_of_setting(study.basins, setting_of(study, own, Inputs(Path())))
-
-
-def maps_of_setting(table: Any, setting: Setting) -> list[BasinMap]:
-    """The same, of a system that is known."""
-    name = setting.study.study.name
-    return [BasinMap(table, one, setting) for one in table.map or [Map(name=name)]]
 
 
 class BasinMap(Question):
@@ -73,7 +52,9 @@ class BasinMap(Question):
         system, place = setting.system(one.values, "basins.map.values"), self.place
         axes = quantities.axes(system, table.axes, f"{place}.axes")
         asked = arguments(table, system, setting, place)
-        self.plan: BasinPlan = basin_plan(system, axes, asked["at"], setting.method(one.method), asked["periods"], asked["every"])
+        self.plan: BasinPlan = basin_plan(
+            system, axes, asked["at"], setting.method(one.method, f"{place}.map.method"), asked["periods"], asked["every"]
+        )
 
     @property
     def stems(self) -> tuple[str, ...]:

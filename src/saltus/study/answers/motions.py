@@ -8,7 +8,7 @@ from saltus.errors import StudyError, nearest
 from saltus.fence import shown
 from saltus.study.answers.motion_rows import TABLES
 from saltus.study.answers.question import Found, OneVerb, first_figure
-from saltus.study.identity import code_hash
+from saltus.study.code import code_hash
 from saltus.study.setting import quantities
 from saltus.study.tables.signature import verb
 from saltus.system.quantity import quantity

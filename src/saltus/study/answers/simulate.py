@@ -90,7 +90,7 @@ class Reference(Motion):
         """Its method is that of [compare]."""
         super().check(table, setting)
         assert self.compare is not None
-        self.method = setting.method(self.compare.reference)
+        self.method = setting.method(self.compare.reference, "compare.reference")
 
     def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
         """It stands in the table of the run."""

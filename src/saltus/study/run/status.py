@@ -12,6 +12,7 @@ from saltus.study.run.copies import COPY, copy_of, inputs_of
 from saltus.study.run.kept import PARTIAL
 from saltus.study.run.maps import STORES
 from saltus.study.table import TextTable
+from saltus.study.tables.read import read
 
 if TYPE_CHECKING:
     from saltus.results.store.store import StoreStatus
@@ -74,8 +75,6 @@ def _row(one: StoreStatus | DamagedStore) -> tuple[str, ...]:
 
 def question_table(folder: Path) -> TextTable | None:
     """A row for each question whose answer is one file; None without a copy of the study."""
-    from saltus.study.tables.read import read
-
     if not (folder / COPY).is_file():
         return None
     notes: list[str] = []

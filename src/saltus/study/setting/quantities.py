@@ -65,11 +65,6 @@ def start(system: System, table: Mapping[str, Start], place: str = "simulate") -
     return {state: _numbers(system, state, value, system.states, f"{place}.start") for state, value in table.items()}
 
 
-def start_or_rest(system: System, table: Mapping[str, Start] | None, place: str) -> dict[str, float | list[float]]:
-    """As :func:`start`; without one every state is zero."""
-    return dict.fromkeys(system.states, 0.0) if table is None else start(system, table, place)
-
-
 def starts(system: System, given: Starts | None, place: str) -> dict[str, float | list[float]] | str | None:
     """``start`` of an analysis that follows many: states in SI, or text such as ``"sweep_up"``, which the analysis reads."""
     return given if given is None or isinstance(given, str) else start(system, given, place)

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
+from saltus import flow
 from saltus.errors import ParameterError, SaltusError, StudyError, nearest
 from saltus.study.setting import quantities
+from saltus.study.setting.curves import curve_of
 from saltus.study.tables.wording import fault
 from saltus.system.formula import Equations, Formula, Formulas
 
@@ -63,9 +65,9 @@ class Setting:
             raise fault(place, error) from None
         return outputs or None
 
-    def method(self, own: SpecTable | None = None) -> Any:
-        """The method of one question: its own, or the study's."""
-        return method_of(own or self.study.method)
+    def method(self, own: SpecTable | None, place: str) -> Any:
+        """The method of one question: its own, which stands at ``place``, or the study's."""
+        return method_of(self.study.method) if own is None else method_of(own, place)
 
 
 def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
@@ -82,8 +84,6 @@ def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
 
 def formulas_of(table: SystemTable, inputs: Inputs) -> Formulas:
     """The terms and tables of [system]. Raises StudyError if one can't be read."""
-    from saltus.study.setting.curves import curve_of
-
     tables = {name: curve_of(inputs.read(one.file, f"system.tables.{name}"), one, name) for name, one in table.tables.items()}
     try:
         return Formulas(table.terms, tables)
@@ -159,9 +159,10 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
         raise fault("system", error) from None
 
 
-def method_of(table: SpecTable) -> Any:
-    """The method that a [method] table describes."""
-    from saltus import flow
-
+def method_of(table: SpecTable, place: str = "method") -> Any:
+    """The method that a table describes. Raises StudyError if it doesn't take one of the options."""
     options = table.model_dump(exclude_unset=True)
-    return getattr(flow, options.pop("name"))(**options)
+    try:
+        return getattr(flow, options.pop("name"))(**options)
+    except ParameterError as error:
+        raise fault(place, error) from None

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import made_results
 from saltus.analysis.basins.compare import compare
 from saltus.analysis.basins.uncertainty import fractions
 from saltus.errors import ParameterError
 from saltus.intervals import wilson
-from saltus.results import AttractorTable, basins_dataset, describe, load, save
+from saltus.results import AttractorTable, describe, load, save
 
 X, V = np.linspace(-5e-3, 5e-3, 4), np.linspace(-1.0, 1.0, 3)
 #: Two orbits of period 1 and 2 and a chaotic motion: type, points, peak.
@@ -26,7 +27,7 @@ def basins(motions=(ONE, TWO, CHAOS), labels=LABELS, axes=None, units=None, stat
         multipliers=np.zeros((m, 2)), exponent=np.zeros(m), exponent_error=np.zeros(m),
         points=[np.array(points, dtype=float).reshape(-1, len(states)) for _, points, _ in motions], fractions=fractions(labels, m),
     )  # fmt: skip
-    return basins_dataset(
+    return made_results.basins(
         states=states, units=units or {"x": "m", "v": "m/s"}, axes=axes or {"x": X, "v": V}, basin=labels,
         periods_to_settle=np.ones_like(labels), status=np.full(labels.shape, 2), status_meanings={2: "ok"},
         grazes_unresolved=np.zeros_like(labels), attractors=table, gap_unit="m",

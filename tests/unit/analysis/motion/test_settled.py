@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import made_results
 from saltus.analysis.motion.settled import settled
 from saltus.errors import ParameterError
-from saltus.results import Guards, stroboscope_dataset
+from saltus.results import Guards
 
 NONE = Guards((), (), np.empty(0))
 
@@ -15,7 +16,7 @@ NONE = Guards((), (), np.empty(0))
 def stroboscope(*strobes: np.ndarray, status: str = "ok"):
     """A stroboscope of one state with these rows."""
     rows = np.stack(strobes)
-    return stroboscope_dataset(
+    return made_results.stroboscope(
         states=("x",), units={"x": "m"}, period=np.arange(rows.shape[1]), values={"x": rows}, status=[status] * len(rows), guards=NONE
     )
 

@@ -53,15 +53,15 @@ def test_samples_that_no_trajectory_has_reached_are_cut_off(ask, arguments, monk
 
 def test_ctrl_c_while_the_result_is_put_together_loses_nothing(monkeypatch):
     whole = sl.simulate(lab, (0.0, 0.5), periods=20, values=STOP, time_errors="local")
-    put_together, pressed = simulate_module.trajectory_dataset, []
+    put_together, pressed = simulate_module.build, []
 
-    def press(**parts):
+    def press(*parts, **more):
         if not pressed:
             pressed.append(True)
             raise KeyboardInterrupt
-        return put_together(**parts)
+        return put_together(*parts, **more)
 
-    monkeypatch.setattr(simulate_module, "trajectory_dataset", press)
+    monkeypatch.setattr(simulate_module, "build", press)
     with pytest.raises(sl.Interrupted) as caught:
         sl.simulate(lab, (0.0, 0.5), periods=20, values=STOP, time_errors="local")
     assert caught.value.partial.identical(whole)

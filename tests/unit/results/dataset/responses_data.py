@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.results import AttractorTable, Events, Guards, Responses, Starts, responses_dataset
+import made_results
+from made_results import Events, Responses, Starts
+from saltus.results import AttractorTable, Guards
 from unit.results.conftest import PROVENANCE, UNITS
 
 FREQUENCY = np.array([4.0, 5.0, 6.0])
@@ -29,7 +31,7 @@ def responses(**changes):
         "events": Events({"frequency": np.array([5.5])}, ["graze"], np.array([0])),
         "guards": Guards(("stop",), ("x",), np.array([1e-3])), "gap_unit": "m", "attrs": PROVENANCE,
     }  # fmt: skip
-    return responses_dataset(**{**arguments, **changes})
+    return made_results.responses(**{**arguments, **changes})
 
 
 def two_parameters(**changes):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+import made_results
 import saltus as sl
 from saltus.errors import ParameterError
-from saltus.results import exponents_dataset
 from saltus.results.dataset import schema
 
 
@@ -19,7 +19,7 @@ def made(**changes):
         "rate": "bit/s", "states": ("x", "v"), "gap_unit": "m", "units": {"frequency": "Hz"}, "varied": {"frequency": np.array([5.0, 7.0])},
         "attrs": {"algorithm": "by hand", "parameters": "{}", "settings": [1, 2]},
     }  # fmt: skip
-    return exponents_dataset(**{**arguments, **changes})
+    return made_results.exponents(**{**arguments, **changes})
 
 
 def test_names_dims_and_units():

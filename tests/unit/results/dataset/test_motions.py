@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+import made_results
 import saltus as sl
 from motions_data import common, each, energy, impacts, section, spectrum
 from saltus.errors import ParameterError
-from saltus.results import motion_dataset
 from saltus.results.dataset import schema
 
 EVERY = {
@@ -50,4 +50,4 @@ def test_units_follow_the_system():
 
 def test_a_state_with_the_name_of_a_column_is_refused():
     with pytest.raises(ParameterError, match="the state 'crossings' has the name of something else"):
-        motion_dataset(schema.SECTION, **common(1, ("crossings",)), each=each(1), table={"crossings": np.zeros(2)})
+        made_results.motion(schema.SECTION, **common(1, ("crossings",)), each=each(1), table={"crossings": np.zeros(2)})

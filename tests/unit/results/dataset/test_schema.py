@@ -88,7 +88,7 @@ def test_a_state_called_velocity_keeps_both_variables():
 @pytest.mark.parametrize("name", ["time", "mode", "status", "contact"])
 def test_a_state_can_not_take_a_name_of_the_result(name):
     with pytest.raises(ParameterError, match=f"state '{name}'.*Rename"):
-        sine_run(states=(name, "v"))
+        sine_run(states=(name, "v"), values={name: np.zeros((1, 49)), "v": np.zeros((1, 49))})
 
 
 def test_one_trajectory_only_without_the_dim():

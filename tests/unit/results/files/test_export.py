@@ -8,8 +8,9 @@ import pytest
 import xarray as xr
 from scipy.io import loadmat
 
+from made_results import Contacts
 from saltus.errors import ParameterError
-from saltus.results import Contacts, content_hash, load, save, to_csv, to_mat
+from saltus.results import content_hash, load, save, to_csv, to_mat
 from saltus.results.files import export
 from unit.results.conftest import PROVENANCE, sine_points, sine_run
 

@@ -1,4 +1,4 @@
-"""One entry of the kernel cache: a file that is read whole, through one handle, and believed only if its owner and its checksum say so.
+"""One entry of the cache: a file that is read whole, through one handle, and believed only if its owner and its checksum say so.
 
 What stands in it is code. So it counts only if it is a regular file of this user (or of the administrator) that nobody else may write
 to; that is asked of the opened file, so nothing can be exchanged between the question and the reading.
@@ -16,8 +16,8 @@ from pathlib import Path
 
 #: First word of an entry; another one is another format.
 FORMAT = "saltus-kernel/1"
-#: End of the names of entries; beginning of the names of those that aren't whole yet.
-SUFFIX, DRAFT = ".kernel", ".building-"
+#: Beginning of the names of those that aren't whole yet.
+DRAFT = ".building-"
 #: Most bytes of an entry: some hundred times what the largest equations take.
 MOST = 1 << 28
 #: Bits of a mode with which others than the owner may write.
@@ -65,7 +65,7 @@ def check_folder(folder: Path) -> None:
 
 def write(path: Path, title: str, data: bytes) -> None:
     """Write an entry in full, then give it its name, read-only."""
-    header = {"format": FORMAT, "key": path.name.removesuffix(SUFFIX), "title": title, "sha256": hashlib.sha256(data).hexdigest()}
+    header = {"format": FORMAT, "key": path.stem, "title": title, "sha256": hashlib.sha256(data).hexdigest()}
     handle, draft = tempfile.mkstemp(prefix=DRAFT, dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -90,7 +90,7 @@ def read(path: Path) -> bytes:
     header, data = _split(_content(path))
     try:
         told = json.loads(header)
-        whole = told["format"] == FORMAT and told["key"] + SUFFIX == path.name and told["sha256"] == hashlib.sha256(data).hexdigest()
+        whole = told["format"] == FORMAT and told["key"] == path.stem and told["sha256"] == hashlib.sha256(data).hexdigest()
     except (ValueError, KeyError, TypeError, RecursionError):
         whole = False
     if not whole:

@@ -1,0 +1,147 @@
+"""What saltus keeps from one process to the next, by what it was made of: safe to lose, and this user's alone.
+
+Compiled kernels, one for each (equations, templates, versions, processor); and the hash of saltus's code, by that of its text. A kernel is
+code, so a folder or a file that others could have written to is never used: kernels are then compiled for this process only, and kept in
+its memory. An entry is written beside the others and renamed into place, so processes that start cold at once can't disturb each other; its
+checksum is verified before anything of it is used, and a damaged one is made again.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import platformdirs
+
+from saltus.cache import entry
+from saltus.errors import SaltusWarning
+
+#: Ends of the names of entries, by what they hold.
+KERNEL, HASH = ".kernel", ".hash"
+_CALLED = {KERNEL: "compiled kernel", HASH: "hash of the code"}
+#: Age from which an unfinished entry belongs to a process that was killed, and from which the hash of code is one of old code [s].
+_ABANDONED, _OLD = 86_400.0, 30 * 86_400.0
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One cached object: its key, what it was made for, its size [bytes] and its file."""
+
+    name: str
+    system: str
+    size_bytes: int
+    path: Path
+
+
+def folder() -> Path:
+    """``$SALTUS_CACHE``, a ``~`` at its beginning being the home folder as in a shell; else saltus's folder in the user's cache."""
+    chosen = os.environ.get("SALTUS_CACHE")
+    return Path(os.path.expanduser(chosen)) if chosen else Path(platformdirs.user_cache_dir("saltus", appauthor=False))
+
+
+def kernels() -> list[Entry]:
+    """Every kernel, by name."""
+    paths = sorted(path for path in folder().glob(f"*{KERNEL}") if not path.name.startswith(entry.DRAFT))
+    return [Entry(path.stem, entry.title_of(path), path.lstat().st_size, path) for path in paths]
+
+
+def clear() -> int:
+    """Delete every entry and every unfinished one; returns how many kernels there were."""
+    found = kernels()
+    for path in folder().iterdir() if folder().is_dir() else ():
+        old = (path / "kernels.py").exists() and (path / "manifest.json").exists()
+        if path.name.startswith(entry.DRAFT) or path.suffix in (KERNEL, HASH) or old:
+            _delete(path)
+    return len(found)
+
+
+def _delete(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        entry.remove(path)
+
+
+def read(key: str, kind: str = KERNEL) -> bytes | None:
+    """What an entry holds, None if there is none that can be used; a warning says why not."""
+    final = folder() / (key + kind)
+    try:
+        return entry.read(final) if _usable() else None
+    except FileNotFoundError:
+        return None
+    except (entry.NotOurs, entry.Damaged) as why:
+        _warn(f"saltus: the {_CALLED[kind]} {final} {why}; building it again.")
+        return None
+
+
+def keep(key: str, title: str, data: bytes, kind: str = KERNEL) -> None:
+    """Write an entry, where that can be done.
+
+    Parameters
+    ----------
+    key : str
+        Its name.
+    title : str
+        What `saltus cache` shows for it.
+    data : bytes
+        What it holds.
+    kind : str
+        :data:`KERNEL` or :data:`HASH`.
+    """
+    final = folder() / (key + kind)
+    if not _usable():
+        return
+    try:
+        _sweep(final.parent)
+        entry.write(final, title, data)
+    except OSError as error:
+        if not final.exists():  # no other process has done it
+            _cannot_write(final.parent, error)
+
+
+def _usable() -> bool:
+    """Whether the folder can be used, made if it isn't there; a warning says why not."""
+    place = folder()
+    try:
+        place.mkdir(parents=True, exist_ok=True, mode=0o700)
+        entry.check_folder(place)
+    except entry.NotOurs as why:
+        _warn(
+            f"saltus: the folder of compiled kernels {place} {why}, so whoever writes there could run code as you. It isn't used: kernels "
+            "are compiled for this process only. Close it (chmod go-w), or set SALTUS_CACHE to a folder of yours."
+        )
+        return False
+    except OSError as error:
+        _cannot_write(place, error)
+        return False
+    return True
+
+
+def _sweep(place: Path) -> None:
+    """Delete what processes left unfinished that were killed long ago, and hashes of old code."""
+    for pattern, age in ((f"{entry.DRAFT}*", _ABANDONED), (f"*{HASH}", _OLD)):
+        _sweep_older(place, pattern, age)
+
+
+def _sweep_older(place: Path, pattern: str, age: float) -> None:
+    for path in place.glob(pattern):
+        try:
+            if time.time() - path.lstat().st_mtime > age:
+                _delete(path)
+        except OSError:  # its process has finished it
+            continue
+
+
+def _cannot_write(place: Path, error: OSError) -> None:
+    _warn(
+        f"saltus: {place} can't be written ({error.strerror or error}); kernels are compiled for this process only. "
+        "Set SALTUS_CACHE to a folder of yours with free space."
+    )
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, SaltusWarning, stacklevel=6)
