@@ -403,7 +403,7 @@ def small_disk(tmp_path):
 def test_full_disk(server, undisturbed, small_disk):
     """Full amid the chunks: a message, what is done stays; with room again it goes on."""
     disk = small_disk(2400)
-    (disk / "ballast").write_bytes(b"\0" * 1_900_000)
+    (disk / "ballast").write_bytes(b"\0" * 2_360_000)
     code, text = server.run(*arguments(server, disk / "out"))
     assert code == 2, text
     assert "No space left on device" in text
