@@ -170,7 +170,7 @@ def arguments(server, folder, *more):
 def undisturbed(server):
     """The run that nothing disturbed: the files of its store, and its map."""
     files = contents(server.first)
-    assert sum("/done/" in name for name in files) == CHUNKS
+    assert sum("/chunks/" in name for name in files) == CHUNKS
     return files, load(server.first / "basins.nc").drop_attrs()
 
 
@@ -181,7 +181,7 @@ def contents(folder):
 
 
 def committed(folder):
-    return len(list((folder / "stores" / "basins" / "done").glob("*.json")))
+    return len(list((folder / "stores" / "basins" / "chunks").glob("*.chunk")))
 
 
 def as_if_undisturbed(folder, undisturbed):
@@ -403,7 +403,7 @@ def small_disk(tmp_path):
 def test_full_disk(server, undisturbed, small_disk):
     """Full amid the chunks: a message, what is done stays; with room again it goes on."""
     disk = small_disk(2400)
-    (disk / "ballast").write_bytes(b"\0" * 1_900_000)
+    (disk / "ballast").write_bytes(b"\0" * 2_360_000)
     code, text = server.run(*arguments(server, disk / "out"))
     assert code == 2, text
     assert "No space left on device" in text
@@ -455,7 +455,7 @@ def half(killed_half_way, tmp_path):
 def test_a_cut_and_a_flipped_chunk_are_computed_again(server, undisturbed, half):
     store = Store.open(half / "stores" / "basins")
     first, second, *_ = map(int, np.flatnonzero(store.done()))
-    cut, flipped = store.path / "data.zarr" / "end_x" / "c" / str(first), store.path / "data.zarr" / "label" / "c" / str(second)
+    cut, flipped = (store.path / "chunks" / f"{index}.chunk" for index in (first, second))
     cut.write_bytes(cut.read_bytes()[:100])
     data = bytearray(flipped.read_bytes())
     data[7] ^= 1

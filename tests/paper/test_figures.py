@@ -59,10 +59,10 @@ def few_checks(monkeypatch):
 def brief(monkeypatch):
     """Few scouts, and little time for motions that never repeat: what comes out means nothing, but all of it is made."""
     monkeypatch.setattr(pipeline, "SCOUTS", 2)
-    monkeypatch.setattr("saltus.analysis.orbits.find_attractors.WATCHED", 256)
+    monkeypatch.setattr("saltus.analysis.orbits.find_attractors.WATCHING_ITERATES", 256)
     monkeypatch.setattr("saltus.analysis.orbits.aperiodic.BLOCKS", 64)
-    for module in ("find_attractors", "noisy", "find_responses"):
-        monkeypatch.setattr(f"saltus.analysis.orbits.{module}.TRAIL", 256)
+    for name in ("find_attractors.SURVEY_ITERATES", "noisy.SURVEY_ITERATES", "find_responses.KEPT_ITERATES"):
+        monkeypatch.setattr(f"saltus.analysis.orbits.{name}", 256)
 
 
 def test_all_figures_are_here():
@@ -103,7 +103,7 @@ def test_attractors_of_the_exact_maps(name, one):
     job = next(job for job in maps_of(parse(tiny(name))) if job.title == one)
     found = job.plan.scout(1)
     assert [orbit.period for orbit in found.orbits] == EXACT[name, one]
-    assert found.wandering == [], "all of them are periodic: what wanders is a transient"
+    assert found.sampled == [], "all of them are periodic: what never repeats is a transient"
     ds = job.plan.finish(job.plan.chunk(0, found), found, 1)
     assert (ds.basin.values >= 0).all(), "every start settles"
     assert (ds.attractor_exponent.values < 0).all()

@@ -100,10 +100,10 @@ def _kinds(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> di
     of = kinds.of(one.ds)
     for code in np.unique(of).tolist():
         x, y = _flat(one, values, of == code, across)
-        wandering = not kinds.repeats(code)
-        size = _size(x.size) * (0.5 if wandering else 1.0)
+        aperiodic = not kinds.repeats(code)
+        size = _size(x.size) * (0.5 if aperiodic else 1.0)
         marks = {"marker": "o", "ms": max(size, _SMALLEST), "mfc": kinds.color(code), "mec": "none", "gid": f"kind {code}"}
-        draw.draw_points(ax, x, y, zorder=2 if wandering else 3, **marks)
+        draw.draw_points(ax, x, y, zorder=2 if aperiodic else 3, **marks)
     return points.kind_handles(one, of)
 
 

@@ -89,7 +89,7 @@ def stopped(finished, tmp_path):
     folder = tmp_path / "stopped"
     shutil.copytree(finished[0], folder)
     for index in (2, 3, 7):
-        (folder / "stores" / "basins" / "done" / f"{index}.json").unlink()
+        (folder / "stores" / "basins" / "chunks" / f"{index}.chunk").unlink()
     for file in folder.glob("basins*"):
         file.unlink()
     return folder
@@ -169,7 +169,7 @@ def test_status_before_during_and_after(finished, stopped, tmp_path):
 def test_status_of_a_store_without_chunks(finished, tmp_path):
     folder = tmp_path / "empty"
     shutil.copytree(finished[0], folder)
-    for record in (folder / "stores" / "basins" / "done").iterdir():
+    for record in (folder / "stores" / "basins" / "chunks").iterdir():
         record.unlink()
     text = saltus("status", folder).stdout
     assert "0 of 8" in text
@@ -177,7 +177,7 @@ def test_status_of_a_store_without_chunks(finished, tmp_path):
 
 
 def test_status_shows_damage_and_who_is_at_work(stopped):
-    (stopped / "stores" / "basins" / "data.zarr" / "end_x" / "c" / "0").unlink()
+    (stopped / "stores" / "basins" / "chunks" / "0.chunk").write_bytes(b"short")
     with Store.open(stopped / "stores" / "basins").lock():
         (row,) = [line for line in saltus("status", stopped).stdout.splitlines() if line.startswith("small")]
     assert row.split()[:7] == ["small", "5", "of", "8", "62", "%", "1"]

@@ -182,7 +182,7 @@ def test_the_code_is_part_of_the_identity(tmp_path, monkeypatch):
     before = code.code_hash.__wrapped__()
     assert before == code.code_hash.__wrapped__() == job().identity()["code"]
     for target in ("taylor_step.py", "labels.py", "engine.py", "trace.py", "find_attractors.py", "capture.py", "maps.py", "module.py",
-                   "assemble.py", "units.py"):  # fmt: skip
+                   "build.py", "units.py"):  # fmt: skip
         with monkeypatch.context() as patch:
             edited_copy(tmp_path / target, target, patch)
             assert code.code_hash.__wrapped__() != before, target

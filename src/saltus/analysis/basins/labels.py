@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.orbits.find_attractors import find_attractors, wanders_on
+from saltus.analysis.orbits.find_attractors import find_attractors, keeps_to_sampled
 from saltus.analysis.orbits.found import Found
 from saltus.flow.maps import Map, Travel
 from saltus.flow.threads import on_threads
@@ -21,7 +21,7 @@ BLOCK = 8
 #: Starts that one thread follows at a time.
 PIECE = 4096
 #: Age at which a trajectory may be taken for one on a chaotic attractor, and between looks after that.
-WANDERS = 64
+APERIODIC_WINDOW = 64
 #: Trajectories that nothing captured from which new attractors are looked for.
 SAMPLE = 256
 
@@ -66,15 +66,15 @@ def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
     """Follow trajectories until an attractor captures them, float64[k, D], for ``most`` iterates at the longest."""
     result = Settling.empty(len(start), start.shape[1])
     travel, who = map_.launch(start, most), np.arange(len(start))
-    trail = np.zeros((len(start), 0, start.shape[1]))
+    iterates = np.zeros((len(start), 0, start.shape[1]))
     while len(who) and travel.age < most:
         points = travel.advance(min(BLOCK, most - travel.age))
         label, when = found.near.capture(points)
         periods = travel.age - points.shape[1] + when + 1
-        if found.wandering:
-            trail = np.concatenate([trail, points], axis=1)[:, -WANDERS:]
-            if travel.age % WANDERS == 0 or travel.age >= most:
-                on = wanders_on(found, trail, found.wandering[0].scale)
+        if found.sampled:
+            iterates = np.concatenate([iterates, points], axis=1)[:, -APERIODIC_WINDOW:]
+            if travel.age % APERIODIC_WINDOW == 0 or travel.age >= most:
+                on = keeps_to_sampled(found, iterates, found.sampled[0].scale)
                 here = (label < 0) & (on >= 0)
                 label[here], periods[here] = len(found.orbits) + on[here], travel.age
         going = travel.going & (label < 0)
@@ -84,7 +84,7 @@ def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
         )
         _write(result, who[leaves], label[leaves], periods[leaves], travel, leaves)
         travel.keep(going)
-        who, trail = who[going], trail[going]
+        who, iterates = who[going], iterates[going]
     _write(result, who, np.full(len(who), OPEN), np.full(len(who), -1), travel, np.arange(len(who)))
     return result
 
@@ -126,6 +126,6 @@ def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most:
 
 
 def _renumber(label: np.ndarray, before: Found, after: Found) -> None:
-    ids = np.array([*map(after.index, before.orbits), *map(after.index, before.wandering)], np.int64)
+    ids = np.array([*map(after.index, before.orbits), *map(after.index, before.sampled)], np.int64)
     if len(ids):
         label[label >= 0] = ids[label[label >= 0]]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.basins.labels import Settling
-from saltus.analysis.orbits.aperiodic import Wandering
+from saltus.analysis.orbits.aperiodic import SampledAttractor
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.noisy import Noisy
@@ -24,7 +24,7 @@ def found_data(found: Found) -> dict[str, Any]:
     return {
         "orbits": [_orbit_data(orbit) for orbit in found.orbits],
         "unstable": [_orbit_data(orbit) for orbit in found.unstable],
-        "wandering": [_wandering_data(one) for one in found.wandering],
+        "sampled": [_sampled_data(one) for one in found.sampled],
         "near": {"centres": found.near.centres.tolist(), "weights": found.near.weights.tolist(), "owners": found.near.owners.tolist()},
     }
 
@@ -48,14 +48,14 @@ def found_from(data: Mapping[str, Any], size: int) -> Found:
 
 def _holds_together(found: Found, size: int) -> bool:
     """Whether sizes fit one another, and numbers what they count."""
-    near, orbits = found.near, [*found.orbits, *found.unstable, *(one.orbit for one in found.wandering if isinstance(one, Noisy))]
+    near, orbits = found.near, [*found.orbits, *found.unstable, *(one.orbit for one in found.sampled if isinstance(one, Noisy))]
     return (
         len(near.centres) == len(near.weights) == len(near.owners)
         and bool(np.isfinite(near.centres).all() and np.isfinite(near.weights).all())
         and bool(((near.owners >= 0) & (near.owners < len(found))).all())
         and all(len(one.points) > 0 and one.multipliers.shape == (size,) for one in orbits)
-        and all(len(one.points) > 0 and one.scale.shape == (size,) for one in found.wandering)
-        and all(one.size.shape == one.scatter.shape == (size,) for one in found.wandering if isinstance(one, Noisy))
+        and all(len(one.points) > 0 and one.scale.shape == (size,) for one in found.sampled)
+        and all(one.size.shape == one.scatter.shape == (size,) for one in found.sampled if isinstance(one, Noisy))
     )
 
 
@@ -64,7 +64,7 @@ def _found(data: Mapping[str, Any], size: int) -> Found:
     return Found(
         Neighbourhoods(_array(near["centres"], size), _array(near["weights"], size, size), np.array(near["owners"], np.int64)),
         [_orbit_from(one, size) for one in data["orbits"]],
-        [_wandering_from(one, size) for one in data["wandering"]],
+        [_sampled_from(one, size) for one in data["sampled"]],
         [_orbit_from(one, size) for one in data["unstable"]],
     )
 
@@ -82,7 +82,7 @@ def _orbit_from(data: Mapping[str, Any], size: int) -> Orbit:
     return Orbit(_array(data["points"], size), values, float(data["mismatch"]))
 
 
-def _wandering_data(one: Wandering) -> dict[str, Any]:
+def _sampled_data(one: SampledAttractor) -> dict[str, Any]:
     data = {
         "kind": one.kind, "exponent": one.exponent, "error": one.exponent_error, "points": one.points.tolist(), "scale": one.scale.tolist(),
     }  # fmt: skip
@@ -91,10 +91,10 @@ def _wandering_data(one: Wandering) -> dict[str, Any]:
     return data | {"orbit": _orbit_data(one.orbit), "size": one.size.tolist(), "scatter": one.scatter.tolist(), "stray": one.stray}
 
 
-def _wandering_from(data: Mapping[str, Any], size: int) -> Wandering:
+def _sampled_from(data: Mapping[str, Any], size: int) -> SampledAttractor:
     plain = str(data["kind"]), float(data["exponent"]), float(data["error"]), _array(data["points"], size), np.array(data["scale"], float)
     if "orbit" not in data:
-        return Wandering(*plain)
+        return SampledAttractor(*plain)
     widths = np.array(data["size"], float), np.array(data["scatter"], float)
     return Noisy(*plain, _orbit_from(data["orbit"], size), *widths, float(data["stray"]))
 

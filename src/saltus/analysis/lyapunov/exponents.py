@@ -147,8 +147,8 @@ def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -
 
     Means of growth lag behind: those of a pair of complex eigenvalues swing about its real part.
     """
-    trail = found.growth.segment.points
-    state, whole = trail[:, -1], np.ptp(np.concatenate([start[:, None], trail], axis=1), axis=1)
+    iterates = found.growth.segment.points
+    state, whole = iterates[:, -1], np.ptp(np.concatenate([start[:, None], iterates], axis=1), axis=1)
     widest = whole.max(axis=1, keepdims=True)  # in place of the range of a state that began at rest and has come to rest
     scale = np.where(whole > AT_REST * widest, whole, np.where((widest > 0) & np.isfinite(widest), widest, 1.0))
     still = find_equilibria(flow.map, state, scale, captures=False)

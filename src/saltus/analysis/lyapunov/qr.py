@@ -112,7 +112,7 @@ def carry(matrices: np.ndarray, frame: np.ndarray, scale: np.ndarray) -> tuple[n
 
 
 def _joined(segments: list[Segment]) -> Segment:
-    """Sums and minima after the transient, the first status that isn't a success, and the last part of the trail."""
+    """Sums and minima after the transient, the first status that isn't a success, and the last points."""
     after = segments[1:]
     status = segments[0].status
     for segment in after:

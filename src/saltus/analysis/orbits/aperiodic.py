@@ -24,13 +24,13 @@ MEASURED = 4
 SURE = 4.0
 #: Exponent [per iterate] that is taken for zero whatever its error.
 FLOOR = 2e-3
-#: A trail that repeats to this, in units of the scale, is an orbit's; one whose repeats become so many times better is on its way to one.
+#: Recurrence below 1e-6 of the scale means periodic; a recurrence that falls by 20 means converging.
 REPEATS, SETTLING = 1e-6, 0.05
-#: Iterates whose places are noted.
-TRAIL = 4096
-#: Boxes across the range of a state, the finest first: the first at which one half of a trail knows the places of the other is taken.
+#: Iterates by which such an attractor is known.
+SURVEY_ITERATES = 4096
+#: Boxes across the range of a state. The finest is taken at which one half of the points knows the places of the other.
 BOXES = (64, 32, 16, 8)
-#: Share of every second place of a trail that must lie in the boxes of the others. An attractor of a higher dimension needs larger boxes.
+#: Share of every second point that must lie in the boxes of the others. Attractors of a higher dimension need larger boxes.
 KNOWN = 0.9
 #: Boxes away from zero beyond which nothing is on an attractor.
 FARTHEST = 2048
@@ -39,16 +39,16 @@ ALIKE = 0.6
 
 
 @dataclass(frozen=True)
-class Wandering:
-    """An attractor that never repeats.
+class SampledAttractor:
+    """An attractor that is known by points on it: one that never repeats, a limit cycle, or a noisy orbit.
 
     Attributes
     ----------
     kind : str
-        ``"chaotic"`` or ``"quasi_periodic"``.
+        ``"chaotic"``, ``"quasi_periodic"``, ``"limit_cycle"`` or ``"noisy_periodic"``.
     exponent, exponent_error : float
         Largest Lyapunov exponent of the map and its standard error [per iterate].
-    points : float64[TRAIL, D]
+    points : float64[SURVEY_ITERATES, D]
         Points on it.
     scale : float64[D]
         Range of each state.
@@ -102,8 +102,8 @@ def _codes(cells: np.ndarray) -> np.ndarray:
     return cells @ (2 * FARTHEST) ** np.arange(cells.shape[-1], dtype=np.int64)
 
 
-def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) -> list[Wandering]:
-    """The attractors on which trajectories wander.
+def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) -> list[SampledAttractor]:
+    """The aperiodic attractors of trajectories that have not settled for long.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
         The map.
     start : float64[k, D]
         Where trajectories stand that have not settled for long.
-    points : float64[k, TRAIL, D]
+    points : float64[k, SURVEY_ITERATES, D]
         Where they were.
     scale : float64[D]
         Range of each state.
@@ -120,28 +120,28 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
     if not usable:
         return []
     groups: list[list[int]] = []
-    trails = [Wandering("", 0.0, 0.0, points[i], scale) for i in usable]
-    for i, trail in enumerate(trails):
-        home = next((group for group in groups if alike(trails[group[0]], trail)), None)
+    runs = [SampledAttractor("", 0.0, 0.0, points[i], scale) for i in usable]
+    for i, iterates in enumerate(runs):
+        home = next((group for group in groups if alike(runs[group[0]], iterates)), None)
         if home is None:
             groups.append([i])
         else:
             home.append(i)
     _, kinds = kinds_of(map_, start[usable], np.broadcast_to(scale, start[usable].shape), groups)
-    return [Wandering(*kind, points[usable[group[0]]], scale) for group, kind in zip(groups, kinds, strict=True) if kind is not None]
+    return [SampledAttractor(*kind, points[usable[group[0]]], scale) for group, kind in zip(groups, kinds, strict=True) if kind is not None]
 
 
-def _settles(trail: np.ndarray, scale: np.ndarray) -> bool:
-    """Whether a trail float64[m, D] repeats, or comes to repeat better and better: it is on an orbit, or on its way to one."""
-    part = len(trail) // 16
-    early, late = (mismatch(piece, scale) for piece in (trail[:part], trail[-part:]))
+def _settles(iterates: np.ndarray, scale: np.ndarray) -> bool:
+    """Whether iterates float64[m, D] recur, or recur better and better: they are on an orbit, or on their way to one."""
+    part = len(iterates) // 16
+    early, late = (mismatch(piece, scale) for piece in (iterates[:part], iterates[-part:]))
     return late < REPEATS or late < SETTLING * early
 
 
-def mismatch(trail: np.ndarray, scale: np.ndarray) -> float:
-    """Smallest n-step difference, n up to half of the trail: the largest of it over the last quarter."""
-    last = len(trail) // 4
-    return min(float(np.abs((trail[-last:] - trail[-last - n : -n]) / scale).max()) for n in range(1, len(trail) // 2))
+def mismatch(iterates: np.ndarray, scale: np.ndarray) -> float:
+    """Smallest n-step difference, n up to half of them: the largest of it over the last quarter."""
+    last = len(iterates) // 4
+    return min(float(np.abs((iterates[-last:] - iterates[-last - n : -n]) / scale).max()) for n in range(1, len(iterates) // 2))
 
 
 def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
@@ -211,14 +211,14 @@ def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> tuple[np.nd
     return state, np.array(growths[ALIGNING:])
 
 
-def alike(one: Wandering, other: Wandering) -> bool:
-    """Whether two trails visit the same boxes."""
+def alike(one: SampledAttractor, other: SampledAttractor) -> bool:
+    """Whether two attractors visit the same boxes."""
     return min(float(other.share(one.points[None])[0]), float(one.share(other.points[None])[0])) > ALIKE
 
 
-def merge(found: list[Wandering]) -> list[Wandering]:
+def merge(found: list[SampledAttractor]) -> list[SampledAttractor]:
     """Those of a list that are different: of two that visit the same boxes the first is kept."""
-    kept: list[Wandering] = []
+    kept: list[SampledAttractor] = []
     for one in found:
         if not any(alike(one, other) for other in kept):
             kept.append(one)

@@ -1,4 +1,4 @@
-"""From trajectories of a map to its attractors: settle, notice what recurs, polish it, and find out what never does."""
+"""From trajectories of a map to its attractors: let them settle, close what recurs, and find out what never does."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from saltus.analysis.orbits.aperiodic import REPEATS, TRAIL, Wandering, merge, mismatch, survey
+from saltus.analysis.orbits.aperiodic import REPEATS, SURVEY_ITERATES, SampledAttractor, merge, mismatch, survey
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.orbits.found import INSIDE, Found, is_about
@@ -18,12 +18,12 @@ from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
 from saltus.flow.maps import Map, Stroboscope, Travel
 from saltus.results.dataset.kinds import Kind
 
-#: Orbits tried in one round; what isn't tried has its turn in the next.
-TRIES = 12
+#: Candidates for orbits in one round; what isn't tried has its turn in the next.
+MAX_CANDIDATES = 12
 #: Trajectories that never recur whose motion is surveyed.
-SURVEYED = 24
-#: Iterates that they are watched, and what their repeats come to, in units of the scale, when they are on an orbit after all.
-WATCHED, ARRIVED = 32 * 1024, 1e-5
+MAX_SURVEYED = 24
+#: Iterates of the survey; recurrence below which its survivor is periodic after all.
+WATCHING_ITERATES, ARRIVED = 32 * 1024, 1e-5
 
 
 def find_attractors(
@@ -61,8 +61,8 @@ def find_attractors(
         Iterates after which it was captured; -1 if it wasn't.
     """
     found = known or Found(Neighbourhoods.none(start.shape[1]))
-    found = Found(found.near, list(found.orbits), list(found.wandering), list(found.unstable))
-    owner: list[Orbit | Wandering | None] = [None] * len(start)
+    found = Found(found.near, list(found.orbits), list(found.sampled), list(found.unstable))
+    owner: list[Orbit | SampledAttractor | None] = [None] * len(start)
     settled = np.full(len(start), -1, np.int64)
     travel, going = map_.launch(start, most), np.arange(len(start))
     turns = isinstance(map_, Stroboscope) and autonomous(map_.system)
@@ -99,7 +99,7 @@ def _captured(found: Found, points: np.ndarray, who: np.ndarray, age: int, owner
 
 def _keeping(found: Found, kind: str, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray) -> np.ndarray:
     """Note which trajectories float64[k, m, D] keep to an attractor of a kind that is known by where it goes, bool[k]."""
-    ones = [one for one in found.wandering if one.kind == kind]
+    ones = [one for one in found.sampled if one.kind == kind]
     on = keep_to(ones, points, INSIDE)
     for i in np.flatnonzero(on >= 0):
         owner[who[i]], settled[who[i]] = ones[on[i]], age
@@ -115,7 +115,7 @@ def _add_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, 
         known = any(_lies_on(points[i, -1], orbit, scale, 10 * apart[i]) for orbit in found.unstable)
         if not known and not any(np.abs((points[i, -1] - points[j, -1]) / scale).max() < near for j in tried):
             tried.append(i)
-        if len(tried) == TRIES:
+        if len(tried) == MAX_CANDIDATES:
             break
     place, k = points[tried, -1], len(tried)
     orbits = find_orbits(map_, place, period[tried], np.broadcast_to(scale, place.shape), np.full(k, map_.noise))
@@ -123,7 +123,7 @@ def _add_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, 
     added = False
     for i in np.flatnonzero(right).tolist():
         orbit = orbits[i]
-        if any(is_about(one, orbit) for one in found.wandering):
+        if any(is_about(one, orbit) for one in found.sampled):
             continue
         known_ones = found.orbits if orbits.stable[i] else found.unstable
         if any(same(orbit, one, scale, max(SAME, 4 * map_.noise)) for one in known_ones):
@@ -135,7 +135,7 @@ def _add_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, 
         if noisy is None:
             found.add(map_, orbit, scale)
         else:
-            found.add_wandering(noisy)
+            found.add_sampled(noisy)
         added = True
     return added
 
@@ -168,13 +168,13 @@ def _on_cycles(
     settled: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are looked for. Notes their owners."""
-    cycles = [one for one in found.wandering if one.kind == Kind.LIMIT_CYCLE.word]
+    cycles = [one for one in found.sampled if one.kind == Kind.LIMIT_CYCLE.word]
     alone = np.flatnonzero(keep_to(cycles, points, INSIDE) < 0)
-    some = alone[np.unique(np.linspace(0, len(alone) - 1, min(TRIES, len(alone))).astype(int))] if len(alone) else alone
+    some = alone[np.unique(np.linspace(0, len(alone) - 1, min(MAX_CANDIDATES, len(alone))).astype(int))] if len(alone) else alone
     some = some[travel.going[rows[some]]]
     if len(some) and isinstance(map_, Stroboscope):
         fresh = limit_cycles(map_, points[some, -1], ROUND * float(map_.period[0]), scale)
-        found.wandering = merge([*found.wandering, *fresh])
+        found.sampled = merge([*found.sampled, *fresh])
     return _keeping(found, Kind.LIMIT_CYCLE.word, points, who, travel.age, owner, settled)
 
 
@@ -188,7 +188,7 @@ def _survey(
     survivors, points, leavers = _watch(travel, going, found, owner, settled)
     if not len(survivors):
         return
-    chosen = np.unique(np.linspace(0, len(survivors) - 1, min(SURVEYED, len(survivors))).astype(int))
+    chosen = np.unique(np.linspace(0, len(survivors) - 1, min(MAX_SURVEYED, len(survivors))).astype(int))
     noisy, strays = _blurred(map_, travel.state[chosen], points[chosen], scale, most)
     keeps = keep_to(noisy, points[chosen], INSIDE) >= 0
     rests = np.array([mismatch(points[i, -ROUND:], scale) < ARRIVED for i in chosen])  # stays on an orbit that doesn't attract
@@ -198,56 +198,56 @@ def _survey(
         moves = chosen[keeps | ~rests]
         leavers.append(points[moves][_leave(map_, travel.state[moves], found, noisy, scale), -ROUND:])
     for one in seen:
-        if not any((one.share(trail) >= INSIDE).any() for trail in leavers if len(trail)):
-            found.add_wandering(one)
-    label = wanders_on(found, points[:, -ROUND:], scale) if found.wandering else np.full(len(survivors), -1)
+        if not any((one.share(iterates) >= INSIDE).any() for iterates in leavers if len(iterates)):
+            found.add_sampled(one)
+    label = keeps_to_sampled(found, points[:, -ROUND:], scale) if found.sampled else np.full(len(survivors), -1)
     for i, one in zip(going[survivors], label, strict=True):
         if one >= 0:
-            owner[i] = found.wandering[one]
+            owner[i] = found.sampled[one]
     found.astray = [stray for stray, one in zip(strays, label[chosen], strict=True) if one < 0] if strays else []
 
 
 def _watch(
     travel: Travel, going: np.ndarray, found: Found, owner: list, settled: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
-    """Those of some trajectories that settle to nothing for TRAIL iterates more, int64[k], where they were, and where those that did."""
+    """Trajectories that don't settle for SURVEY_ITERATES more, int64[k], their iterates, and those of the ones that do."""
     survivors = np.arange(len(going))
-    trails: list[np.ndarray] = []
+    runs: list[np.ndarray] = []
     leavers: list[np.ndarray] = []
-    for _ in range(TRAIL // ROUND):
+    for _ in range(SURVEY_ITERATES // ROUND):
         points = travel.advance(ROUND)
         caught = _captured(found, points, going[survivors], travel.age - ROUND, owner, settled)
-        leavers += [trail[caught] for trail in trails]
+        leavers += [iterates[caught] for iterates in runs]
         stays = ~caught & travel.going
         travel.keep(stays)
-        survivors, trails = survivors[stays], [*(trail[stays] for trail in trails), points[stays]]
+        survivors, runs = survivors[stays], [*(iterates[stays] for iterates in runs), points[stays]]
         if not len(survivors):
             break
-    return survivors, np.concatenate(trails, axis=1), leavers
+    return survivors, np.concatenate(runs, axis=1), leavers
 
 
-def _blurred(map_: Map, state: np.ndarray, trails: np.ndarray, scale: np.ndarray, most: int) -> tuple[list[Noisy], list[Stray]]:
-    """The noisy orbits that trajectories float64[k, TRAIL, D] keep to, and how far each strays from an exact one; nothing of an exact map.
+def _blurred(map_: Map, state: np.ndarray, runs: np.ndarray, scale: np.ndarray, most: int) -> tuple[list[Noisy], list[Stray]]:
+    """The noisy orbits that trajectories float64[k, SURVEY_ITERATES, D] keep to, and how far each strays from an exact one.
 
-    They stand at float64[k, D].
+    They stand at float64[k, D]. Nothing of an exact map.
     """
     if not _blurs(map_):
         return [], []
     orbits = _exactly(map_, state, scale, most)
-    strays = [stray_of(map_, orbit, trail, scale) for orbit, trail in zip(orbits, trails, strict=True)]
+    strays = [stray_of(map_, orbit, iterates, scale) for orbit, iterates in zip(orbits, runs, strict=True)]
     about = [blurred(map_, orbit, scale) for orbit in {id(orbit): orbit for orbit in orbits if orbit is not None}.values()]
-    return [one for one in about if one is not None and (one.share(trails) >= INSIDE).any()], strays
+    return [one for one in about if one is not None and (one.share(runs) >= INSIDE).any()], strays
 
 
 def _leave(map_: Map, state: np.ndarray, found: Found, noisy: list[Noisy], scale: np.ndarray) -> np.ndarray:
     """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]; those beside a noisy one don't."""
-    travel, going = map_.launch(state, WATCHED), np.arange(len(state))
+    travel, going = map_.launch(state, WATCHING_ITERATES), np.arange(len(state))
     left = np.zeros(len(state), bool)
-    while len(going) and travel.age < WATCHED:
+    while len(going) and travel.age < WATCHING_ITERATES:
         points = travel.advance(ROUND)
         arrives = found.near.capture(points)[0] >= 0
         if travel.age % (8 * ROUND) == 0:
-            arrives |= [mismatch(trail, scale) < ARRIVED for trail in points] & (keep_to(noisy, points, INSIDE) < 0)
+            arrives |= [mismatch(iterates, scale) < ARRIVED for iterates in points] & (keep_to(noisy, points, INSIDE) < 0)
         left[going[arrives]] = True
         stays = ~arrives & travel.going
         travel.keep(stays)
@@ -255,11 +255,11 @@ def _leave(map_: Map, state: np.ndarray, found: Found, noisy: list[Noisy], scale
     return left
 
 
-def wanders_on(found: Found, trails: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def keeps_to_sampled(found: Found, runs: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """For trajectories float64[k, m, D]: which attractor of those that never repeat each keeps to, -1 if none; none if it repeats."""
-    shares = np.stack([one.share(trails) for one in found.wandering], axis=1)
-    _, apart = recurrence(trails, scale)
+    shares = np.stack([one.share(runs) for one in found.sampled], axis=1)
+    _, apart = recurrence(runs, scale)
     best = shares.argmax(axis=1)
     recurring = (Kind.LIMIT_CYCLE.word, Kind.NOISY_PERIODIC.word)  # iterates on these may recur
-    turns = np.array([one.kind in recurring for one in found.wandering])
+    turns = np.array([one.kind in recurring for one in found.sampled])
     return np.where((shares.max(axis=1) >= INSIDE) & ((apart > REPEATS) | turns[best]), best, -1)

@@ -26,14 +26,14 @@ from saltus.results.dataset.kinds import Kind
 
 #: Trajectories that one thread follows at a time.
 PIECE = 512
-#: Periods and looks a period from which the range of a motion is taken.
-RANGED, LOOKS = 4, 32
-#: Points of a motion that never repeats that are kept.
-TRAIL = 1024
+#: Periods, and samples in each, from which the range of a motion is taken.
+RANGE_PERIODS, SAMPLES_PER_PERIOD = 4, 32
+#: Iterates that are kept of a motion that never repeats.
+KEPT_ITERATES = 1024
 
 
 @dataclass
-class Steady:
+class SettledMotions:
     """What k trajectories settle to.
 
     Attributes
@@ -48,7 +48,7 @@ class Steady:
         Iterates after which it was known; -1 if it isn't.
     scale : float64[k, D]
         Range of each state in the motion.
-    trail : dict of int to float64[TRAIL, D]
+    iterates : dict of int to float64[KEPT_ITERATES, D]
         Points of those that never repeat.
     end : float64[k, D]
         Where the trajectory stood last.
@@ -60,11 +60,11 @@ class Steady:
     exponent_error: np.ndarray
     settled: np.ndarray
     scale: np.ndarray
-    trail: dict[int, np.ndarray]
+    iterates: dict[int, np.ndarray]
     end: np.ndarray
 
     @classmethod
-    def empty(cls, count: int, size: int) -> Steady:
+    def empty(cls, count: int, size: int) -> SettledMotions:
         """Nothing computed yet."""
         nothing = np.full(count, np.nan)
         return cls(
@@ -72,53 +72,53 @@ class Steady:
             np.full(count, -1, np.int64), np.ones((count, size)), {}, np.full((count, size), np.nan),
         )  # fmt: skip
 
-    def put(self, where: np.ndarray, other: Steady) -> None:
+    def put(self, where: np.ndarray, other: SettledMotions) -> None:
         """Write another's results to the rows int64[m]."""
         for name in ("kind", "exponent", "exponent_error", "settled", "scale", "end"):
             getattr(self, name)[where] = getattr(other, name)
         self.orbits.put(where, other.orbits)
-        self.trail.update({int(where[i]): trail for i, trail in other.trail.items()})
+        self.iterates.update({int(where[i]): iterates for i, iterates in other.iterates.items()})
 
 
-def settle_each(
+def find_responses(
     map_: Stroboscope,
     start: np.ndarray,
     most: int,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
-    result: Steady | None = None,
-) -> Steady:
+    result: SettledMotions | None = None,
+) -> SettledMotions:
     """What each trajectory settles to: start float64[k, D], row i by row i of the map, followed for ``most`` iterates at the longest.
 
     What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't depend on the other trajectories, nor on
     threads.
     """
-    result = Steady.empty(len(start), start.shape[1]) if result is None else result
+    result = SettledMotions.empty(len(start), start.shape[1]) if result is None else result
     pieces = [np.arange(first, min(first + PIECE, len(start))) for first in range(0, len(start), PIECE)]
 
-    def work(piece: np.ndarray) -> Steady:
+    def work(piece: np.ndarray) -> SettledMotions:
         return _settle(map_.rows(piece, threads=1), start[piece], most)
 
     on_threads(work, pieces, result.put, threads, progress)
     return result
 
 
-def _settle(map_: Stroboscope, start: np.ndarray, most: int) -> Steady:
+def _settle(map_: Stroboscope, start: np.ndarray, most: int) -> SettledMotions:
     """One piece, on one thread."""
-    result = Steady.empty(*start.shape)
+    result = SettledMotions.empty(*start.shape)
     who = _follow(map_, start, np.arange(len(start)), most, result, SETTLED)
     if len(who):
         result.scale[who] = motion_range(map_.rows(who), result.end[who])
         who = _follow(map_, result.end, who, ROUND, result, NEAR)
     if len(who):
-        who = _wander(map_, result.end, who, result)
+        who = _classify_aperiodic(map_, result.end, who, result)
     if len(who):  # neither a recurrence nor an exponent: once more as long, and from farther away
         who = _follow(map_, result.end, who, most, result, NEAR)
         result.kind[who] = Kind.UNCONVERGED
     return result
 
 
-def _follow(map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, result: Steady, near: float) -> np.ndarray:
+def _follow(map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, result: SettledMotions, near: float) -> np.ndarray:
     """Follow trajectories until they settle on an orbit; writes what is known, returns those that haven't."""
     flight = map_.rows(who).launch(start[who], most + ROUND)
     while len(who) and flight.age < most:
@@ -139,7 +139,7 @@ def _follow(map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, re
     return who
 
 
-def _settled(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
+def _settled(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: SettledMotions) -> np.ndarray:
     """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes the orbits."""
     if autonomous(map_.system):
         return _settled_unforced(map_.rows(who), points, who, near, result)
@@ -153,7 +153,7 @@ def _settled(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float
     return done
 
 
-def _settled_unforced(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: Steady) -> np.ndarray:
+def _settled_unforced(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: SettledMotions) -> np.ndarray:
     """As :func:`_settled` for rows of a system without forcing: which rest, or go round a limit cycle."""
     state, window = points[:, -1], ROUND * float(map_.period[0])
     result.scale[who] = np.maximum(result.scale[who], np.ptp(points, axis=1))
@@ -169,20 +169,20 @@ def _settled_unforced(map_: Stroboscope, points: np.ndarray, who: np.ndarray, ne
     return done
 
 
-def _wander(map_: Stroboscope, start: np.ndarray, who: np.ndarray, result: Steady) -> np.ndarray:
-    """Type the trajectories that don't recur by their exponents; writes what is known, returns those that stay unclear."""
+def _classify_aperiodic(map_: Stroboscope, start: np.ndarray, who: np.ndarray, result: SettledMotions) -> np.ndarray:
+    """Classify trajectories that don't recur by their exponents; writes what is known, returns those that stay unclear."""
     maps = map_.rows(who)
     state, kinds = kinds_of(maps, start[who], result.scale[who], [[i] for i in range(len(who))])
-    flight = maps.launch(state, TRAIL)
-    trail = flight.advance(TRAIL)
-    recurs = recurrence(trail[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR, maps.noise_of(result.scale[who]))  # by now
+    flight = maps.launch(state, KEPT_ITERATES)
+    iterates = flight.advance(KEPT_ITERATES)
+    recurs = recurrence(iterates[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR, maps.noise_of(result.scale[who]))  # by now
     result.end[who] = flight.state
     unclear = np.ones(len(who), bool)
     if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
         recurs |= unforced.nearly_recurs(maps, flight.state, ROUND * float(map_.period[0]))
-        away = unforced.runs_away(trail)
+        away = unforced.runs_away(iterates)
         result.kind[who[away]] = Kind.ESCAPED
-    for i in np.flatnonzero(np.isfinite(trail).all(axis=(1, 2))):
+    for i in np.flatnonzero(np.isfinite(iterates).all(axis=(1, 2))):
         kind = kinds[i]
         if (
             result.kind[who[i]] != Kind.ESCAPED
@@ -192,13 +192,13 @@ def _wander(map_: Stroboscope, start: np.ndarray, who: np.ndarray, result: Stead
             unclear[i], row = False, who[i]
             result.kind[row] = Kind[kind[0].upper()]
             result.exponent[row], result.exponent_error[row] = kind[1:]
-            result.trail[int(row)], result.settled[row] = trail[i], -1
+            result.iterates[int(row)], result.settled[row] = iterates[i], -1
     return who[unclear & (result.kind[who] != Kind.ESCAPED)]
 
 
 def motion_range(map_: Stroboscope, state: np.ndarray) -> np.ndarray:
     """Range of each state in the motion from states float64[k, D] on, float64[k, D]; its size where it rests, 1 where that is 0."""
-    samples = map_.run(state, RANGED, Schedule.even(RANGED, LOOKS)).samples
+    samples = map_.run(state, RANGE_PERIODS, Schedule.even(RANGE_PERIODS, SAMPLES_PER_PERIOD)).samples
     with np.errstate(all="ignore"):
         lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
     scale = np.where(lengths > RESTS * sizes, lengths, sizes)

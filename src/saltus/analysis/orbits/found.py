@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.orbits.aperiodic import Wandering, merge
+from saltus.analysis.orbits.aperiodic import SampledAttractor, merge
 from saltus.analysis.orbits.capture import Neighbourhoods, neighbourhoods
 from saltus.analysis.orbits.noisy import Noisy, Stray
 from saltus.analysis.orbits.orbits import Orbit
@@ -26,7 +26,7 @@ class Found:
         Where the periodic ones capture.
     orbits : list of Orbit
         The periodic ones, stable.
-    wandering : list of Wandering
+    sampled : list of SampledAttractor
         Those that never repeat: their ids follow.
     unstable : list of Orbit
         Periodic orbits met on the way that don't attract.
@@ -36,28 +36,28 @@ class Found:
 
     near: Neighbourhoods
     orbits: list[Orbit] = field(default_factory=list)
-    wandering: list[Wandering] = field(default_factory=list)
+    sampled: list[SampledAttractor] = field(default_factory=list)
     unstable: list[Orbit] = field(default_factory=list)
     astray: list[Stray] = field(default_factory=list)
 
     def __len__(self) -> int:
-        return len(self.orbits) + len(self.wandering)
+        return len(self.orbits) + len(self.sampled)
 
     def add(self, map_: Map, orbit: Orbit, scale: np.ndarray) -> None:
         """One more periodic attractor, and where it captures."""
         self.near = self.near.joined(neighbourhoods(map_, orbit, len(self.orbits), scale))
         self.orbits.append(orbit)
 
-    def add_wandering(self, one: Wandering) -> None:
+    def add_sampled(self, one: SampledAttractor) -> None:
         """One more that is known by where it goes, unless it is there. Orbits that turn out to be scatter about it are no longer others."""
-        self.wandering = merge([*self.wandering, one])
+        self.sampled = merge([*self.sampled, one])
         kept = [i for i, orbit in enumerate(self.orbits) if not is_about(one, orbit)]
         self.near = self.near.of(np.array(kept, np.int64))
         self.orbits = [self.orbits[i] for i in kept]
 
-    def index(self, one: Orbit | Wandering) -> int:
+    def index(self, one: Orbit | SampledAttractor) -> int:
         """The id of an attractor that was found."""
-        every: list[Orbit | Wandering] = [*self.orbits, *self.wandering]
+        every: list[Orbit | SampledAttractor] = [*self.orbits, *self.sampled]
         for i, other in enumerate(every):
             if other is one or (isinstance(one, Orbit) and is_about(other, one)):
                 return i
@@ -66,12 +66,12 @@ class Found:
     def ordered(self, scale: np.ndarray) -> Found:
         """The same with ids that don't depend on the order of discovery: by period, then by size, then by place."""
         order = sorted(range(len(self.orbits)), key=lambda i: (self.orbits[i].period, *_rounded(self.orbits[i], scale)))
-        wandering = sorted(self.wandering, key=lambda w: (w.kind, *w.first))
+        sampled = sorted(self.sampled, key=lambda w: (w.kind, *w.first))
         near = self.near.renumbered(np.argsort(np.array(order, np.int64)))
-        return Found(near, [self.orbits[i] for i in order], wandering, self.unstable, self.astray)
+        return Found(near, [self.orbits[i] for i in order], sampled, self.unstable, self.astray)
 
 
-def is_about(one: Orbit | Wandering, orbit: Orbit) -> bool:
+def is_about(one: Orbit | SampledAttractor, orbit: Orbit) -> bool:
     """Whether an orbit is scatter about a noisy one."""
     return isinstance(one, Noisy) and bool(one.share(orbit.points[None])[0] >= INSIDE)
 

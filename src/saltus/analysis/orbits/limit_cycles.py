@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from saltus.analysis.orbits.aperiodic import TRAIL, Wandering
+from saltus.analysis.orbits.aperiodic import SURVEY_ITERATES, SampledAttractor
 from saltus.analysis.orbits.cycles import attracting_cycles
 from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.analysis.orbits.tolerances import NEAR, ROUND
@@ -13,7 +13,7 @@ from saltus.flow.maps import Stroboscope
 from saltus.results.dataset.kinds import Kind
 
 
-def limit_cycles(map_: Stroboscope, state: np.ndarray, window: float, scale: np.ndarray) -> list[Wandering]:
+def limit_cycles(map_: Stroboscope, state: np.ndarray, window: float, scale: np.ndarray) -> list[SampledAttractor]:
     """Attracting limit cycles on which some trajectories float64[k, D] lie, each by places in equal steps of its time.
 
     Parameters
@@ -33,10 +33,10 @@ def limit_cycles(map_: Stroboscope, state: np.ndarray, window: float, scale: np.
     if not len(rows):
         return []
     once = map_.rows(rows).with_period(cycles.time[rows])
-    points = once.run(cycles.points[rows, 0], 1, Schedule.even(1, TRAIL)).samples
-    return [Wandering(Kind.LIMIT_CYCLE.word, 0.0, 0.0, one, scale) for one in points]
+    points = once.run(cycles.points[rows, 0], 1, Schedule.even(1, SURVEY_ITERATES)).samples
+    return [SampledAttractor(Kind.LIMIT_CYCLE.word, 0.0, 0.0, one, scale) for one in points]
 
 
-def cycle_of(map_: Stroboscope, one: Wandering) -> OrbitBatch:
+def cycle_of(map_: Stroboscope, one: SampledAttractor) -> OrbitBatch:
     """A limit cycle that is known by its places: its first one is where it begins."""
     return attracting_cycles(map_, one.points[:1], ROUND * float(map_.period[0]), NEAR)[0]

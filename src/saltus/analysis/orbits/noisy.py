@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from saltus.analysis.orbits.aperiodic import TRAIL, Wandering
+from saltus.analysis.orbits.aperiodic import SURVEY_ITERATES, SampledAttractor
 from saltus.analysis.orbits.orbits import Orbit
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Map, Stroboscope
@@ -31,7 +31,7 @@ BETWEEN = 32
 
 
 @dataclass(frozen=True)
-class Noisy(Wandering):
+class Noisy(SampledAttractor):
     """An orbit about which errors of a map keep its motion scattered; ``points`` and ``exponent`` are the orbit's.
 
     Attributes
@@ -76,15 +76,15 @@ class Stray:
     distance: float
 
 
-def apart(trails: np.ndarray, points: np.ndarray, size: np.ndarray) -> np.ndarray:
+def apart(runs: np.ndarray, points: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Differences of trajectories float64[k, m, D] from an orbit float64[n, D], each at its best shift of the phase, in units of ``size``.
 
     The best shift is that of the smallest mean square: one for the whole trajectory. Where a trajectory isn't finite, inf.
     """
-    n, m = len(points), trails.shape[1]
-    best, least = np.full(trails.shape, np.inf), np.full(len(trails), np.inf)
+    n, m = len(points), runs.shape[1]
+    best, least = np.full(runs.shape, np.inf), np.full(len(runs), np.inf)
     for shift in range(n):
-        difference = (trails - points[(np.arange(m) + shift) % n]) / size
+        difference = (runs - points[(np.arange(m) + shift) % n]) / size
         square = np.mean(difference**2, axis=(1, 2))
         nearer = square < least
         best[nearer], least[nearer] = difference[nearer], square[nearer]
@@ -94,7 +94,7 @@ def apart(trails: np.ndarray, points: np.ndarray, size: np.ndarray) -> np.ndarra
 def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
     """What errors of a map make of an orbit of the exact one: scatter about it; None if the motion leaves it.
 
-    The map is started on each point of the orbit and watched for TRAIL iterates. So the scatter is a property of map and orbit: the
+    The map is started on each point of the orbit for SURVEY_ITERATES iterates. So the scatter is a property of map and orbit: the
     starts from which the orbit was found change it by what the orbit's last bits do, some per cent.
 
     Parameters
@@ -106,10 +106,10 @@ def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
     scale : float64[D]
         Range of each state in all motions.
     """
-    travel = map_.launch(orbit.points, TRAIL)
-    trails = np.concatenate([travel.advance(LOOK) for _ in range(TRAIL // LOOK)], axis=1)
+    travel = map_.launch(orbit.points, SURVEY_ITERATES)
+    runs = np.concatenate([travel.advance(LOOK) for _ in range(SURVEY_ITERATES // LOOK)], axis=1)
     size = motion_size(map_, orbit, scale)
-    distance = apart(trails, orbit.points, size)
+    distance = apart(runs, orbit.points, size)
     stray = float(np.abs(distance).max())
     if not stray <= NARROW:
         return None
@@ -126,11 +126,11 @@ def motion_size(map_: Map, orbit: Orbit, scale: np.ndarray) -> np.ndarray:
     return np.where(wide > 0, wide, scale)
 
 
-def stray_of(map_: Map, orbit: Orbit | None, trail: np.ndarray, scale: np.ndarray) -> Stray:
+def stray_of(map_: Map, orbit: Orbit | None, iterates: np.ndarray, scale: np.ndarray) -> Stray:
     """How far a trajectory float64[m, D] of an inexact map strays from an exact orbit; unknown if there is none."""
     if orbit is None:
         return Stray(0, np.nan)
-    return Stray(orbit.period, float(np.abs(apart(trail[None], orbit.points, motion_size(map_, orbit, scale))).max()))
+    return Stray(orbit.period, float(np.abs(apart(iterates[None], orbit.points, motion_size(map_, orbit, scale))).max()))
 
 
 def stray_attrs(strays: Sequence[Stray]) -> dict[str, str | float]:
@@ -142,9 +142,9 @@ def stray_attrs(strays: Sequence[Stray]) -> dict[str, str | float]:
     return {"unconverged_exactly": words, "unconverged_stray": max(far, default=np.nan)}
 
 
-def keep_to(attractors: Sequence[Wandering], trails: np.ndarray, inside: float) -> np.ndarray:
+def keep_to(attractors: Sequence[SampledAttractor], runs: np.ndarray, inside: float) -> np.ndarray:
     """Which of some attractors, known by where they go, trajectories float64[k, m, D] keep to with such a share, int64[k]; -1 for none."""
     if not attractors:
-        return np.full(len(trails), -1, np.int64)
-    shares = np.stack([one.share(trails) for one in attractors], axis=1)
+        return np.full(len(runs), -1, np.int64)
+    shares = np.stack([one.share(runs) for one in attractors], axis=1)
     return np.where(shares.max(axis=1) >= inside, shares.argmax(axis=1), -1)

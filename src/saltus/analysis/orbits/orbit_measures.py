@@ -22,7 +22,7 @@ from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 
 #: Forcing periods of a motion that never repeats from which its numbers are taken, where there are many such motions.
-WANDERED = 64
+APERIODIC_PERIODS = 64
 #: Nodes that a thread holds at a time: some 20 MB.
 HELD = 8192
 #: Places of Gauss's rule on a piece: exact for the square of a polynomial of degree 20.
@@ -104,7 +104,9 @@ def unknown(m: int, size: int, outputs: int | None = None) -> Measures:
     return Measures(maximum, minimum, mean, deviation, harmonic, margin, span, contacts, [""] * m, turning)
 
 
-def measure(map_: Stroboscope, start: np.ndarray, periods: np.ndarray, window: int = WANDERED, outputs: Outputs | None = None) -> Measures:
+def measure(
+    map_: Stroboscope, start: np.ndarray, periods: np.ndarray, window: int = APERIODIC_PERIODS, outputs: Outputs | None = None
+) -> Measures:
     """The numbers of the motions from states float64[m, D], row i by row i of the map.
 
     Parameters

@@ -198,18 +198,18 @@ def _averaged(
     """
     length = n * np.maximum(-(-SETTLING_ITERATES // n), 2 * AVERAGED_RETURNS)
     longest = int(length.max())
-    trails = map_.launch(start, longest + 1).advance(longest + 1)
-    means = [mean_orbit(trails[i, : length[i]], int(n[i]), scale[i], float(noise[i])) for i in range(len(n))]
+    runs = map_.launch(start, longest + 1).advance(longest + 1)
+    means = [mean_orbit(runs[i, : length[i]], int(n[i]), scale[i], float(noise[i])) for i in range(len(n))]
     known = [(row, *mean) for row, mean in enumerate(means) if mean is not None and len(mean[0]) <= LONGEST]
     return np.array([row for row, _, _ in known], np.int64), [points for _, points, _ in known], np.array([mean[2] for mean in known])
 
 
-def mean_orbit(trail: np.ndarray, n: int, scale: np.ndarray, noise: float) -> tuple[np.ndarray, float] | None:
-    """The orbit that the end of a trail of an inexact map lies on, and how far the trail lies from it; None if it lies on none.
+def mean_orbit(iterates: np.ndarray, n: int, scale: np.ndarray, noise: float) -> tuple[np.ndarray, float] | None:
+    """The orbit on which iterates of an inexact map end, and how far they lie from it; None if they end on none.
 
     Parameters
     ----------
-    trail : float64[m, D]
+    iterates : float64[m, D]
         States one iterate apart, at least 16 n of them.
     n : int
         Iterates after which they nearly recur.
@@ -218,7 +218,7 @@ def mean_orbit(trail: np.ndarray, n: int, scale: np.ndarray, noise: float) -> tu
     noise : float
         Errors of the map, in units of the scale.
     """
-    last = trail[-AVERAGED_RETURNS * n :]
+    last = iterates[-AVERAGED_RETURNS * n :]
     points, scatter = _mean(last, n, scale)
     if not scatter <= JITTER * noise:
         return None

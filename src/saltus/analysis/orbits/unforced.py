@@ -13,7 +13,7 @@ from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.flow.maps import Stroboscope
 from saltus.system.evaluate import evaluate
 
-#: Parts of a trail that must each be larger than the one before, and how much the last must be larger than the first, to run away.
+#: Parts of a motion that must each be larger than the one before, and how much the last must be larger than the first, to run away.
 EIGHTHS, GROWN = 8, 3.0
 #: Returns farther than this, in units of the range, are no sign of a limit cycle.
 TORUS = 1e-2
@@ -70,9 +70,9 @@ def nearly_recurs(map_: Stroboscope, state: np.ndarray, window: float) -> np.nda
     return np.asarray(returns(map_, state, window).apart < TORUS)
 
 
-def runs_away(trail: np.ndarray) -> np.ndarray:
-    """Which trails float64[k, m, D] only grow: in each eighth of them more than before, and much in all, bool[k]."""
-    sizes = np.stack([np.abs(part).max(axis=(1, 2)) for part in np.array_split(trail, EIGHTHS, axis=1)])
+def runs_away(iterates: np.ndarray) -> np.ndarray:
+    """Which motions float64[k, m, D] only grow: in each eighth of them more than before, and much in all, bool[k]."""
+    sizes = np.stack([np.abs(part).max(axis=(1, 2)) for part in np.array_split(iterates, EIGHTHS, axis=1)])
     with np.errstate(invalid="ignore"):
         return np.asarray((np.diff(sizes, axis=0) > 0).all(axis=0) & (sizes[-1] > GROWN * sizes[0]))
 

@@ -89,7 +89,7 @@ def why_they_end(found: Found, followed: Followed, values: np.ndarray, ends: np.
 
 def _leading(found: Found, response: int) -> complex:
     """Leading multiplier; of a limit cycle the largest but the trivial one, of an equilibrium the leading eigenvalue [1/s]."""
-    multipliers = found.steady.orbits.multipliers[found.row[response]]
+    multipliers = found.motions.orbits.multipliers[found.row[response]]
     return complex(multipliers[1 if found.kind[response] == Kind.LIMIT_CYCLE and len(multipliers) > 1 else 0])
 
 
@@ -103,7 +103,7 @@ def _told_by_neighbours(found: Found, last: int, beyond: int, multiplier: comple
     if doubled and multiplier.real < 0:
         return "period_doubling"
     starts = np.flatnonzero((found.of[here] >= 0) & (found.of[here] == last))
-    if len(starts) and (found.steady.kind.reshape(found.of.shape)[beyond, starts] == Kind.CHAOTIC).any():
+    if len(starts) and (found.motions.kind.reshape(found.of.shape)[beyond, starts] == Kind.CHAOTIC).any():
         return "chaos"
     if found.kind[last] != Kind.EQUILIBRIUM and abs(multiplier.imag) > 1e-9 and _turns(found, last, 2 * here - beyond, abs(multiplier)):
         return "neimark_sacker"
@@ -115,7 +115,7 @@ def _turns(found: Found, last: int, before: int, size: float) -> bool:
     alike = (found.place == before) & (found.kind == found.kind[last]) & (found.period == found.period[last])
     if size <= TURNING or not alike.any():
         return False
-    scale, points = found.steady.scale[found.row[last]], found.points(last)
+    scale, points = found.motions.scale[found.row[last]], found.points(last)
     apart = {int(j): orbit_distance(found.points(int(j)), points, scale) for j in np.flatnonzero(alike)}
     nearest = min(apart, key=lambda j: apart[j])
     grown = size - abs(_leading(found, nearest))
@@ -133,7 +133,7 @@ def _is_twice(found: Found, longer: int, shorter: int) -> bool:
 
 def _covers(found: Found, longer: int, shorter: int) -> bool:
     """Whether every point of an orbit of period 2n lies near one of an orbit of period n."""
-    scale = found.steady.scale[found.row[shorter]]
+    scale = found.motions.scale[found.row[shorter]]
     apart = np.abs((found.points(longer)[:, None] - found.points(shorter)[None]) / scale).max(axis=2).min(axis=1)
     return bool(apart.max() < LINK)
 

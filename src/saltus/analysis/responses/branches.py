@@ -66,7 +66,7 @@ def _distance(found: Found, a: int, b: int) -> float:
     """How far two motions at different values that never repeat lie apart, in units of their range; inf if they differ in kind."""
     if found.kind[a] != found.kind[b]:
         return np.inf
-    scale = np.maximum(found.steady.scale[found.row[a]], found.steady.scale[found.row[b]])
+    scale = np.maximum(found.motions.scale[found.row[a]], found.motions.scale[found.row[b]])
     p, q = found.points(a), found.points(b)
     return float(max(np.abs((p.mean(axis=0) - q.mean(axis=0)) / scale).max(), np.abs((p.std(axis=0) - q.std(axis=0)) / scale).max()))
 

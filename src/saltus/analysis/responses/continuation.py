@@ -82,8 +82,8 @@ class Follower:
             grid.system, method if method.exact else method.companion(), grid.rows[found.place[rows]], grid.every, threads
         )
         self._every = grid.every
-        self._scale = found.steady.scale[found.row[rows]]
-        self.orbits, self.value = found.steady.orbits.rows(found.row[rows]), values[found.place[rows]]
+        self._scale = found.motions.scale[found.row[rows]]
+        self.orbits, self.value = found.motions.orbits.rows(found.row[rows]), values[found.place[rows]]
         self.step, self.narrow, self.known = np.zeros(len(rows)), np.zeros(len(rows), bool), np.ones(len(rows), bool)
         if not method.exact and len(rows):
             exact, apart = self._near(np.arange(len(rows)), self.value, self.orbits)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.orbits.aperiodic import Wandering, alike
-from saltus.analysis.orbits.find_responses import Steady, settle_each
+from saltus.analysis.orbits.aperiodic import SampledAttractor, alike
+from saltus.analysis.orbits.find_responses import SettledMotions, find_responses
 from saltus.analysis.orbits.orbit_measures import Measures, measure
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.orbits.unforced import multipliers_and_eigenvalues, rest
@@ -23,7 +23,7 @@ from saltus.results.dataset.kinds import CLOSED, Kind
 #: Point of a limit cycle at which the first state doesn't turn: it is least at point 0.
 ASIDE = 23
 #: Points kept of a motion that never repeats.
-WANDERED = 64
+APERIODIC_PERIODS = 64
 
 
 @dataclass
@@ -32,7 +32,7 @@ class Found:
 
     Attributes
     ----------
-    steady : Steady
+    motions : SettledMotions
         What every trajectory settled to: row place * s + start.
     row : int64[m]
         A trajectory that settled to the response.
@@ -42,7 +42,7 @@ class Found:
         Response of every trajectory, or a code below zero.
     """
 
-    steady: Steady
+    motions: SettledMotions
     row: np.ndarray
     place: np.ndarray
     of: np.ndarray
@@ -55,46 +55,52 @@ class Found:
     @property
     def kind(self) -> np.ndarray:
         """Kind of each response, int64[m]."""
-        return self.steady.kind[self.row]
+        return self.motions.kind[self.row]
 
     @property
     def period(self) -> np.ndarray:
         """Points by which each is known: n of an nT, 1 of an equilibrium, 0 if it doesn't repeat, int64[m]."""
-        return self.steady.orbits.period[self.row]
+        return self.motions.orbits.period[self.row]
 
     @property
     def time(self) -> np.ndarray:
         """Period of each limit cycle [s], 0 of an equilibrium, NaN of what follows a forcing, float64[m]."""
-        return self.steady.orbits.time[self.row]
+        return self.motions.orbits.time[self.row]
 
     def points(self, response: int) -> np.ndarray:
         """Its stroboscopic points, float64[n, D]."""
         row = int(self.row[response])
-        return self.steady.trail[row] if row in self.steady.trail else self.steady.orbits.points[row, : self.steady.orbits.period[row]]
+        return (
+            self.motions.iterates[row]
+            if row in self.motions.iterates
+            else self.motions.orbits.points[row, : self.motions.orbits.period[row]]
+        )
 
     def start(self, aside: bool = False) -> np.ndarray:
         """A state on each, float64[m, D]; ``aside``: not where a limit cycle turns."""
         index = np.where(aside & (self.kind == Kind.LIMIT_CYCLE), ASIDE, 0)
-        return np.array([self.points(i)[index[i]] for i in range(len(self))]).reshape(len(self), self.steady.orbits.points.shape[-1])
+        return np.array([self.points(i)[index[i]] for i in range(len(self))]).reshape(len(self), self.motions.orbits.points.shape[-1])
 
 
 def find(grid: Grid, method: Method, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
     """The responses of a grid; on Ctrl-C those that are known, with ``complete`` False."""
     map_, count = grid.map(method, threads), len(grid.starts)
-    result = Steady.empty(grid.places * count, grid.starts.shape[1])
+    result = SettledMotions.empty(grid.places * count, grid.starts.shape[1])
     complete = True
     try:
         if grid.sweeps:
             _sweep(grid, map_, most, result, threads, progress)
         else:
-            settle_each(map_.rows(np.repeat(np.arange(grid.places), count)), np.tile(grid.starts, (grid.places, 1)), most,
+            find_responses(map_.rows(np.repeat(np.arange(grid.places), count)), np.tile(grid.starts, (grid.places, 1)), most,
                         threads, progress, result)  # fmt: skip
     except KeyboardInterrupt:
         complete = False
     return _gathered(result, grid.places, count, 4.0 * map_.noise_of(result.scale), complete)
 
 
-def _sweep(grid: Grid, map_: Stroboscope, most: int, result: Steady, threads: int | None, progress: Callable[[float], None] | None) -> None:
+def _sweep(
+    grid: Grid, map_: Stroboscope, most: int, result: SettledMotions, threads: int | None, progress: Callable[[float], None] | None
+) -> None:
     """Each start along the axis: where it stands at one value is where it starts at the next."""
     count = len(grid.starts)
     for k in range(grid.places):
@@ -103,12 +109,12 @@ def _sweep(grid: Grid, map_: Stroboscope, most: int, result: Steady, threads: in
             place, before = (k, k - 1) if way == "up" else (grid.places - 1 - k, grid.places - k)
             start = result.end[before * count + who] if k else grid.starts[who]
             rows = place * count + who
-            result.put(rows, settle_each(map_.rows(np.full(len(who), place)), np.where(np.isfinite(start), start, 0.0), most, threads))
+            result.put(rows, find_responses(map_.rows(np.full(len(who), place)), np.where(np.isfinite(start), start, 0.0), most, threads))
         if progress:
             progress((k + 1) / grid.places)
 
 
-def _gathered(result: Steady, places: int, count: int, tolerance: np.ndarray, complete: bool) -> Found:
+def _gathered(result: SettledMotions, places: int, count: int, tolerance: np.ndarray, complete: bool) -> Found:
     """Which trajectories at a value settled to the same response."""
     of = result.kind.copy()
     rows: list[int] = []
@@ -128,7 +134,7 @@ def _gathered(result: Steady, places: int, count: int, tolerance: np.ndarray, co
     return Found(result, chosen, chosen // count, of.reshape(places, count), complete)
 
 
-def _same(result: Steady, a: int, b: int, tolerance: float) -> bool:
+def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
     """Whether two trajectories at one value settled to the same response."""
     if result.kind[a] != result.kind[b] or result.orbits.period[a] != result.orbits.period[b]:
         return False
@@ -136,14 +142,14 @@ def _same(result: Steady, a: int, b: int, tolerance: float) -> bool:
         return False
     if result.kind[a] in CLOSED:
         return bool(result.orbits.distance(result.orbits.points[[b], 0], result.scale[[a]], [a])[0] < tolerance)
-    first, second = (Wandering("", 0.0, 0.0, result.trail[row], result.scale[a]) for row in (a, b))
+    first, second = (SampledAttractor("", 0.0, 0.0, result.iterates[row], result.scale[a]) for row in (a, b))
     return alike(first, second)
 
 
-def _order(result: Steady, row: int) -> tuple[float, ...]:
+def _order(result: SettledMotions, row: int) -> tuple[float, ...]:
     """By kind, period, then size, coarse enough that rounding can't change it."""
     period = result.orbits.period[row]
-    points = result.orbits.points[row, :period] if period else result.trail[row].mean(axis=0)[None]
+    points = result.orbits.points[row, :period] if period else result.iterates[row].mean(axis=0)[None]
     sizes = np.atleast_1d(np.round(np.sqrt(np.mean((points / result.scale[row]) ** 2, axis=0)), 7))
     return (int(result.kind[row]), int(period), *(float(size) for size in sizes))
 
@@ -161,7 +167,7 @@ def numbers_of(found: Found, outputs: Outputs, grid: Grid, method: Method, threa
 def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
     """What is known of each response."""
     map_ = grid.map(method).rows(found.place)
-    kind, s = found.kind, found.steady
+    kind, s = found.kind, found.motions
     period = np.where(kind == Kind.PERIODIC, found.period, 0)
     multipliers, eigenvalues = multipliers_and_eigenvalues(s.orbits.multipliers[found.row], kind == Kind.EQUILIBRIUM)
     hits = np.bincount(found.of[found.of >= 0], minlength=len(found))
@@ -178,7 +184,7 @@ def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> Att
         multipliers=multipliers,
         exponent=s.exponent[found.row] / map_.period,
         exponent_error=s.exponent_error[found.row] / map_.period,
-        points=[found.points(i)[: int(known)] for i, known in enumerate(np.where(found.period > 0, found.period, WANDERED))],
+        points=[found.points(i)[: int(known)] for i, known in enumerate(np.where(found.period > 0, found.period, APERIODIC_PERIODS))],
         fractions=shares,
         **({} if grid.every is None else {"cycle": np.where(kind == Kind.LIMIT_CYCLE, found.time, np.nan), "eigenvalues": eigenvalues}),
     )

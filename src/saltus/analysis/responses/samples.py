@@ -6,7 +6,7 @@ import numpy as np
 
 from saltus.analysis.orbits.orbit_measures import Measures
 from saltus.analysis.responses.grid import Grid
-from saltus.analysis.responses.responses import WANDERED, Found, own_times, spans_of
+from saltus.analysis.responses.responses import APERIODIC_PERIODS, Found, own_times, spans_of
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome
 from saltus.flow.maps import Stroboscope
@@ -37,7 +37,7 @@ def check_unforced_sample(sample: str, system: System) -> None:
 
 def sampled(sample: str, numbers: Measures, grid: Grid, method: Method, found: Found, threads: int | None = None) -> list[np.ndarray]:
     """The sampled states of each response, float64[n, D], over one period of a response, or many of one that never repeats."""
-    spans = np.where(found.period > 0, spans_of(found), WANDERED)
+    spans = np.where(found.period > 0, spans_of(found), APERIODIC_PERIODS)
     if sample == "stroboscope":
         return [found.points(i)[:span] for i, span in enumerate(spans)]
     if sample == "turning_points":

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from saltus.errors import ParameterError, shown
-from saltus.results.store.durable import StoreError, read, seal, unseal, write_together
+from saltus.results.store.durable import StoreError, read, seal, unseal, write_whole
 from saltus.results.store.lock import WHOLE, exclusive
 
 
@@ -38,7 +38,7 @@ def put_artifact(
         if intact and existing == "replace" and shard != WHOLE:
             raise StoreError(f"{name!r} of {store} can only be replaced under the lock of the whole store.")
         if not intact or existing == "replace":
-            write_together(store / "parts", "artifact", {file: data})
+            write_whole(file, data, store / "parts", "artifact")
 
 
 def get_artifact(store: Path, made_under: str, name: str) -> Any:

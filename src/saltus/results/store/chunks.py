@@ -1,23 +1,27 @@
-"""The grid of a map, cut into chunks, and a chunk's bytes as zarr keeps them. Nothing here touches the disk.
+"""The grid of a map, cut into chunks, and a chunk as bytes that know what they are. Nothing here touches the disk.
 
-zarr encodes and decodes in memory; the store writes what comes out, since zarr's own store for folders doesn't wait for the disk. The bytes
-are little-endian numbers and a CRC-32C, not compressed: the same numbers give the same bytes on every machine and version.
+A chunk is one file: its arrays in the order of their names, as little-endian numbers; then its number and the hash of its store; then the
+SHA-256 of all that. In another place, or another store, it doesn't fit, and no bit of it can change unseen. The same numbers give the same
+bytes on every machine and version.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import zarr
-from zarr.buffer import cpu
-from zarr.codecs import Crc32cCodec
-from zarr.storage import MemoryStore
 
 from saltus.errors import ParameterError
+
+#: Number of the chunk, and hash of the store's head.
+_PLACE = struct.Struct("<q32s")
+#: Bytes behind the numbers: the place, and the checksum.
+TRAILER = _PLACE.size + hashlib.sha256().digest_size
 
 
 @dataclass(frozen=True)
@@ -88,72 +92,63 @@ class Chunks:
             "arrays": ", ".join(f"{name} {dtype.name}" for name, dtype in self.arrays.items()),
         }
 
+    def size(self, index: int) -> int:
+        """Bytes of the file of a chunk."""
+        extent = self.extent(index)
+        return (extent.stop - extent.start) * sum(dtype.itemsize for dtype in self.arrays.values()) + TRAILER
 
-class Codec:
-    """Values of a chunk to bytes and back, and the metadata that lets any reader of zarr 3 do the same.
+    def encode(self, index: int, values: Mapping[str, np.ndarray], store: str) -> bytes:
+        """The file of a chunk.
 
-    Parameters
-    ----------
-    chunks : Chunks
-    attributes : mapping
-        Of the group: plain values.
-    """
-
-    def __init__(self, chunks: Chunks, attributes: Mapping[str, Any]) -> None:
-        self._chunks = chunks
-        self._memory: dict[str, Any] = {}
-        group = zarr.create_group(MemoryStore(self._memory), zarr_format=3, attributes=dict(sorted(attributes.items())))
-        self._arrays = {
-            name: group.create_array(
-                name, shape=(chunks.cells,), chunks=(chunks.chunk,), dtype=dtype, fill_value=_no_value(dtype), filters=None,
-                compressors=[Crc32cCodec()], dimension_names=("cell",),
-                config={"write_empty_chunks": True},  # a chunk of fill values is a result like any other
-            )
-            for name, dtype in chunks.arrays.items()
-        }  # fmt: skip
-        #: Files that make a folder a zarr group, by their path in it.
-        self.metadata = {path: buffer.to_bytes() for path, buffer in sorted(self._memory.items())}
-
-    def encode(self, index: int, name: str, values: np.ndarray) -> bytes:
-        """Bytes of one array of a chunk.
+        Parameters
+        ----------
+        index : int
+            Number of the chunk.
+        values : mapping of str to ndarray (cells,)
+            Every array.
+        store : str
+            Hash of the store's head, 64 hexadecimal digits.
 
         Raises
         ------
         ParameterError
-            If there are too few or too many values, or their dtype would lose digits.
+            If an array is missing or unknown, there are too few or too many values, or their dtype would lose digits.
         """
-        extent, dtype = self._chunks.extent(index), self._chunks.arrays[name]
-        values = np.asarray(values)
-        if values.shape != (extent.stop - extent.start,) or not np.can_cast(values.dtype, dtype, "safe"):
-            raise ParameterError(
-                f"chunk {index} of {name!r} has {extent.stop - extent.start} values of {dtype}, not {values.shape} of {values.dtype}."
-            )
-        self._arrays[name][extent] = values.astype(dtype)
-        return self._memory.pop(self.key(index, name)).to_bytes()
+        if set(values) != set(self.arrays):
+            raise ParameterError(f"chunk {index} has the arrays {sorted(values)}, the store keeps {sorted(self.arrays)}.")
+        extent = self.extent(index)
+        parts = []
+        for name, dtype in self.arrays.items():
+            array = np.asarray(values[name])
+            if array.shape != (extent.stop - extent.start,) or not np.can_cast(array.dtype, dtype, "safe"):
+                raise ParameterError(
+                    f"chunk {index} of {name!r} has {extent.stop - extent.start} values of {dtype}, not {array.shape} of {array.dtype}."
+                )
+            parts.append(array.astype(dtype.newbyteorder("<")).tobytes())
+        content = b"".join([*parts, _place(index, store)])
+        return content + hashlib.sha256(content).digest()
 
-    def decode(self, index: int, name: str, data: bytes) -> np.ndarray:
-        """Values of one array of a chunk."""
-        key = self.key(index, name)
-        self._memory[key] = cpu.Buffer.from_bytes(data)
-        try:
-            return np.asarray(self._arrays[name][self._chunks.extent(index)])
-        finally:
-            self._memory.pop(key, None)
-
-    def largest(self, name: str) -> int:
-        """Most bytes of one array of a chunk: its values, and the checksum after them."""
-        return self._chunks.chunk * self._chunks.arrays[name].itemsize + 4
+    def decode(self, index: int, data: bytes, store: str) -> dict[str, np.ndarray] | None:
+        """Values of a chunk, by array; None if the file isn't this chunk of this store, bit by bit."""
+        if len(data) != self.size(index) or not self.fits(index, data[-TRAILER:], store) or not is_whole(data):
+            return None
+        extent, values, begin = self.extent(index), {}, 0
+        for name, dtype in self.arrays.items():
+            stored = np.frombuffer(data, dtype.newbyteorder("<"), extent.stop - extent.start, begin)
+            values[name], begin = stored.astype(dtype), begin + stored.nbytes
+        return values
 
     @staticmethod
-    def key(index: int, name: str) -> str:
-        """Path of a chunk's file in the group."""
-        return f"{name}/c/{index}"
+    def fits(index: int, trailer: bytes, store: str) -> bool:
+        """Whether the last bytes of a file say that it is this chunk of this store."""
+        return trailer[: _PLACE.size] == _place(index, store)
 
 
-def _no_value(dtype: np.dtype) -> Any:
-    """What a reader that doesn't ask for the done-map sees where nothing is computed: a value that stands out."""
-    if dtype.kind in "fc":
-        return np.nan
-    if dtype.kind == "b":
-        return False
-    return np.iinfo(dtype).min if dtype.kind == "i" else np.iinfo(dtype).max
+def _place(index: int, store: str) -> bytes:
+    return _PLACE.pack(index, bytes.fromhex(store))
+
+
+def is_whole(data: bytes) -> bool:
+    """Whether the bytes of a file are those that its checksum was made of."""
+    end = max(0, len(data) - hashlib.sha256().digest_size)
+    return len(data) >= TRAILER and hashlib.sha256(memoryview(data)[:end]).digest() == data[end:]

@@ -1,4 +1,4 @@
-"""Bytes that reach the disk together or not at all, and JSON that knows when it was damaged. The ground under a store."""
+"""Files that reach the disk complete or not at all, and JSON that knows when it was damaged. The ground under a store."""
 
 from __future__ import annotations
 
@@ -19,46 +19,40 @@ class StoreError(SaltusError, OSError):
     """A store can't be made, resumed, locked, written or read."""
 
 
-def write_together(parts: Path, prefix: str, files: Mapping[Path, bytes]) -> None:
-    """Write files that count only together; the last one says that the others are complete.
+def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
+    """Write a file that appears under its name complete or not at all, whatever befalls the process or the disk.
 
-    All bytes, those of the last file too, are on the disk before the first name appears: a disk that fills up leaves everything as it
-    was. The last name appears once the other names are on the disk too, so that not even a power cut can leave it alone.
+    The bytes are on the disk before the name appears, and the name is before this returns. A disk that fills up leaves all as it was.
 
     Parameters
     ----------
-    parts : Path
-        Folder on the same disk for the drafts; what a killed process leaves behind lies there.
-    prefix : str
-        Beginning of the drafts' names. No other process may be writing under the same one.
-    files : mapping of Path to bytes
-        What to write, in the order in which the names are to appear.
+    path : Path
+        The file.
+    data : bytes
+        What is in it.
+    drafts : Path
+        Folder on the same disk for the draft; what a killed process leaves behind lies there.
+    name : str
+        Beginning of the draft's name. No other process may be writing under the same one.
 
     Raises
     ------
     StoreError
         If the disk is full, the folder is missing or may not be written to.
     """
-    drafts = {target: parts / f"{prefix}.{number}.part" for number, target in enumerate(files)}
-    *others, last = files
+    draft = drafts / f"{name}.part"
     try:
-        for target, draft in drafts.items():
-            write(draft, files[target])
-        for target in others:
-            os.replace(drafts[target], target)
-        for folder in dict.fromkeys(target.parent for target in others):
-            flush_names(folder)
-        os.replace(drafts[last], last)
-        flush_names(last.parent)
+        write(draft, data)
+        os.replace(draft, path)
+        flush_names(path.parent)
     except OSError as error:
         raise StoreError(
-            f"{last} can't be written: {error.strerror or error}. Nothing half-written was left behind, and what was done stays done: "
+            f"{path} can't be written: {error.strerror or error}. Nothing half-written was left behind, and what was done stays done: "
             "make room or mend the disk, then start again."
         ) from error
     finally:
-        for draft in drafts.values():
-            with suppress(OSError):  # swept away at the next start
-                draft.unlink(missing_ok=True)
+        with suppress(OSError):  # swept away at the next start
+            draft.unlink(missing_ok=True)
 
 
 def write(path: Path, data: bytes) -> None:
@@ -96,6 +90,16 @@ def size(path: Path) -> int | None:
         return path.stat().st_size if path.is_file() else None
     except FileNotFoundError:  # a draft that has just taken its place
         return None
+
+
+def tail(path: Path, count: int) -> bytes:
+    """The last bytes of a regular file; fewer if it is shorter, or gone."""
+    try:
+        with path.open("rb") as file:
+            file.seek(-min(count, path.stat().st_size), os.SEEK_END)
+            return file.read(count)
+    except OSError:
+        return b""
 
 
 def sha256(data: bytes) -> str:

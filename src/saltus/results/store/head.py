@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from saltus.results.store.chunks import Chunks
-from saltus.results.store.durable import StoreError, read, seal, sha256, unseal, write_together
+from saltus.results.store.chunks import TRAILER, Chunks, is_whole
+from saltus.results.store.durable import StoreError, read, seal, sha256, unseal, write_whole
 from saltus.results.store.lock import exclusive
 
 #: Layout of the files. A store of another one is refused, not guessed at.
-FORMAT = 2
+FORMAT = 3
 #: Name of the file.
 HEAD = "store.json"
+#: Folder of the chunks.
+CHUNKS = "chunks"
 #: Most cells of a map that a head may speak of: of more, not even the list of chunks is to be made.
 MOST_CELLS = 10**9
 _TYPES = {
@@ -94,21 +98,39 @@ def mend_head(path: Path, head: Mapping[str, Any]) -> None:
     there = _opened(read(path / HEAD) or b"")
     if there is not None and (there.get("format") != FORMAT or fingerprint(there) == fingerprint(head)):
         return
-    makers = _makers(path)
-    if there is not None and makers != {fingerprint(head)}:
+    if there is not None and (_made_under(path, there) or not _made_under(path, head)):
         return  # an intact head that differs: the caller compares the two and says how
-    if there is None and not makers and not (path / HEAD).exists():
+    if there is None and _made_under(path, head) is None and not (path / HEAD).exists():
         return  # an empty folder, or something else: not ours to write to
-    if makers and fingerprint(head) not in makers:
+    if _made_under(path, head) is False:
         raise StoreError(
             f"{path / HEAD} is damaged, and the chunks beside it were made from something else than what is asked for here. Nothing was "
             "changed. Go on with the study that made them, which writes the file again, or choose another path."
         )
     with exclusive(path / "locks" / "head", patience=10.0):
-        write_together(path / "parts", "head", {path / HEAD: seal(head)})
+        write_whole(path / HEAD, seal(head), path / "parts", "head")
 
 
-def _makers(path: Path) -> set[str]:
-    """Hashes of the heads under which the intact records of a folder were written."""
-    records = (unseal(read(file) or b"") for folder in ("done", "artifacts") for file in sorted((path / folder).glob("*.json")))
-    return {str(record["store"]) for record in records if record is not None and "store" in record}
+def _made_under(path: Path, head: Mapping[str, Any]) -> bool | None:
+    """Whether an intact chunk or artifact in a folder was made under a head; None if there is no intact one at all."""
+    chunks = Chunks.checked(tuple(head["shape"]), head["chunk"], head["arrays"])
+    wanted, strangers = fingerprint(head), False
+    for file in numbered(path).values() if (path / CHUNKS).is_dir() else ():
+        data = read(file) or b""
+        if is_whole(data):
+            if int(file.stem) < chunks.count and chunks.fits(int(file.stem), data[-TRAILER:], wanted):
+                return True
+            strangers = True
+    for file in sorted((path / "artifacts").glob("*.json")):
+        record = unseal(read(file) or b"")
+        if record is not None and "store" in record:
+            if record["store"] == wanted:
+                return True
+            strangers = True
+    return False if strangers else None
+
+
+def numbered(path: Path) -> dict[int, Path]:
+    """The files of chunks in a store's folder, by number, in rising order."""
+    names = [name for name in os.listdir(path / CHUNKS) if re.fullmatch(r"\d+\.chunk", name)]
+    return {number: path / CHUNKS / f"{number}.chunk" for number in sorted(int(name[:-6]) for name in names)}

@@ -2,20 +2,18 @@
 
 ::
 
-    store.json          identity, shape, what is kept                         written once, at creation
-    data.zarr/          a zarr 3 group, one flat array of cells per variable  one file per chunk and array
-    done/7.json         chunk 7 of this store is complete: SHA-256 of files   written last
-    artifacts/          small values that all chunks share                    a checksum inside
-    locks/, parts/      who is writing; drafts that a kill left behind        no part of the outcome
+    store.json          identity, shape, what is kept                   written once, at creation
+    chunks/7.chunk      all arrays of chunk 7                           a checksum inside; that it is there says that it is done
+    artifacts/          small values that all chunks share              a checksum inside
+    locks/, parts/      who is writing; drafts that a kill left behind  no part of the outcome
 
-Records and artifacts hold their number or name and the hash of ``store.json``: in another place, or another store, they count as damaged.
+Chunks and artifacts hold their number or name and the hash of ``store.json``: in another place, or another store, they count as damaged.
 No file holds a time, a host or an order, so a finished store is the same bit by bit however it came about.
 """
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -27,23 +25,24 @@ import numpy as np
 
 from saltus.errors import ParameterError
 from saltus.results.store.artifacts import get_artifact, has_artifact, put_artifact
-from saltus.results.store.chunks import Chunks, Codec
+from saltus.results.store.chunks import TRAILER, Chunks
 from saltus.results.store.draft_folder import remove_old_drafts, write_folder
 from saltus.results.store.durable import (
     StoreError,
     flush_names,
     read,
     seal,
-    sha256,
     size,
-    unseal,
-    write_together,
+    tail,
+    write_whole,
 )
-from saltus.results.store.head import HEAD, fingerprint, head_of, mend_head, read_head
+from saltus.results.store.head import CHUNKS, HEAD, fingerprint, head_of, mend_head, numbered, read_head
 from saltus.results.store.identity import agree, texts
-from saltus.results.store.lock import WHOLE, exclusive, holders, locked
+from saltus.results.store.lock import WHOLE, holders, locked
 
 __all__ = ["Store", "StoreError", "StoreStatus"]
+
+_FOLDERS = (CHUNKS, "artifacts", "locks", "parts")
 
 
 @dataclass(frozen=True)
@@ -95,7 +94,6 @@ class Store:
         self.note: dict[str, Any] = head["note"]
         self.chunks = Chunks.checked(tuple(head["shape"]), head["chunk"], head["arrays"])
         self._made_under = fingerprint(head)
-        self._codec = Codec(self.chunks, {"identity": self.identity, "shape": list(self.chunks.shape)})
         self._shard: tuple[int, int] | None = None
         self._process = 0
 
@@ -143,8 +141,7 @@ class Store:
         if path.exists():
             raise StoreError(f"{path} is there already. Resume it if it is a store, or choose another path; nothing is overwritten.")
         store = cls(path, head)
-        files = {f"data.zarr/{name}": data for name, data in store._codec.metadata.items()} | {HEAD: seal(head)}
-        write_folder(path, files, folders=store._folders())
+        write_folder(path, {HEAD: seal(head)}, _FOLDERS)
         return store
 
     @classmethod
@@ -223,15 +220,12 @@ class Store:
             finally:
                 self._shard = None
 
-    def _folders(self) -> tuple[str, ...]:
-        return ("done", "artifacts", "locks", "parts", *(f"data.zarr/{array}/c" for array in self.chunks.arrays))
-
     def _make_folders(self) -> None:
         """Make those that are gone again: tools that copy trees leave empty ones out. A store that was deleted stays so."""
         if not (self.path / HEAD).exists():
             raise StoreError(f"{self.path} holds no {HEAD} any more. Was it moved or deleted? Start again to make it anew.")
         try:
-            for name in self._folders():
+            for name in _FOLDERS:
                 (self.path / name).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise StoreError(f"{self.path} can't be written to: {error}. Mend its permissions or the disk.") from error
@@ -251,7 +245,7 @@ class Store:
 
     # -- chunks ------------------------------------------------------------------------------------------------------------
     def commit(self, index: int, values: Mapping[str, np.ndarray]) -> None:
-        """Write one chunk: all of it counts once its record is there, none of it before.
+        """Write one chunk: all of it is there, or none of it.
 
         Committing the same values again does nothing.
 
@@ -273,30 +267,25 @@ class Store:
         index = int(index)
         if index % n != k:
             raise StoreError(f"chunk {index} of {self.path} belongs to shard {index % n} of {n}, and the lock is for shard {k}.")
-        if set(values) != set(self.chunks.arrays):
-            raise ParameterError(f"chunk {index} has the arrays {sorted(values)}, the store keeps {sorted(self.chunks.arrays)}.")
-        data = {name: self._codec.encode(index, name, values[name]) for name in self.chunks.arrays}
-        told = {name: {"bytes": len(file), "sha256": sha256(file)} for name, file in data.items()}
-        record = seal({"index": index, "store": self._made_under, "files": told})
-        earlier = read(self._record(index))
-        if earlier == record:
+        data = self.chunks.encode(index, values, self._made_under)
+        earlier = read(self._file(index))
+        if earlier == data:
             return
         if earlier is not None:
             raise StoreError(
-                f"chunk {index} of {self.path} is done, with other values. Either its record is damaged (verify() tells), "
+                f"chunk {index} of {self.path} is done, with other values. Either its file is damaged (verify() tells), "
                 "or the same cells came out differently on two machines: then compute all chunks on one kind of machine."
             )
-        files = {self._file(index, name): file for name, file in data.items()}
-        write_together(self.path / "parts", str(index), {**files, self._record(index): record})
+        write_whole(self._file(index), data, self.path / "parts", str(index))
 
     def done(self) -> np.ndarray:
         """Which chunks are committed: bool (chunks,). One listing of a folder, so it serves as progress, from any machine too."""
         done = np.zeros(self.chunks.count, dtype=bool)
         try:
-            names = os.listdir(self.path / "done")
+            there = numbered(self.path)
         except OSError as error:
             raise StoreError(f"{self.path} can't be read: {error.strerror}. Was it moved or deleted?") from error
-        done[[int(name[:-5]) for name in names if re.fullmatch(r"\d+\.json", name) and int(name[:-5]) < len(done)]] = True
+        done[[index for index in there if index < len(done)]] = True
         return done
 
     def missing(self, shard: tuple[int, int] | None = None) -> list[int]:
@@ -313,12 +302,13 @@ class Store:
             If it isn't committed, or isn't what was committed.
         """
         self.chunks.extent(index)
-        files = self._intact(index)
-        if files is None and not self._record(index).exists():
+        data = read(self._file(index), self.chunks.size(index))
+        values = self.chunks.decode(index, data, self._made_under) if data is not None else None
+        if values is None and not self._file(index).exists():
             raise StoreError(f"chunk {index} of {self.path} isn't computed yet. Resume the store to compute it.")
-        if files is None:
+        if values is None:
             raise StoreError(f"chunk {index} of {self.path} is damaged. verify() marks it as missing, so that resuming computes it again.")
-        return {name: self._codec.decode(index, name, data) for name, data in files.items()}
+        return values
 
     def read_all(self) -> dict[str, np.ndarray]:
         """Values of all cells, by array: (cells,), the grid in C order.
@@ -350,39 +340,26 @@ class Store:
         k, n = self._held()
         damaged = [index for index in self.damaged() if index % n == k]
         for index in damaged:
-            self._record(index).unlink(missing_ok=True)
+            self._file(index).unlink(missing_ok=True)
         if damaged:
-            flush_names(self.path / "done")
-        for name, data in self._codec.metadata.items():  # nothing here reads these files, other readers of zarr do
-            if read(self.path / "data.zarr" / name) != data:
-                with exclusive(self.path / "locks" / "metadata", patience=10.0):
-                    write_together(self.path / "parts", "metadata", {self.path / "data.zarr" / name: data})
+            flush_names(self.path / CHUNKS)
         return damaged
 
     def damaged(self, *, checksums: bool = True) -> list[int]:
-        """Committed chunks whose files aren't what was committed; without ``checksums`` only files that are gone or too short count."""
-        return [int(index) for index in np.flatnonzero(self.done()) if self._intact(int(index), checksums=checksums) is None]
+        """Committed chunks whose files aren't what was committed; without ``checksums`` only their sizes and last bytes are read."""
+        intact = self._is_intact if checksums else self._seems_intact
+        return [int(index) for index in np.flatnonzero(self.done()) if not intact(int(index))]
 
-    def _intact(self, index: int, *, checksums: bool = True) -> dict[str, bytes] | None:
-        """The files of a chunk, by array; None if one is missing or isn't what was committed, or the record isn't this chunk's."""
-        record = unseal(read(self._record(index)) or b"")
-        if record is None or record.get("index") != index or record.get("store") != self._made_under:
-            return None
-        told = record.get("files")
-        if not isinstance(told, dict) or not all(isinstance(told.get(name), dict) for name in self.chunks.arrays):
-            return None
-        if not checksums:
-            sizes = {name: size(self._file(index, name)) for name in self.chunks.arrays}
-            return {} if sizes == {name: told[name].get("bytes") for name in sizes} else None
-        files = {name: read(self._file(index, name), self._codec.largest(name)) for name in self.chunks.arrays}
-        found = {name: data for name, data in files.items() if data is not None and sha256(data) == told[name].get("sha256")}
-        return found if len(found) == len(files) else None
+    def _is_intact(self, index: int) -> bool:
+        data = read(self._file(index), self.chunks.size(index))
+        return data is not None and self.chunks.decode(index, data, self._made_under) is not None
 
-    def _record(self, index: int) -> Path:
-        return self.path / "done" / f"{index}.json"
+    def _seems_intact(self, index: int) -> bool:
+        file = self._file(index)
+        return size(file) == self.chunks.size(index) and self.chunks.fits(index, tail(file, TRAILER), self._made_under)
 
-    def _file(self, index: int, name: str) -> Path:
-        return self.path / "data.zarr" / self._codec.key(index, name)
+    def _file(self, index: int) -> Path:
+        return self.path / CHUNKS / f"{index}.chunk"
 
     # -- artifacts ---------------------------------------------------------------------------------------------------------
     def put(self, name: str, value: Any, *, existing: Literal["same", "keep", "replace"] = "same") -> Any:
@@ -436,9 +413,9 @@ class Store:
 
     def _last_written(self) -> datetime | None:
         times = []
-        for record in (self.path / "done").iterdir():
+        for file in numbered(self.path).values():
             with suppress(FileNotFoundError):  # a writer that verifies has just dropped it
-                times.append(record.stat().st_mtime)
+                times.append(file.stat().st_mtime)
         return datetime.fromtimestamp(max(times), UTC) if times else None
 
 

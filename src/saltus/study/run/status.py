@@ -49,7 +49,7 @@ def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
 
     found: list[StoreStatus | DamagedStore] = []
     alone = (folder / "store.json").exists()
-    for path in [folder] if alone else sorted(done.parent for done in (folder / STORES).glob("*/done") if done.parent.name[0] != "."):
+    for path in [folder] if alone else sorted(one for one in (folder / STORES).glob("[!.]*") if one.is_dir()):
         try:
             found.append(Store.open(path).status())
         except StoreError as error:

@@ -12,7 +12,7 @@ import pytest
 from function_maps import FunctionMap
 from saltus.analysis.basins.labels import Settling, settle
 from saltus.analysis.basins.serial import cell_types, found_data, found_from, settling_arrays, settling_from
-from saltus.analysis.orbits.aperiodic import Wandering
+from saltus.analysis.orbits.aperiodic import SampledAttractor
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
@@ -41,7 +41,7 @@ def case(request):
     """A map, and the attractors that were found on it."""
     map_ = henon(1.4 if request.param == "chaotic" else 1.0, 0.3)
     found = find_attractors(map_, starts(), SCALE, 256)[0]
-    assert [len(found.wandering), len(found.orbits)] == ([1, 0] if request.param == "chaotic" else [0, 1])
+    assert [len(found.sampled), len(found.orbits)] == ([1, 0] if request.param == "chaotic" else [0, 1])
     return map_, found
 
 
@@ -58,9 +58,9 @@ def numbers(found):
         return array.dtype.str, array.shape, array.tobytes()
 
     orbits = [(told(o.points), told(o.multipliers.astype(complex)), struct.pack("d", o.mismatch)) for o in (*found.orbits, *found.unstable)]
-    wandering = [(w.kind, struct.pack("dd", w.exponent, w.exponent_error), told(w.points), told(w.scale)) for w in found.wandering]
+    sampled = [(w.kind, struct.pack("dd", w.exponent, w.exponent_error), told(w.points), told(w.scale)) for w in found.sampled]
     near = found.near
-    return len(found.orbits), orbits, wandering, told(near.centres), told(near.weights), told(near.owners)
+    return len(found.orbits), orbits, sampled, told(near.centres), told(near.weights), told(near.owners)
 
 
 def test_found_comes_back_to_the_last_bit(case):
@@ -79,7 +79,7 @@ def test_one_bit_changes_the_bytes(case):
     """The test above can fail: the last bit of one number is seen."""
     data = found_data(case[1])
     again = found_from(json.loads(json.dumps(data)), 2)
-    part = (again.wandering or again.orbits)[0].points
+    part = (again.sampled or again.orbits)[0].points
     part[0, 0] = np.nextafter(part[0, 0], 9.0)
     assert numbers(again) != numbers(case[1])
 
@@ -97,7 +97,7 @@ def test_numbers_that_text_may_lose():
     found = Found(
         Neighbourhoods(odd[:2].copy(), matrices[:2], np.array([0, 1])),
         [orbit],
-        [Wandering("quasi_periodic", -0.0, np.nan, odd, SCALE)],
+        [SampledAttractor("quasi_periodic", -0.0, np.nan, odd, SCALE)],
         [orbit],
     )
     data = json.loads(json.dumps(found_data(found)))
@@ -106,8 +106,8 @@ def test_numbers_that_text_may_lose():
     assert again.orbits[0].points.tobytes() == odd.tobytes()
     assert again.unstable[0].multipliers.tobytes() == orbit.multipliers.tobytes()
     assert struct.pack("d", again.orbits[0].mismatch) == struct.pack("d", 1e-17)
-    assert again.wandering[0].points.tobytes() == odd.tobytes()
-    assert struct.pack("d", again.wandering[0].exponent) == struct.pack("d", -0.0)
+    assert again.sampled[0].points.tobytes() == odd.tobytes()
+    assert struct.pack("d", again.sampled[0].exponent) == struct.pack("d", -0.0)
 
 
 def test_nothing_found():
@@ -137,7 +137,7 @@ def test_a_worker_gets_the_same_attractors(case):
         lambda data: data["orbits"][0].update(points=[]),
         lambda data: data["orbits"][0].update(points=[["a", {}]]),
         lambda data: data["orbits"][0].update(multipliers=[[0.5, 0.0]]),
-        lambda data: data.pop("wandering"),
+        lambda data: data.pop("sampled"),
         lambda data: data.update(near=5),
     ],
 )

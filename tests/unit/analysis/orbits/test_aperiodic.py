@@ -7,7 +7,7 @@ import pytest
 
 from function_maps import FunctionMap
 from saltus.analysis.basins.labels import complete, settle
-from saltus.analysis.orbits.aperiodic import Wandering, growth_rates, kind_of_growth, kinds_of, merge
+from saltus.analysis.orbits.aperiodic import SampledAttractor, growth_rates, kind_of_growth, kinds_of, merge
 from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.recurrence import recurrence
 
@@ -65,7 +65,7 @@ def circle(contraction: float, angle: float = GOLDEN) -> FunctionMap:
 
 
 def kinds(found) -> list[str]:
-    return [*("periodic" for _ in found.orbits), *(one.kind for one in found.wandering)]
+    return [*("periodic" for _ in found.orbits), *(one.kind for one in found.sampled)]
 
 
 def drawn(low, high, count=60, seed=1) -> np.ndarray:
@@ -113,7 +113,7 @@ def test_henon_is_chaotic_and_what_runs_away_is_told():
         found, label, _ = find_attractors(map_, start, scale, 1000)
         result = settle(map_, start, found, 1000)
     assert kinds(found) == ["chaotic"]
-    one = found.wandering[0]
+    one = found.sampled[0]
     assert abs(one.exponent - 0.41922) < 4 * one.exponent_error
     away = ~np.isfinite(map_.launch(start, 1000).advance(1000)).all(axis=(1, 2))
     assert 0 < away.sum() < 100
@@ -162,8 +162,8 @@ def test_a_rotation_is_quasi_periodic_however_slowly_it_attracts(contraction):
     found, label, _ = find_attractors(circle(contraction), drawn((-2, -2), (2, 2), 30), np.array([4.0, 4.0]), 4000)
     assert kinds(found) == ["quasi_periodic"]
     assert (label == 0).all()
-    assert abs(found.wandering[0].exponent) < 1e-2
-    assert np.linalg.norm(found.wandering[0].points, axis=1) == pytest.approx(np.ones(4096), abs=1e-6)
+    assert abs(found.sampled[0].exponent) < 1e-2
+    assert np.linalg.norm(found.sampled[0].points, axis=1) == pytest.approx(np.ones(4096), abs=1e-6)
 
 
 @pytest.mark.parametrize("parts", [4, 7])
@@ -215,8 +215,8 @@ def test_a_chaotic_saddle_is_not_an_attractor():
 
 
 # -- boxes ---------------------------------------------------------------------------------------------------------------------
-def wandering(points, kind="chaotic") -> Wandering:
-    return Wandering(kind, 0.1, 0.01, np.asarray(points, float), np.ones(np.shape(points)[1]))
+def sampled(points, kind="chaotic") -> SampledAttractor:
+    return SampledAttractor(kind, 0.1, 0.01, np.asarray(points, float), np.ones(np.shape(points)[1]))
 
 
 def test_a_chaotic_attractor_of_four_states_is_one():
@@ -225,7 +225,7 @@ def test_a_chaotic_attractor_of_four_states_is_one():
 
 
 def test_shares_of_boxes():
-    line = wandering(np.stack([np.linspace(0, 1, 4096), np.zeros(4096)], axis=1))
+    line = sampled(np.stack([np.linspace(0, 1, 4096), np.zeros(4096)], axis=1))
     on, off = np.array([[0.5, 0.001]] * 3), np.array([[0.5, 0.4]] * 3)
     lost = np.array([[0.5, 0.0], [np.nan, np.nan], [1e300, 0.0]])
     assert line.share(np.stack([on, off, lost])) == pytest.approx([1.0, 0.0, 1 / 3])
@@ -237,12 +237,12 @@ def ring() -> np.ndarray:
 
 
 def test_one_attractor_seen_twice_is_kept_once_and_twins_are_kept():
-    assert len(merge([wandering(ring() + 2), wandering(ring()[::-1] + 2)])) == 1
-    assert len(merge([wandering(ring() + 2), wandering(-ring() - 2)])) == 2
+    assert len(merge([sampled(ring() + 2), sampled(ring()[::-1] + 2)])) == 1
+    assert len(merge([sampled(ring() + 2), sampled(-ring() - 2)])) == 2
 
 
 def test_one_set_has_one_type():
-    assert len(merge([wandering(ring(), "chaotic"), wandering(ring(), "quasi_periodic")])) == 1
+    assert len(merge([sampled(ring(), "chaotic"), sampled(ring(), "quasi_periodic")])) == 1
 
 
 # -- recurrence ----------------------------------------------------------------------------------------------------------------

@@ -73,19 +73,19 @@ def test_the_scatter_of_a_linear_map_is_that_of_its_errors_added_up(slope):
     scatter = []
     for error in (1e-3, 4e-3):
         found, label, _ = find_attractors(linear(slope, error), starts(), WIDE, 256)
-        assert [(one.kind, one.orbit.period) for one in found.wandering] == [("noisy_periodic", 1)]
+        assert [(one.kind, one.orbit.period) for one in found.sampled] == [("noisy_periodic", 1)]
         assert not found.orbits
         assert not found.astray
         assert set(label) == {0}
-        scatter.append(found.wandering[0].scatter.item())
+        scatter.append(found.sampled[0].scatter.item())
         assert scatter[-1] == pytest.approx(error * math.sqrt(0.5 / (1 - slope**2)), rel=0.1)
-        assert scatter[-1] < found.wandering[0].stray <= error / (1 - abs(slope)) * (1 + 1e-9)
+        assert scatter[-1] < found.sampled[0].stray <= error / (1 - abs(slope)) * (1 + 1e-9)
     assert scatter[1] / scatter[0] == pytest.approx(4.0, rel=0.15)
 
 
 def test_a_blurred_cycle_has_the_period_and_the_points_of_the_exact_one(cycle, searched):
     _, found, label = searched
-    (noisy,) = found.wandering
+    (noisy,) = found.sampled
     assert not found.orbits
     assert set(label) == {0}
     np.testing.assert_allclose(noisy.points, cycle.points, atol=1e-13)
@@ -109,13 +109,13 @@ def test_what_scouts_miss_is_found_by_the_post_pass():
     result = settle(map_, starts(40, 2), nothing, 256)
     assert set(result.label) == {OPEN}
     found = complete(map_, result, nothing, SCALE, 256, 1)
-    assert [one.kind for one in found.wandering] == ["noisy_periodic"]
+    assert [one.kind for one in found.sampled] == ["noisy_periodic"]
     assert set(result.label) == {0}
 
 
 def test_the_starts_do_not_decide_the_scatter(searched):
-    """But for the last bits of the orbit, which errors of this kind amplify: 4 trails of 4096 points tell the scatter to some per cent."""
-    few, many = find_attractors(henon(1e-3), starts(2, 2), SCALE, 256)[0].wandering[0], searched[1].wandering[0]
+    """But for the last bits of the orbit, which errors of this kind amplify: 4 runs of 4096 points tell the scatter to some per cent."""
+    few, many = find_attractors(henon(1e-3), starts(2, 2), SCALE, 256)[0].sampled[0], searched[1].sampled[0]
     np.testing.assert_allclose(few.scatter, many.scatter, rtol=0.05)
 
 
@@ -124,7 +124,7 @@ def test_an_exact_map_is_never_noisy():
     blurred_ = henon(1e-3)
     plain = FunctionMap(blurred_._function, "x y", blurred_._derivative)
     found, label, _ = find_attractors(plain, starts(size=2), SCALE, 256)
-    assert "noisy_periodic" not in [one.kind for one in found.wandering]
+    assert "noisy_periodic" not in [one.kind for one in found.sampled]
     assert not found.astray
     assert set(label) == {-1}
 
@@ -138,25 +138,25 @@ def noisy_cycle(orbit) -> Noisy:
 
 def test_only_the_right_order_of_the_points_is_on_it(cycle):
     one = noisy_cycle(cycle)
-    trail = np.tile(cycle.points, (16, 1))
-    slip = np.concatenate([trail[:30], trail[31:]])
-    backwards, jitter = trail[::-1], np.random.default_rng(1).uniform(-1, 1, trail.shape) * one.size * one.stray
-    shares = [one.share(each[None])[0] for each in (trail, np.roll(trail, 1, axis=0), trail + jitter, slip, backwards)]
+    iterates = np.tile(cycle.points, (16, 1))
+    slip = np.concatenate([iterates[:30], iterates[31:]])
+    backwards, jitter = iterates[::-1], np.random.default_rng(1).uniform(-1, 1, iterates.shape) * one.size * one.stray
+    shares = [one.share(each[None])[0] for each in (iterates, np.roll(iterates, 1, axis=0), iterates + jitter, slip, backwards)]
     assert shares[:3] == [1.0, 1.0, 1.0]
     assert 0.4 < shares[3] < 0.6
     assert shares[4] < 0.6
-    beside = trail + 1.01 * ROOM * one.stray * one.size
+    beside = iterates + 1.01 * ROOM * one.stray * one.size
     assert one.share(beside[None])[0] == 0.0
     assert one.share(np.full((1, 8, 2), np.nan))[0] == 0.0
 
 
 def test_distances_are_those_at_the_best_of_all_shifts(cycle):
-    trails = np.random.default_rng(3).normal(size=(5, 11, 2))
+    runs = np.random.default_rng(3).normal(size=(5, 11, 2))
     slow = []
-    for trail in trails:
-        shifts = [[(trail[j] - cycle.points[(j + shift) % 4]) / SCALE for j in range(11)] for shift in range(4)]
+    for iterates in runs:
+        shifts = [[(iterates[j] - cycle.points[(j + shift) % 4]) / SCALE for j in range(11)] for shift in range(4)]
         slow.append(min(shifts, key=lambda rows: np.sum(np.square(rows))))
-    np.testing.assert_allclose(apart(trails, cycle.points, SCALE), slow, rtol=1e-12)
+    np.testing.assert_allclose(apart(runs, cycle.points, SCALE), slow, rtol=1e-12)
 
 
 # -- one attractor, or none ----------------------------------------------------------------------------------------------------
@@ -167,8 +167,8 @@ def test_loops_that_errors_make_are_scatter_about_the_exact_orbit():
     map_ = FunctionMap(lambda z: -0.5 * z - error * np.where(z < 0, -1.0, 1.0), "x", derivative, 1e-5, exact)
     assert orbit_near(map_, np.array([2.1 * error]), 2, WIDE).period == 2
     found, label, _ = find_attractors(map_, starts(), WIDE, 256)
-    assert [(one.kind, one.orbit.period) for one in found.wandering] == [("noisy_periodic", 1)]
-    assert found.wandering[0].scatter.item() == pytest.approx(2 * error, rel=1e-3)
+    assert [(one.kind, one.orbit.period) for one in found.sampled] == [("noisy_periodic", 1)]
+    assert found.sampled[0].scatter.item() == pytest.approx(2 * error, rel=1e-3)
     assert not found.orbits
     assert set(label) == {0}
 
@@ -178,7 +178,7 @@ def test_an_orbit_that_errors_only_shift_stays_periodic():
     map_ = FunctionMap(lambda z: 0.5 * z + 1e-3, "x", derivative, 1e-5, FunctionMap(lambda z: 0.5 * z, "x", derivative))
     found, label, _ = find_attractors(map_, starts(), WIDE, 256)
     assert [orbit.period for orbit in found.orbits] == [1]
-    assert not found.wandering
+    assert not found.sampled
     assert found.orbits[0].points.item() == pytest.approx(2e-3)
     assert set(label) == {0}
 
@@ -190,12 +190,12 @@ def test_orbits_beside_a_noisy_one_become_it(cycle):
     far = orbit_near(elsewhere, np.full(2, 9.9), 1, SCALE)
     found.add(henon(0.0).exact_map, cycle, SCALE)
     found.add(elsewhere, far, SCALE)
-    found.add_wandering(noisy_cycle(cycle))
+    found.add_sampled(noisy_cycle(cycle))
     assert found.orbits == [far]
     assert set(found.near.owners) == {0}
-    assert [found.index(one) for one in (far, cycle, found.wandering[0])] == [0, 1, 1]
-    found.add_wandering(noisy_cycle(cycle))
-    assert len(found.wandering) == 1
+    assert [found.index(one) for one in (far, cycle, found.sampled[0])] == [0, 1, 1]
+    found.add_sampled(noisy_cycle(cycle))
+    assert len(found.sampled) == 1
 
 
 def test_cells_that_have_a_label_keep_their_attractor_when_it_turns_out_to_be_noisy(cycle):
@@ -220,9 +220,9 @@ def test_errors_that_carry_the_motion_too_far_leave_it_without_a_type():
 
 def test_a_store_keeps_it_to_the_last_bit(cycle):
     found = Found(Neighbourhoods.none(2))
-    found.add_wandering(noisy_cycle(cycle))
+    found.add_sampled(noisy_cycle(cycle))
     data = json.loads(json.dumps(found_data(found)))
-    (again,), (one,) = found_from(data, 2).wandering, found.wandering
+    (again,), (one,) = found_from(data, 2).sampled, found.sampled
     assert isinstance(again, Noisy)
     for name in ("points", "scale", "size", "scatter"):
         assert getattr(again, name).tobytes() == getattr(one, name).tobytes(), name
