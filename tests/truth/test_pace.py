@@ -5,7 +5,7 @@ import pytest
 
 import saltus as sl
 from saltus.errors import SaltusWarning
-from saltus.flow.pace import LONG, LOOK, STILL, marks, resume
+from saltus.flow.pace import CHECK_STEPS, LONG_CHECK_STEPS, MIN_PROGRESS, marks, resume
 from saltus.kernels import status as st
 
 
@@ -29,32 +29,32 @@ def stopped(arrays, steps, periods, due=1e-3):
 
 def test_what_stands_still_goes_on_once_and_is_stopped_at_the_second_look():
     arrays = batch()
-    assert stopped(arrays, LOOK + 1, 3.25) == [True]
-    assert stopped(arrays, 2 * (LOOK + 1), 3.25 + 0.5 * STILL * 96) == [False]
-    assert stopped(arrays, 2 * (LOOK + 1), 3.25 + 0.5 * STILL * 96) == [False], "asked again it is the same"
+    assert stopped(arrays, CHECK_STEPS + 1, 3.25) == [True]
+    assert stopped(arrays, 2 * (CHECK_STEPS + 1), 3.25 + 0.5 * MIN_PROGRESS * 96) == [False]
+    assert stopped(arrays, 2 * (CHECK_STEPS + 1), 3.25 + 0.5 * MIN_PROGRESS * 96) == [False], "asked again it is the same"
 
 
 def test_what_only_creeps_goes_on_until_a_million_steps_say_otherwise():
     arrays = batch()
-    for look in range(1, LONG // LOOK):
-        assert stopped(arrays, look * LOOK, 3.0 + 1e-5 * look) == [True]
-    assert stopped(arrays, LONG, 3.0005) == [True], "three periods were fast"
-    for look in range(1, LONG // LOOK):
-        assert stopped(arrays, LONG + look * LOOK, 3.0005 + 1e-5 * look) == [True]
-    assert stopped(arrays, 2 * LONG, 3.001) == [False]
+    for look in range(1, LONG_CHECK_STEPS // CHECK_STEPS):
+        assert stopped(arrays, look * CHECK_STEPS, 3.0 + 1e-5 * look) == [True]
+    assert stopped(arrays, LONG_CHECK_STEPS, 3.0005) == [True], "three periods were fast"
+    for look in range(1, LONG_CHECK_STEPS // CHECK_STEPS):
+        assert stopped(arrays, LONG_CHECK_STEPS + look * CHECK_STEPS, 3.0005 + 1e-5 * look) == [True]
+    assert stopped(arrays, 2 * LONG_CHECK_STEPS, 3.001) == [False]
 
 
 def test_a_burst_of_steps_is_forgiven():
     arrays = batch()
-    assert stopped(arrays, LOOK, 0.0) == [True]
-    assert stopped(arrays, 3 * LOOK, 1e-9) == [True], "the look between the two was fast enough"
-    assert stopped(arrays, 4 * LOOK, 1e-4) == [True]
+    assert stopped(arrays, CHECK_STEPS, 0.0) == [True]
+    assert stopped(arrays, 3 * CHECK_STEPS, 1e-9) == [True], "the look between the two was fast enough"
+    assert stopped(arrays, 4 * CHECK_STEPS, 1e-4) == [True]
 
 
 def test_each_is_judged_alone():
     arrays = batch(3)
-    stopped(arrays, LOOK, np.array([1.0, 2.0, 3.0]))
-    assert stopped(arrays, 2 * LOOK, np.array([1.0, 2.5, 3.0])) == [False, True, False]
+    stopped(arrays, CHECK_STEPS, np.array([1.0, 2.0, 3.0]))
+    assert stopped(arrays, 2 * CHECK_STEPS, np.array([1.0, 2.5, 3.0])) == [False, True, False]
 
 
 @sl.system(states="h", units={"h": "m"})
@@ -69,7 +69,7 @@ def test_a_tank_that_runs_empty_is_told_soon_and_where_it_is_empty():
         run = sl.simulate(tank, {"h": start}, t_end=10, samples=4, progress=False)
     assert set(run.status.values.tolist()) == {"budget_steps"}
     np.testing.assert_allclose(run.end_time, 2 * np.sqrt(start) / 0.3, rtol=1e-7)
-    assert run.steps.max() < 5 * LOOK
+    assert run.steps.max() < 5 * CHECK_STEPS
     with pytest.warns(SaltusWarning, match="budget_steps"):
         alone = sl.simulate(tank, [start[0]], t_end=10, samples=4, progress=False)
     assert (alone.steps.item(), alone.end_time.item()) == (run.steps.values[0], run.end_time.values[0]), "whatever else is in the batch"

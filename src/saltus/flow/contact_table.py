@@ -57,7 +57,7 @@ class ContactTable:
 
     @classmethod
     def empty(cls, size: int, states: int) -> ContactTable:
-        """Room for ``size`` contacts of so many states; what stands there isn't said."""
+        """Uninitialised room for ``size`` contacts of systems with ``states`` states."""
         return cls(np.empty((size, st.RECORD_INTEGERS), np.int64), np.empty((size, st.RECORD_FLOATS + states + 1)))
 
     def __len__(self) -> int:

@@ -31,7 +31,7 @@ from saltus.system.system import System
 CHUNK = 1024
 #: Threads of one call.
 MOST_THREADS = 4096
-#: Steps of the lanes between two looks at the keyboard, for two states: some ten milliseconds.
+#: Steps of the lanes between two checks for Ctrl-C, for two states: some ten milliseconds.
 SLICE = 50_000
 #: Contacts that a chunk's table holds before it is emptied, besides room for those of one step.
 RECORDS = 8192
@@ -57,7 +57,7 @@ class Schedule:
 
     @classmethod
     def even(cls, periods: int, per_period: int, first: int = 0, beyond: int = 0) -> Schedule:
-        """So many samples in each of some periods from ``first`` on, at equal distances from its start, and some ``beyond`` them."""
+        """``per_period`` equidistant samples in each of ``periods`` from ``first`` on, and ``beyond`` more after them."""
         index = first * per_period + np.arange(periods * per_period + beyond)
         return cls(index // per_period, (index % per_period) / per_period)
 
@@ -83,12 +83,12 @@ class Request:
     schedule : Schedule
         When samples are taken.
     record_from : int or None
-        First period since the start whose contacts are kept; None keeps none.
+        First period since the start whose contacts are recorded; None records none.
     t_end : float
-        Time that was asked for [s]: what adding up periods rounds beyond it is cut off.
+        End that the user gave [s]: sums of periods that exceed it by rounding are cut off.
     checks : int
-        So many trajectories at the end are there to check the others: they move as the method's companion moves them, which must be of the
-        same kernels, and no samples of them are taken.
+        Number of trajectories at the end that check the others. The method's companion moves them, with the same kernels, and takes no
+        samples of them.
     """
 
     start: np.ndarray
@@ -198,7 +198,7 @@ def run(
         raise RunInterrupted(lambda: _finish(outcome, whole, chunks, request.t_end)) from None
     if room.stopped:
         warnings.warn(
-            f"the contacts of this call, {room.kept} by now, filled half of the free memory: trajectories that were under way stopped with "
+            f"the contacts of this call, {room.count} by now, filled half of the free memory: trajectories that were under way stopped with "
             "status budget_events. Keep those of the last periods only (keep=), or run fewer starts or periods in one call.",
             SaltusWarning,
             stacklevel=4,
@@ -207,7 +207,7 @@ def run(
 
 
 def options_of(method: Method, periods: float, count: int, checks: int = 0) -> np.ndarray:
-    """The numbers of a method as its kernels read them, for so many trajectories of which the last ones are checks."""
+    """The numbers of a method as its kernels read them, for ``count`` trajectories, the last ``checks`` of them checks."""
     options = np.tile(method.numbers(periods), (count, 1))
     if checks:
         options[-checks:] = method.companion().numbers(periods)
@@ -309,14 +309,14 @@ def _returns_where_sliding_begins(contacts: ContactTable, status: np.ndarray) ->
 
 # -- work ----------------------------------------------------------------------------------------------------------------------
 def slice_of(states: int) -> int:
-    """Steps of the lanes between two looks at the keyboard: those of many states take longer."""
+    """Steps of the lanes between two checks for Ctrl-C: steps of many states take longer."""
     return max(SLICE * 4 // max(states, 2) ** 2, 1)
 
 
 def _advance(
     chunk: _Chunk, module: Flow, workspace: tuple, stop: Stop, room: Contacts, show: Callable[[float], None] | None = None
 ) -> None:
-    """Move a chunk to its end in slices; empties its table of contacts after each. Where there is room for no more, it ends there."""
+    """Move a chunk to its end in slices; empties its table of contacts after each. It ends early if the memory for contacts is full."""
     arrays = chunk.arrays
     steps = slice_of(arrays["state"].shape[1])
     while not stop.is_set():

@@ -21,9 +21,9 @@ from saltus.system.tangent import tangent_system
 
 #: Samples of the mode in each period, where contacts aren't located.
 MODE_SAMPLES = 32
-#: What a system without forcing needs, as the end of a sentence.
+#: End of the message for a system without forcing.
 NO_PERIOD = (
-    'has no forcing period: give every=, the time between two looks at the motion, such as every="0.1 s", about a turn of it. '
+    'has no forcing period: give every=, the time between two samples of the motion, such as every="0.1 s", about a turn of it. '
     "Answers don't depend on it."
 )
 #: The noise of a method is relative to a box of starts; a motion is some ten times smaller. Measured for ode45 at (1e-4, 1e-7) on the rig's
@@ -119,7 +119,7 @@ class Stroboscope:
     parameters : float64[k, P], optional
         Values in the order of ``system.values``: one row for all points, or a row for each. Default: those of the system.
     every : float or float64[k], optional
-        Time between two looks [s]: for systems without forcing.
+        Time between two samples [s]: for systems without forcing.
     threads : int, optional
         Threads for everything but :meth:`launch`.
     """
@@ -180,7 +180,7 @@ class Stroboscope:
         return self._with(parameters=self.parameters[index], period=self.period[index], threads=threads or self.threads)
 
     def with_period(self, time: np.ndarray) -> Stroboscope:
-        """The same rows with other times between two looks [s], float64[k]: for systems without forcing."""
+        """The same rows with other times between two samples [s], float64[k]: for systems without forcing."""
         return self._with(period=np.array(time, float))
 
     def of_system(self, system: System) -> Stroboscope:
@@ -188,7 +188,7 @@ class Stroboscope:
         return self._with(system=system, states=system.states)
 
     def _with(self, **changed: object) -> Stroboscope:
-        other = copy.copy(self)  # nothing of what was checked changes
+        other = copy.copy(self)  # the checked arguments don't change
         other.__dict__.pop("exact_map", None)
         other.__dict__.update(changed)
         return other
@@ -200,7 +200,7 @@ class Stroboscope:
     def run(
         self, start: np.ndarray, periods: np.ndarray | int, schedule: Schedule | None = None, record: int | None = None
     ) -> engine.Outcome:
-        """Trajectories of so many periods each, with samples at a schedule; contacts from period ``record`` on are kept."""
+        """Trajectories over ``periods`` each, with samples at a schedule and the contacts from period ``record`` on."""
         request = Request.periods(start, self.parameters, self.period, periods, schedule=schedule or Schedule.none(), record_from=record)
         return engine.run(self.system, self.method, request, self.threads)
 

@@ -15,16 +15,16 @@ import numpy as np
 from saltus.codegen.module import Flow, lane_width, ode45_module, taylor_module
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
-from saltus.flow.pace import LONG, LOOK
+from saltus.flow.pace import CHECK_STEPS, LONG_CHECK_STEPS
 from saltus.system.system import System
 
 #: Steps that a trajectory may take for each of its periods; a healthy one takes ten to a hundred.
 STEPS_PER_PERIOD = 10_000
 #: Steps that any trajectory may take.
 STEPS_AT_LEAST = 1_000_000
-#: Lanes of a few trajectories, such as one and the three copies that measure its errors: a step of 16 takes twice as long (0028).
-FEW = 4
-#: Share of its span that these steps must bring a trajectory further: one that needs a thousand million steps, minutes, is run to its end.
+#: Trajectories of a small batch, and its lanes: one and the three copies that measure its errors. 16 lanes take twice as long (0028).
+SMALL_BATCH = 4
+#: Share of its span that LONG_CHECK_STEPS steps must bring: a trajectory of 1e9 steps, minutes, runs to its end.
 SLOWEST_SHARE = 1e-3
 
 
@@ -42,12 +42,12 @@ def _check_positive(name: str, value: Any) -> None:
 
 
 _M = TypeVar("_M", bound="Method")
-#: What ode45's options are called here.
+#: Names of ode45's options here.
 _MATLAB: Mapping[str, str] = {"reltol": "rtol", "abstol": "atol", "events": "events"}
 
 
-def _told(cls: type[_M]) -> type[_M]:
-    """Answer options that a method doesn't have by those that it has."""
+def _explain_unknown_options(cls: type[_M]) -> type[_M]:
+    """Raise a clear error for options that a method doesn't have."""
     signature, made = inspect.signature(cls), cls.__init__
 
     @functools.wraps(made)
@@ -84,15 +84,15 @@ class Method:
         raise NotImplementedError
 
     def numbers(self, periods: float) -> np.ndarray:
-        """The options as the kernel reads them, for a run of so many periods."""
+        """The options as the kernel reads them, for a run of ``periods``."""
         raise NotImplementedError
 
     def due(self, periods: float) -> float | None:  # noqa: ARG002
-        """Periods that so many steps as :data:`saltus.flow.pace.LONG` must bring a run of so many; None if it has a budget of steps."""
+        """Least progress in :data:`saltus.flow.pace.LONG_CHECK_STEPS` steps, in periods; None if there is a budget of steps."""
         return None
 
-    def suited_to(self, count: int) -> Method:  # noqa: ARG002  (what most methods don't ask)
-        """The method with which so many trajectories are moved soonest; its results are the same to the bit."""
+    def suited_to(self, count: int) -> Method:  # noqa: ARG002  (unused by most methods)
+        """The fastest variant of the method for ``count`` trajectories; its results are the same to the bit."""
         return self
 
     @property
@@ -115,11 +115,11 @@ class Method:
         return np.full(len(scale), self.noise)
 
     def companion(self) -> Method:
-        """A more exact method: how far its contact times lie from this one's tells their errors."""
+        """A more exact method: the distance of its contact times from this one's measures their errors."""
         raise NotImplementedError
 
 
-@_told
+@_explain_unknown_options
 @dataclass(frozen=True)
 class Taylor(Method):
     """Taylor series, contacts located on the gap's own polynomial: machine precision, no contact missed. The default.
@@ -164,17 +164,17 @@ class Taylor(Method):
 
     def suited_to(self, count: int) -> Taylor:
         """With few lanes for few trajectories, unless the user has chosen."""
-        return replace(self, lanes=min(FEW, lane_width())) if self.lanes is None and count <= FEW else self
+        return replace(self, lanes=min(SMALL_BATCH, lane_width())) if self.lanes is None and count <= SMALL_BATCH else self
 
     def numbers(self, periods: float) -> np.ndarray:
-        """log2 of the tolerance, steps between two looks at the pace, event budget, periods that they must bring."""
+        """log2 of the tolerance, steps between two checks of the pace, event budget, least progress between two checks [periods]."""
         due = self.due(periods)
-        steps, least = (LOOK, due * LOOK / LONG) if due is not None else (self.max_steps or 0, math.inf)
+        steps, least = (CHECK_STEPS, due * CHECK_STEPS / LONG_CHECK_STEPS) if due is not None else (self.max_steps or 0, math.inf)
         return np.array([math.log2(self.tolerance), float(steps), float(self.max_events), least])
 
     def due(self, periods: float) -> float | None:
         """See :class:`Method`."""
-        return min(SLOWEST_SHARE * periods, LONG / STEPS_PER_PERIOD) if self.max_steps is None else None
+        return min(SLOWEST_SHARE * periods, LONG_CHECK_STEPS / STEPS_PER_PERIOD) if self.max_steps is None else None
 
     @property
     def noise(self) -> float:
@@ -191,7 +191,7 @@ class Taylor(Method):
         return Taylor(self.order, self.tolerance * 2.0**-4, self.lanes, self.max_steps, self.max_events)
 
 
-@_told
+@_explain_unknown_options
 @dataclass(frozen=True)
 class ODE45(Method):
     """MATLAB's ode45 with odezero, digit for digit, for comparison with published results.
@@ -248,11 +248,11 @@ class ODE45(Method):
         return min((5.0 if self.events == "locate" else 20.0) * self.rtol, 0.01)
 
     def noise_of(self, scale: np.ndarray) -> np.ndarray:
-        """The same, where AbsTol is what limits the error of a small state too."""
+        """The same, with the errors that AbsTol allows to small states."""
         return self.noise * np.maximum(1.0, self.atol / (self.rtol * scale)).max(axis=1)
 
     def companion(self) -> Taylor:
-        """The Taylor flow: exact, beside ode45."""
+        """The Taylor flow, which is exact compared with ode45."""
         return Taylor()
 
 

@@ -21,10 +21,10 @@ from saltus.system.system import System
 
 #: Order and log2 of the tolerance of the series: their truncation is rounding.
 ORDER, LOG2_TOLERANCE = 20, -50.0
-#: Pieces between two nodes: more are a pole.
+#: Pieces between two nodes; more mean a pole.
 MOST_PIECES = 1000
-#: A boundary this near to the beginning of a piece is the one at which it began [lengths of the piece].
-BEGAN = 1e-9
+#: A boundary nearer than this to the start of a piece is the one at which the piece starts [lengths of the piece].
+START_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -123,19 +123,19 @@ class MotionSeries:
         module, motion = self._module, nodes.motion
         constants, (clock, room) = self._constants[:, motion], self._clock(nodes)
         work = np.zeros((module.ROWS, len(motion)))
-        beside = Boundaries(module, state, side, constants, clock)
+        boundaries = Boundaries(module, state, side, constants, clock)
         with np.errstate(all="ignore"):
-            aside = beside.jets(work)
+            aside = boundaries.jets(work)
             for guard in range(self._own, self._guards):
                 terms = self._gap(work, guard)
                 terms[0] = np.where(np.abs(terms[0]) <= self._noise(work, guard), 0.0, terms[0])
                 side[guard] = np.where(new, np.where(polynomials.leading_signs(terms)[0] < 0.0, -1.0, 1.0), side[guard])
             if self._own < self._guards:
-                aside |= beside.jets(work)
+                aside |= boundaries.jets(work)
             h = module.step_length(work, LOG2_TOLERANCE)
             if module.PROBED:
                 h = self._probed(nodes, side, constants, clock, work, h)
-            h = beside.shortened(work, np.minimum(h, np.minimum(room, nodes.length)), aside)
+            h = boundaries.shortened(work, np.minimum(h, np.minimum(room, nodes.length)), aside)
         return work, h
 
     def _clock(self, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
@@ -174,7 +174,7 @@ class MotionSeries:
         flips = np.zeros((self._module.NGUARDS + self._module.SINGULAR, len(h)), bool)
         for guard in range(self._own, self._guards):
             which, place = polynomials.sign_changes(self._gap(work, guard) * h ** np.arange(ORDER + 1)[:, None])
-            which, place = which[place > BEGAN], place[place > BEGAN]
+            which, place = which[place > START_TOLERANCE], place[place > START_TOLERANCE]
             which, first = np.unique(which, return_index=True)
             sooner = np.ones(len(h))
             sooner[which] = place[first]

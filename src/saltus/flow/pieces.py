@@ -21,7 +21,7 @@ from saltus.system.expression import Expr
 from saltus.system.guards import Guard
 from saltus.system.system import System
 
-#: Samples of a period besides the contacts: an exact flow leaves the rest to the series, another one is followed closely; and for cubics.
+#: Samples of a period besides the contacts: for an exact method, for another method, and for cubics.
 NODES, NODES_INEXACT, SAMPLES = 8, 64, 1000
 #: Nodes whose series are worked out at a time: some thousand rows of them fill a few ten megabytes.
 WIDTH = 2048
@@ -32,7 +32,7 @@ SAME = 1e-9
 def pieces(
     map_: Stroboscope, start: np.ndarray, periods: int, quantities: Sequence[Expr], guards: Sequence[Guard]
 ) -> tuple[Pieces, Outcome]:
-    """The motions from float64[k, D] over so many periods, row i by row i of the map.
+    """The motions from float64[k, D] over ``periods``, row i by row i of the map.
 
     Parameters
     ----------
@@ -41,11 +41,11 @@ def pieces(
     start : float64[k, D]
         States at a whole period.
     periods : int
-        How long.
+        Length of the motions.
     quantities : sequence of Expr
-        What is asked about: functions of time, states and parameters, whose conditions hold bits.
+        Functions of time, states and parameters, whose conditions hold bits.
     guards : sequence of Guard
-        What these bits number: the guards of the system, then those that only the quantities need.
+        Guards that the bits stand for: those of the system, then those of the quantities alone.
 
     Returns
     -------
@@ -61,8 +61,8 @@ def pieces(
         bad = bad[np.isfinite(outcome.state[bad]).all(axis=1)]
         if len(bad):  # a pole, or a law whose series isn't known where it begins
             cubics = _pieces(map_.rows(bad), start[bad], periods, watched, len(guards), True)[0]
-            kept = whole.rows(~np.isin(whole.motion, bad))
-            whole = _joined([[kept, replace(cubics, motion=bad[cubics.motion])]])
+            good = whole.rows(~np.isin(whole.motion, bad))
+            whole = _joined([[good, replace(cubics, motion=bad[cubics.motion])]])
     return whole, outcome
 
 

@@ -1,7 +1,7 @@
 """Many polynomials on [0, 1] at once: values, integrals, and every place where one changes its sign.
 
 A polynomial is a column of ``terms`` float64[n + 1, p]: ``sum(terms[k] * x**k)``. Roots are isolated by the sign variations of Bernstein
-coefficients, halving the interval while there are more than one: none is missed, but for pairs closer than rounding can tell. (Lane &
+coefficients, halving the interval while there are more than one: only pairs closer than rounding are missed. (Lane &
 Riesenfeld, BIT 21 (1981); kernels/isolation.py does the same for one polynomial inside the flow.)
 """
 

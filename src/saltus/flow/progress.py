@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def reporting(progress: bool | Callable[[float], None] | None) -> Iterator[Callable[[float], None] | None]:
-    """Within, what is to be called with the share done: the user's own, a bar after two seconds on a terminal, lines elsewhere.
+    """A context with the progress callable: the user's own, a bar after two seconds on a terminal, lines elsewhere.
 
     Raises ParameterError if it is neither a callable, nor True, False or None.
     """
@@ -54,7 +54,7 @@ class Lines:
 
     Parameters
     ----------
-    tell : callable
+    write : callable
         Called with each line.
     clock : callable
         The time [s].
@@ -62,9 +62,9 @@ class Lines:
 
     PATIENCE, EVERY = 10.0, 300.0
 
-    def __init__(self, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
-        self._tell, self._clock = tell, clock
-        self._begun = self._told = clock()
+    def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
+        self._write, self._clock = write, clock
+        self._begun = self._written = clock()
         self._passed = 0
         self._first: tuple[float, float] | None = None
 
@@ -73,12 +73,12 @@ class Lines:
         now, quarter = self._clock(), int(4 * share)
         if self._first is None:
             self._first = now, share
-        if share >= 1.0 or now - self._begun < self.PATIENCE or (quarter <= self._passed and now - self._told < self.EVERY):
+        if share >= 1.0 or now - self._begun < self.PATIENCE or (quarter <= self._passed and now - self._written < self.EVERY):
             return
-        since, before = self._first  # what came before, such as compiling, isn't the pace of the work
+        since, before = self._first  # the time before, such as compiling, doesn't count
         left = (now - since) * (1 - share) / (share - before) if share > before else None
-        self._passed, self._told = max(quarter, self._passed), now
-        self._tell(f"{share:.0%} done in {now - self._begun:.0f} s" + (f", about {left:.0f} s left" if left is not None else ""))
+        self._passed, self._written = max(quarter, self._passed), now
+        self._write(f"{share:.0%} done in {now - self._begun:.0f} s" + (f", about {left:.0f} s left" if left is not None else ""))
 
 
 class _Bar:

@@ -1,4 +1,4 @@
-"""Memory: how much is free, and what is refused, or stopped, before it fills it. Half of what is free is for one call."""
+"""Memory: free memory, and the limit of one call, which is half of it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 
 from saltus.errors import ParameterError
 
-#: What a call may take of the memory that is free.
+#: Share of the free memory that one call may take.
 SHARE = 0.5
-#: What is never too much [bytes], so that memory isn't looked at for it.
-LITTLE = 2**24
-#: Free memory [bytes] where the system doesn't tell.
-UNKNOWN = 4 * 2**30
+#: Always allowed, without a measurement of the free memory [bytes].
+ALWAYS_ALLOWED = 2**24
+#: Free memory if the system doesn't report it [bytes].
+DEFAULT_FREE = 4 * 2**30
 #: Memory of a contact of D states, from the kernel's table to the Dataset with both runs of measured time errors [bytes]. Measured: 401 for
 #: two states in one run; the second keeps its own.
 CONTACT, CONTACT_OF_A_STATE = 640, 80
@@ -26,7 +26,7 @@ def free() -> int:
         fields = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text().splitlines())
         amounts.append(int(fields["MemAvailable"].split()[0]) * 1024)
     except (OSError, KeyError, ValueError, IndexError):
-        amounts.append(UNKNOWN)
+        amounts.append(DEFAULT_FREE)
     for limit, used in (("memory.max", "memory.current"), ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes")):
         try:
             amounts.append(max(int(Path("/sys/fs/cgroup", limit).read_text()) - int(Path("/sys/fs/cgroup", used).read_text()), 0))
@@ -36,18 +36,18 @@ def free() -> int:
 
 
 def check_room(size: float, what: str, instead: str) -> None:
-    """Raise ParameterError if so many bytes are more than one call may take.
+    """Raise ParameterError if ``size`` is more than one call may take.
 
     Parameters
     ----------
     size : float
         Estimate [bytes].
     what : str
-        What would fill it, in the plural: ``"4 trajectories with 100 samples each"``.
+        The contents, in the plural: ``"4 trajectories with 100 samples each"``.
     instead : str
-        What to do in place of it, as a sentence.
+        Advice, as a sentence.
     """
-    if size <= LITTLE:
+    if size <= ALWAYS_ALLOWED:
         return
     room = SHARE * free()
     if size > room:
@@ -68,19 +68,19 @@ class Contacts:
 
     def __init__(self, states: int) -> None:
         self._lock, self._each = threading.Lock(), CONTACT + CONTACT_OF_A_STATE * states
-        self.kept, self.stopped = 0, False
+        self.count, self.stopped = 0, False
 
     @functools.cached_property
     def most(self) -> float:
-        """How many there is room for."""
+        """Largest number of contacts."""
         return SHARE * free() / self._each
 
     def take(self, count: int) -> None:
-        """Note that so many more are kept."""
+        """Count ``count`` more contacts."""
         with self._lock:
-            self.kept += count
+            self.count += count
 
     @property
     def full(self) -> bool:
-        """Whether there is room for no more."""
-        return self.kept * self._each > LITTLE and self.kept >= self.most
+        """Whether the memory for contacts is full."""
+        return self.count * self._each > ALWAYS_ALLOWED and self.count >= self.most

@@ -1,4 +1,4 @@
-"""Series of motions beside a boundary where a law has none, such as ``d**1.5`` where a contact begins: the steps of the compiled flow.
+"""Series of motions near a boundary on which a law has none, such as ``d**1.5`` where a contact begins: the steps of the compiled flow.
 
 As in kernels/taylor_singular.py, in NumPy and without the flow's care for its last digits: the flow knows the states at contacts already.
 Behind the boundary a series reaches at most as far as the boundary is away. On it the terms without a series are set aside, for a time in
@@ -16,10 +16,10 @@ from saltus.kernels.isolation import ROUNDING
 
 #: Share of the way to a boundary that a series is used for.
 REACH = 0.9
-#: Change of a state by all that is left out, as a share of it.
+#: Relative change of a state by the terms left out.
 NEGLIGIBLE = 2.0**-46
-#: A gap of so many rounding errors can be told from zero.
-TOLD = 1024.0
+#: A gap is nonzero beyond this many rounding errors.
+NONZERO_ROUNDINGS = 1024.0
 #: Trials for the length over which terms may be left out.
 TRIALS = 60
 
@@ -32,14 +32,14 @@ class Boundaries:
     module : ModuleType
         From :func:`saltus.codegen.plain_series.series_module`.
     state, side, constants, clock : float64[:, n]
-        What its ``jets`` take: one column for each motion.
+        Arguments of its ``jets``: one column for each motion.
     """
 
     def __init__(self, module: ModuleType, state: np.ndarray, side: np.ndarray, constants: np.ndarray, clock: np.ndarray):
         self._module, self._state, self._side, self._constants, self._clock = module, state, side, constants, clock
 
     def jets(self, work: np.ndarray) -> np.ndarray:
-        """Fill in all terms; returns whether some were set aside, bool[n]. What acts near its own boundary is set aside."""
+        """Fill in all terms; returns where some were set aside, bool[n]: those that act near their own boundary."""
         module, aside = self._module, np.zeros(work.shape[1], bool)
         for _ in range(module.SINGULAR + 1):
             module.jets(self._state, self._side, self._constants, self._clock, work)
@@ -75,7 +75,7 @@ class Boundaries:
         return np.where(gap > 0.0, 2.0 * gap / (rate + np.sqrt(rate * rate + 4.0 * bend * gap)), 0.0)
 
     def _forces(self, work: np.ndarray, j: int) -> np.ndarray:
-        """What the terms of a boundary add to the rates of the states."""
+        """Contribution of the terms of a boundary to the rates of the states."""
         module = self._module
         first = module.CALM_ROW + j * module.NMOVED
         return np.abs(work[1 : module.NMOVED * _terms(module) : _terms(module)] - work[first : first + module.NMOVED])
@@ -84,16 +84,16 @@ class Boundaries:
         return np.any(~(self._forces(work, j) <= 0.0), axis=0)
 
     def _near(self, work: np.ndarray, j: int) -> np.ndarray:
-        """Where terms act and their boundary can't be told from here, or they change nothing until they are there."""
+        """Motions on the boundary of an acting term up to rounding, or so near that the term changes nothing before it is reached."""
         module, count = self._module, _terms(self._module)
-        told = self._gap(work, j) > TOLD * ROUNDING * work[module.SCALE_ROW + module.SINGULAR_GUARD[j]]
+        nonzero = self._gap(work, j) > NONZERO_ROUNDINGS * ROUNDING * work[module.SCALE_ROW + module.SINGULAR_GUARD[j]]
         size = np.abs(self._state[: module.NMOVED])
         weak = np.all(self._way(work, j) * self._forces(work, j) <= 0.25 * NEGLIGIBLE * size, axis=0)
         finite = np.all(np.isfinite(work[: module.NSTATES * count]), axis=0)
-        return (self._acts(work, j) & weak) | ~(told & finite)
+        return (self._acts(work, j) & weak) | ~(nonzero & finite)
 
     def _negligible(self, work: np.ndarray, h: np.ndarray, which: np.ndarray) -> np.ndarray:
-        """Lengths over which what was set aside changes no state by more than NEGLIGIBLE; looked at in the middle, where a gap is open."""
+        """Lengths over which the terms set aside change no state by more than NEGLIGIBLE, estimated in the middle of the step."""
         module, count = self._module, _terms(self._module)
         series = np.stack([work[i * count : (i + 1) * count] for i in range(module.NSTATES)], axis=1)  # [terms, states, n]
         rates = polynomials.derivative(series)

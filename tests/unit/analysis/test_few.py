@@ -14,7 +14,7 @@ from saltus.analysis.motion import time_errors
 from saltus.codegen.module import lane_width
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
-from saltus.flow.methods import FEW
+from saltus.flow.methods import SMALL_BATCH
 from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
 
@@ -30,8 +30,8 @@ def falling(length: str) -> sl.System:
 
 
 def test_few_trajectories_take_few_lanes_unless_the_user_chose():
-    assert sl.Taylor().suited_to(FEW) == sl.Taylor(lanes=min(FEW, lane_width()))
-    assert sl.Taylor().suited_to(FEW + 1) == sl.Taylor()
+    assert sl.Taylor().suited_to(SMALL_BATCH) == sl.Taylor(lanes=min(SMALL_BATCH, lane_width()))
+    assert sl.Taylor().suited_to(SMALL_BATCH + 1) == sl.Taylor()
     assert sl.Taylor(lanes=16).suited_to(1) == sl.Taylor(lanes=16)
     assert sl.ODE45().suited_to(1) == sl.ODE45()
 
@@ -56,7 +56,7 @@ def test_a_trajectory_and_its_copies_are_one_call(monkeypatch):
 
     monkeypatch.setattr(time_errors.engine, "run", counted)
     sl.simulate(RIG, (0.0, 0.0), periods=3)
-    assert calls == [(1 + time_errors.COPIES, time_errors.COPIES, min(FEW, lane_width()))]
+    assert calls == [(1 + time_errors.COPIES, time_errors.COPIES, min(SMALL_BATCH, lane_width()))]
 
 
 @pytest.mark.parametrize("method", [sl.Taylor(lanes=4), sl.Taylor(lanes=2, tolerance=2.0**-40)], ids=["default", "loose"])
