@@ -174,7 +174,7 @@ def test_every_refusal_is_in_words(only_arguments, seed, trials):
         (lambda: sl.system(states=5), 'states must be names, such as states="x v", not 5'),
         (lambda: sl.system(states="x v", units=5), "units must be a mapping"),
         (lambda: sl.system(states="x v", forced_at=[])(_equation), "forced_at must be the name of a parameter"),
-        (lambda: sl.system(states="x v")(dict), "Python doesn't tell what arguments"),
+        (lambda: sl.system(states="x v")(dict), "Python doesn't know the arguments"),
         (lambda: rig.with_values(force=np.datetime64("2020-01-01", "ns")), "is not a number"),
         (lambda: sl.simulate(rig, (np.timedelta64(1, "ns"), 0.0), periods=1), "is not a number"),
         (lambda: sl.simulate(rig, {5: 1.0}, periods=1), "has no state 5. Known: v, x"),

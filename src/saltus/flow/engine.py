@@ -198,7 +198,7 @@ def run(
         raise RunInterrupted(lambda: _finish(outcome, whole, chunks, request.t_end)) from None
     if room.stopped:
         warnings.warn(
-            f"the contacts of this call, {room.count} by now, filled half of the free memory: trajectories that were under way stopped with "
+            f"the contacts of this call, {room.count} by now, filled half of the free memory: trajectories still running stopped with "
             "status budget_events. Keep those of the last periods only (keep=), or run fewer starts or periods in one call.",
             SaltusWarning,
             stacklevel=4,

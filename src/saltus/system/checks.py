@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from saltus.system.system import System
 
 
-#: Boundaries that a system may have: each is a bit of the mode, and sets of them, with one bit more, are kept in doubles on the way.
+#: Most boundaries of a system: each is a bit of the mode, and a double holds 53 bits.
 MOST_GUARDS = 52
 
 

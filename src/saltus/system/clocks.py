@@ -20,7 +20,7 @@ from saltus.system.functions import of_numbers
 
 _SYMBOL = ex.parameter("\0wave")
 _RELATIONS: weakref.WeakValueDictionary[Expr, Relation] = weakref.WeakValueDictionary()
-#: Comparisons that one may come apart into, where pieces stand inside it.
+#: Most comparisons that one with pieces inside splits into.
 _MOST_CASES = 64
 
 

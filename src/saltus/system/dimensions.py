@@ -1,8 +1,9 @@
-"""Dimensions of an equation, checked while it is traced: what is added or compared must have one unit, and rates that of their state.
+"""Dimensions of an equation, checked while it is traced: terms of a sum or comparison have one unit, and rates that of their state
+per second.
 
-Numbers written into an equation are in SI, and may have any unit: alone in a sum, a comparison or a piece they have that of what stands
-beside them (``x > 1e-3``), and what they multiply isn't known (``-4000*x``), but for the numbers that formulas are made of (2, 1/2, 2 pi).
-Where a unit isn't known nothing is said. Angles count as plain numbers.
+Numbers written into an equation are in SI and may have any unit. Alone in a sum, a comparison or a piece they take the unit of the other
+terms (``x > 1e-3``). A product with one has no known unit (``-4000*x``), except with the numbers of formulas (2, 1/2, 2 pi). Unknown units
+are not checked. Angles count as plain numbers.
 """
 
 from __future__ import annotations

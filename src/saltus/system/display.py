@@ -1,4 +1,4 @@
-"""How a System looks: text for the terminal, HTML with formulas for a notebook."""
+"""Display of a System: text for the terminal, HTML with formulas for a notebook."""
 
 from __future__ import annotations
 

@@ -225,7 +225,7 @@ def with_own_unit(make: Callable[[], Any]) -> Any:
 
 @runtime_checkable
 class _LeavesOpen(Protocol):
-    """An observer that can be told to ask nothing about a node."""
+    """An observer that can leave the unit of a node open."""
 
     def leave_open(self, node: Expr) -> None:
         """Take the node as it is."""

@@ -29,7 +29,7 @@ _STOP = (
     "a stiff spring and damper, stop = sl.piecewise((k*(x - gap) + c*v, x > gap), otherwise=0), with c = 2*z*sqrt(k*mass) and "
     "z = -log(e)/sqrt(pi**2 + log(e)**2) rebounds with e"
 )
-#: Names that people look for in saltus, and what to write in their place.
+#: Names of other packages, and their equivalents here.
 ADVICE: dict[str, str] = {
     "arctan2": "Write sl.atan2(y, x).", "arctan": "Write sl.atan.", "arcsin": "Write sl.asin.", "arccos": "Write sl.acos.",
     "absolute": "Write sl.abs or abs.", "fabs": "Write sl.abs or abs.", "maximum": "Write sl.max.", "minimum": "Write sl.min.",

@@ -23,13 +23,13 @@ from saltus.system.laws import freeplay
 from saltus.system.names import why_no_name
 from saltus.system.tables import Table, look_up
 
-#: Most characters of a formula.
+#: Longest formula [characters].
 LONGEST = 1000
-#: Most levels of a formula: each takes a few of the thousand calls within calls that Python allows.
+#: Deepest nesting of a formula: each level takes a few of Python's thousand nested calls.
 DEPTH = 200
 _SIMPLE = ("abs", "atan", "cos", "exp", "log", "max", "min", "piecewise", "sin", "sqrt", "tan", "tanh")
 _COMPOSED = ("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "sign", "sinh", "where")
-#: What a formula may call.
+#: Functions of formulas.
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(functions, name) for name in _SIMPLE}, **{name: getattr(compositions, name) for name in _COMPOSED},
     "freeplay": freeplay, "mod": mod,
@@ -145,7 +145,7 @@ class Formula:
 
 
 class Formulas:
-    """The formulas of one file: what they share.
+    """The names that the formulas of one file share.
 
     Parameters
     ----------
@@ -223,11 +223,11 @@ def _parsed(text: str) -> ast.expr:
         raise TraceError(f"a formula is text of 1 to {LONGEST} characters, such as k*(x - gap), not {shown(text)}.")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of numbers that touch words, which the tree tells better
+            warnings.simplefilter("ignore")  # of numbers that touch words: the tree gives the better message
             tree = ast.parse(f"({text.strip()}\n)", mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        told = error.msg.split(".")[0] if isinstance(error, SyntaxError) else "it is nested too deeply"
-        raise TraceError(f"the formula {shown(text)} can't be read: {told}. Write it like k*(x - gap).") from None
+        fault = error.msg.split(".")[0] if isinstance(error, SyntaxError) else "it is nested too deeply"
+        raise TraceError(f"the formula {shown(text)} can't be read: {fault}. Write it like k*(x - gap).") from None
     if _depth(tree) > DEPTH:
         raise TraceError(f"the formula {shown(text)} can't be read: it is nested too deeply. Give a part of it a name, as a term.")
     _check(tree, text)
@@ -266,5 +266,5 @@ def _check(tree: ast.AST, text: str) -> None:
                 fits = isinstance(node, _NODES)
         strange = [child for child in ast.iter_child_nodes(node) if not isinstance(child, _NODES)]
         if not fits or any(isinstance(child, ast.operator | ast.cmpop) for child in strange):
-            told = next((_INSTEAD[type(one)] for one in (node, *strange) if type(one) in _INSTEAD), _MEANINGS)
-            raise TraceError(f"the formula {shown(text)}: {_written(node)} has no meaning in a formula; {told}.")
+            advice = next((_INSTEAD[type(one)] for one in (node, *strange) if type(one) in _INSTEAD), _MEANINGS)
+            raise TraceError(f"the formula {shown(text)}: {_written(node)} has no meaning in a formula; {advice}.")

@@ -23,7 +23,7 @@ def of_numbers(name: str, function: Callable[..., Any], *numbers: Any) -> Any:
         If one of them isn't a number, or the function has no value there.
     """
     for number in numbers:
-        as_expr(number)  # which refuses what isn't a number
+        as_expr(number)  # refuses anything but a number
     try:
         return function(*numbers)
     except (TypeError, ValueError, ArithmeticError):

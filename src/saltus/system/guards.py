@@ -56,7 +56,7 @@ def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, .
 
 
 def join_guards(roots: Iterable[Expr], known: Sequence[Guard]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """As :func:`find_guards`, for expressions that join a system: its guards stay as they are, and what is new follows them.
+    """As :func:`find_guards`, for expressions that join a system: its guards don't change, and new ones follow them.
 
     Raises
     ------
@@ -257,15 +257,15 @@ def _negated(a: Expr) -> Expr:
 
 # -- numbering and names -------------------------------------------------------------------------------------------------------
 def _used_only(field: tuple[Expr, ...], guards: Sequence[Guard], known: int) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """Leave out guards on which nothing depends, renumber and name the rest; the first ``known`` stay as they are."""
+    """Drop guards on which nothing depends, renumber and name the rest; the first ``known`` don't change."""
     used = bits_in(field) | set(range(known))
     for number in reversed(range(len(guards))):
         if number in used:
             used |= bits_in([guards[number].gap])
     new = {old: number for number, old in enumerate(sorted(used))}
     field = tuple(_renumbered(root, new) for root in field)
-    kept = [guards[old] if old < known else replace(guards[old], gap=_renumbered(guards[old].gap, new)) for old in new]
-    return field, tuple(_with_names(kept, known))
+    used_guards = [guards[old] if old < known else replace(guards[old], gap=_renumbered(guards[old].gap, new)) for old in new]
+    return field, tuple(_with_names(used_guards, known))
 
 
 def bits_in(roots: Sequence[Expr]) -> set[int]:

@@ -9,11 +9,11 @@ from typing import Any
 
 from saltus.fence import has_control
 
-#: Letters that a system's name may have.
+#: Longest name of a system [characters].
 LONGEST = 200
-#: What stands before a state's name in a result, and where the state is so called.
+#: Prefixes of a state's name in a result, and the place that each stands for.
 _PLACES = {"end_": "the end", "contact_": "a contact"}
-#: Names that mean something else to whoever reads equations or what is generated from them.
+#: Names with another meaning in equations or in the generated code.
 RESERVED = frozenset({"t", "np", "numpy", "math", "numba", "njit", "saltus", "kept", "kernel", "inner", "entry"})
 
 

@@ -44,11 +44,11 @@ def check_overlaps(system: System, values: Mapping[str, Any]) -> None:
             continue
         worst = int(np.argmax(np.ravel(overlap > 0)))
         names = sorted({node.payload for node in walk(width) if node.op == "param"})
-        told = ", ".join(f"{name} = {np.ravel(values[name])[worst if np.size(values[name]) > 1 else 0]:g}" for name in names)
+        given = ", ".join(f"{name} = {np.ravel(values[name])[worst if np.size(values[name]) > 1 else 0]:g}" for name in names)
         entry = f" (trajectory {worst} of {np.size(overlap)})" if np.ndim(overlap) else ""
         places = " and ".join(equation_of(number, system.guards) for number in (first, second))
         raise ParameterError(
-            f"{system.name}: with {told}{entry} the contacts at {places} overlap, and the first piece would hide the second. A "
+            f"{system.name}: with {given}{entry} the contacts at {places} overlap, and the first piece would hide the second. A "
             f"clearance can't be negative. Springs that touch on both sides at once are the sum of two one-sided contacts: "
             f"sl.freeplay(x, stiffness=k, lower_gap=gap) + sl.freeplay(x, stiffness=k, upper_gap=gap)."
         )

@@ -18,9 +18,9 @@ from saltus.system.expression import TIME, Expr, depends_on, div, operands, rela
 if TYPE_CHECKING:
     from saltus.system.system import System
 
-#: Share of its cycles by which a clock may miss a whole number of them in a period, and cycles by which a phase may.
+#: Rounding allowed in the number of cycles in a period: relative, and absolute for a phase [cycles].
 CLOCK_MISS, PHASE_MISS = 1e-9, 1e-9
-#: Difference after a period, in units of the values at one state, that is no rounding.
+#: Difference after a period that exceeds rounding, relative to the values at one state.
 DIFFERENCE = 1e-7
 
 
@@ -82,8 +82,8 @@ def _rate(angle: Expr) -> Expr | None:
 def check_periodic(system: System) -> None:
     """Raise a TraceError if the equations of a forced system differ after one period of the forcing.
 
-    Finds the forgotten 2 pi in ``cos(frequency*t)``, ramps, and a second frequency that isn't a multiple of the first. What no formula
-    tells is evaluated at samples.
+    Finds the forgotten 2 pi in ``cos(frequency*t)``, ramps, and a second frequency that isn't a multiple of the first. Other
+    expressions are evaluated at samples.
     """
     period = system.period()
     if period is None:

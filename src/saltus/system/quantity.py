@@ -92,9 +92,7 @@ def _arguments(system: System, function: Quantity, title: str) -> tuple[list[Exp
     try:
         arguments = list(inspect.signature(function).parameters.values())
     except ValueError:  # of a class or function of C
-        raise TraceError(
-            f"{title}: Python doesn't tell what arguments {function!r:.80} takes. Write a function of names, such as x."
-        ) from None
+        raise TraceError(f"{title}: Python doesn't know the arguments of {function!r:.80}. Write a function of names, such as x.") from None
     plain = [a.name for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
     if tuple(plain[1:]) == states:
         known[plain[0]] = TIME  # written as an equation, whatever the time is called there
@@ -222,14 +220,14 @@ def _with_guard(system: System, gap: Expr, guards: tuple[Guard, ...], name: str)
 
 # -- integrals -----------------------------------------------------------------------------------------------------------------
 def with_integrals(system: System, integrands: Mapping[str, Quantity], units: Mapping[str, str] | None = None) -> System:
-    """The system with more states, each the integral of a function along the motion; they start where they are put, as a rule at zero.
+    """The system with more states, each the integral of a function along the motion; their starts are given, as a rule zero.
 
     Parameters
     ----------
     system : System
         What moves.
     integrands : mapping of str to callable
-        By the name of the new state, what is integrated: a function of (t, states, parameters), see :func:`quantity`. It can't use the
+        Integrands by the name of the new state: functions of (t, states, parameters), see :func:`quantity`. They can't use the
         other integrals.
     units : mapping of str to str, optional
         Coherent SI unit of each integral.

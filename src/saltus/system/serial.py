@@ -27,7 +27,7 @@ _OPERANDS |= dict.fromkeys(ELEMENTARY, 1)
 
 
 def to_dict(system: System) -> dict[str, Any]:
-    """A system as JSON-able data; floats are kept to the last bit."""
+    """A system as JSON-able data; floats are exact."""
     return {
         "format": FORMAT,
         "name": system.name,
@@ -116,7 +116,7 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     _require(why_no_title(data["name"]) is None, f"{shown(data['name'])} is no name of a system: {why_no_title(data['name'])}")
     for name in ("description", "source"):
         _require(why_no_text(data[name]) is None, f"its {name} can't be used: {why_no_text(data[name])}")
-    _require(why_not_together(states) is None, f"its states can't be told apart: {why_not_together(states)}")
+    _require(why_not_together(states) is None, f"its states have ambiguous names: {why_not_together(states)}")
     _require(len({*states, *parameters}) == len(states) + len(parameters), "a name stands twice")
     names = {"state": set(states), "param": set(parameters)}
     nodes: list[Expr] = []

@@ -1,8 +1,8 @@
 """Laws that have no Taylor series on a boundary: ``d**1.5``, ``sqrt(d)``, ``d*log(d)`` where the gap d is zero.
 
-Such a term is analytic on either side of its boundary, and small beside it. :func:`set_aside` finds these terms and lets a bit of their
-own switch them off, so that a step off the boundary, or onto it, sees the rest of the equations only (kernels/taylor_singular.py).
-:func:`check_finite` refuses what is infinite there. Both rest on the *order* of an expression on a boundary: the power of the gap with
+Such a term is analytic on either side of its boundary, and small near it. :func:`set_aside` finds these terms and gives each a bit that
+switches it off: a step off the boundary, or onto it, uses the rest of the equations only (kernels/taylor_singular.py).
+:func:`check_finite` refuses terms that are infinite there. Both use the *order* of an expression on a boundary: the power of the gap with
 which it goes to zero.
 """
 

@@ -27,7 +27,7 @@ class System:
     Attributes
     ----------
     name, description, source : str
-        What it is called, what it is, where it was published.
+        Name, description, publication.
     states : tuple of str
         Names of the states.
     field : tuple of Expr
@@ -94,7 +94,7 @@ class System:
 
     @property
     def origin(self) -> System:
-        """The system that this one is a copy of with other values, itself if it is none: what follows from the equations is kept there."""
+        """The system that this one copies with other values, or itself; it holds all that depends on the equations alone."""
         return vars(self).get("_origin", self)
 
     def resolve(self, name: str, value: Any) -> Any:
@@ -198,7 +198,7 @@ class System:
     def _fingerprint(self) -> str:
         return serial.fingerprint(self)
 
-    # -- units and looks --------------------------------------------------------------------------------------------------------
+    # -- units and display -----------------------------------------------------------------------------------------------------
     def state_unit(self, name: str) -> str:
         """Unit of a state; ``""`` if not declared. Raises ParameterError for an unknown state."""
         if not among(name, self.states):
@@ -234,7 +234,7 @@ class System:
     def __reduce__(self) -> tuple[Any, ...]:
         return System.from_dict, (self.to_dict(),)
 
-    # -- what it isn't ----------------------------------------------------------------------------------------------------------
+    # -- misuse ----------------------------------------------------------------------------------------------------------------
     def __call__(self, *_: Any, **__: Any) -> Any:
         """Refuse: a System is no function. Raises ParameterError."""
         raise ParameterError(

@@ -22,7 +22,7 @@ from saltus.system.functions import piecewise
 
 KINDS = ("linear", "pchip", "spline")
 OUTSIDE = ("hold", "extend", "periodic")
-#: Knots of a table in a state: each is a boundary that the motion may meet, and code of its own.
+#: Most knots of a table in a state: each adds a boundary and code.
 MOST_KNOTS = 32
 
 
@@ -105,7 +105,7 @@ def table(
     Parameters
     ----------
     x : Expr or float
-        Where to look. ``t``, or ``rate*t + offset`` with numbers and parameters: a drive of any number of points. Or anything that
+        Argument of the curve. ``t``, or ``rate*t + offset`` with numbers and parameters: a drive of any number of points. Or anything that
         depends on states: a law of 32 points at most, with a boundary at each knot.
     points : sequence of float
         Where the curve is known, ascending [unit of x].
@@ -147,7 +147,7 @@ def look_up(x: Operand, data: Table) -> Any:
     with ex.observed(None):
         line = affine(x)
     if line is None or not ex.depends_on(x, ("time",)):
-        raise TraceError(f"sl.table in {x!r}: look up at a state, or at rate*t + offset with numbers and parameters for the rest.")
+        raise TraceError(f"sl.table in {x!r}: write a state, or rate*t + offset with numbers and parameters for the rest.")
     return Expr("table", (x,), data)
 
 
@@ -159,7 +159,7 @@ def curve(points: Any, values: Any, kind: str, outside: str, name: str) -> Table
     if not (isinstance(name, str) and name.isidentifier()):
         raise TraceError(f"sl.table: name={shown(name)} is no name. Use letters, digits and _.")
     if has_mask([points, values]):
-        raise TraceError("sl.table: points or values are masked, and a mask isn't kept. Leave them out of both.")
+        raise TraceError("sl.table: points or values are masked, and masks aren't supported. Leave them out of both.")
     try:
         x, y = (np.array(data, dtype=np.float64) for data in (points, values))
     except (TypeError, ValueError, OverflowError):

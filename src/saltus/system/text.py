@@ -37,18 +37,18 @@ class Boundary(Protocol):
 
 
 class Writer:
-    """Writes expressions; remembers what it has written.
+    """Writes expressions, each part once.
 
     Parameters
     ----------
     guards : sequence of Guard
-        What the bits in the conditions stand for.
+        Guards of the bits in the conditions.
     shared : iterable of Expr
         Roots that will be written; parts that they use more than once and that are long get lines of their own in :attr:`lines`.
     taken : iterable of str
         Names that such parts may not have.
     limit : int or None
-        Longest text kept of a part; longer ones become ``...`` where they are used.
+        Longest text of a part; longer ones become ``...`` where they are used.
     """
 
     #: Length from which a part used twice gets a name; ten times that for any part.
@@ -96,7 +96,7 @@ class Writer:
         """The text of one side of a guard, such as ``x > upper_gap``."""
         return self._sides[guard][0 if positive else 1]
 
-    # -- how things look; a subclass for another notation overrides these -------------------------------------------------------
+    # -- notation, which a subclass may override --------------------------------------------------------------------------------
     greater, less = " > ", " < "
 
     def joint(self, both: bool) -> str:

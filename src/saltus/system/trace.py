@@ -1,4 +1,4 @@
-"""Tracing: the user's function is called once, with symbols, and what it computes is recorded.
+"""Tracing: the user's function is called once, with symbols, and its operations are recorded.
 
 Whatever goes wrong inside the function becomes a TraceError that names its file and line and says what to write instead.
 """
@@ -33,7 +33,7 @@ R = TypeVar("R")
 
 _HERE = str(Path(__file__).parent.parent)
 _LIBRARIES = tuple({sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None})
-#: How functions are called that people call with their arguments in a row.
+#: Calls of functions that are often called with positional arguments.
 _CALLS = {
     "freeplay": "sl.freeplay(x, stiffness=..., gap=...), or lower_gap= and upper_gap=, damping= with velocity=, preload=",
     "piecewise": "sl.piecewise((value, condition), ..., otherwise=value)",
@@ -52,8 +52,8 @@ def _known_words(function: Callable[P, R]) -> Callable[P, R]:
         for word in kwargs:
             if word not in known:
                 there = elsewhere.get(word)
-                told = f'Write {there}=, the name of the parameter that holds the forcing frequency: {there}="frequency".' if there else ""
-                raise TraceError(f"sl.system has no argument {word!r}. {told or nearest(word, known)}")
+                advice = f'Write {there}=, the name of the parameter with the forcing frequency: {there}="frequency".' if there else ""
+                raise TraceError(f"sl.system has no argument {word!r}. {advice or nearest(word, known)}")
         return function(*args, **kwargs)
 
     return called
@@ -87,14 +87,14 @@ def system(
         Coherent SI unit of states and parameters: ``{"x": "m", "mass": "kg", "damping_ratio": "1"}``. The unit of a parameter whose
         default is text (``mass="3 kg"``) is known already.
     guards : mapping of str to callable, optional
-        Names for guards, each with the comparison that it is called after, as a function of states and parameters by name:
+        Names for guards, each with its comparison, as a function of states and parameters by name:
         ``{"teeth": lambda x1, x2, gap: x2 - x1 > gap}``. A guard without one is named after the parameter that sets it, or by its equation.
     name : str, optional
-        What to call the system; the function's name if not given.
+        Name of the system; default: that of the function.
     source : str, optional
         Where the equations were published.
     check_units : bool, optional
-        Whether to check that what is added or compared has one unit, and each rate that of its state per second, as far as units are known.
+        Whether to check known units: terms of a sum or comparison have one unit, and each rate has that of its state per second.
         False for equations whose numbers have units of their own.
 
     Returns
@@ -134,8 +134,8 @@ def system(
             raise TraceError(
                 f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, ...), not {shown(function)}."
             )
-        title, told = name or getattr(function, "__name__", "system").strip("<>"), inspect.getdoc(function) or ""
-        for what, text, why in (("name", title, why_no_title), ("source", source, why_no_text), ("docstring", told, why_no_text)):
+        title, description = name or getattr(function, "__name__", "system").strip("<>"), inspect.getdoc(function) or ""
+        for what, text, why in (("name", title, why_no_title), ("source", source, why_no_text), ("docstring", description, why_no_text)):
             if why(text) is not None:
                 raise TraceError(f"the {what} of a system can't be {shown(text)}: {why(text)}.")
         defaults = _parameters(function, names, title)
@@ -157,7 +157,7 @@ def system(
             units=known_units,
             forced_at=forced_at,
             source=source,
-            description=told,
+            description=description,
         )
         return with_guard_names(made, guards) if guards else made
 
@@ -191,7 +191,7 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
     try:
         signature = inspect.signature(function)
     except ValueError:  # of a class or function of C
-        raise TraceError(f"{title}: Python doesn't tell what arguments {shown(function)} takes. Write a function, {wanted}.") from None
+        raise TraceError(f"{title}: Python doesn't know the arguments of {shown(function)}. Write a function, {wanted}.") from None
     for argument in signature.parameters.values():
         if argument.kind == argument.VAR_POSITIONAL and len(positional) == 1:
             together = True

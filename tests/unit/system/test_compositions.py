@@ -182,7 +182,7 @@ def test_a_table_in_a_state_is_the_same_curve_in_pieces(kind, outside):
     [
         (lambda t, x: sl.table(x, np.arange(40.0), np.random.default_rng(1).normal(size=40)), "has 40 knots.*32 at most"),
         (lambda t, x: sl.table(x, [0, 1], [0, 0], outside="periodic"), "is for tables in time"),
-        (lambda t, x: sl.table(t * t, [0, 1], [0, 0]), "look up at a state, or at rate"),
+        (lambda t, x: sl.table(t * t, [0, 1], [0, 0]), "write a state, or rate"),
         (lambda t, x: sl.table(t, [0, 1, 1], [0, 0, 0]), r"points\[2\] = 1 follows 1"),
         (lambda t, x: sl.table(t, [0, 1], [0, math.nan]), r"values\[1\] is not a finite number"),
         (lambda t, x: sl.table(t, [0, 1], [0, 1, 2]), "one length"),
