@@ -97,13 +97,13 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
             told = {"question": report.name, "done": report.done, "total": report.total, "seconds": report.seconds, "seconds_left": left}
             print(json.dumps(told), file=sys.stderr, flush=True)  # noqa: T201
 
-    def tell_json(text: str) -> None:
+    def note_json(text: str) -> None:
         if kind == "json":
             print(json.dumps({"note": text}), file=sys.stderr, flush=True)  # noqa: T201
 
-    from saltus.codegen.announce import telling
+    from saltus.codegen.announce import announcing_to
 
-    with telling(tell_json):
+    with announcing_to(note_json):
         yield report_json, say if kind != "json" else lambda _: None
 
 

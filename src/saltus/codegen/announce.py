@@ -1,4 +1,4 @@
-"""A line before a kernel is compiled: people who wait want to know what for, and for how long."""
+"""A line before a kernel is compiled: its purpose, and how long it takes."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ def _to_stderr(text: str) -> None:
     sys.stderr.flush()
 
 
-_TELL: ContextVar[Callable[[str], None]] = ContextVar("tell", default=_to_stderr)
+_WRITE: ContextVar[Callable[[str], None]] = ContextVar("write", default=_to_stderr)
 
 
 @contextmanager
-def telling(tell: Callable[[str], None]) -> Iterator[None]:
-    """Within, sentences about compiling go to this callable; by default they are lines on standard error."""
-    token = _TELL.set(tell)
+def announcing_to(write: Callable[[str], None]) -> Iterator[None]:
+    """A context in which sentences about compiling go to ``write``; by default they go to standard error."""
+    token = _WRITE.set(write)
     try:
         yield
     finally:
-        _TELL.reset(token)
+        _WRITE.reset(token)
 
 
 @contextmanager
 def silent() -> Iterator[None]:
-    """Within, nothing is said about compiling."""
-    with telling(lambda _: None):
+    """A context without sentences about compiling."""
+    with announcing_to(lambda _: None):
         yield
 
 
 def announce(what: str, seconds: float) -> None:
-    """Say what is going to be compiled and how often that happens, and how long it takes on a quiet machine."""
-    _TELL.get()(f"compiling {what}, about {seconds:.0f} s")
+    """Announce a compilation, and its duration on a quiet machine [s]."""
+    _WRITE.get()(f"compiling {what}, about {seconds:.0f} s")

@@ -1,4 +1,4 @@
-"""A process that compiles for another one ends when that one is gone: killed, it can't end it itself."""
+"""A process that compiles for another one ends when the other has died, even by SIGKILL."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import os
 import threading
 import time
 
-#: Environment variable that holds the number of the process that asked.
-ASKED_BY = "SALTUS_ASKED_BY"
-#: Time between two looks [s].
-LOOK = 0.5
+#: Environment variable with the id of the parent process.
+PARENT_ID = "SALTUS_ASKED_BY"
+#: Time between two checks of the parent [s].
+CHECK_INTERVAL = 0.5
 
 
 def end_with_asker() -> None:
-    """End this process as soon as its parent is another one than the process that asked; asked by none, go on."""
-    asker = os.environ.pop(ASKED_BY, "")
+    """End this process as soon as its parent isn't the process in PARENT_ID any more; go on if none is given."""
+    asker = os.environ.pop(PARENT_ID, "")
     if asker.isdigit():
         threading.Thread(target=_watch, args=(int(asker),), daemon=True).start()
 
 
 def _watch(asker: int) -> None:
     while os.getppid() == asker:  # on Windows for ever; there the answer finds nobody, and the process ends after it
-        time.sleep(LOOK)
+        time.sleep(CHECK_INTERVAL)
     os._exit(1)

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from saltus.errors import TraceError
 
-#: Lines of a function that stays whole, and of a block of one that doesn't.
+#: Most lines of a function that isn't split, and lines of a block.
 WHOLE, LENGTH = 1000, 250
-#: Bytes of the stack for the values that blocks hand on: threads have 8 MB on Linux, and less elsewhere.
-MOST_KEPT = 4_000_000
+#: Most bytes of the stack for the values that blocks share: threads have 8 MB on Linux, and less elsewhere.
+MAX_STACK = 4_000_000
 
 _VALUE = re.compile(r"%r\d+\b")
 
@@ -44,10 +44,10 @@ def in_blocks(name: str, result: str, parameters: str, attributes: str, lines: l
         given = ", ".join(f"{kind} {value}" for kind, value in zip(_kinds(parameters), plain.split(", "), strict=True))
         calls.append(f"  call void @{name}.{i}({given}, ptr %kept)\n")
     places = sum(slot.width for slot in slots.values())
-    if 8 * places * lanes > MOST_KEPT:
+    if 8 * places * lanes > MAX_STACK:
         raise TraceError(
             f"the equation is too long to be compiled: {len(lines)} operations, whose values take {8e-6 * places * lanes:.1f} MB of the "
-            f"stack; at most {MOST_KEPT / 1e6:.0f} MB are used. Couple fewer states, or take a lower order or fewer lanes, such as "
+            f"stack; at most {MAX_STACK / 1e6:.0f} MB are used. Couple fewer states, or take a lower order or fewer lanes, such as "
             "sl.Taylor(12, lanes=4)."
         )
     memory = f"  %kept = alloca [{max(places, 1) * lanes} x double], align 64\n"
@@ -59,7 +59,7 @@ def _kinds(parameters: str) -> list[str]:
 
 
 class _Slot(NamedTuple):
-    """Where a value is kept: its place, its type, the block that gives it."""
+    """Memory of a value: its place, its type, the block that computes it."""
 
     place: int
     type: str
@@ -86,7 +86,7 @@ def _slots(blocks: list[list[Line]]) -> dict[str, _Slot]:
 
 
 def _one_block(block: list[Line], i: int, slots: dict[str, _Slot], lanes: int, last: bool) -> str:
-    """The lines of a block: values of others are loaded where they are first used, its own are kept where others use them."""
+    """The lines of a block: values of others are loaded where they are first used, its own are stored if others use them."""
     out, here = [], set()
     for line in block:
         for used in _VALUE.findall(line.text):
@@ -95,7 +95,7 @@ def _one_block(block: list[Line], i: int, slots: dict[str, _Slot], lanes: int, l
                 out += _load(used, slots[used], lanes)
         out.append(line.text)
         if line.name in slots:
-            out += _keep(line.name, slots[line.name], lanes)
+            out += _store(line.name, slots[line.name], lanes)
     if not last:
         out.append("ret void")
     return "".join(f"  {line}\n" for line in out)
@@ -106,7 +106,7 @@ def _load(name: str, slot: _Slot, lanes: int) -> list[str]:
     return [_address(place, slot, lanes), f"{name} = load {slot.type}, ptr {place}, align 8"]
 
 
-def _keep(name: str, slot: _Slot, lanes: int) -> list[str]:
+def _store(name: str, slot: _Slot, lanes: int) -> list[str]:
     place = f"%to{name[2:]}"
     return [_address(place, slot, lanes), f"store {slot.type} {name}, ptr {place}, align 8"]
 

@@ -22,21 +22,21 @@ from pathlib import Path
 from saltus import cache
 from saltus.codegen import machine, templates
 from saltus.codegen.announce import announce
-from saltus.codegen.asker import ASKED_BY
+from saltus.codegen.asker import PARENT_ID
 from saltus.errors import CacheError
 from saltus.interrupt import check_stop
 
-#: Time between two looks whether the work is to stop [s].
-LOOK = 0.1
-#: Seconds of LLVM's work for a million characters of an equation, and for a template: for people who wait.
+#: Time between two checks for a stop [s].
+CHECK_INTERVAL = 0.1
+#: Seconds of LLVM's work for a million characters of an equation, and for a template, as announced.
 SECONDS_PER_MEGABYTE, SECONDS_OF_TEMPLATE, SECONDS_OF_LOWERING = 1.0, 2.5, 20.0
-#: What takes longer is made by another process; what takes longer than this is announced [s].
-LONG, ANNOUNCED = 0.5, 1.0
-#: Objects that are held in memory.
-_HELD = 32
+#: Durations from which another process compiles, and from which a compilation is announced [s].
+OTHER_PROCESS, ANNOUNCEMENT = 0.5, 1.0
+#: Objects in memory.
+_MAX_OBJECTS = 32
 
 _COMPILING: weakref.WeakSet[subprocess.Popen] = weakref.WeakSet()
-#: One thread at a time sees to an object.
+#: One lock for each object.
 _LOCKS: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
 _OBJECTS: OrderedDict[str, bytes] = OrderedDict()
 
@@ -99,12 +99,12 @@ def built(order: Order) -> bytes:
         if found is None:
             found = cache.read(order.key)
         if found is None:
-            if order.said and order.seconds > ANNOUNCED:
+            if order.said and order.seconds > ANNOUNCEMENT:
                 announce(order.said, order.seconds)
-            found = (_made_elsewhere(order) if order.seconds > LONG else None) or made(order)
+            found = (_made_elsewhere(order) if order.seconds > OTHER_PROCESS else None) or made(order)
             cache.keep(order.key, order.title, found)
         _OBJECTS[order.key] = found
-        while len(_OBJECTS) > _HELD:
+        while len(_OBJECTS) > _MAX_OBJECTS:
             _OBJECTS.popitem(last=False)
         return found
 
@@ -141,8 +141,8 @@ def bitcode(name: str) -> bytes:
 
 @contextmanager
 def _held(lock: threading.Lock) -> Iterator[None]:
-    """Hold a lock; who is asked to stop while it waits for one stops."""
-    while not lock.acquire(timeout=LOOK):
+    """Hold a lock; a stop is heeded while waiting for it."""
+    while not lock.acquire(timeout=CHECK_INTERVAL):
         check_stop()
     try:
         yield
@@ -163,7 +163,7 @@ def _made_elsewhere(order: Order) -> bytes | None:
         If the work that this thread does a part of was asked to stop.
     """
     if order.template:
-        bitcode(order.template)  # made and kept first, if it must be
+        bitcode(order.template)  # made first if it isn't current
     given = json.dumps([order.template, order.texts, order.called, machine.target(), order.open_sizes]).encode()
     return _answer_of("saltus.codegen.build_one", (), given, order.title)
 
@@ -171,7 +171,7 @@ def _made_elsewhere(order: Order) -> bytes | None:
 def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) -> bytes | None:
     """What a module writes when it is run by another process and given these bytes; None if there is none, or it doesn't succeed."""
     path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = {**os.environ, "PYTHONPATH": path, ASKED_BY: str(os.getpid())}
+    environment = {**os.environ, "PYTHONPATH": path, PARENT_ID: str(os.getpid())}
     try:
         with tempfile.TemporaryFile() as file:  # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
             file.write(given)
@@ -198,7 +198,7 @@ def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) 
 def _wait(process: subprocess.Popen) -> bytes:
     while True:
         try:
-            return process.communicate(timeout=LOOK)[0]
+            return process.communicate(timeout=CHECK_INTERVAL)[0]
         except subprocess.TimeoutExpired:
             check_stop()
 

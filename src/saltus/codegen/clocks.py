@@ -1,4 +1,4 @@
-"""The clocks of a system in generated code: what kernels/clocks.py needs to know, and the code that reads what it holds."""
+"""The clocks of a system in generated code: the tables of kernels/clocks.py, and the code that reads its state."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def _switch_numbers(gap: Expr) -> tuple[int, tuple[Expr, ...]]:
 
 
 def _line(node: Expr) -> tuple[Expr, Expr]:
-    """Rate and offset of the time that a remainder or table looks at."""
+    """Rate and offset of the argument of a remainder or table."""
     line = affine(node.args[0])
     assert line is not None, "a system holds remainders and tables of rate*t + offset only"
     return line

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 
 _VALUE = re.compile(r"\bs\d+\b")
-#: A constant in all lanes: what is loaded from a table, or a literal.
+#: A constant in all lanes: a load from a table, or a literal.
 _CONSTANT = re.compile(r"(?!load\(y,)\w+\([^()]*\)")
 
 
@@ -53,7 +53,7 @@ class Lines:
             self._shared.append(("", code))
 
     def shared(self, first: int = 0) -> Iterator[str]:
-        """The shared lines; what is handed to the columns is stored to the rows of ``work`` from ``first`` on."""
+        """The shared lines; values for the columns are stored to the rows of ``work`` from ``first`` on."""
         for names, code in self._shared:
             yield f"{names} = {code}" if names else code
             for name in names.split(", "):

@@ -29,7 +29,7 @@ LAST_EXACT_DIVISOR = 12
 SINE = 12
 
 
-#: What makes a coefficient differ from step to step.
+#: Operations whose coefficients differ from step to step.
 MOVING = ("select", "held")
 
 
@@ -144,7 +144,7 @@ class JetCode:
 
     # -- sums -------------------------------------------------------------------------------------------------------------------
     def _sum(self, products: list[tuple[str, str] | tuple[str]], start: str | None = None) -> str | None:
-        """``start + a*b + ...`` as a chain of fused multiply-adds, what is known last at its end."""
+        """``start + a*b + ...`` as a chain of fused multiply-adds, the latest value at its end."""
         total = start
         for factors in sorted(products, key=lambda factors: self._wait(" ".join(factors))):
             if len(factors) == 1:
@@ -183,7 +183,7 @@ class JetCode:
         return total
 
     def _term(self, series: Series, coefficient: Expr, k: int) -> tuple[str, Expr] | None:
-        """Coefficient k of a series and what it is multiplied by: a forcing's amplitude goes into its recurrence, once for all k."""
+        """Coefficient k of a series and its factor: a forcing's amplitude goes into its recurrence, once for all k."""
         frequency = self._time_frequency(series.operands[0]) if series.kind in ("sin", "cos") else None
         if frequency is not None and abs(_number(coefficient)) != 1.0:
             part = "sine" if series.kind == "sin" else "cosine"

@@ -5,8 +5,8 @@ Two tiers give the same bits, for they are the same operations in the same order
 generic   the templates' machine code serves all equations and is on disk; only the equation is compiled, in a fraction of a second
 full      sizes, tables and the equation are known to the compiler: one piece of code
 
-A flow begins generic. Once it has worked for `STEADY_AFTER` seconds another process makes it again; it is kept on disk, and exchanged
-between two calls. The next process finds it there and begins with it.
+A flow begins generic. After `STEADY_AFTER` seconds of work another process compiles the full tier, stores it on disk, and the flow changes
+to it between two calls. The next process begins with it.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from saltus.codegen.interface import Interface
 from saltus.codegen.lane_ir import constants_ir, equation_ir
 
 GENERIC, FULL = TIERS = ("generic", "full")
-#: What a flow becomes.
+#: Final tier of a flow.
 STEADY = FULL
-#: Seconds of work after which a flow is made again: making it costs some three seconds of another processor, and gains a tenth.
+#: Seconds of work before the full tier is compiled: that takes some three seconds of another processor, and gains a tenth.
 STEADY_AFTER = 2.0
 #: Constants that the generic code knows too: loops over them are unrolled.
 _BAKED = ("ORDER", "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "HORNER", "FINER", "SHORTEST")
@@ -122,7 +122,7 @@ class Kernels:
         return self._memory.arrays
 
     def propagate(self, *values: Any) -> int:
-        """Call the kernel; kernels/batch.py says what its arrays are. Other threads go on meanwhile."""
+        """Call the kernel, without the GIL; kernels/batch.py describes its arrays."""
         block = self._call.block(values)
         begun = time.perf_counter()
         answer = int(self._entry(block.ctypes.data))

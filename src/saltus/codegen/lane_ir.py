@@ -20,7 +20,7 @@ from saltus.codegen.interface import ARRAY, REAL, WHOLE, Interface
 # Kinds of values: a lane, a mask of lanes, a double, a truth value, a whole number.
 LANE, MASK, NUMBER, TRUTH, INTEGER = "lane", "mask", "number", "truth", "integer"
 
-#: Functions of a head that its others call: what the arguments are that they were given, None as long as nobody has called them.
+#: Functions of a head that its others call: their arguments, None before the first call.
 Helpers = dict[str, tuple[str, ...] | None]
 #: Functions whose arrays hold a lane in each row; those of the others hold numbers.
 OF_LANES = ("jets", "rates")
@@ -324,7 +324,7 @@ class _Body:
                 self.do(f"ret {self.types[found.kind]} {found.text}")
 
     def _helper(self, name: str, arguments: list[ast.expr]) -> None:
-        """Call another function of the head: with arrays, or what is left of them from some row on, and with values."""
+        """Call another function of the head with values and with arrays, whole or from some row on."""
         given = []
         for argument in arguments:
             match argument:
@@ -377,7 +377,7 @@ def _whole(node: ast.expr, names: Mapping[str, Value]) -> int:
 
 
 class _Signature(NamedTuple):
-    """What the arguments of a function are, what it returns, its attributes, and how many numbers are a row of its arrays."""
+    """Arguments of a function, its result and attributes, and the numbers in a row of its arrays."""
 
     arguments: tuple[str, ...]
     result: str
@@ -403,7 +403,7 @@ def _function(
 
 @cache
 def _trigonometry(lanes: int) -> tuple[str, frozenset[str]]:
-    """sincos, turned and two_product of kernels/trigonometry.py, and what they declare."""
+    """sincos, turned and two_product of kernels/trigonometry.py, and their declarations."""
     tree = templates.tree_of(templates.text("trigonometry"))
     numbers = _numbers_of(tree)
     vector, declared = f"<{lanes} x double>", set[str]()

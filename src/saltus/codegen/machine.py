@@ -153,5 +153,5 @@ def loaded(objects: Sequence[bytes], symbol: str) -> Loaded:
             keeper = library.add_current_process().export_symbol(symbol).link(_jit(), f"saltus{next(_NUMBER)}")
         except RuntimeError as error:
             why = " ".join(str(error).split())
-            raise CacheError(f"a compiled kernel can't be loaded: {shown(why, 200)}. Delete what is kept: saltus cache clear.") from error
+            raise CacheError(f"a compiled kernel can't be loaded: {shown(why, 200)}. Delete the cache: saltus cache clear.") from error
     return Loaded(keeper[symbol], keeper)

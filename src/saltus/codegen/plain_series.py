@@ -18,7 +18,7 @@ from saltus.system.system import System
 def series_module(system: System, order: int) -> ModuleType:
     """Jets and step length of a system, as its Taylor flow compiles them.
 
-    It is for what looks at a motion that a flow has computed already. Nothing is compiled, so a new function costs no time.
+    It evaluates a motion that a flow has computed. Nothing is compiled, so a new function costs no time.
     """
     return _plain(taylor_head(system, order, 1).text)
 

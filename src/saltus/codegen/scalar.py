@@ -84,7 +84,7 @@ class ScalarCode:
         self._names: dict[Expr, str] = {}
 
     def value(self, root: Expr) -> str:
-        """Code for the value of an expression; emits what it needs."""
+        """Code for the value of an expression; emits the lines before it."""
         self._emit(self._needed(root))
         return self._name(root)
 

@@ -113,7 +113,7 @@ class SeriesBuilder:
         return self._clocks.row_of_side(relation)
 
     def may_hide(self) -> bool:
-        """Whether some series can be asleep where it is expanded and awake within the step, so that its coefficients don't tell.
+        """Whether some series can be negligible where it is expanded and large within the step, so that its coefficients don't show it.
 
         ``tanh`` and ``exp`` far from their bend, a high power of time: all but sums and products of states and harmonics of time.
         """
@@ -146,7 +146,7 @@ class SeriesBuilder:
         return self._unit(self._make(node.op, (self._as_series(forms[0]),)))
 
     def _polynomial(self, node: Expr) -> Linear:
-        """The present piece of a remainder or a table: what its clock holds, times powers of the time since its reference."""
+        """The present piece of a remainder or a table: the coefficients in its clock, times powers of the time since its reference."""
         assert self._clocks is not None
         offset, *rest = (Expr("held", (), row) for row in self._clocks.rows_of_coefficients(node))
         since = self._make("since", (), self._clocks.row_of_reference(node))

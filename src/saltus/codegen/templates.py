@@ -16,7 +16,7 @@ from saltus.errors import CacheError
 
 #: Widths of a step of the Taylor flow.
 WIDTHS = (2, 4, 8, 16)
-#: Every bitcode: what it is made of, and lanes.
+#: Interface and lanes of every bitcode.
 BITCODE: dict[str, tuple[Interface, int]] = {
     **{f"taylor_{lanes}": (TAYLOR, lanes) for lanes in WIDTHS}, "ode45": (ODE45, 1), "capture": (CAPTURE, 1),
 }  # fmt: skip
@@ -52,7 +52,7 @@ def source_hash(name: str) -> str:
 
 @cache
 def text_hash(name: str) -> str:
-    """The same with every character: quick, and what isn't changed at all is current."""
+    """The same of the texts to the character: quick, and enough for unchanged files."""
     return _hash(name, _texts(name))
 
 
@@ -125,13 +125,13 @@ def is_current(name: str) -> bool:
 
 
 def identity(name: str) -> str:
-    """What a bitcode is called in the names of what is made of it."""
+    """Name of a bitcode in the keys of the code made from it."""
     return str(manifest()["bitcode"][name]["sha256"]) if is_current(name) else source_hash(name)
 
 
 @cache
 def open_names_of(interface: Interface) -> tuple[str, ...]:
-    """The names of a layout whose values depend on what is open, in the order in which they are computed."""
+    """The names of a layout whose values depend on open sizes, in the order in which they are computed."""
     if not interface.layout:
         return ()
     unknown, found = {*interface.sizes, *interface.flags, *interface.tables}, list[str]()

@@ -84,7 +84,7 @@ def test_wherever_a_function_is_cut_its_numbers_are_the_same(monkeypatch):
 
 
 def test_an_equation_whose_values_would_overrun_the_stack_is_refused(monkeypatch):
-    monkeypatch.setattr(blocks, "MOST_KEPT", 100)
+    monkeypatch.setattr(blocks, "MAX_STACK", 100)
     with pytest.raises(sl.SaltusError, match="too long to be compiled"):
         equation(row_of_masses(8), 4)
 

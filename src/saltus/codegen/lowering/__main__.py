@@ -29,7 +29,7 @@ def made(name: str) -> tuple[bytes, dict]:
 
 
 def main() -> None:
-    """Make what isn't current, or all of it."""
+    """Make the bitcode that isn't current, or all of it."""
     if os.environ.get("PYTHONHASHSEED") != "0":  # Numba goes through sets: their order is part of the bitcode
         os.environ["PYTHONHASHSEED"] = "0"
         os.execv(sys.executable, [sys.executable, "-P", "-m", "saltus.codegen.lowering", *sys.argv[1:]])

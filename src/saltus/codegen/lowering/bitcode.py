@@ -52,7 +52,7 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
 
 
 def _advise(function: llvm.ValueRef, inlined: set[str]) -> None:
-    """Tell LLVM what is to be inlined and what is rarely run."""
+    """Mark the functions that LLVM inlines, and those that rarely run."""
     own = function.name.split(".")[1] if "." in function.name else function.name
     if own in NOINLINE:
         function.add_function_attribute("noinline")
@@ -90,7 +90,7 @@ def _caller(function: llvm.ValueRef, symbol: str, name: str) -> str:
 
 
 def _shrink(module: llvm.ModuleRef) -> None:
-    """Drop what nobody calls, and simplify what is simple for every size and processor."""
+    """Drop unused functions, and simplify independently of sizes and processor."""
     llvm.initialize_native_target()
     machine = llvm.Target.from_triple(module.triple).create_target_machine()
     builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))

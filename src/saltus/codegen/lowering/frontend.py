@@ -15,7 +15,7 @@ from numba.core import codegen
 from numba.core.compiler_lock import global_compiler_lock
 
 from saltus.codegen.interface import Interface
-from saltus.codegen.lowering import lane_types, open_names  # noqa: F401  (lane_types: for what it registers)
+from saltus.codegen.lowering import lane_types, open_names  # noqa: F401  (lane_types: registers its types)
 from saltus.codegen.templates import open_names_of, text
 from saltus.kernels import batch, clocks_layout, lanes, parts, status
 
@@ -78,7 +78,7 @@ class _Space:
         return self._built[module]
 
     def fill(self, names: dict[str, Any], module: str, opener: _Opener) -> dict[str, Any]:
-        """Run what is to be compiled of a module in these names."""
+        """Run the kernels of a module in these names."""
         tree = ast.parse(text(module))
         for node in tree.body:
             if isinstance(node, ast.ImportFrom) and str(node.module).startswith("saltus.kernels."):
@@ -86,9 +86,9 @@ class _Space:
                 if home != "marks":
                     source = self.imported(home)
                     names.update({alias.asname or alias.name: source[alias.name] for alias in node.names})
-        kept = ast.Module(list(_kernels_only(tree)), [])
-        self.inlined |= {node.name for node in kept.body if isinstance(node, ast.FunctionDef) and _mark(node) == "inner"}
-        exec(compile(ast.fix_missing_locations(opener.visit(kept)), f"{module}.py", "exec"), names)
+        kernels = ast.Module(list(_kernels_only(tree)), [])
+        self.inlined |= {node.name for node in kernels.body if isinstance(node, ast.FunctionDef) and _mark(node) == "inner"}
+        exec(compile(ast.fix_missing_locations(opener.visit(kernels)), f"{module}.py", "exec"), names)
         return names
 
 
