@@ -75,7 +75,9 @@ class Kinds:
         """Raise ParameterError for the first of the arguments that is of another kind, or has masked numbers."""
         for name, value in given.items():
             if has_mask(value):
-                raise ParameterError(f"{caller}: {name} has masked numbers, and a mask isn't kept. Leave them out: array.compressed().")
+                raise ParameterError(
+                    f"{caller}: {name} has masked numbers, and masks aren't supported. Leave them out: array.compressed()."
+                )
             kinds = self._of.get(name)
             if kinds and not any(_KINDS[kind][0](value) for kind in kinds):
                 words = [_KINDS[kind][1] for kind in kinds if kind != "None"]

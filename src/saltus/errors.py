@@ -53,7 +53,7 @@ class UnusedParameterWarning(SaltusWarning):
 
 
 def _cut(message: str) -> str:
-    """A message without its middle, if it is too long: it begins with what is wrong, and ends with what to do."""
+    """A message without its middle, if it is too long: the error comes first, the advice last."""
     if len(message) <= LONGEST:
         return message
     first, last = LONGEST * 2 // 3, LONGEST // 4
@@ -78,7 +78,7 @@ class _Repr(reprlib.Repr):
 
 
 def shown(value: object, limit: int = 80) -> str:
-    """A value as a message shows it: at most so many characters of it, on one line."""
+    """A value as a message shows it: on one line, cut if it is long."""
     try:
         text = _Repr().repr(value)
     except Exception:  # whatever an object of somebody else does when it is looked at
@@ -99,6 +99,6 @@ def nearest(name: object, known: Iterable[str]) -> str:
         return f"Known: {', '.join(sorted(known))}."
     alike = unicodedata.normalize("NFKC", name)
     if alike != name and alike in known:
-        return f"Write {alike!r} ({alike!a}), which is how Python reads {name!r} ({name!a}) in the function: they only look alike."
+        return f"Write {alike!r} ({alike!a}), which is how Python reads {name!r} ({name!a}) in the function: they only appear alike."
     close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     return f"Did you mean {close[0]!r}?" if close else f"Known: {', '.join(sorted(known))}."

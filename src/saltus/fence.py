@@ -14,7 +14,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-#: Most bytes of a study, and of a table that it names.
+#: Largest study, and largest table that it names [bytes].
 STUDY_BYTES, TABLE_BYTES = 1_000_000, 10_000_000
 #: Most bytes of a file of JSON in a store.
 STORED_BYTES = 100_000_000
@@ -22,7 +22,7 @@ STORED_BYTES = 100_000_000
 PARTS, LEVELS = 100, 20
 #: Most characters of a key.
 KEY = 100
-#: Largest whole numbers that mean something: of periods, whose times keep some digits; of what is counted in memory.
+#: Largest whole numbers allowed: of periods, whose times keep some digits; of objects in memory.
 MOST_PERIODS, MOST_COUNT = 10**12, 2**31 - 1
 #: Characters of a value that a message repeats.
 SHOWN = 80
@@ -50,7 +50,7 @@ class RefusedError(ValueError):
 
 # -- files ---------------------------------------------------------------------------------------------------------------------
 def regular(path: Path) -> None:
-    """Refuse what is no regular file: a folder, a pipe that would be waited on for ever, a device that never ends."""
+    """Refuse anything but a regular file: a folder, a pipe that would block for ever, a device that never ends."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError) as error:
@@ -113,7 +113,7 @@ def shown(value: object, most: int = SHOWN) -> str:
 
 
 def csv_cell(value: Any) -> Any:
-    """A cell that no spreadsheet takes for a formula: one that looks like it gets an apostrophe, as spreadsheets have it."""
+    """A cell that no spreadsheet takes for a formula: one that begins like a formula gets an apostrophe."""
     if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r") and not _NUMBER.fullmatch(value):
         return f"'{value}"
     return value

@@ -85,7 +85,7 @@ def ctrl_c_waits() -> Iterator[None]:
 def no_ctrl_c_is_lost() -> Iterator[None]:
     """Within, a Ctrl-C that Python drops is pressed again.
 
-    It drops one that comes while it tells a weak reference, or a finalizer, that an object has gone: nobody could catch what is raised
+    It drops one that comes in the callback of a weak reference, or in a finalizer: nobody could catch what is raised
     there, so it is handed to ``sys.unraisablehook``, which prints it and goes on.
     """
     before = sys.unraisablehook
@@ -149,7 +149,7 @@ class Stop:
         _CURRENT.set(self)
 
 
-#: What the work in this context asks whether it is to stop; None where Ctrl-C itself arrives.
+#: The stop flag of the work in this context; None where Ctrl-C itself arrives.
 _CURRENT: ContextVar[Stop | None] = ContextVar("stop", default=None)
 
 

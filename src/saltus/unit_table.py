@@ -4,7 +4,7 @@ A unit that isn't in the table is refused; none is guessed. The vocabulary of a 
 is a measure of yarn and ``mil`` an angle. Symbols that mean different things to different people (``g``, ``lb``, ``mil``) are marked
 :attr:`Unit.doubtful`.
 
-Factors are decimals of 60 digits. Powers of pi are counted beside them, so that 900 rpm are 15 Hz exactly.
+Factors are decimals of 60 digits. Powers of pi are counted separately, so that 900 rpm are 15 Hz exactly.
 """
 
 from __future__ import annotations

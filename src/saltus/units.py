@@ -1,10 +1,10 @@
 """Units at the edge: text such as ``"0.4 mm"`` becomes a number in SI here, and nowhere below.
 
 A declared unit is a product of coherent SI units (``"m"``, ``"N/m^3"``, ``"Hz"``, ``"rad/s"``, ``"1"``), so that a bare number always means
-SI. The angle is kept as a dimension of its own where it decides between a frequency [Hz] and an angular frequency [rad/s]: ``"94.2 rad/s"``
+SI. The angle is a dimension of its own where it decides between a frequency [Hz] and an angular frequency [rad/s]: ``"94.2 rad/s"``
 given to a parameter in Hz is divided by 2 pi, and a bare rate in 1/s, which could mean either, is refused.
 
-Which units can be read is told by a table of our own (unit_table.py, docs/decisions/0020). Its arithmetic runs on decimals: ``"0.4 mm"`` is
+The units that can be read are in a table of our own (unit_table.py, docs/decisions/0020). Its arithmetic runs on decimals: ``"0.4 mm"`` is
 the double nearest to 0.0004, ``"900 rpm"`` is 15 Hz exactly.
 """
 
@@ -74,7 +74,7 @@ _LIKE_DECLARED = "'N/m', 'N*s/m', 'kg*m^2/s^2' or '1'"
 
 
 def coherent_unit(text: str, name: str) -> str:
-    """The coherent SI unit in which a text value is kept: ``"14 kN/m"`` gives ``"N/m"``, ``"0.4 mm"`` gives ``"m"``, ``"2 lbf/in"`` gives
+    """The coherent SI unit in which a text value is stored: ``"14 kN/m"`` gives ``"N/m"``, ``"0.4 mm"`` gives ``"m"``, ``"2 lbf/in"`` gives
     ``"N/m"``, ``"900 rpm"`` gives ``"rad/s"``.
 
     Raises

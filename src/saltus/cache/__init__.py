@@ -1,8 +1,8 @@
-"""What saltus keeps from one process to the next, by what it was made of: safe to lose, and this user's alone.
+"""The cache that processes share, keyed by the inputs of each entry: safe to lose, and private to this user.
 
-Compiled kernels, one for each (equations, templates, versions, processor); and the hash of saltus's code, by that of its text. A kernel is
-code, so a folder or a file that others could have written to is never used: kernels are then compiled for this process only, and kept in
-its memory. An entry is written beside the others and renamed into place, so processes that start cold at once can't disturb each other; its
+Compiled kernels, one for each (equations, templates, versions, processor); and the hash of saltus's code, by that of its text. A kernel
+is code, so a folder or a file that others could have written to is never used: kernels are then compiled for this process only, in its
+memory. An entry is written under another name and renamed into place, so processes that start cold at once can't disturb each other; its
 checksum is verified before anything of it is used, and a damaged one is made again.
 """
 
@@ -20,7 +20,7 @@ import platformdirs
 from saltus.cache import entry
 from saltus.errors import SaltusWarning
 
-#: Ends of the names of entries, by what they hold.
+#: Suffixes of the names of entries, by content.
 KERNEL, HASH = ".kernel", ".hash"
 _CALLED = {KERNEL: "compiled kernel", HASH: "hash of the code"}
 #: Age from which an unfinished entry belongs to a process that was killed, and from which the hash of code is one of old code [s].
@@ -29,7 +29,7 @@ _ABANDONED, _OLD = 86_400.0, 30 * 86_400.0
 
 @dataclass(frozen=True)
 class Entry:
-    """One cached object: its key, what it was made for, its size [bytes] and its file."""
+    """One cached object: its key, its system, its size [bytes] and its file."""
 
     name: str
     system: str

@@ -16,9 +16,9 @@ from pathlib import Path
 
 #: First word of an entry; another one is another format.
 FORMAT = "saltus-kernel/1"
-#: Beginning of the names of those that aren't whole yet.
+#: Prefix of the names of unfinished entries.
 DRAFT = ".building-"
-#: Most bytes of an entry: some hundred times what the largest equations take.
+#: Largest entry [bytes]: some hundred times those of the largest equations.
 MOST = 1 << 28
 #: Bits of a mode with which others than the owner may write.
 _GROUP, _OTHERS = stat.S_IWGRP, stat.S_IWOTH
@@ -89,8 +89,8 @@ def read(path: Path) -> bytes:
     """
     header, data = _split(_content(path))
     try:
-        told = json.loads(header)
-        whole = told["format"] == FORMAT and told["key"] == path.stem and told["sha256"] == hashlib.sha256(data).hexdigest()
+        fields = json.loads(header)
+        whole = fields["format"] == FORMAT and fields["key"] == path.stem and fields["sha256"] == hashlib.sha256(data).hexdigest()
     except (ValueError, KeyError, TypeError, RecursionError):
         whole = False
     if not whole:

@@ -1,6 +1,6 @@
 """The command `saltus`. No logic here: read what was typed, call :mod:`saltus.study`, show the tables that it returns.
 
-This module imports typer and nothing else that is heavy, so that ``saltus --help`` is there at once; each command imports what it needs.
+This module imports typer and nothing else that is heavy, so that ``saltus --help`` is there at once; each command imports its own modules.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def main() -> None:
 
 
 def _replace_closed_streams() -> None:
-    """Let what is printed to a closed standard stream (``>&-``) go nowhere; else the next file that is opened would take its place."""
+    """Discard output to a closed standard stream (``>&-``); else the next file opened would take its place."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)

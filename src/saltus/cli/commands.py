@@ -1,4 +1,4 @@
-"""The commands. Each help teaches with an example; each imports what it needs when it runs."""
+"""The commands. Each help has an example; each imports its modules when it runs."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def run(
     only: Only = None,
     inputs: Annotated[
         list[Path] | None,
-        typer.Option(help="A folder beside the study's own in which it may read the files that it names; may be given again."),
+        typer.Option(help="Another folder in which the study may read the files that it names; may be given again."),
     ] = None,
     threads: Threads = None,
     workers: Workers = None,
@@ -113,8 +113,8 @@ def run(
     """Run a study file: answer its questions, print their tables, keep data and pictures.
 
     A study names a model of saltus and its values; it never runs code, and reads no file outside its folder unless you allow it with
-    --inputs. A system of your own is given here, by you. What is computed is kept: stopped at any moment, by anything, a study goes on
-    where it was when it is run again. An answer that is there isn't computed twice, unless what it depends on changed.
+    --inputs. A system of your own is given here, by you. Results are stored: a study stopped at any moment, by anything, goes
+    on where it was when it is run again. An answer isn't computed twice unless its inputs changed.
 
     Example: `saltus run replications/saunders2021/table2.toml`
 
@@ -158,7 +158,7 @@ def _run(
         with screen.reporting(progress.value) as (report, say):
             outcome = run_study(spec, text, folder, own, resources, report, say, inputs=inputs, only=only)
     except KeyboardInterrupt:
-        screen.fail(f"stopped; what is computed is kept. Go on with: {again}")
+        screen.fail(f"stopped; results so far are stored. Go on with: {again}")
         raise
     for table in outcome.tables:
         screen.show(table)
@@ -198,7 +198,7 @@ def resume(
     shard: Shard = "",
     progress: ProgressKind = Progress.bar,
 ) -> None:
-    """Go on with a study that was stopped: only what is missing or damaged is computed.
+    """Go on with a study that was stopped: only missing or damaged results are computed.
 
     Example: `saltus resume saltus-runs/fig6b`
     """
@@ -246,11 +246,11 @@ def reproduce(
 ) -> None:
     """Redraw a published paper's figures and hold each of its claims against exact arithmetic: one HTML report.
 
-    Every claim gets a verdict (holds, holds in part, does not hold, not decidable), computed from the data by a rule that stands beside
-    it. Stopped at any moment, it goes on where it was when it is run again; what is computed already isn't computed twice.
+    Every claim gets a verdict (holds, holds in part, does not hold, not decidable), computed from the data by a rule printed with
+    it. Stopped at any moment, it goes on where it was when it is run again; nothing is computed twice.
 
     Writes report.html; claims.csv, each claim with the answers and the verdict in a row; the data and the pictures. Of some figures only:
-    report-fig8.html and claims-fig8.csv, beside those of all figures. Exit code 1 if something could not be computed; the report says what.
+    report-fig8.html and claims-fig8.csv, next to those of all figures. Exit code 1 if something could not be computed; see the report.
 
     Example: `saltus reproduce saunders2021 --quick`
 
@@ -263,7 +263,7 @@ def reproduce(
     from saltus.study.table import TextTable
 
     if not paper:
-        screen.show(TextTable("Papers; `saltus reproduce NAME` does one", ("name", "what it is"), tuple(replication.names().items())))
+        screen.show(TextTable("Papers; `saltus reproduce NAME` does one", ("name", "title"), tuple(replication.names().items())))
         return
     chosen = replication.find(paper)
     folder = out or Path("saltus-runs") / (f"{paper}-quick" if quick else paper)
@@ -272,7 +272,7 @@ def reproduce(
         with screen.reporting("bar") as (report, say):
             result = replication.reproduce(chosen, folder, figure or (), quick, threads, report, say)
     except KeyboardInterrupt:
-        screen.fail(f"stopped; what is computed is kept in {folder}. Go on with the same command.")
+        screen.fail(f"stopped; results so far are stored in {folder}. Go on with the same command.")
         raise
     screen.show(replication.verdict_table(result))
     screen.files([result.report, result.claims_file])
@@ -298,7 +298,7 @@ def models(
         screen.say(repr(published.find(name)()))
         screen.say(f'energy      sl.models.energy("{name}"), as sl.energy_balance takes it')
     else:
-        screen.show(TextTable("Models; `saltus models NAME` shows one", ("name", "what it is"), tuple(published.describe().items())))
+        screen.show(TextTable("Models; `saltus models NAME` shows one", ("name", "description"), tuple(published.describe().items())))
 
 
 @app.command()
@@ -354,12 +354,12 @@ def cache_show() -> None:
 
     Example: `saltus cache show`
     """
-    from saltus import cache as kept
+    from saltus import cache as entries
     from saltus.cli import screen
     from saltus.study.table import TextTable
 
-    rows = tuple((entry.name[:12], entry.system, f"{entry.size_bytes / 1e6:.2f}") for entry in kept.kernels())
-    screen.show(TextTable(f"Kernels in {kept.folder()}", ("entry", "system", "MB"), rows))
+    rows = tuple((entry.name[:12], entry.system, f"{entry.size_bytes / 1e6:.2f}") for entry in entries.kernels())
+    screen.show(TextTable(f"Kernels in {entries.folder()}", ("entry", "system", "MB"), rows))
 
 
 @cache.command("clear")
@@ -373,12 +373,12 @@ def cache_clear(
 
     Example: `saltus cache clear`
     """
-    from saltus import cache as kept
+    from saltus import cache as entries
     from saltus.cli import screen
     from saltus.results.files import known
 
-    count = kept.clear()
-    screen.say(f"deleted {count} {'entry' if count == 1 else 'entries'} from {kept.folder()}")
+    count = entries.clear()
+    screen.say(f"deleted {count} {'entry' if count == 1 else 'entries'} from {entries.folder()}")
     if everything:
         screen.say(f"forgot {_result_files(known.forget())}")
     elif left := known.count():

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-#: What is called with the share done, if anything.
+#: Callable that takes the share done, or None.
 Progress = Callable[[float], None] | None
 #: Starts (x [m], v [m/s]): the four that Saunders et al. (2021), Fig. 5, name; then 1.9 mm, which reaches the 4T that they report from 2 mm
 #: (there the outcome changes from one nanometre to the next); and a high one, which reaches the T-periodic response.
@@ -66,7 +66,7 @@ def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods:
     case : str
         ``"a"``, ``"b"`` or ``"c"``.
     periods : int
-        Forcing periods to run; the last 96 (or all, if fewer) are kept.
+        Forcing periods to run; the last 96 (or all, if fewer) are recorded.
     progress : callable, optional
         Called with the share done.
 
@@ -81,11 +81,11 @@ def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods:
 
     rig = models.delangre(case, force=force, frequency=frequency)
     x, v = np.array(STARTS).T
-    kept = min(LAST, periods)
-    run = simulate(rig, start={"x": x, "v": v}, periods=periods, keep=kept, progress=progress or False)
+    recorded = min(LAST, periods)
+    run = simulate(rig, start={"x": x, "v": v}, periods=periods, keep=recorded, progress=progress or False)
     twins = {"x": np.concatenate([x - NEIGHBOUR, x + NEIGHBOUR]), "v": np.tile(v, 2)}
-    beside = stroboscope(rig, start=twins, periods=periods, keep=kept + 1)
-    neighbours = settled(beside)["response_period"].values.reshape(2, len(STARTS))
+    twin_run = stroboscope(rig, start=twins, periods=periods, keep=recorded + 1)
+    neighbours = settled(twin_run)["response_period"].values.reshape(2, len(STARTS))
     found = settled(run)
     title = f"deLangre rig, case {case}, {force} at {frequency}, {periods} forcing periods"
     return Demo(run, found, neighbours, _table(run, found, neighbours, title))
@@ -113,7 +113,7 @@ def _pyplot() -> Any:
 
 
 def draw(result: Demo, file: Path) -> Path:
-    """A row for each start, the time history and the phase portrait of what it settles to; returns the file."""
+    """A row for each start, the time history and the phase portrait of its response; returns the file."""
     plt = _pyplot()
     from saltus import plot
 
@@ -134,7 +134,7 @@ def draw(result: Demo, file: Path) -> Path:
 
 
 def _handles(axes: Iterable[Axes]) -> Iterator[tuple[Any, str]]:
-    """What stands in the legends of all axes."""
+    """Legend entries of all axes."""
     for one in axes:
         yield from zip(*one.get_legend_handles_labels(), strict=True)
 
@@ -142,13 +142,13 @@ def _handles(axes: Iterable[Axes]) -> Iterator[tuple[Any, str]]:
 def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: str) -> TextTable:
     texts, periods = response_texts(run), found["response_period"].values.tolist()
     statuses = run["status"].values.astype(str).tolist()
-    beside = [_beside(n, neighbours[:, i].tolist()) for i, n in enumerate(periods)]
+    shifted = [_shifted(n, neighbours[:, i].tolist()) for i, n in enumerate(periods)]
     counts = [float(count) if n else None for n, count in zip(periods, found["contacts_per_response"].values, strict=True)]
     x, v = zip(*STARTS, strict=True)
     columns = [
         Column("start x, v", _start, {"start x [m]": x, "start v [m/s]": v}),
         words("settles to", [text if status == "ok" else f"{text} ({status})" for text, status in zip(texts, statuses, strict=True)]),
-        words("1 nm off", beside),
+        words("1 nm off", shifted),
         Column("contacts", lambda i: "-" if counts[i] is None else f"{counts[i]:g} in {texts[i]}", {"contacts in a response": counts}),
         quantity("peak |x|", found["x_peak"].values, "m"),
         quantity("rms x", found["x_rms"].values, "m"),
@@ -159,13 +159,13 @@ def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: st
         f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. Stability isn't examined."
         + (f" States repeat to {float(found['mismatch'].where(periodic).max()):.0e} of their range." if periodic.any() else "")
     ]
-    if set(beside) - {"same", "-"}:
+    if set(shifted) - {"same", "-"}:
         notes.append("Where a start 1 nm away settles to something else, no experiment and no other program need agree.")
     return table(title, columns, notes)
 
 
-def _beside(n: int, neighbours: list[int]) -> str:
-    """What the neighbours of a start settle to, if it settles itself."""
+def _shifted(n: int, neighbours: list[int]) -> str:
+    """Responses of the neighbours of a start, if it settles itself."""
     if n == 0:
         return "-"
     return "same" if set(neighbours) == {n} else ", ".join(map(period_text, neighbours))

@@ -94,8 +94,8 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
         if kind == "json" and (now - shown[0] > 1.0 or report.last):
             shown[0] = now
             left = report.seconds_left
-            told = {"question": report.name, "done": report.done, "total": report.total, "seconds": report.seconds, "seconds_left": left}
-            print(json.dumps(told), file=sys.stderr, flush=True)  # noqa: T201
+            fields = {"question": report.name, "done": report.done, "total": report.total, "seconds": report.seconds, "seconds_left": left}
+            print(json.dumps(fields), file=sys.stderr, flush=True)  # noqa: T201
 
     def note_json(text: str) -> None:
         if kind == "json":

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from saltus.results.provenance import content_hash
 from saltus.study.code import statement_hash
 from saltus.study.identity import identity
-from saltus.study.run.kept import kept_or_computed
+from saltus.study.run.stored import load_or_compute
 from saltus.study.tables.parts import slug
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Job:
             new.append(True)
             return ds.assign_attrs({SECONDS: time.perf_counter() - begin})
 
-        return kept_or_computed(slug(self.name), self.name, self.identity(inputs), compute, at), bool(new)
+        return load_or_compute(slug(self.name), self.name, self.identity(inputs), compute, at), bool(new)
 
 
 @cache

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from saltus import cache as kept
+from saltus import cache as disk_cache
 
 #: The folder of saltus.
 PACKAGE = Path(__file__).parents[1]
@@ -18,7 +18,7 @@ PACKAGE = Path(__file__).parents[1]
 COMPUTING = (
     "fence", "intervals", "interrupt", "unit_table", "units", "cache", "system", "kernels", "codegen", "flow", "results", "analysis",
 )  # fmt: skip
-#: What a node of Python's syntax has that says nothing about what the code does.
+#: Fields of Python's syntax tree without effect on the code.
 _IDLE = ("kind", "type_comment", "ctx")
 
 
@@ -26,14 +26,14 @@ _IDLE = ("kind", "type_comment", "ctx")
 def code_hash(*places: str) -> str:
     """SHA-256 of the code of packages and modules of saltus, by default of :data:`COMPUTING`.
 
-    To read the syntax takes half a second, so the hash is kept in the cache under that of the text.
+    To read the syntax takes half a second, so the hash is cached under that of the text.
     """
     sources = dict(pair for place in places or COMPUTING for pair in _sources(place))
     key = hash_of({**sources, "": Path(__file__).read_bytes()})
-    found = kept.read(key, kept.HASH)
+    found = disk_cache.read(key, disk_cache.HASH)
     if found is None:
         found = hash_of({name: statement_hash(source).encode() for name, source in sources.items()}).encode()
-        kept.keep(key, "code of saltus", found, kept.HASH)
+        disk_cache.keep(key, "code of saltus", found, disk_cache.HASH)
     return found.decode()
 
 
@@ -61,7 +61,7 @@ def _written(value: Any) -> str:
         fields["body"] = value.body[1:]
     if isinstance(value, ast.JoinedStr):
         fields["values"] = [one for one in value.values if not (isinstance(one, ast.Constant) and one.value == "")]  # 3.12 has such
-    said = sorted((name, one) for name, one in fields.items() if one is not None and one != [])  # versions differ in what is empty
+    said = sorted((name, one) for name, one in fields.items() if one is not None and one != [])  # Python versions differ in empty fields
     return f"{type(value).__name__}({' '.join(f'{name}={_written(one)}' for name, one in said)})"
 
 

@@ -1,4 +1,4 @@
-"""Plain tables: what a study has to say, before anything decides how it looks."""
+"""Plain tables: the results of a study, before formatting."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class TextTable:
     notes : tuple of str
         Sentences that belong under the table.
     data : tuple of tuple of str
-        What a CSV file holds, headings first: plain numbers in SI, the unit in the heading. Without it that is what is shown.
+        Columns of the CSV file by heading: plain numbers in SI, the unit in the heading. Default: the text shown.
     """
 
     title: str
@@ -87,7 +87,7 @@ def quantity(heading: str, values: Any, unit: str, digits: int = 4, name: str | 
 
 
 def interval(heading: str, low: Any, high: Any, text: Callable[[float], str], unit: str = "") -> Column:
-    """A range, shown as ``2 to 4``, or as ``4`` where both ends look the same; ``-`` where there is none."""
+    """A range, shown as ``2 to 4``, or as ``4`` where both ends have the same text; ``-`` where there is none."""
     ends = _floats(low), _floats(high)
 
     def shown(i: int) -> str:

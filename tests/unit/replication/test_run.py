@@ -104,7 +104,7 @@ def test_a_folder_that_can_not_be_written_to_stops_everything(tmp_path, monkeypa
     def full(*_):
         raise ResultFileError("the disk is full")
 
-    monkeypatch.setattr("saltus.study.run.kept.save", full)
+    monkeypatch.setattr("saltus.study.run.stored.save", full)
     with pytest.raises(ResultFileError, match="the disk is full"):
         reproduce(small_paper(), tmp_path)
 

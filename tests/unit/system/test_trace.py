@@ -377,7 +377,7 @@ def test_letters_that_only_look_alike_are_told():
     with pytest.raises(SaltusError, match=r"Write 'μ' \('\\u03bc'\), which is how Python reads 'µ' \('\\xb5'\) in the function"):
         system(states="x v", units={"\u00b5": "1"})(block)
     traced = system(states="x v", units={"\u03bc": "1"})(block)
-    with pytest.raises(SaltusError, match="they only look alike"):
+    with pytest.raises(SaltusError, match="they only appear alike"):
         traced.resolve("\u00b5", 0.5)
     assert traced.resolve("\u03bc", 0.5) == 0.5
 

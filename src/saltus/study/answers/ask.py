@@ -92,7 +92,7 @@ def ask(
     Raises
     ------
     StudyError, UnitError, ParameterError
-        If it isn't a study, or doesn't fit its system: told before anything is computed.
+        If it isn't a study, or doesn't fit its system, before anything is computed.
     Interrupted
         On Ctrl-C, or where the work is asked to stop (:class:`saltus.interrupt.Stop`); its ``partial`` is the Dataset of the question that
         was being answered.
@@ -107,7 +107,7 @@ def ask(
             if progress is not None:
                 progress((done + share) / len(asked))
 
-        with told_of(question.place):
+        with naming_table(question.place):
             found[question.stem] = question.compute(found, threads, show)
             answers.append(Answer(question, found[question.stem], question.rows(found[question.stem], found)))
     return answers
@@ -124,8 +124,8 @@ class NoInputs(Inputs):
 
 
 @contextmanager
-def told_of(table: str) -> Iterator[None]:
-    """What an analysis says of its arguments is said of a table of the study."""
+def naming_table(table: str) -> Iterator[None]:
+    """A context in which errors in arguments of an analysis name the table of the study."""
     try:
         yield
     except (ParameterError, TraceError, UnitError) as error:
@@ -144,7 +144,7 @@ def questions_of(study: Study, own: System | None, inputs: Inputs, only: Sequenc
     of_system = inputs.taken
     asked: list[Question] = []
     for name, table in study.questions():
-        with told_of(name):
+        with naming_table(name):
             asked += [_ONE[name](table, setting)] if name in _ONE else _SEVERAL[name](table, setting)
     stems = [stem for question in asked for stem in question.stems]
     twice = sorted({stem for stem in stems if stems.count(stem) > 1})

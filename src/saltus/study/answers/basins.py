@@ -39,9 +39,9 @@ class BasinMap(Question):
     Attributes
     ----------
     plan : BasinPlan
-        What is computed, chunk by chunk.
+        Plan of the map, in chunks.
     compare : str or None
-        The title of the map that it is set beside.
+        The title of the map to compare it with.
     """
 
     place, shared = "basins", True
@@ -69,7 +69,7 @@ class BasinMap(Question):
         return identity(plan.system, plan.method, asked)
 
     def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
-        """The map, all at once: nothing is kept of it before it is done."""
+        """The map, all at once; nothing is stored before it is complete."""
         return map_of(self.plan, threads, progress)
 
     def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
@@ -109,7 +109,7 @@ class Agreement(Question):
         self.stem, self.needs = f"{one.stem}{AGREEMENT}", (other_stem, one.stem)
 
     def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
-        """Set the maps beside each other, cell by cell."""
+        """Compare the maps, cell by cell."""
         from saltus.analysis.basins.compare import compare
 
         return compare(*(found[stem] for stem in self.needs)).assign_attrs(name_a=self.names[0], name_b=self.names[1])

@@ -1,4 +1,4 @@
-"""Contact times beside those that a paper printed, beside exact ones, and beside a second method."""
+"""Contact times compared with those that a paper printed, with exact ones, and with a second method."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def contact_table(
     title : str
         Goes above the table.
     run : Dataset
-        What ``simulate`` returned for one start.
+        Result of ``simulate`` for one start.
     printed : sequence of Row
-        What was printed.
+        The printed contacts.
     exact : mapping of int to float
         Exact contact times [s] by number of the contact; empty if there are none.
     reference : Dataset or None
@@ -55,7 +55,7 @@ def contact_table(
     ours, theirs = [_time(run, row) for row in printed], [row.number("time_s") for row in printed]
     known = [exact.get(n) for n in numbers]
     second = [None if reference is None or time is None else _time(reference, row) - time for row, time in zip(printed, known, strict=True)]
-    beside = [abs(row.number(RESIDUAL)) if row.text(RESIDUAL) else None for row in printed]
+    printed_residuals = [abs(row.number(RESIDUAL)) if row.text(RESIDUAL) else None for row in printed]
     legs = [" ".join(map(str, _legs(run)[before:n])) for before, n in zip([0, *numbers], numbers, strict=False)]
     method, other = run.attrs["method"], reference.attrs["method"] if reference is not None else "reference"
     columns = [
@@ -65,7 +65,7 @@ def contact_table(
         _column("printed [s]", theirs, _seconds),
         _column("difference", [a - b for a, b in zip(ours, theirs, strict=True)], _small, "difference [s]"),
         _column("|x - j| [m]", residuals(run)[np.array(numbers, dtype=int) - 1].tolist(), _small),
-        _column("printed [m]", beside, _small),
+        _column("printed [m]", printed_residuals, _small),
         _column("exact [s]", known, _seconds),
         _column(f"{other} - exact", second, _small, f"{other} - exact [s]"),
         words("steps", legs),

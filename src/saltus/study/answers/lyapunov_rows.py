@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 #: Exponents that get a column of their own.
 COLUMNS = 4
-#: What the sum of the exponents is set beside.
+#: Sum of the exponents, and the mean divergence that it must equal.
 _SUMS = {"sum": "exponent_sum", "mean divergence": "mean_divergence"}
 
 
 def exponent_table(title: str, ds: xr.Dataset) -> TextTable:
-    """A row for each trajectory: kind of motion, exponents, interval of the largest, their sum beside the mean divergence."""
+    """A row for each trajectory: kind of motion, exponents, interval of the largest, their sum, mean divergence."""
     unit = ds["lyapunov_exponent"].attrs.get("units", "")
     count, shown = ds.sizes["trajectory"], min(ds.sizes["exponent"], COLUMNS)
     periods = ds["response_period"].values.tolist() if "response_period" in ds else [0] * count
@@ -38,7 +38,7 @@ def exponent_table(title: str, ds: xr.Dataset) -> TextTable:
 def _notes(ds: xr.Dataset, shown: int) -> tuple[str, ...]:
     notes = [f"{ds.sizes['trajectory'] - shown} more motions are in the file."] if ds.sizes["trajectory"] > shown else []
     if "near_graze" in ds and np.any(ds["near_graze"].values == 1):
-        notes.append("Near a graze finite deviations don't grow as infinitesimal ones do: the exponents tell less there.")
+        notes.append("Near a graze finite deviations don't grow as infinitesimal ones do: the exponents say little there.")
     if "mean_divergence" in ds and ds.sizes["exponent"] > 1:
         notes.append("The sum of the exponents and the mean divergence, found without the tangent, must agree.")
     return tuple(notes)

@@ -48,8 +48,8 @@ def spectrum_table(title: str, ds: xr.Dataset) -> TextTable:
     shown = np.sort([row for row in largest[:ROWS] if real[row] or np.isnan(size[row])]).astype(int).tolist()
     windows = sorted(set(np.atleast_1d(ds["window"].values).astype(str).tolist()))
     periods = sorted(set(np.atleast_1d(ds["response_period"].values).tolist()))
-    told = ", ".join(f"{n}T" if n else "not periodic within what was looked at" for n in periods)
-    notes = [f"Window {', '.join(windows)}; response {told}. An amplitude is that of the cosine; frequency 0 is the mean."]
+    responses = ", ".join(f"{n}T" if n else "not periodic within the samples" for n in periods)
+    notes = [f"Window {', '.join(windows)}; response {responses}. An amplitude is that of the cosine; frequency 0 is the mean."]
     if rest := size.size - len(shown):
         noise = int(np.count_nonzero(~real & ~np.isnan(size)))
         notes.append(f"{rest} more lines are in the file" + (f", {noise} of them no larger than rounding errors can be." if noise else "."))

@@ -1,4 +1,4 @@
-"""[poincare], [spectrum], [impacts] and [energy]: what is taken from motions after a transient."""
+"""[poincare], [spectrum], [impacts] and [energy]: analyses of motions after a transient."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: The key of a surface that is a formula.
 FORMULA = "formula"
-#: What a balance is made of.
+#: Parts of a balance.
 _PARTS = ("energy", "supplied", "dissipated")
 
 

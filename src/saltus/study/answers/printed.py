@@ -1,4 +1,4 @@
-"""CSV files that stand beside a study: numbers that somebody printed, and exact ones. What they hold is never repeated in a message."""
+"""CSV files in the folder of a study: printed numbers and exact ones. Messages never repeat their contents."""
 
 from __future__ import annotations
 

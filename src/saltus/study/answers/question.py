@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: Datasets of a study by the stems of their files.
 Found = Mapping[str, "xr.Dataset"]
-#: What is called with the share done.
+#: Callable that takes the share done.
 Show = Callable[[float], None]
 
 
@@ -92,7 +92,7 @@ class OneVerb(Question):
     Raises
     ------
     StudyError, UnitError, ParameterError
-        If it doesn't fit the system: told before anything is computed.
+        If it doesn't fit the system, before anything is computed.
     """
 
     #: Name of the function, and of its argument that says how to integrate.
@@ -136,7 +136,7 @@ class OneVerb(Question):
             raise fault(self.place, error) from error
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
-        """The answer; ``how`` are the method, the threads and where progress is told."""
+        """The answer; ``how`` are the method, the threads and the progress callable."""
         ds: xr.Dataset = verb(self.function)(self.system, **(self.arguments | how))
         return ds
 

@@ -27,7 +27,7 @@ class Responses(OneVerb):
     axes: ClassVar[str]
 
     def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
-        """Have the analysis look at its arguments before anything is computed."""
+        """Check the arguments of the analysis before anything is computed."""
         from saltus.analysis.responses.grid import grid_of
 
         start, box, seed, follow = (self.arguments[name] for name in ("start", "box", "seed", "follow"))
@@ -79,7 +79,7 @@ class Response(Responses):
             )
 
     def check(self, table: Any, setting: Setting) -> None:
-        """The measured points are read now, so that a fault is told before anything is computed."""
+        """Read the measured points now: errors come before anything is computed."""
         super().check(table, setting)
         self.measured = None if table.measured is None else setting.inputs.read(table.measured, self.place)
         self.inputs = [] if self.measured is None else [self.measured]

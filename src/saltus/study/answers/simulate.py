@@ -1,4 +1,4 @@
-"""[simulate]: move one start, or a batch of them, and keep the motion with its contacts; [compare]: beside printed and exact times."""
+"""[simulate]: move one start, or a batch of them, and keep the motion with its contacts; [compare]: with printed and exact times."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Motion(OneVerb):
     place, function = "simulate", "simulate"
 
     def names(self, table: Any, setting: Setting) -> tuple[str, str]:  # noqa: ARG002
-        """It is called as the study is."""
+        """Its name is that of the study."""
         self.group = setting.study.study.name
         return self.group, RUN
 
@@ -49,7 +49,7 @@ class Motion(OneVerb):
             raise StudyError(f'[simulate] periods: {self.system.name} has no forcing period. Write t_end = "2 s" in place of it.')
 
     def check(self, table: Any, setting: Setting) -> None:
-        """Read the files of [compare] now, so that a fault is told before anything is computed."""
+        """Read the files of [compare] now: errors come before anything is computed."""
         self.compare = setting.study.compare
         if self.compare is None:
             return
@@ -80,10 +80,10 @@ class Motion(OneVerb):
 
 
 class Reference(Motion):
-    """The same by the second method of [compare], to be set beside it."""
+    """The same motion by the second method of [compare]."""
 
     def names(self, table: Any, setting: Setting) -> tuple[str, str]:
-        """Its file stands beside that of the run."""
+        """Its file lies in the folder of the run's."""
         return f"{super().names(table, setting)[0]}, reference", REFERENCE
 
     def check(self, table: Any, setting: Setting) -> None:

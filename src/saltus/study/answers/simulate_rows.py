@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def run_table(title: str, run: xr.Dataset) -> TextTable:
-    """A row for each trajectory: status, contacts, grazes, steps, state at the end and, for a forced system, what it settled to.
+    """A row for each trajectory: status, contacts, grazes, steps, state at the end and, for a forced system, its response.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def run_table(title: str, run: xr.Dataset) -> TextTable:
 
 
 def response_texts(run: xr.Dataset) -> list[str]:
-    """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty if the system isn't forced or too little was kept."""
+    """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty for an unforced system or too few samples."""
     try:
         found = settled(run)
     except ParameterError:

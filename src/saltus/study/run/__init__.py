@@ -1,1 +1,1 @@
-"""Studies at work: answers kept in a folder, maps in stores that survive anything, threads, processes and clusters."""
+"""Running studies: answers in a folder, maps in crash-safe stores, threads, processes and clusters."""

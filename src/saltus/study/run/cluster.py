@@ -1,6 +1,6 @@
 """Chunks on a dask cluster, which a scheduler's address stands for. Needs the extra ``cluster``.
 
-A dask scheduler runs what it is sent: whoever can reach it can run anything as the user who started it. See docs/studies.md.
+A dask scheduler runs any code: whoever can reach it can run anything as the user who started it. See docs/studies.md.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from saltus.analysis.orbits.found import Found
 
 #: Chunks handed out at a time, for each worker: enough to keep it busy, few enough that a large map doesn't fill the scheduler.
-AHEAD = 4
+CHUNKS_PER_WORKER = 4
 #: Times that a chunk is given to another worker when its own dies.
-RETRIES = 5
+MAX_RETRIES = 5
 _SILENT = "the scheduler {} doesn't answer ({}). Start one with `dask scheduler`, or leave --scheduler out."
 
 
@@ -45,7 +45,7 @@ def cluster_runner(scheduler: str) -> Iterator[Callable[..., None]]:
         from distributed import Client
     except ImportError:
         raise StudyError('a cluster needs dask. Install "saltus[cluster]", or leave --scheduler out.') from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # late heartbeats and lost workers are healed here, and told if they aren't
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # late heartbeats and lost workers are handled here, or raise errors
     try:
         client = Client(scheduler, timeout=10)
     except (OSError, ValueError) as error:
@@ -75,17 +75,17 @@ def _run(client: Any, plan: BasinPlan, found: Found, missing: list[int], keep: C
         raise StudyError("the scheduler has no workers. Start some with `dask worker ADDRESS`, or leave --scheduler out.") from error
     shared = client.scatter((plan, found), broadcast=True)
     waiting, tries = iter(missing), dict.fromkeys(missing, 0)
-    width = max(AHEAD * max(len(client.scheduler_info()["workers"]), 1), AHEAD)
+    width = max(CHUNKS_PER_WORKER * max(len(client.scheduler_info()["workers"]), 1), CHUNKS_PER_WORKER)
     indices = {_submit(client, shared, index): index for _, index in zip(range(width), waiting, strict=False)}
     running, done = as_completed(list(indices)), 0
     for future in running:
         index = indices.pop(future)
         try:
             part = future.result()
-        except (Exception, asyncio.CancelledError) as error:  # every worker that knew the plan is gone: tell it to their successors
+        except (Exception, asyncio.CancelledError) as error:  # every worker with the plan has died: send it to their successors
             tries[index] += 1
-            if tries[index] > RETRIES:
-                raise StudyError(f"chunk {index} failed on {RETRIES} workers, the last time with {error!r}.") from error
+            if tries[index] > MAX_RETRIES:
+                raise StudyError(f"chunk {index} failed on {MAX_RETRIES} workers, the last time with {error!r}.") from error
             client.wait_for_workers(1, timeout=60)
             shared = client.scatter((plan, found), broadcast=True)
             again = _submit(client, shared, index)
@@ -103,7 +103,7 @@ def _run(client: Any, plan: BasinPlan, found: Found, missing: list[int], keep: C
 
 
 def _submit(client: Any, shared: Any, index: int) -> Any:
-    return client.submit(_chunk, shared, index, retries=RETRIES, pure=False)
+    return client.submit(_chunk, shared, index, retries=MAX_RETRIES, pure=False)
 
 
 def _chunk(shared: tuple[BasinPlan, Found], index: int) -> Settling:

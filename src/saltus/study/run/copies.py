@@ -13,13 +13,13 @@ from saltus.results.files.atomic import ResultFileError, replacing
 from saltus.results.store.durable import seal, sha256, unseal
 from saltus.study.setting.inputs import Input, Inputs, KeptInputs
 
-#: Name of the copy of the study, of the seal that says what it was, and the folder of copies of files that it names.
+#: Names of the copy of the study, of the seal with its hashes, and of the folder of copies of its files.
 COPY, SEAL, INPUTS = "study.toml", "study.seal", "inputs"
-_CHANGED = "changed since it was written. Run the study that it was made from again, with --out {}: what is computed is kept."
+_CHANGED = "changed since it was written. Run the study that it was made from again, with --out {}: finished results are reused."
 
 
 def keep_copy(folder: Path, text: str, files: Iterable[Input]) -> None:
-    """Copy a study and the files that it names into its output folder, byte for byte; the seal says what each was."""
+    """Copy a study and the files that it names into its output folder, byte for byte; the seal holds their hashes."""
     names = _names(files := list(files))
     if files:
         if not (folder / INPUTS).resolve().is_relative_to(folder.resolve()):
@@ -28,8 +28,8 @@ def keep_copy(folder: Path, text: str, files: Iterable[Input]) -> None:
     for file in files:
         _write(folder / INPUTS / names[file.name], file.data)
     data = text.encode()
-    told = {file.name: {"copy": names[file.name], "sha256": file.sha256} for file in files}
-    _write(folder / SEAL, seal({"study": sha256(data), "inputs": told}))
+    hashes = {file.name: {"copy": names[file.name], "sha256": file.sha256} for file in files}
+    _write(folder / SEAL, seal({"study": sha256(data), "inputs": hashes}))
     _write(folder / COPY, data)
 
 
@@ -71,21 +71,21 @@ def inputs_of(folder: Path, text: str) -> Inputs:
     if not (folder / SEAL).exists():  # a study that somebody put there by hand
         return Inputs(folder / INPUTS)
     try:
-        told = unseal(fence.content(folder / SEAL, fence.STUDY_BYTES))
+        sealed = unseal(fence.content(folder / SEAL, fence.STUDY_BYTES))
     except fence.RefusedError as refused:
         raise StudyError(f"{folder / SEAL} {refused}") from None
-    if told is None or not _is_seal(told):
+    if sealed is None or not _is_seal(sealed):
         raise StudyError(f"{folder / SEAL} {_CHANGED.format(folder)}")
-    if told["study"] != sha256(text.encode()):
+    if sealed["study"] != sha256(text.encode()):
         raise StudyError(f"{folder / COPY} {_CHANGED.format(folder)}")
-    return KeptInputs(folder / INPUTS, {name: (one["copy"], one["sha256"]) for name, one in told["inputs"].items()})
+    return KeptInputs(folder / INPUTS, {name: (one["copy"], one["sha256"]) for name, one in sealed["inputs"].items()})
 
 
-def _is_seal(told: dict[str, Any]) -> bool:
-    """Whether a seal says what one says: hashes and names, of copies beside one another."""
-    inputs = told.get("inputs")
+def _is_seal(sealed: dict[str, Any]) -> bool:
+    """Whether a seal has its form: hashes, and names of copies in one folder."""
+    inputs = sealed.get("inputs")
     return (
-        isinstance(told.get("study"), str)
+        isinstance(sealed.get("study"), str)
         and isinstance(inputs, dict)
         and all(isinstance(one, dict) and isinstance(one.get("sha256"), str) and _is_name(one.get("copy")) for one in inputs.values())
     )

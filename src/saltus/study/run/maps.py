@@ -1,4 +1,4 @@
-"""The basin maps of a study: planned into chunks, computed by threads, processes or a cluster, kept in stores that survive anything."""
+"""The basin maps of a study: planned into chunks, computed by threads, processes or a cluster, in crash-safe stores."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
     from saltus.analysis.orbits.found import Found
 
-#: Chunks from which on a map is worth an estimate.
+#: Chunks of a map from which its time is estimated.
 LARGE = 20
 #: Cells whose labels are timed for the estimate.
-TIMED = 512
+TIMED_CELLS = 512
 #: Folder of a study's stores, in its output folder.
 STORES = "stores"
 
@@ -42,7 +42,7 @@ def open_store(job: BasinMap, folder: Path) -> Store:
 
 
 def compute(job: BasinMap, store: Store, resources_: Resources, report: Callable[[Report], None], say: Callable[[str], None]) -> bool:
-    """Compute what is missing of a map (of a shard of it); returns whether the whole map is done.
+    """Compute the missing chunks of a map (of a shard of it); returns whether the whole map is done.
 
     Every chunk is committed when it is ready: stopped at any moment, by anything, the work goes on from there.
     """
@@ -101,7 +101,7 @@ def finish(job: BasinMap, store: Store, threads: int | None = None) -> xr.Datase
 
 def estimate(plan: BasinPlan, found: Found, resources_: Resources) -> str:
     """A sentence on the time, memory and disk that a map will take, from a few hundred of its cells."""
-    cells = plan.sample(TIMED)
+    cells = plan.sample(TIMED_CELLS)
     map_ = plan.map(1)
     map_.launch(plan.starts(cells[:1]), 1).advance(1)  # compiles, if it must
     begin = time.perf_counter()

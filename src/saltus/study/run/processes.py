@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from saltus.analysis.orbits.found import Found
 
 #: Chunks that a process has at a time: one that it computes, one that it begins while the first is committed.
-AHEAD = 2
+CHUNKS_PER_PROCESS = 2
 #: Times that a chunk is given to another process when its own dies.
-RETRIES = 5
+MAX_RETRIES = 5
 
 
 def run_on_processes(
@@ -91,7 +91,7 @@ class _Worker:
 
     def take(self, waiting: deque[int]) -> bool:
         """Hand it as many chunks as it may have; False if it is dead."""
-        while waiting and len(self.held) < AHEAD:
+        while waiting and len(self.held) < CHUNKS_PER_PROCESS:
             try:
                 self.pipe.send(waiting[0])
             except OSError:
@@ -129,8 +129,8 @@ def _successor(dead: _Worker, waiting: deque[int], tries: dict[int, int]) -> _Wo
     code = dead.end()
     for index in reversed(dead.held or list(waiting)[:1]):
         tries[index] += 1
-        if tries[index] > RETRIES:
-            raise StudyError(f"chunk {index} failed in {RETRIES} processes; the last one ended with code {code}. Is there enough memory?")
+        if tries[index] > MAX_RETRIES:
+            raise StudyError(f"chunk {index} failed in {MAX_RETRIES} processes; the last ended with code {code}. Is there enough memory?")
     waiting.extendleft(reversed(dead.held))
     return dead.again()
 
@@ -139,8 +139,8 @@ def _successor(dead: _Worker, waiting: deque[int], tries: dict[int, int]) -> _Wo
 def _without_ctrl_c() -> Iterator[None]:
     """Processes that are started within never see Ctrl-C: it is for this one, which ends them. Here it waits until they are started.
 
-    The mask is what they inherit. It holds for one thread; another may take the signal, and Python would raise it here, in the middle of
-    what a process is told at its start.
+    They inherit the mask. It holds for one thread: another may take the signal, and Python would raise it
+    here, amid the start of a process.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield

@@ -1,4 +1,4 @@
-"""What a study is computed with, what it reports on the way, and what it gives."""
+"""Options of a run of a study, its reports, and its results."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class Running:
     folder : Path
         Output.
     text : str
-        The study as it stands, kept with each result.
+        Text of the study, stored with each result.
     resources : Resources
     report, say : callable
         Called with the progress of a question; with a sentence.

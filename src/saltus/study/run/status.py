@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from saltus.errors import SaltusError, StudyError
 from saltus.study.run.copies import COPY, copy_of, inputs_of
-from saltus.study.run.kept import PARTIAL
 from saltus.study.run.maps import STORES
+from saltus.study.run.stored import PARTIAL
 from saltus.study.table import TextTable
 from saltus.study.tables.read import read
 
@@ -58,7 +58,7 @@ def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
 
 
 def status_table(found: list[StoreStatus | DamagedStore]) -> TextTable:
-    """A row for each store; what is wrong with one that can't be opened stands below."""
+    """A row for each store; errors of those that can't be opened follow below."""
     columns = ("map", "chunks", "done", "damaged", "MB", "last written", "at work")
     return TextTable("Maps", columns, tuple(map(_row, found)), tuple(one.why for one in found if isinstance(one, DamagedStore)))
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from saltus.results import save
 from saltus.results.files.atomic import remove_old_drafts
-from saltus.study.answers.ask import questions_of, told_of
+from saltus.study.answers.ask import naming_table, questions_of
 from saltus.study.answers.basins import BasinMap
 from saltus.study.run.copies import keep_copy
-from saltus.study.run.kept import kept_or_computed
 from saltus.study.run.maps import compute, finish, open_store
 from saltus.study.run.running import Outcome, Report, Resources, Running
+from saltus.study.run.stored import load_or_compute
 from saltus.study.run.write import write
 from saltus.study.setting.inputs import Inputs
 from saltus.study.tables.spec import Study
@@ -39,7 +39,7 @@ def run_study(
     inputs: Inputs | None = None,
     only: Sequence[str] = (),
 ) -> Outcome:
-    """Answer the questions of a study, or what is missing of the answers, and write what came out.
+    """Answer the questions of a study that have no answer yet, and write the results.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def run_study(
     Raises
     ------
     StudyError, UnitError, ParameterError
-        If the study doesn't fit its system: told before anything is computed.
+        If the study doesn't fit its system, before anything is computed.
     StoreError
         If a store in the folder was made from something else: names what differs.
     """
@@ -83,7 +83,7 @@ def run_study(
     for question in asked:
         first = resources.shard is None or resources.shard[0] == 0
         if (first or question.shared) and found.keys() >= set(question.needs):
-            with told_of(question.place):
+            with naming_table(question.place):
                 ds = _answer(question, found, at, stores)
                 if ds is None:
                     outcome.waiting.append(question.title)
@@ -94,13 +94,13 @@ def run_study(
 
 
 def _answer(question: Question, found: Mapping[str, xr.Dataset], at: Running, stores: Mapping[str, Store]) -> xr.Dataset | None:
-    """The answer, kept or computed; None if other shards have still to work on it."""
+    """The answer, loaded or computed; None if other shards have still to work on it."""
     if (identity := question.identity()) is None:
         ds = question.compute(found, at.resources.threads, lambda _: None)
         save(ds, at.folder / f"{question.stem}.nc")
         return ds
     if not isinstance(question, BasinMap):
-        return kept_or_computed(
+        return load_or_compute(
             question.stem, question.title, identity, lambda show: question.compute(found, at.resources.threads, show), at
         )
     store = stores[question.stem]

@@ -24,7 +24,7 @@ def system_of_question(table: Generated, setting: Setting, place: str) -> System
 
 
 def arguments(table: Generated, system: System, setting: Setting, place: str) -> dict[str, Any]:
-    """What the analysis is called with beside the system and the method.
+    """Arguments of the analysis, except the system and the method.
 
     Parameters
     ----------

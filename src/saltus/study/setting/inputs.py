@@ -1,4 +1,4 @@
-"""Files that a study names: looked for where a study may look, read once, kept with the answers."""
+"""Files that a study names: found in the allowed folders, read once, stored with the answers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Input:
 
     @property
     def sha256(self) -> str:
-        """Hash of what it holds."""
+        """Hash of its contents."""
         return sha256(self.data)
 
     @property
@@ -52,7 +52,7 @@ class Inputs:
         More folders, given on the command line.
     """
 
-    _advice = "It must stand beside the study."
+    _advice = "It must lie in the study's folder."
 
     def __init__(self, folder: Path, allowed: Sequence[Path] = ()) -> None:
         self._folders = [place.resolve() for place in (folder, *allowed)]
@@ -69,7 +69,7 @@ class Inputs:
         Raises
         ------
         StudyError
-            If it lies elsewhere, isn't there, or is no regular file of at most 10 MB. What it holds isn't repeated.
+            If it lies elsewhere, isn't there, or is no regular file of at most 10 MB. Messages don't repeat its contents.
         """
         if name not in self._taken:
             path = self._find(name, place)
@@ -80,7 +80,7 @@ class Inputs:
         return self._taken[name]
 
     def _find(self, name: str, place: str) -> Path:
-        """Where it lies. Looked at as text first: asking the system about a path of the network already talks to it."""
+        """Path of the file. It is checked as text first: a query for a network path already connects to it."""
         if "\0" in name:
             raise StudyError(f"[{place}] a file name holds a NUL character. Write the name of a file.")
         inside = [path for folder in self._folders if (path := Path(os.path.normpath(folder / name))).is_relative_to(folder)]
@@ -88,7 +88,7 @@ class Inputs:
         if not real:
             raise StudyError(
                 f"[{place}] {fence.shown(name)!r} lies outside the study's folder {self._folders[0]}, and a study reads nothing there. "
-                "Put the file beside the study; or, if you trust the study, allow the folder: --inputs FOLDER."
+                "Put the file there; or, if you trust the study, allow the folder: --inputs FOLDER."
             )
         return next((path for path in real if path.exists()), real[0])
 
@@ -103,22 +103,22 @@ class KeptInputs(Inputs):
     ----------
     folder : Path
         Of the copies.
-    kept : mapping of str to (str, str)
+    copies : mapping of str to (str, str)
         Name of the copy and SHA-256 of each file, by its name in the study.
     """
 
     _advice = "Run the study again, which copies it anew: saltus run STUDY.toml."
 
-    def __init__(self, folder: Path, kept: Mapping[str, tuple[str, str]]) -> None:
+    def __init__(self, folder: Path, copies: Mapping[str, tuple[str, str]]) -> None:
         super().__init__(folder)
-        self._kept = dict(kept)
+        self._copies = dict(copies)
 
     def _find(self, name: str, place: str) -> Path:
-        if name not in self._kept:
+        if name not in self._copies:
             raise StudyError(f"[{place}] {self._folders[0]} has no copy of {fence.shown(name)!r}. {self._advice}")
-        return self._folders[0] / self._kept[name][0]
+        return self._folders[0] / self._copies[name][0]
 
     def _checked(self, found: Input) -> Input:
-        if found.sha256 != self._kept[found.name][1]:
+        if found.sha256 != self._copies[found.name][1]:
             raise StudyError(f"{found.path} changed since it was written. {self._advice}")
         return found

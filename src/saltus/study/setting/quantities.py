@@ -21,7 +21,7 @@ def number(value: Quantity, unit: str, place: str, key: str) -> float:
     value : float or str
         As written in the study.
     unit : str
-        Coherent SI unit of what it is for; ``"1"`` for a plain number, ``""`` if not known.
+        Coherent SI unit of the quantity; ``"1"`` for a plain number, ``""`` if not known.
     place, key : str
         Table and key, for the message.
 
@@ -105,8 +105,8 @@ def is_batch(*tables: Mapping[str, Start], place: str = "simulate") -> bool:
     """Whether there are lists among values. Raises StudyError if two of them differ in length, or one is empty."""
     lengths = {name: len(value) for part in tables for name, value in part.items() if isinstance(value, list)}
     if len(set(lengths.values())) > 1 or 0 in lengths.values():
-        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise StudyError(f"[{place}] lists must have the same length, at least 1: {told}.")
+        sizes = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise StudyError(f"[{place}] lists must have the same length, at least 1: {sizes}.")
     return bool(lengths)
 
 

@@ -54,7 +54,7 @@ class Setting:
             raise fault(place, error) from None
 
     def outputs(self, system: System, given: Mapping[str, Output], place: str) -> dict[str, Any] | None:
-        """Outputs as the analyses take them, looked at now, so that a fault is told before anything is computed."""
+        """Outputs as the analyses take them, checked now: errors come before anything is computed."""
         from saltus.analysis.outputs import outputs_of
 
         place = f"{place}.outputs"
@@ -71,7 +71,7 @@ class Setting:
 
 
 def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
-    """The setting of a study: its system, and what its formulas share, with the files that they take part in.
+    """The setting of a study: its system, the names that its formulas share, and their files.
 
     Raises
     ------

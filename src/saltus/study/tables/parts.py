@@ -35,13 +35,13 @@ def _title(name: str) -> str:
 
 def _file_name(name: str) -> str:
     if len(slug(name)) > LONGEST:
-        raise ValueError(f"gives a file name of {len(slug(name))} characters; at most {LONGEST} fit beside the others")
+        raise ValueError(f"gives a file name of {len(slug(name))} characters; at most {LONGEST} are allowed")
     return name
 
 
-#: Most characters of a name that names files too.
+#: Longest name that names files too [characters].
 LONGEST = 100
-#: What something is called in tables and pictures; and in the names of files as well.
+#: Name in tables and pictures; and in the names of files as well.
 Title = Annotated[str, Field(min_length=1), AfterValidator(_title)]
 FileTitle = Annotated[Title, AfterValidator(_file_name)]
 
@@ -53,7 +53,7 @@ class Table(BaseModel):
 
 
 class Header(Table):
-    """[study]: what it is, for people."""
+    """[study]: title and description, for readers."""
 
     name: FileTitle = Field(description="A title.", examples=["Rig b4 at 15 Hz"])
     description: str = Field("", description="What the study shows.", examples=["Four starts, four responses"])
@@ -64,7 +64,7 @@ class Curve(Table):
     """[system.tables.<name>]: measured points from a file, which formulas call by their name: ``stop(x)``, ``drive(t)``."""
 
     file: str = Field(
-        description="CSV beside the study: two columns, units in the headings. Where the curve is known, ascending; its values there.",
+        description="CSV in the study's folder: two columns, units in the headings. Where the curve is known, ascending; its values there.",
         examples=["stop.csv"],
     )
     kind: Literal["linear", "pchip", "spline"] = Field(
@@ -152,7 +152,7 @@ class Range(Table):
 class Named(Table):
     """What questions have in common that may be asked several times."""
 
-    #: What one without a name is called.
+    #: Name of one without a name.
     called: ClassVar[str]
 
     name: FileTitle | None = Field(None, description="What it is called in tables, pictures and files.", examples=["stiff stop"])

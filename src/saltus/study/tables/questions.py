@@ -28,11 +28,11 @@ class OfLength(Generated):
 
 
 class Compare(Table):
-    """[compare]: set contact times beside those that somebody printed, and beside exact ones."""
+    """[compare]: compare contact times with printed ones, and with exact ones."""
 
-    printed: str = Field(description="CSV beside the study: marker, event_number, time_s, and, if printed, position_minus_boundary_m.",
+    printed: str = Field(description="CSV in the study's folder: marker, event_number, time_s, and, if printed, position_minus_boundary_m.",
                          examples=["table2.csv"])  # fmt: skip
-    exact: str | None = Field(None, description="CSV beside the study: event_number, time_s.", examples=["exact_events.csv"])
+    exact: str | None = Field(None, description="CSV in the study's folder: event_number, time_s.", examples=["exact_events.csv"])
     reference: Method | None = Field(None, description="A second method to run on the same system.", examples=[{"name": "Taylor"}])
 
 
@@ -61,7 +61,7 @@ class Varied(Asked):
         return self
 
 
-_MEASURED = Field(None, description="CSV beside the study to draw with it: frequency [Hz], amplitude [mm].", examples=["shaker.csv"])
+_MEASURED = Field(None, description="CSV in the study's folder, drawn with it: frequency [Hz], amplitude [mm].", examples=["shaker.csv"])
 FrequencyResponse = table(
     "frequency_response", ["frequency_response"], OF_RESPONSES, called="Frequency response", measured=(str | None, _MEASURED)
 )
@@ -86,7 +86,7 @@ class Map(Table):
     values: dict[str, Quantity] = Field(
         default_factory=dict, description="Values that differ from [system].", examples=[{"contact_stiffness": "25.5 kN/m"}]
     )
-    compare: str | None = Field(None, description="The name of another map to set beside this one, cell by cell.", examples=["exact"])
+    compare: str | None = Field(None, description="The name of another map to compare with this one, cell by cell.", examples=["exact"])
 
 
 class OfMaps(Generated):

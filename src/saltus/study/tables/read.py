@@ -28,7 +28,7 @@ def read(path: Path | str) -> tuple[Study, str]:
     -------
     study : Study
     text : str
-        The file as it stands, to the byte; kept with the result.
+        The file to the byte; stored with the result.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def parse(text: str, name: str = "study") -> Study:
 
 
 def study_of(data: Mapping[str, Any], name: str = "study") -> Study:
-    """A study from what its TOML holds. Raises StudyError as :func:`read` does."""
+    """A study from its parsed TOML. Raises StudyError as :func:`read` does."""
     try:
         return Study.model_validate(data)
     except ValidationError as error:
@@ -68,9 +68,9 @@ def study_of(data: Mapping[str, Any], name: str = "study") -> Study:
         raise StudyError(f"{name}: " + (faults[0] if len(faults) == 1 else "".join(f"\n  - {fault}" for fault in faults))) from None
 
 
-#: Faults that are told at once.
+#: Most errors in one message.
 _FAULTS = 12
-#: Most characters of texts, by key: titles and paths may be longer than quantities and words, descriptions longer still.
+#: Longest texts by key [characters]: titles and paths may be longer than quantities and words, descriptions longer still.
 _LONGEST = {"name": 200, "printed": 400, "exact": 400, "measured": 400, "description": 20_000, "source": 20_000}
 _WORD = 100
 #: Tables whose texts are formulas.

@@ -104,8 +104,8 @@ def table(
     summary = (inspect.getdoc(verb(verbs[0])) or "").split("\n\n")[0]
     several = f" Several: [[{place}]], each with a name." if issubclass(base if isinstance(base, type) else base[-1], Named) else ""
     fields: dict[str, Any] = {name: key for name, (key, _) in found.items()} | own
-    title, told = place.title().replace("_", ""), f"[{place}]: {_plain(summary)}{several}"
-    made = create_model(title, __base__=base, __module__=__name__, __doc__=told, **fields)
+    title, text = place.title().replace("_", ""), f"[{place}]: {_plain(summary)}{several}"
+    made = create_model(title, __base__=base, __module__=__name__, __doc__=text, **fields)
     for name, value in {"kinds": {name: kind for name, (_, kind) in found.items()}, "called": called}.items():
         setattr(made, name, value)
     return made
@@ -117,15 +117,15 @@ def options(method: type, examples: Mapping[str, Any]) -> Any:
     keys: dict[str, Any] = {one.name: _key(method, one, Kind(examples=(examples.get(one.name, one.default),)))[0] for one in parameters}
     summary = _plain((inspect.getdoc(method) or "").split("\n\n")[0])
     name: Any = method.__name__
-    told = f"[method] name = {toml(name)}: {summary}"
+    text = f"[method] name = {toml(name)}: {summary}"
     fields = {"name": (Literal[name], ...)} | keys
-    return create_model(name, __base__=Table, __module__=__name__, __doc__=told, **fields)
+    return create_model(name, __base__=Table, __module__=__name__, __doc__=text, **fields)
 
 
 # -- one key -------------------------------------------------------------------------------------------------------------------
 def _key(function: Callable[..., Any], parameter: inspect.Parameter, kind: Kind) -> tuple[Any, Kind]:
     """Type and Field of a key, and how it is written."""
-    written, told = documented(function)[parameter.name]
+    written, description = documented(function)[parameter.name]
     kind = Kind() if written.startswith("{") else kind  # its choices say all
     holds, examples, limits = kind.holds or _holds(parameter, written), kind.examples, dict(kind.limits)
     if holds in (int, float) and not limits:
@@ -134,7 +134,7 @@ def _key(function: Callable[..., Any], parameter: inspect.Parameter, kind: Kind)
     examples = examples or choices[1:] or ((not parameter.default,) if holds is bool else ())
     default = kind.default if kind.default is not parameter.empty else parameter.default
     optional = holds if default is not None else holds | None
-    text = kind.description or _plain(told)
+    text = kind.description or _plain(description)
     given = {"default_factory": dict} if default == {} else {"default": ... if default is parameter.empty else default}
     made = Field(**given, description=text, examples=list(examples), **limits)
     return (optional, made), kind

@@ -30,9 +30,9 @@ _TABLES = {name: f"[{name}]" for name in _QUESTIONS} | {"impact_statistics": "[i
 
 
 def fault(place: str, error: Exception) -> StudyError:
-    """What is wrong with a table of a study, from the error that its arguments met."""
-    told = in_toml(str(error))
-    return StudyError(told if told.startswith("[") else f"[{place}] {told}")
+    """The error of a table of a study, from the error of its arguments."""
+    message = in_toml(str(error))
+    return StudyError(message if message.startswith("[") else f"[{place}] {message}")
 
 
 def toml(value: Any) -> str:
@@ -53,17 +53,17 @@ def toml(value: Any) -> str:
 
 
 def in_toml(message: str) -> str:
-    """A message on arguments of a Python function as one on keys of a study; what it quotes stays as it is."""
+    """A message on arguments of a Python function as one on keys of a study; quotations don't change."""
     parts, at = [], 0
     while (found := _PYTHON.search(message, at)) is not None:
         parts.append(message[at : found.start()])
-        told, at = _said(found, message)
-        parts.append(told)
+        text, at = _said(found, message)
+        parts.append(text)
     return "".join(parts) + message[at:]
 
 
 def _said(found: re.Match[str], message: str) -> tuple[str, int]:
-    """What stands in a study for a piece of Python, and where it ends."""
+    """A piece of Python as a study writes it, and where it ends."""
     end = found.end()
     if name := found["method"]:
         options = in_toml(found["options"].removeprefix("..., ").removesuffix("...")).strip(" ,")

@@ -1,4 +1,4 @@
-"""Results that are one file: kept when they are computed, and not computed again while they are what the study asks for."""
+"""Results of one file: stored once computed, and reused while their identity is that of the question."""
 
 from __future__ import annotations
 
@@ -19,40 +19,40 @@ if TYPE_CHECKING:
 
 #: Attribute of a result that holds its identity.
 IDENTITY = "study_identity"
-#: End of the name of a file that holds what was computed before a stop.
+#: End of the name of a file with a result that was stopped.
 PARTIAL = "-partial"
 
 
-def kept_or_computed(
+def load_or_compute(
     stem: str, title: str, identity: Mapping[str, str], compute: Callable[[Callable[[float], None]], xr.Dataset], at: Running
 ) -> xr.Dataset:
-    """The result in ``STEM.nc`` if it is that of this question, else computed and kept there.
+    """The result in ``STEM.nc`` if it has this question's identity, else computed and stored there.
 
     Parameters
     ----------
     stem, title : str
         Name of the file; of the question.
     identity : mapping of str to str
-        What must be the same for the file to be the answer.
+        Hashes and texts that the file must have to be the answer.
     compute : callable
-        Takes what is called with the share done.
+        Takes the progress callable.
     at : Running
         Where.
 
     Raises
     ------
     Interrupted
-        On Ctrl-C; what was computed so far is kept in ``STEM-partial.nc``.
+        On Ctrl-C; the part computed is stored in ``STEM-partial.nc``.
     """
     file = at.folder / f"{stem}.nc"
-    kept = _kept(file, title, identity, at.say)
-    if kept is not None:
+    stored = _stored(file, title, identity, at.say)
+    if stored is not None:
         at.report(Report(title, 100, 100, 0.0, 0, last=True, what="%"))
-        return kept
+        return stored
     return _computed(file, title, identity, compute, at)
 
 
-def _kept(file: Path, title: str, identity: Mapping[str, str], say: Callable[[str], None]) -> xr.Dataset | None:
+def _stored(file: Path, title: str, identity: Mapping[str, str], say: Callable[[str], None]) -> xr.Dataset | None:
     """The result in a file, if it is there, sound, and of this identity."""
     if not file.exists():
         return None
