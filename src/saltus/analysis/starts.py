@@ -128,14 +128,16 @@ def check_system(system: Any) -> None:
     name = getattr(system, "__name__", "")
     if callable(system) and str(getattr(system, "__module__", "")).startswith("saltus.models"):
         raise ParameterError(f"sl.models.{name} is the function that makes a System. Call it: sl.models.{name}().")
-    told = "Put @sl.system(states=...) above the function." if callable(system) else "Take one of sl.models, such as sl.models.delangre()."
+    advice = (
+        "Put @sl.system(states=...) above the function." if callable(system) else "Take one of sl.models, such as sl.models.delangre()."
+    )
     if isinstance(system, Mapping) and "format" in system:
-        told = "Write sl.System.from_dict(...) of what System.to_dict() gave."
-    raise ParameterError(f"the system must be a System, not {type(system).__name__}. {told}")
+        advice = "Write sl.System.from_dict(...) of what System.to_dict() gave."
+    raise ParameterError(f"the system must be a System, not {type(system).__name__}. {advice}")
 
 
 def looks_every(system: System, every: Any) -> float | None:
-    """Time between two looks [s] at a system without forcing; None for a forced one.
+    """Time between two samples [s] at a system without forcing; None for a forced one.
 
     Raises
     ------

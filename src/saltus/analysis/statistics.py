@@ -28,7 +28,7 @@ RUNNING = 200
 
 @dataclass(frozen=True)
 class Means:
-    """Means of the first so many values of each series, and how sure they are: m lengths.
+    """Means of the beginnings of each series, and how sure they are: m lengths.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ R = TypeVar("R")
 #: What people write who come from elsewhere, and what it is called here.
 _ELSEWHERE: Mapping[str, str] = {
     **dict.fromkeys(("tend", "tfinal", "t_final", "tf", "t_max", "tmax", "duration", "t_span", "tspan"), "t_end="),
-    **dict.fromkeys(("t_eval", "teval", "n_samples", "nsamples", "dt", "step"), "samples= (so many a period)"),
+    **dict.fromkeys(("t_eval", "teval", "n_samples", "nsamples", "dt", "step"), "samples= (per period)"),
     **dict.fromkeys(("y0", "x0", "u0", "initial", "initial_state", "ic"), "start="),
     **dict.fromkeys(("rtol", "atol"), "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none"),
     **dict.fromkeys(("params", "parameters", "args", "p"), "values="),
@@ -35,7 +35,7 @@ _ELSEWHERE: Mapping[str, str] = {
 }
 #: What verbs take for states that the user names, as one would write it.
 _RANGES = {"axes": 'x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)', "box": 'x=("-5 mm", "5 mm"), v=("-1 m/s", "1 m/s")'}
-#: What tells how long to go on; which of them a verb has depends on whether it looks at whole periods only.
+#: Arguments for the length of a run; verbs of whole periods have no t_end.
 _LENGTHS = ("t_end", "periods", "every")
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 
@@ -107,13 +107,13 @@ def _instead(word: str, known: Mapping[str, inspect.Parameter], args: tuple[Any,
 
 
 def _length(known: Mapping[str, inspect.Parameter]) -> str:
-    """How a verb is told how long to go on."""
+    """The arguments of a verb for the length of its run."""
     ways = {
         "t_end": "t_end= [s]",
-        "periods": "periods= (forcing periods)" if "every" not in known else "periods= (forcing periods, or looks every= seconds apart of "
+        "periods": "periods= (forcing periods)" if "every" not in known else "periods= (forcing periods, or samples every= seconds of "
         "a system without forcing)",
     }  # fmt: skip
-    return f"How long it goes on is told by {' or '.join(text for name, text in ways.items() if name in known)}."
+    return f"The length of the run is {' or '.join(text for name, text in ways.items() if name in known)}."
 
 
 def _call(known: Mapping[str, inspect.Parameter]) -> str:

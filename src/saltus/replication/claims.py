@@ -49,7 +49,7 @@ class _Words(string.Formatter):
         return FORMATS[spec](value) if spec in FORMATS else format(value, spec)
 
 
-def told(template: str, quantities: Quantities) -> str:
+def filled(template: str, quantities: Quantities) -> str:
     """A sentence with the quantities in it."""
     return _Words().vformat(template, (), quantities)
 
@@ -90,10 +90,10 @@ class Row:
         """Read the data, apply the rules, and tell what was found."""
         found = {ALWAYS: True, NEVER: False, **self.read(data)}
         for name, line in self.lines.items():
-            found[name] = line.get("between", "; ").join(told(line["text"], one) for one in _each(line, found))
+            found[name] = line.get("between", "; ").join(filled(line["text"], one) for one in _each(line, found))
         checks = chain.from_iterable(((row, one) for one in _each(row, found)) for row in self.checks)
         why = (row["text"] for row in self.why if found[row.get("when", ALWAYS)] and not found[row.get("unless", NEVER)])
         return Finding(
-            told(self.own, found), told(self.exact, found), tuple(Check(told(row["text"], one), passed(row, one)) for row, one in checks),
-            told(self.sure, found), told(next(why, ""), found),
+            filled(self.own, found), filled(self.exact, found), tuple(Check(filled(row["text"], one), passed(row, one)) for row, one in checks),
+            filled(self.sure, found), filled(next(why, ""), found),
         )  # fmt: skip

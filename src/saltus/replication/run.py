@@ -134,7 +134,7 @@ def reproduce(
     Raises
     ------
     ParameterError
-        If the paper has no such figure: told before anything is made.
+        If the paper has no such figure: raised before anything is made.
     ResultFileError
         If the folder can't be written to.
     StoreError

@@ -114,8 +114,8 @@ def _through(one: xr.Dataset) -> str:
     names = [name for name in states_of(one) if f"attractor_{name}" in one]
     points = {name: float(np.ravel(one[f"attractor_{name}"].values)[0]) for name in names}
     units = {name: one[f"attractor_{name}"].attrs.get("units", "") for name in names}
-    told = ", ".join(f"{name} = {value:.4g} {units[name]}".rstrip() for name, value in points.items() if np.isfinite(value))
-    return f", through {told}" if told else ""
+    place = ", ".join(f"{name} = {value:.4g} {units[name]}".rstrip() for name, value in points.items() if np.isfinite(value))
+    return f", through {place}" if place else ""
 
 
 def _unsettled(basin: xr.DataArray) -> str:

@@ -34,9 +34,9 @@ WING = sl.models.aeroelastic()
 @pytest.mark.parametrize(
     ("call", "teaches"),
     [
-        (lambda: sl.lyapunov(rig, (0, 0), t_end=4), r"periods= \(forcing periods, or looks every= seconds apart of a system without"),
-        (lambda: sl.frequency_response(rig, (1, 2, 3), every=4), r"told by periods= \(forcing periods\)\."),
-        (lambda: sl.simulate(rig, (0, 0), every=4), r"told by t_end= \[s\] or periods= \(forcing periods\)\."),
+        (lambda: sl.lyapunov(rig, (0, 0), t_end=4), r"periods= \(forcing periods, or samples every= seconds of a system without"),
+        (lambda: sl.frequency_response(rig, (1, 2, 3), every=4), r"is periods= \(forcing periods\)\."),
+        (lambda: sl.simulate(rig, (0, 0), every=4), r"is t_end= \[s\] or periods= \(forcing periods\)\."),
         (lambda: sl.poincare(WING, (0, 0, 0, 0), ("plunge", 0)), "no forcing period: give t_end="),
         (lambda: sl.simulate(WING, (0, 0, 0, 0), periods=4), "Give t_end= in place of periods="),
         (lambda: sl.stroboscope(WING), "no forcing period to be seen once in. Take sl.simulate with t_end="),

@@ -10,7 +10,7 @@ import pytest
 
 from saltus.errors import ParameterError
 from saltus.replication import find, papers
-from saltus.replication.claims import Row, told
+from saltus.replication.claims import Row, filled
 from saltus.replication.run import reproduce
 from saltus.replication.verdict import FAILS, HOLDS, IN_PART, RULES, UNDECIDED, VERDICTS, Check, passed, verdict_of
 
@@ -94,7 +94,7 @@ def test_a_row_makes_checks_and_sentences_from_quantities():
 def test_words_for_numbers():
     numbers = {"k": 2.55e4, "nan": math.nan, "n": [1, 3, 0], "d": 1.23e-5, "none": []}
     text = "{k:power} {nan:power} {n:period} {d:um} {d:mm} {nan:alpha} {none:share}"
-    assert told(text, numbers) == "2.55e4 nowhere T, 3T, not periodic 12.3 µm 0.012 mm not measurable none"
+    assert filled(text, numbers) == "2.55e4 nowhere T, 3T, not periodic 12.3 µm 0.012 mm not measurable none"
 
 
 @pytest.mark.parametrize("name", papers.names())

@@ -69,7 +69,7 @@ def attractors(
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
     every : float or str, optional
-        Time between two looks [s]: needed for a system without forcing.
+        Time between two samples [s]: needed for a system without forcing.
     threads : int, optional
         Default all processors. Results don't depend on it.
     progress : bool or callable

@@ -53,7 +53,7 @@ def basins(
     periods : int
         Forcing periods that a trajectory is followed at most.
     every : float or str, optional
-        Time between two looks [s]: needed for a system without forcing.
+        Time between two samples [s]: needed for a system without forcing.
     threads : int, optional
         Default all processors. Results don't depend on it.
     progress : bool or callable

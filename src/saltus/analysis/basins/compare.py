@@ -23,7 +23,7 @@ from saltus.results.dataset.schema import AGREEMENT, BASINS, attractor_name, axe
 #: Largest distance of two orbits that count as one, in units of the axis ranges: far above what methods differ by on one attractor,
 #: below what tells neighbours on the rig apart.
 TOLERANCE = 0.01
-#: Orbits of equal peak and rms count as one up to so many times that distance: errors of a weakly damped response add up in its phase.
+#: Orbits of equal peak and rms count as one up to this multiple of that distance: errors of a weakly damped response add up in its phase.
 SHIFTED = 10.0
 #: Largest difference of two grids that is rounding, in units of the axis range.
 _ROUNDING = 1e-9

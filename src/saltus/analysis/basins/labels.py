@@ -16,11 +16,11 @@ from saltus.results.dataset.kinds import Kind
 
 #: Not captured by any attractor known so far, beside the codes of :class:`Kind`: for the post-pass.
 OPEN = min(Kind) - 1
-#: Iterates between two looks at who has been captured.
+#: Iterates between two tests for capture.
 BLOCK = 8
 #: Starts that one thread follows at a time.
 PIECE = 4096
-#: Age at which a trajectory may be taken for one on a chaotic attractor, and between looks after that.
+#: Age at which a trajectory may be taken for one on a chaotic attractor, and age between two tests after that.
 APERIODIC_WINDOW = 64
 #: Trajectories that nothing captured from which new attractors are looked for.
 SAMPLE = 256
@@ -106,7 +106,7 @@ def _write(result: Settling, who: np.ndarray, label: np.ndarray, periods: np.nda
 
 
 def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most: int, threads: int | None = None) -> Found:
-    """Look for new attractors where nothing captured, label what they capture, and give all attractors their final ids.
+    """Search new attractors where nothing captured, label what they capture, and give all attractors their final ids.
 
     Changes ``result``. The trajectories go on from where they stood. Returns the attractors in their final order.
     """

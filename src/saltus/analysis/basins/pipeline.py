@@ -1,7 +1,7 @@
 """The plan of a basin map: which starts, in which chunks, and what each chunk computes. Everything that a store or a cluster needs to know.
 
 Three stages, each a pure function of the plan and of the stages before: *scout* finds the attractors from a fixed sample of the starts,
-*chunk* labels one run of cells with them, *finish* looks after what no known attractor captured and makes the Dataset.
+*chunk* labels one run of cells with them, *finish* labels what no known attractor captured and makes the Dataset.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class BasinPlan:
     periods : int
         Forcing periods that a trajectory is followed at most, before and once more after new attractors are looked for.
     every : float or None
-        Time between two looks [s] for a system without forcing.
+        Time between two samples [s] for a system without forcing.
     scouts : int
         Starts from which attractors are looked for first; the fewer, the more is left to what the cells themselves lead to.
     """

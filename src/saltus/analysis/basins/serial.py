@@ -30,7 +30,7 @@ def found_data(found: Found) -> dict[str, Any]:
 
 
 def found_from(data: Mapping[str, Any], size: int) -> Found:
-    """Attractors from :func:`found_data`'s result, of a system with so many states.
+    """Attractors from :func:`found_data`'s result, of a system with this number of states.
 
     Raises
     ------

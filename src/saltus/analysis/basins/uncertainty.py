@@ -57,7 +57,7 @@ def fractions(labels: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def smallest_basin(cells: int) -> float:
-    """Share above which a basin can't have been missed by so many starts, with a confidence of 95 %: 3/N, the rule of three.
+    """Share above which a basin can't have been missed by this number of starts, with a confidence of 95 %: 3/N, the rule of three.
 
     Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743. It holds for starts drawn at random. On a regular grid it says the same of
     a basin that is scattered finely; a compact one is met for certain as soon as it holds a whole cell, 1/N. 1 if there are fewer than

@@ -13,7 +13,7 @@ from saltus.kernels import status as st
 from saltus.results.dataset.schema import parameters_of, response_name, states_of
 from saltus.system.system import System
 
-#: Orbits of two methods are one if they lie so many times the method's own noise apart, and at least this much of the motion's range.
+#: Orbits of two methods are one if their distance is below this multiple of the method's noise, or below this part of the motion's range.
 SAME_NOISE, SAME_AT_LEAST = 4.0, 1e-3
 #: Points of a response from which one-period errors are measured; more say nothing new.
 POINTS = 64

@@ -65,7 +65,7 @@ def energy_balance(
     supplied, dissipated : callable
         Power that flows in, and power that is lost [W], likewise.
     periods : int
-        Whole forcing periods to look at, after the transient.
+        Whole forcing periods after the transient.
     t_end : float or str
         Time at the end [s], in place of periods; of a forced system at a whole period.
     transient : int, or float or str
@@ -134,7 +134,7 @@ def _schedule(seen: Stretch, intervals: int | None) -> Schedule:
 
 
 def _check_room(seen: Stretch, intervals: int) -> None:
-    """Raise ParameterError if the balance of so many intervals doesn't fit."""
+    """Raise ParameterError if the balance of these intervals doesn't fit into memory."""
     numbers = seen.group.size * (2 * len(seen.system.states) + 8) + 2
     check_room(8.0 * numbers * intervals, f"{seen.group.size} trajectories with {intervals} intervals each", "Draw the balance of fewer.")
 

@@ -54,7 +54,7 @@ def impact_statistics(
     system, start, t_start, method, values, threads, progress
         As for :func:`saltus.simulate`. The method must locate contacts.
     periods : int
-        Whole forcing periods to look at, after the transient.
+        Whole forcing periods after the transient.
     t_end : float or str
         Time at the end [s], in place of periods.
     transient : int, or float or str

@@ -58,7 +58,7 @@ def poincare(
     direction : {0, 1, -1}
         Keep all crossings, or only those where the function rises (1) or falls (-1).
     periods : int
-        Whole forcing periods to look at, after the transient.
+        Whole forcing periods after the transient.
     t_end : float or str
         Time at the end [s], in place of periods.
     transient : int, or float or str

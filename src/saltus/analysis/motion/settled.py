@@ -1,7 +1,7 @@
 """What a motion has settled to, so far as the kept periods can tell.
 
 The stroboscope (states at whole forcing periods) is searched for the smallest n after which it repeats. That is an observation, not a
-proof: a slow transient may look settled, and a response of more than half of the kept periods looks aperiodic. Nothing here says whether
+proof: a slow transient may pass for settled, and a response of more than half of the kept periods for aperiodic. Nothing here says whether
 an orbit is stable; Newton and Floquet multipliers do that.
 """
 
@@ -19,7 +19,7 @@ from saltus.results.dataset.schema import TRAJECTORY, check, kind_of, states_of
 #: Largest mismatch that counts as a repeat: far above rounding, far below what tells 24T from its neighbour 12T on the rig (1e-2).
 TOLERANCE = 1e-6
 #: A transient of an nT response may repeat to the tolerance after 3n periods a little before it does after n. Where a part of the period
-#: repeats to so many times the tolerance, nothing is said yet.
+#: repeats to this multiple of the tolerance, nothing is decided yet.
 UNDECIDED = 10
 #: Periods looked at, by default: enough for two repeats of a 48T response.
 LAST = 96
@@ -38,7 +38,7 @@ def settled(run: xr.Dataset, *, tolerance: float = TOLERANCE, last: int | None =
         Largest difference of states n periods apart that counts as a repeat, relative to the range of each state in the samples looked
         at (from a stroboscope, to its largest magnitude).
     last : int, optional
-        Whole periods at the end to look at; at least 2, by default at most 96. Responses up to half of them can be told.
+        Whole periods at the end to compare; at least 2, by default at most 96. The longest response that is recognised is half of them.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def settled(run: xr.Dataset, *, tolerance: float = TOLERANCE, last: int | None =
     last = min(LAST, kept) if last is None else whole_number(last, "last")
     if not 2 <= last <= kept:
         raise ParameterError(
-            f"settled looks at 2 whole forcing periods or more: last = {last}, and {kept} were kept. Give keep={max(last, LAST)}."
+            f"settled compares 2 whole forcing periods or more: last = {last}, and {kept} were kept. Give keep={max(last, LAST)}."
         )
     whole = whole[-last - 1 :]
     batch = "trajectory" in run.dims

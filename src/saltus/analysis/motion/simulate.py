@@ -70,7 +70,7 @@ def simulate(
         Samples per forcing period (default 200), or over the whole span if the system isn't forced (default 10 000, and down to
         2000 for many trajectories).
     keep : int
-        Keep samples and contacts of the last so many periods only (default all).
+        Number of periods at the end whose samples and contacts are kept (default all).
     values : mapping
         Parameter values of this call: one each, or an array with one for each trajectory (the forcing frequency included).
     time_errors : {"measured", "local"}

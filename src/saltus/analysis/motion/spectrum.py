@@ -57,7 +57,7 @@ def spectrum(
     window : {"none", "hann"}, optional
         For all trajectories; by default ``"none"`` where the response repeats, else ``"hann"``.
     last : int, optional
-        Whole forcing periods at the end to look at, as many of them as are whole responses; by default one response, or all periods
+        Whole forcing periods at the end to transform, cut to whole responses; by default one response, or all periods
         that were kept where one doesn't repeat.
 
     Returns
@@ -95,8 +95,8 @@ def spectrum(
     weights = np.array([WINDOWS[name](stretch.count) for name in chosen])
     lines = {name: _lines(run, name, stretch, weights) for name in names}
     batch = "trajectory" in run.dims
-    told = json.loads(run.attrs.get("varied_parameters", "[]")) if batch else []  # a varied frequency shows in the lines
-    varied = {name: run[name].values for name in told if name in run.coords and name not in ("frequency", "order")}
+    named = json.loads(run.attrs.get("varied_parameters", "[]")) if batch else []  # a varied frequency shows in the lines
+    varied = {name: run[name].values for name in named if name in run.coords and name not in ("frequency", "order")}
     own = stretch.frequency.ndim == 2
     subject = Subject(
         states=names,

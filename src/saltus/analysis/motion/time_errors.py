@@ -20,7 +20,7 @@ from saltus.system.system import System
 COPIES = 3
 #: The estimate is this many times the largest distance so far: where errors are rounding, and where the companion is exact beside them.
 SAFETY, SAFETY_OF_EXACT_COMPANION = 8.0, 4.0
-#: Up to so many trajectories move in one call with their copies.
+#: Most trajectories that move in one call with their copies.
 FEW = 16
 #: Share of the work that is the run itself, where its copies come after it.
 BY_ITSELF = 0.3

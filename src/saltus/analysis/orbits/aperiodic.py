@@ -1,4 +1,4 @@
-"""Attractors that never repeat: quasi-periodic and chaotic ones, told apart by their largest Lyapunov exponent, known by where they go.
+"""Attractors that never repeat: quasi-periodic and chaotic ones, distinguished by their largest Lyapunov exponent, known by the region that they visit.
 
 Exponents: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980), one direction renormalised at every block.
 """
@@ -152,7 +152,7 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
     exponent, error = float(blocks.mean()), float(blocks.mean(axis=1).std(ddof=1) / math.sqrt(len(blocks)))
     if error > UNCLEAR:
         return None
-    if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():  # growth like t looks positive at first
+    if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():  # growth like t seems exponential at first
         return Kind.CHAOTIC.word, exponent, error
     zero = max(FLOOR, min(SURE * error, BOUNDED / (len(second) * BLOCK)))
     return (Kind.QUASI_PERIODIC.word, exponent, error) if abs(second.mean()) <= zero else None

@@ -61,7 +61,7 @@ class Neighbourhoods:
 
     @classmethod
     def none(cls, size: int) -> Neighbourhoods:
-        """No neighbourhoods, of points with so many states."""
+        """No neighbourhoods, of points with this number of states."""
         return cls(np.zeros((0, size)), np.zeros((0, size, size)), np.zeros(0, np.int64))
 
     def joined(self, other: Neighbourhoods) -> Neighbourhoods:

@@ -19,13 +19,13 @@ from saltus.analysis.orbits.tolerances import AMPLIFIED, BESIDE, CONVERGED, LONG
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 
-#: Samples of the motion in which a return is looked for; a window is so many times shorter or longer than the one before.
+#: Samples of the motion in which a return is searched; ratio of the lengths of two windows.
 SAMPLES, ZOOM = 4096, 8
-#: Windows tried at most, from that of the looks on.
+#: Most windows that are tried, from that of the samples on.
 MOST_WINDOWS = 6
 #: Samples follow the motion where its direction turns by less than 18 degrees from one to the next, for so large a share of them.
 TURN, FOLLOWED = 0.95, 0.9
-#: A return farther than this, in units of the scale, may be none: a longer window is looked at, unless this one holds so many turns.
+#: A return farther than this, in units of the scale, may be none: a longer window is searched, unless this one holds this number of turns.
 FAR, ENOUGH = 0.05, 8
 #: Returns that samples can't tell apart: the error of the cubic between them, in units of the scale.
 SAMPLED = 1e-6

@@ -1,7 +1,7 @@
 """Periodic motions that errors of the map itself keep from closing: how far its points scatter about an orbit of the exact map.
 
 Errors of ode45 at a loose tolerance act as bounded noise does. An orbit that such noise blurs is known by the exact one: each point of the
-motion lies beside the point of the orbit at the same phase, for as long as one looks. Loops closer together than the scatter can't be told
+motion lies beside the point of the orbit at the same phase, for the whole survey. Loops closer together than the scatter can't be told
 apart in the motion itself: Crutchfield, Farmer & Huberman, Physics Reports 92 (1982) 45-82, who call it noisy periodic.
 """
 
@@ -22,11 +22,11 @@ from saltus.results.dataset.schema import period_text
 #: Largest distance from the orbit, in units of the range of the motion, that is still scatter about it. Returns of ode45 on the rig scatter
 #: by 0.05 to 4 % (decision 11); wrong phases of an orbit, and other orbits, lie tens of per cent away.
 NARROW = 0.05
-#: A stretch of the motion belongs to the orbit if it strays no farther than so many times what was seen when the orbit was found.
+#: A stretch of the motion belongs to the orbit if it strays no farther than this multiple of what was seen when the orbit was found.
 ROOM = 2.0
-#: Iterates between two looks at the motion, as when attractors are searched for: a step of ode45 ends at each.
-LOOK = 128
-#: Looks at the exact motion in each period, for its range.
+#: Iterates of one call, as in the search for attractors: a step of ode45 ends at each.
+ITERATES_PER_CALL = 128
+#: Samples of the exact motion in each period, for its range.
 BETWEEN = 32
 
 
@@ -107,7 +107,7 @@ def blurred(map_: Map, orbit: Orbit, scale: np.ndarray) -> Noisy | None:
         Range of each state in all motions.
     """
     travel = map_.launch(orbit.points, SURVEY_ITERATES)
-    runs = np.concatenate([travel.advance(LOOK) for _ in range(SURVEY_ITERATES // LOOK)], axis=1)
+    runs = np.concatenate([travel.advance(ITERATES_PER_CALL) for _ in range(SURVEY_ITERATES // ITERATES_PER_CALL)], axis=1)
     size = motion_size(map_, orbit, scale)
     distance = apart(runs, orbit.points, size)
     stray = float(np.abs(distance).max())

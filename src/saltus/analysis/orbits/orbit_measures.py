@@ -96,7 +96,7 @@ class Measures:
 
 
 def unknown(m: int, size: int, outputs: int | None = None) -> Measures:
-    """Nothing known of m motions of so many states and outputs (default: just the states)."""
+    """Nothing known of m motions of these states and outputs (default: no outputs)."""
     wide = size if outputs is None else outputs
     maximum, minimum, mean, deviation = np.full((4, m, wide), np.nan)
     margin, span, contacts = np.full((3, m), np.nan)
@@ -138,7 +138,7 @@ def measure(
 
 
 def _measured(map_: Stroboscope, start: np.ndarray, span: int, closed: bool, outputs: Outputs) -> Measures:
-    """The numbers of some motions over so many periods, after which they repeat or don't."""
+    """The numbers of some motions over ``periods`` periods, after which they repeat or don't."""
     size, wide = start.shape[1], len(outputs)
     whole, outcome = pieces(map_, start, span, outputs.formulas, outputs.guards)
     result = unknown(len(start), size, wide)

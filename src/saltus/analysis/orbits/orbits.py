@@ -84,7 +84,7 @@ class OrbitBatch:
 
     @classmethod
     def none(cls, count: int, size: int) -> OrbitBatch:
-        """No orbit yet, of points with so many states."""
+        """No orbit yet, of points with this number of states."""
         points, multipliers = np.full((count, LONGEST, size), np.nan), np.full((count, size), np.nan + 0j)
         return cls(np.zeros(count, np.int64), points, multipliers, *np.full((2, count), np.nan))
 
@@ -138,7 +138,7 @@ def find_orbits(
     noise : float64[k]
         Mismatch of a closed orbit that errors of the map explain, in units of the scale.
     max_slow : int
-        Newton's method gives up after so many slow steps: where they are more the orbit isn't near. One may be due to a contact between.
+        Newton's method gives up after this number of slow steps: the orbit isn't near. One may be due to a contact between.
     """
     result = OrbitBatch.none(*start.shape)
     if not len(start):

@@ -12,7 +12,7 @@ NEAR = 1e-3
 #: Recurrence at which a trajectory has settled where nothing captures it. It leaves the slowest transient of the rig in a few rounds, and
 #: takes no neighbour for the orbit. What hasn't come so near in time is let in from NEAR.
 SETTLED = 1e-5
-#: An orbit belongs to a trajectory that lies within so many recurrences of it: the ratio of the two is 1/(1 - multiplier).
+#: An orbit belongs to a trajectory that lies within this multiple of its recurrence: the ratio of the two is 1/(1 - multiplier).
 BESIDE = 30.0
 #: Recurrence below which distances are rounding.
 ROUNDING = 1e-9
@@ -40,7 +40,7 @@ MARGINAL = 1e-7
 SETTLING_ITERATES, AVERAGED_RETURNS = 400, 8
 #: Scatter of the returns to a point, in units of the map's noise, that its errors may make.
 JITTER = 2.0
-#: Points of an orbit lie at least so many scatters apart.
+#: Least distance of two points of an orbit, in units of the scatter.
 APART = 5.0
 #: Scatter below which period doubling isn't looked for.
 SHOWING = 1e-6

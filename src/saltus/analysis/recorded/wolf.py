@@ -176,7 +176,7 @@ def wolf(
 
 
 def measure(points: np.ndarray, interval: float, search: Search) -> Growing:
-    """Exponents from the neighbours on a trajectory float64[n, m] of so many seconds between samples."""
+    """Exponents from the neighbours on a trajectory float64[n, m] at this sampling interval [s]."""
     evolutions = follow(points, search)
     time, count = interval * search.evolve, len(evolutions.growth)
     if not count:

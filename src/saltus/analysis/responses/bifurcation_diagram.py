@@ -51,7 +51,7 @@ def bifurcation_diagram(
     follow : bool
         Whether each start goes on, from the lowest value upwards, where it stood at the value before; otherwise each value starts afresh.
     every : float or str, optional
-        Time between two looks at the motion of a system without forcing [s], about a turn of it. Equilibria, limit cycles, their periods,
+        Time between two samples of the motion of a system without forcing [s], about a turn of it. Equilibria, limit cycles, their periods,
         sizes and stability don't depend on it.
     box, values, outputs, method, periods, seed, threads, progress
         As for :func:`saltus.frequency_response`.

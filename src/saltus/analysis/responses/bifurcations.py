@@ -1,6 +1,6 @@
-"""Why a branch ends between two values of a parameter: the bifurcation, where it can be told.
+"""Why a branch ends between two values of a parameter: the bifurcation, where it can be recognised.
 
-A fold, at which a stable and an unstable orbit meet, is told by three things: the leading multiplier is real and goes to +1, by the square
+A fold, at which a stable and an unstable orbit meet, is recognised by three things: the leading multiplier is real and goes to +1, by the square
 root of the distance; Newton's method finds nothing beyond; and the place to which (1 - multiplier)^2 extrapolates is where it stops finding
 the orbit. Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapters 4 and 5; di Bernardo, Budd, Champneys & Kowalczyk,
 Piecewise-smooth Dynamical Systems (2008), chapter 2.
@@ -21,7 +21,7 @@ from saltus.results.dataset.kinds import CLOSED, Kind
 #: A complex leading multiplier is on its way to the unit circle beyond this, if it grew by so much in the last step of the parameter that
 #: it is there after AHEAD more of them. Being near isn't enough: of a lightly damped oscillator all multipliers are, and stay there.
 TURNING, AHEAD = 0.95, 2.0
-#: The law is measured over so many times the step within which a branch ends.
+#: The law is measured over this multiple of the step within which a branch ends.
 OVER = 64
 #: Farthest that the law's extrapolation may lie from the interval, in its widths.
 BESIDE = 3.0
@@ -64,7 +64,7 @@ def why_they_end(found: Found, followed: Followed, values: np.ndarray, ends: np.
     way : {1, -1}
         Direction in which it ends.
     exact : bool
-        Whether the method's errors are rounding, so that the place of an end can be told.
+        Whether the method's errors are rounding, so that the place of an end can be located.
 
     Returns
     -------
@@ -94,12 +94,12 @@ def _leading(found: Found, response: int) -> complex:
 
 
 def _told_by_neighbours(found: Found, last: int, beyond: int, multiplier: complex) -> str:
-    """What the responses at the next value say, ``end`` if nothing; "" if it is told by another branch."""
+    """What the responses at the next value say, ``end`` if nothing; "" if another branch reports it."""
     here = int(found.place[last])
     neighbours = np.flatnonzero(found.place == beyond)
     doubled = [j for j in neighbours if _is_twice(found, int(j), last) and _covers(found, int(j), last)]
     if any(_is_twice(found, last, int(j)) and _covers(found, last, int(j)) for j in neighbours):
-        return ""  # the same doubling, told by the branch of half the period
+        return ""  # the same doubling, reported by the branch of half the period
     if doubled and multiplier.real < 0:
         return "period_doubling"
     starts = np.flatnonzero((found.of[here] >= 0) & (found.of[here] == last))

@@ -25,7 +25,7 @@ _NEVER = 1e6
 
 
 def follow(found: Found, followed: Followed, places: int) -> np.ndarray:
-    """Branch of every response of a grid with one axis of so many values, int64[m]; numbered in the order in which they begin."""
+    """Branch of every response of a grid with one axis of values, int64[m]; numbered in the order in which they begin."""
     before = _before(found, followed)
     branch = np.full(len(found), -1, np.int64)
     heads: list[int] = []  # response that a branch ends with so far
@@ -81,7 +81,7 @@ def events(found: Found, table: AttractorTable, branch: np.ndarray, followed: Fo
     for way, side in ((+1, -1), (-1, 0)):
         ends = np.array([members[side] for members in groups], np.int64)
         result += why_they_end(found, followed, values, ends, way, exact)
-    step = float(np.diff(values).max(initial=0.0))  # a limit cycle begins where an equilibrium begins to oscillate: told once
+    step = float(np.diff(values).max(initial=0.0))  # a limit cycle begins where an equilibrium begins to oscillate: reported once
     born = [event.value for event in result if event.kind == "hopf"]
     result = [event for event in result if event.kind != "end" or not any(abs(event.value - value) <= step for value in born)]
     return sorted(result, key=lambda event: (event.value, event.branch, event.kind))

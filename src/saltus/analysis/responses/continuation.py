@@ -21,7 +21,7 @@ from saltus.flow.methods import Method
 
 #: Farthest that an orbit moves in one step, in units of its own range.
 LINK = 0.35
-#: An orbit that moves less than this in one step is taken for the same one without a look at the middle.
+#: An orbit that moves less than this in one step is taken for the same one without a step at the middle.
 SURE = 0.02
 #: Farthest that the middle of a step lies from halfway, in units of the step: 0.21 right at a fold, half if one of the steps is a jump.
 ASTRAY = 0.25
@@ -93,7 +93,7 @@ class Follower:
     def to(self, target: np.ndarray, which: np.ndarray, halvings: int = HALVINGS) -> np.ndarray:
         """Follow those of ``which``, bool[k], to values float64[k] while they attract; which arrive, bool[k].
 
-        The others stay at the last value that they were followed to. The distance is halved so many times at most.
+        The others stay at the last value that they were followed to. The distance is halved a limited number of times.
         """
         going, in_a_row = which & self.known, np.zeros(len(which), np.int64)
         self.step = np.where(going, target - self.value, self.step)

@@ -51,7 +51,7 @@ class Followed:
         return np.asarray(self._index[WAYS.index(way), responses])
 
     def _follow(self, found: Found, grid: Grid, rows: np.ndarray, ways: np.ndarray, ahead: int, which: np.ndarray) -> np.ndarray:
-        """Follow some on to so many values ahead, and note what they meet there; which arrive, bool[k]."""
+        """Follow some on to a value ahead, and note what they meet there; which arrive, bool[k]."""
         (values,) = grid.axes.values()
         place = found.place[rows] + ahead * ways
         arrived = self.follower.to(

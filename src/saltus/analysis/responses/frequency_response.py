@@ -35,7 +35,7 @@ def frequency_response(
     """Steady responses against the forcing frequency: which there are, and which start leads to which.
 
     Every start is followed at every frequency until it has settled on an orbit that is closed by Newton's method and attracts by its
-    Floquet multipliers; what never repeats is typed by its largest Lyapunov exponent. Coexisting responses are told apart by their orbits,
+    Floquet multipliers; what never repeats is typed by its largest Lyapunov exponent. Coexisting responses are distinguished by their orbits,
     not by their amplitudes, and followed from frequency to frequency as branches.
 
     Parameters

@@ -45,7 +45,7 @@ class Grid:
     drawn : bool
         Whether the starts are random: then shares of them are shares of their box.
     every : float or None
-        Time between two looks [s] at a system without forcing.
+        Time between two samples [s] at a system without forcing.
     """
 
     system: System
@@ -101,7 +101,7 @@ def grid_of(
     follow : bool or None
         Whether each start is followed from value to value, upwards.
     every : float, str or None
-        Time between two looks [s] at a system without forcing.
+        Time between two samples [s] at a system without forcing.
 
     Raises
     ------

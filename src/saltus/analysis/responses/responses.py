@@ -196,5 +196,5 @@ def spans_of(found: Found) -> np.ndarray:
 
 
 def own_times(found: Found, grid: Grid) -> np.ndarray | None:
-    """Time of one of these periods [s], of a system without forcing: that of the limit cycle, else that between two looks."""
+    """Time of one of these periods [s], of a system without forcing: that of the limit cycle, else that between two samples."""
     return None if grid.every is None else np.where(found.time > 0, found.time, grid.every)

@@ -183,5 +183,5 @@ def padded(points: Sequence[np.ndarray], size: int) -> np.ndarray:
 
 
 def basin_meanings(attractors: int) -> dict[int, str]:
-    """Words for the labels of a map with so many attractors."""
+    """Words for the labels of a map with this number of attractors."""
     return {**WITHOUT_WORDS, **{i: f"attractor_{i}" for i in range(attractors)}}

@@ -1,6 +1,6 @@
 """Arrays in, a Dataset out: every result is made here, by the table of its kind.
 
-Everything that goes in is an array of NumPy. Where xarray isn't told so, it asks whether an array is one of dask, pint, cupy or sparse, and
+Everything that goes in is an array of NumPy. Of anything else xarray asks whether an array is one of dask, pint, cupy or sparse, and
 imports for it those that are installed: dask.array alone takes 0.4 s.
 """
 
@@ -56,7 +56,7 @@ class Guards:
         return list(self.units) or [states.get(state, "") if state else "" for state in self.states]
 
     def first(self, count: int) -> Guards:
-        """So many of them."""
+        """Their number."""
         return Guards(self.names[:count], self.states[:count], self.boundaries[:count], self.units[:count])
 
     def values(self, states: Mapping[str, str]) -> dict[str, Any]:
@@ -221,7 +221,7 @@ class _Building:
         (self.coords if spec.coord else self.data)[name] = array_variable(dims, array, attrs)
 
     def _dims(self, dims: tuple[str, ...], of: Mapping[str, tuple[str, str, str]] | None, count: int) -> tuple[str, ...]:
-        """The dims of a row for an array of so many axes."""
+        """The dims of a row for an array with this number of axes."""
         if _is_plain(dims) and not self.along:
             return dims
         found = tuple(self._named(dims, of))

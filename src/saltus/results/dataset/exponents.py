@@ -26,7 +26,7 @@ EXPONENTS_VARIABLES = {
     "grazes": Variable(_EACH, "1", "grazes after the transient", "i8"),
     "grazes_unresolved": Variable(_EACH, "1", "grazes shallower than the local error, after the transient", "i8"),
     "smallest_gap_margin": MINIMA["smallest_gap_margin"],
-    "block_time": Variable(_EACH, "s", "time of a block: the forcing period, or the time between two looks"),
+    "block_time": Variable(_EACH, "s", "time of a block: the forcing period, or the time between two samples"),
     "status": STATUS,
     "replacements": Variable(_EACH, "1", "replacements of the neighbour", "i8"),
     "replaced_distance": Variable(_EACH, "1", "mean distance at replacement, as a share of the range of the motion"),

@@ -1,4 +1,4 @@
-"""Tables of the results that look at a motion more closely: sections, spectra, impact statistics, energy balances."""
+"""Tables of the results of one motion: sections, spectra, impact statistics, energy balances."""
 
 from __future__ import annotations
 

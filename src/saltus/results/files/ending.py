@@ -21,7 +21,7 @@ _ENDING = re.compile(rb"\nsaltus-sha256:([0-9a-f]{64})\n")
 _LENGTH = 80
 #: Time that reading a file without an ending may take [s], and how much of it is read in a second at the least [byte].
 PATIENCE, SLOWEST = 60.0, 1e7
-#: Memory that it may take: so many times its size, but this much at the least [byte].
+#: Memory that it may take: multiple of its size, and least value [byte].
 TIMES, LEAST = 8, 4 << 30
 #: What xarray reads by is tried, without xarray, which takes longer to load than most files.
 _TRIAL = """

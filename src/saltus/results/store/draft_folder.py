@@ -15,7 +15,7 @@ from saltus.results.store.lock import exclusive, is_held
 
 #: A folder takes a moment to make: a draft of one that is older than this [s], and not locked, was left by a process that was killed.
 _DRAFT_AGE = 60.0
-#: Lock file in a draft, held while it is filled: a clock that jumps ahead makes it look old, but not abandoned.
+#: Lock file in a draft, held while it is filled: a clock that jumps ahead makes it seem old, but not abandoned.
 _LOCK = Path("locks") / "draft"
 
 

@@ -1,7 +1,7 @@
 """One writer at a time: locks of the operating system, which end with the process that holds them, however it ends.
 
 A lock is for one shard k of n: the chunks k, k + n, k + 2n ... The whole store is shard 0 of 1. Two shards exclude each other if they have
-a chunk in common. Each has a file of its own, and the rule is: take your own lock, then look whether an overlapping one is held. Two
+a chunk in common. Each has a file of its own, and the rule is: take your own lock, then check that no overlapping one is held. Two
 processes that do this at the same moment may both be refused, never both be let in.
 """
 
@@ -24,7 +24,7 @@ from saltus.results.store.durable import StoreError
 
 #: All chunks, as a shard.
 WHOLE = (0, 1)
-#: How long to wait for a lock [s]: longer than another process's look at it takes, too short to be taken for queueing.
+#: How long to wait for a lock [s]: longer than another process's check of it takes, too short to be taken for queueing.
 _PATIENCE = 0.5
 #: Most bytes of the note of who holds a lock.
 _NOTE = 10_000
@@ -150,7 +150,7 @@ def _open(file: Path, flags: int = os.O_RDWR | os.O_CREAT) -> int:
 
 
 def _wait(handle: int, *, shared: bool, patience: float) -> bool:
-    """Try to lock until it works or ``patience`` is spent: another process's look takes a moment and is no reason to give up."""
+    """Try to lock until it works or ``patience`` is spent: another process's check takes a moment and is no reason to give up."""
     end = time.monotonic() + patience
     while not _try(handle, shared=shared):
         if time.monotonic() >= end:
@@ -163,7 +163,7 @@ if sys.platform == "win32":
     import msvcrt
 
     def _try(handle: int, *, shared: bool) -> bool:  # noqa: ARG001
-        """Without shared locks: looks exclude each other for a moment. Locked bytes can't be read: take one far behind the text."""
+        """Without shared locks: checks exclude each other for a moment. Locked bytes can't be read: take one far behind the text."""
         os.lseek(handle, 1 << 30, os.SEEK_SET)
         try:
             msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from saltus.results.dataset.kinds import WITHOUT, Kind, told
+from saltus.results.dataset.kinds import WITHOUT, Kind, sentences
 from saltus.results.dataset.schema import axes_of, kind_text
 from saltus.results.summary import own_errors
 from saltus.study.table import Column, TextTable, number, quantity, table, with_error, words
@@ -57,7 +57,7 @@ def _notes(ds: xr.Dataset) -> tuple[str, ...]:
     if attrs["unresolved_cells"]:
         notes.append(f"{attrs['unresolved_cells']} starts met a graze shallower than the local error: either outcome is possible.")
     unconverged, words = WITHOUT[Kind.UNCONVERGED], own_errors(attrs)
-    notes += [f"{note} {words}".rstrip() if unconverged in note else note for note in told(ds["basin"].values)]
+    notes += [f"{note} {words}".rstrip() if unconverged in note else note for note in sentences(ds["basin"].values)]
     if "attractor_scatter" in ds:
         notes.append(
             "Noisy: errors of the method keep the motion from closing. It stays beside an exact orbit, whose numbers stand in the row; "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from saltus.results.dataset.kinds import told
+from saltus.results.dataset.kinds import sentences
 from saltus.results.dataset.schema import event_name, kind_text, parameters_of, response_name, states_of
 from saltus.study.table import ROWS, Column, TextTable, interval, number, quantity, table, words
 from saltus.units import from_si
@@ -79,7 +79,7 @@ def _notes(ds: xr.Dataset, more: int) -> tuple[str, ...]:
     notes = [f"{ds.sizes['response']} different responses from {of.size} starts at {math.prod(of.shape[:-1])} values."]
     if more:
         notes.append(f"{more} shorter branches are in the file.")
-    return (*notes, *told(of))
+    return (*notes, *sentences(of))
 
 
 def _events(title: str, ds: xr.Dataset) -> TextTable:
