@@ -52,7 +52,7 @@ def check_room(size: float, what: str, instead: str) -> None:
     room = SHARE * free()
     if size > room:
         raise ParameterError(
-            f"{what} are more than fits here: they need about {size / 1e9:.3g} GB of memory, and half of what is free is "
+            f"{what} are more than fits here: they need about {size / 1e9:.3g} GB of memory, and half of the free memory is "
             f"{room / 1e9:.3g} GB. {instead}"
         )
 

@@ -30,7 +30,7 @@ def small(monkeypatch):
 def test_what_does_not_fit_is_refused_with_its_size(small, call, teaches):
     with pytest.raises(sl.SaltusError, match=teaches) as refused:
         call()
-    assert "half of what is free is 0.05 GB" in str(refused.value)
+    assert "half of the free memory is 0.05 GB" in str(refused.value)
 
 
 def test_free_memory_is_told_and_sensible():

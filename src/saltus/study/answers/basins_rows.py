@@ -60,7 +60,7 @@ def _notes(ds: xr.Dataset) -> tuple[str, ...]:
     notes += [f"{note} {words}".rstrip() if unconverged in note else note for note in sentences(ds["basin"].values)]
     if "attractor_scatter" in ds:
         notes.append(
-            "Noisy: errors of the method keep the motion from closing. It stays beside an exact orbit, whose numbers stand in the row; "
+            "Noisy: errors of the method keep the motion from closing. It stays near an exact orbit, whose numbers are in the row; "
             "scatter is its root mean square distance from there."
         )
     return tuple(notes)

@@ -83,7 +83,7 @@ class Reference(Motion):
     """The same motion by the second method of [compare]."""
 
     def names(self, table: Any, setting: Setting) -> tuple[str, str]:
-        """Its file lies in the folder of the run's."""
+        """Its file lies next to that of the run."""
         return f"{super().names(table, setting)[0]}, reference", REFERENCE
 
     def check(self, table: Any, setting: Setting) -> None:
