@@ -1,4 +1,6 @@
-"""All benchmarks that the documentation shows: `python -m benchmarks`. Takes some ten minutes; leave the machine alone meanwhile."""
+"""All benchmarks that the documentation shows: `python -m benchmarks`. Takes some ten minutes;
+leave the machine alone meanwhile.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +12,21 @@ ROOT = Path(__file__).resolve().parent.parent
 #: Where the page that compares finds its numbers.
 FOLDER = "docs/comparison"
 #: One after the other: two at a time would time each other.
-BENCHMARKS = ("benchmarks/startup.py", "benchmarks/compile.py", "benchmarks/flow.py", "benchmarks/contacts.py", "benchmarks/basins.py")
+BENCHMARKS = (
+    "benchmarks/startup.py",
+    "benchmarks/compile.py",
+    "benchmarks/flow.py",
+    "benchmarks/contacts.py",
+    "benchmarks/basins.py",
+)
 
 
 def main() -> int:
     """Run each in a process of its own; returns how many failed."""
     commands = [[sys.executable, name, "--write", FOLDER] for name in BENCHMARKS]
-    return sum(subprocess.run(command, cwd=ROOT, check=False).returncode != 0 for command in commands)
+    return sum(
+        subprocess.run(command, cwd=ROOT, check=False).returncode != 0 for command in commands
+    )
 
 
 if __name__ == "__main__":

@@ -1,18 +1,22 @@
-"""What a map of basins costs, and how far its labels can be trusted: saltus beside its rivals, same cells, same run.
+"""What a map of basins costs, and how far its labels can be trusted: saltus beside its rivals, same
+cells, same run.
 
-Case b4 of the deLangre rig at 15 Hz, starts x in [-5, 5] mm, v in [-1, 1] m/s. Everything is compiled before the clock starts. Rivals are
-on one pinned core; too slow for every cell, they label a random subset, and their time is scaled to the whole map. Finding the attractors
-is part of our time (about two seconds, however large the map: small maps say little); rivals are handed the orbits to compare with.
-Cells that start on a boundary (of maps with an odd number of cells) are left out of the subset: heyoka hangs there. Ratios are of CPU
-time, which other users of the machine disturb less.
+Case b4 of the deLangre rig at 15 Hz, starts x in [-5, 5] mm, v in [-1, 1] m/s. Everything is
+compiled before the clock starts. Rivals are on one pinned core; too slow for every cell, they label
+a random subset, and their time is scaled to the whole map. Finding the attractors is part of our
+time (about two seconds, however large the map: small maps say little); rivals are handed the orbits
+to compare with. Cells that start on a boundary (of maps with an odd number of cells) are left out
+of the subset: heyoka hangs there. Ratios are of CPU time, which other users of the machine disturb
+less.
 
-A rival can't be held to labels that rounding decides: this system stays on a chaotic saddle for hundreds of periods from many a start. So
-saltus and heyoka are also compared with themselves at another tolerance (the floor), and with each other where neither changes its mind.
+A rival can't be held to labels that rounding decides: this system stays on a chaotic saddle for
+hundreds of periods from many a start. So saltus and heyoka are also compared with themselves at
+another tolerance (the floor), and with each other where neither changes its mind.
 
-    python benchmarks/basins.py                 200 x 200 cells
-    python benchmarks/basins.py --cells 60      smaller (or larger)
-    python benchmarks/basins.py --alone         saltus only
-    python benchmarks/basins.py --write FOLDER  keep the tables for the documentation (python -m benchmarks does that)
+    python benchmarks/basins.py                 200 x 200 cells python benchmarks/basins.py --cells
+    60      smaller (or larger) python benchmarks/basins.py --alone         saltus only python
+    benchmarks/basins.py --write FOLDER  keep the tables for the documentation (python -m benchmarks
+    does that)
 """
 
 from __future__ import annotations
@@ -39,10 +43,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.record import Column, Record, Table, options_of
 from benchmarks.rivals import rig
 
-#: Periods that rivals let a trajectory settle, and those they look at: all but some 5 of 2000 cells follow an orbit then.
+#: Periods that rivals let a trajectory settle, and those they look at: all but some 5 of 2000 cells
+#: follow an orbit then.
 PERIODS, KEEP = 600, 48
-#: Periods between two looks of the loop that stops early: the whole map takes 26 s with 12, 30 s with 24, 35 s with 48. With 3, also 26 s,
-#: one in 60 of the cells that settle in 50 to 100 periods is taken for settled while it only passes an orbit.
+#: Periods between two looks of the loop that stops early: the whole map takes 26 s with 12, 30 s
+#: with 24, 35 s with 48. With 3, also 26 s, one in 60 of the cells that settle in 50 to 100 periods
+#: is taken for settled while it only passes an orbit.
 LOOK = 12
 #: heyoka's tolerances: that of benchmarks/flow.py, and its own default.
 TOLERANCE, OTHER_TOLERANCE = 1e-12, 2.0**-52
@@ -50,7 +56,8 @@ TOLERANCE, OTHER_TOLERANCE = 1e-12, 2.0**-52
 SETTLING = (0, 50, 100, 150, 200, 300, 10_000)
 #: What is kept for the documentation.
 COLUMNS = (
-    Column("program"), Column("CPU time of the map [s]", ".1f"), Column("wall time [s]", ".1f"), Column("CPU, times saltus", ".3g"),
+    Column("program"), Column("CPU time of the map [s]", ".1f"), Column("wall time [s]", ".1f"),
+    Column("CPU, times saltus", ".3g"),
     Column("same label as saltus", ".1%"), Column("cells timed", "d"),
 )  # fmt: skip
 FLOOR_COLUMNS = (Column("programs"), Column("same label", ".1%"), Column("cells", "d"))
@@ -70,7 +77,9 @@ class Seconds:
 
 @dataclass(frozen=True)
 class Rival:
-    """What a rival took for the whole map (scaled), and its labels int64[k] of the cells of the subset."""
+    """What a rival took for the whole map (scaled), and its labels int64[k] of the cells of the
+    subset.
+    """
 
     name: str
     seconds: Seconds
@@ -80,7 +89,9 @@ class Rival:
 
 @dataclass(frozen=True)
 class Subset:
-    """Random cells of a map: their place in the flattened map, their starts [m], [m/s], and our label and periods to settle."""
+    """Random cells of a map: their place in the flattened map, their starts [m], [m/s], and our
+    label and periods to settle.
+    """
 
     cells: np.ndarray
     x: np.ndarray
@@ -90,10 +101,12 @@ class Subset:
 
     def first(self, count: int) -> Subset:
         """The first few of them: as random as all."""
-        return Subset(*(getattr(self, name)[:count] for name in ("cells", "x", "v", "labels", "settling")))
+        return Subset(
+            *(getattr(self, name)[:count] for name in ("cells", "x", "v", "labels", "settling"))
+        )
 
 
-# -- clock ---------------------------------------------------------------------------------------------------------------------
+# -- clock -----------------------------------------------------------------------------------------
 @contextlib.contextmanager
 def one_core() -> Iterator[None]:
     """Everything within on one pinned core."""
@@ -115,18 +128,27 @@ def timed(job: Callable[[], object], repeats: int = 1) -> tuple[Seconds, object]
     return Seconds(*np.min(taken, axis=0).tolist()), result
 
 
-# -- ours ----------------------------------------------------------------------------------------------------------------------
-def ours(cells: int, threads: int, *, method: sl.Taylor | None = None, repeats: int = 1) -> tuple[Seconds, xr.Dataset]:
+# -- ours ------------------------------------------------------------------------------------------
+def ours(
+    cells: int, threads: int, *, method: sl.Taylor | None = None, repeats: int = 1
+) -> tuple[Seconds, xr.Dataset]:
     """Times and map of saltus."""
     system = sl.models.delangre("b", force="4 N", frequency="15 Hz")
     axes = {"x": ("-5 mm", "5 mm", cells), "v": ("-1 m/s", "1 m/s", cells)}
-    return timed(lambda: sl.basins(system, **axes, method=method, threads=threads, progress=False), repeats)  # type: ignore[return-value]
+    return timed(
+        lambda: sl.basins(system, **axes, method=method, threads=threads, progress=False), repeats
+    )  # type: ignore[return-value]
 
 
 def orbits_of(ds: xr.Dataset) -> list[np.ndarray]:
-    """Stroboscopic points of the attractors [m], [m/s], float64[n, 2] each; one that never repeats has a point at infinity."""
+    """Stroboscopic points of the attractors [m], [m/s], float64[n, 2] each; one that never repeats
+    has a point at infinity.
+    """
     points = np.stack([ds.attractor_x.values, ds.attractor_v.values], axis=-1)
-    return [row[:n] if n else np.full((1, 2), np.inf) for row, n in zip(points, ds.attractor_period.values, strict=True)]
+    return [
+        row[:n] if n else np.full((1, 2), np.inf)
+        for row, n in zip(points, ds.attractor_period.values, strict=True)
+    ]
 
 
 def subset_of(ds: xr.Dataset, count: int, seed: int = 15) -> Subset:
@@ -134,17 +156,25 @@ def subset_of(ds: xr.Dataset, count: int, seed: int = 15) -> Subset:
     x, v = (grid.ravel() for grid in np.meshgrid(ds.x.values, ds.v.values, indexing="ij"))
     allowed = np.flatnonzero((x != -rig.LOWER_GAP) & (x != rig.UPPER_GAP))
     cells = np.random.default_rng(seed).permutation(allowed)[:count]
-    return Subset(cells, x[cells], v[cells], ds.basin.values.ravel()[cells], ds.periods_to_settle.values.ravel()[cells])
+    return Subset(
+        cells,
+        x[cells],
+        v[cells],
+        ds.basin.values.ravel()[cells],
+        ds.periods_to_settle.values.ravel()[cells],
+    )
 
 
-# -- rivals --------------------------------------------------------------------------------------------------------------------
+# -- rivals ----------------------------------------------------------------------------------------
 def absent(left_out: list[str], what: str) -> None:
     """Say, and note, that a rival isn't there."""
     left_out.append(what)
     print(f"{what}; left out", file=sys.stderr)
 
 
-def heyoka(subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_out: list[str]) -> Iterator[Rival]:
+def heyoka(
+    subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_out: list[str]
+) -> Iterator[Rival]:
     """heyoka at two tolerances, and with a loop that stops early; nothing if it isn't installed."""
     try:
         from benchmarks.rivals import heyoka_basins
@@ -162,7 +192,9 @@ def heyoka(subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_out: l
         yield Rival(name, seconds.scaled(whole / subset.cells.size), found, subset.cells.size)  # type: ignore[arg-type]
 
 
-def pynamicalsys(subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_out: list[str]) -> Iterator[Rival]:
+def pynamicalsys(
+    subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_out: list[str]
+) -> Iterator[Rival]:
     """pynamicalsys; nothing if it isn't installed."""
     try:
         from benchmarks.rivals import pynamicalsys_basins
@@ -176,7 +208,7 @@ def pynamicalsys(subset: Subset, orbits: Sequence[np.ndarray], whole: int, left_
     yield Rival(name, seconds.scaled(whole / subset.cells.size), labels, subset.cells.size)
 
 
-# -- print ---------------------------------------------------------------------------------------------------------------------
+# -- print -----------------------------------------------------------------------------------------
 def equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Where two programs name the same attractor."""
     return (a == b) & (a >= 0)
@@ -189,70 +221,131 @@ def percent(hits: np.ndarray) -> str:
 
 def line(name: str, seconds: Seconds, unit: Seconds, same: str, cells: str) -> str:
     """One row of the first table."""
-    return f"| {name:<36} | {seconds.cpu:9.1f} | {seconds.wall:9.1f} | {seconds.cpu / unit.cpu:8.1f} | {same:>17} | {cells:<14} |"
+    return (
+        f"| {name:<36} | {seconds.cpu:9.1f} | {seconds.wall:9.1f} | "
+        f"{seconds.cpu / unit.cpu:8.1f} | {same:>17} | {cells:<14} |"
+    )
 
 
 def heading(cells: int) -> None:
     """Print what is computed, and the head of the first table."""
-    print(f"{processor()}; {cells} x {cells} cells; {lane_width()} lanes; times [s] are those of the whole map")
+    print(
+        f"{processor()}; {cells} x {cells} cells; {lane_width()} lanes; times [s] are those of "
+        f"the whole map"
+    )
     print(f"| {'':<36} | CPU       | wall      | CPU, rel.| same label        | timed on       |")
     print(f"|{'-' * 38}|----------:|----------:|---------:|------------------:|----------------|")
 
 
 def by_settling(subset: Subset, pairs: dict[str, np.ndarray]) -> Table:
-    """Print the share of equal labels by our periods to settle: what differs is decided after many periods on a chaotic saddle."""
+    """Print the share of equal labels by our periods to settle: what differs is decided after many
+    periods on a chaotic saddle.
+    """
     print("\nsame label [%] by how many periods a cell takes to settle:")
-    print(f"| {'periods':<42} |" + "".join(f" {f'< {high}' if high < SETTLING[-1] else 'more':>6} |" for high in SETTLING[1:]))
+    print(
+        f"| {'periods':<42} |"
+        + "".join(
+            f" {f'< {high}' if high < SETTLING[-1] else 'more':>6} |" for high in SETTLING[1:]
+        )
+    )
     print(f"|{'-' * 44}|" + "-------:|" * (len(SETTLING) - 1))
     shares = {name: _shares(subset.settling[: same.size], same) for name, same in pairs.items()}
     for name, row in shares.items():
-        print(f"| {name:<42} |" + "".join(f" {'' if share is None else f'{100 * share:.1f}':>6} |" for share in row))
+        print(
+            f"| {name:<42} |"
+            + "".join(f" {'' if share is None else f'{100 * share:.1f}':>6} |" for share in row)
+        )
     counts = np.histogram(subset.settling, SETTLING)[0]
     print(f"| {'cells':<42} |" + "".join(f" {count:6d} |" for count in counts))
-    columns = [Column("periods to settle"), *(Column(f"< {high}" if high < SETTLING[-1] else "more", ".0%") for high in SETTLING[1:])]
-    return Table("Same label, by how long a cell takes to settle", columns, [(name, *row) for name, row in shares.items()])
+    columns = [
+        Column("periods to settle"),
+        *(Column(f"< {high}" if high < SETTLING[-1] else "more", ".0%") for high in SETTLING[1:]),
+    ]
+    return Table(
+        "Same label, by how long a cell takes to settle",
+        columns,
+        [(name, *row) for name, row in shares.items()],
+    )
 
 
 def _shares(settling: np.ndarray, same: np.ndarray) -> list[float | None]:
-    """Share of equal labels in each group of cells by their periods to settle; None for an empty one."""
-    groups = [same[(settling >= low) & (settling < high)] for low, high in itertools.pairwise(SETTLING)]
+    """Share of equal labels in each group of cells by their periods to settle; None for an empty
+    one.
+    """
+    groups = [
+        same[(settling >= low) & (settling < high)] for low, high in itertools.pairwise(SETTLING)
+    ]
     return [float(group.mean()) if group.size else None for group in groups]
 
 
 def reasons(subset: Subset, other: np.ndarray, first: Rival, second: Rival) -> np.ndarray:
-    """Print what is wrong with the cells that saltus and heyoka label differently; returns where they agree among the steady ones."""
+    """Print what is wrong with the cells that saltus and heyoka label differently; returns where
+    they agree among the steady ones.
+    """
     same, lost = equal(subset.labels, first.labels), first.labels < 0
     our_own, their_own = equal(subset.labels, other), equal(first.labels, second.labels)
     differs = subset.settling[~same]
     print(f"\n{(~same).sum()} of {same.size} cells have another label in heyoka. Of these")
-    print(f"  {(~same & lost).sum():5d}  aren't on any orbit after heyoka's {PERIODS + KEEP} periods")
-    print(f"  {(~same & ~lost & ~our_own).sum():5d}  change their label in saltus too, at tolerance 2^-52")
-    print(f"  {(~same & ~lost & our_own & ~their_own).sum():5d}  change it in heyoka, at tolerance 2^-52")
-    print(f"  {(~same & ~lost & our_own & their_own).sum():5d}  change it in neither: each may have met one attractor twice by chance")
+    print(
+        f"  {(~same & lost).sum():5d}  aren't on any orbit after heyoka's {PERIODS + KEEP} periods"
+    )
+    print(
+        f"  {(~same & ~lost & ~our_own).sum():5d}  change their label in saltus too, at "
+        f"tolerance 2^-52"
+    )
+    print(
+        f"  {(~same & ~lost & our_own & ~their_own).sum():5d}  change it in heyoka, at tolerance "
+        f"2^-52"
+    )
+    print(
+        f"  {(~same & ~lost & our_own & their_own).sum():5d}  change it in neither: each may "
+        f"have met one attractor twice by chance"
+    )
     if differs.size:
-        print(f"Periods to settle where labels differ: {differs.min()} at least, median {np.median(differs):.0f}; elsewhere median"
-              f" {np.median(subset.settling[same]):.0f}")  # fmt: skip
-    print(f"Cells that change in neither: saltus and heyoka name the same attractor on {percent(same[our_own & their_own])}")
+        print(
+            f"Periods to settle where labels differ: {differs.min()} at least, median "
+            f"{np.median(differs):.0f}; elsewhere median"
+            f" {np.median(subset.settling[same]):.0f}"
+        )
+    print(
+        f"Cells that change in neither: saltus and heyoka name the same attractor on "
+        f"{percent(same[our_own & their_own])}"
+    )
     return same[our_own & their_own]
 
 
-def rows(make: Callable[..., Iterator[Rival]], subset: Subset, ds: xr.Dataset, unit: Seconds, left_out: list[str]) -> list[Rival]:
+def rows(
+    make: Callable[..., Iterator[Rival]],
+    subset: Subset,
+    ds: xr.Dataset,
+    unit: Seconds,
+    left_out: list[str],
+) -> list[Rival]:
     """Run and print one program's rows; no rows if it isn't installed."""
     rivals = []
     for rival in make(subset, orbits_of(ds), ds.basin.size, left_out):
         rivals.append(rival)
         same = equal(subset.labels, rival.labels)
-        print(line(rival.name, rival.seconds, unit, percent(same), f"{rival.cells}, scaled"), flush=True)
+        print(
+            line(rival.name, rival.seconds, unit, percent(same), f"{rival.cells}, scaled"),
+            flush=True,
+        )
     return rivals
 
 
-def kept_row(name: str, seconds: Seconds, unit: Seconds, same: float | None, cells: int) -> tuple[str | float | None, ...]:
+def kept_row(
+    name: str, seconds: Seconds, unit: Seconds, same: float | None, cells: int
+) -> tuple[str | float | None, ...]:
     """One row of what is kept."""
     return name, seconds.cpu, seconds.wall, seconds.cpu / unit.cpu, same, cells
 
 
-def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: list[str]) -> tuple[list[tuple], list[Table]]:
-    """Print the rivals' rows, the floors, and what is wrong where labels differ; returns those rows, and the other tables to be kept."""
+def beside(
+    ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: list[str]
+) -> tuple[list[tuple], list[Table]]:
+    """Print the rivals' rows, the floors, and what is wrong where labels differ; returns those
+    rows, and the other tables to be kept.
+    """
     with one_core():
         taylor = rows(heyoka, subset, ds, unit, left_out)
         rivals = taylor + rows(pynamicalsys, subset.first(few), ds, unit, left_out)
@@ -266,12 +359,28 @@ def beside(ds: xr.Dataset, unit: Seconds, subset: Subset, few: int, left_out: li
     if taylor:
         pairs["heyoka, heyoka at 2^-52"] = equal(taylor[0].labels, taylor[1].labels)
         print(f"  heyoka {percent(pairs['heyoka, heyoka at 2^-52'])}")
-        steady = {"saltus, heyoka, where neither changes at 2^-52": reasons(subset, other[subset.cells], *taylor[:2])}
+        steady = {
+            "saltus, heyoka, where neither changes at 2^-52": reasons(
+                subset, other[subset.cells], *taylor[:2]
+            )
+        }
     agreeing = {rival.name: equal(subset.labels[: rival.cells], rival.labels) for rival in rivals}
-    kept = [kept_row(rival.name, rival.seconds, unit, float(agreeing[rival.name].mean()), rival.cells) for rival in rivals]
-    floors = [(name, float(same.mean()), int(same.size)) for name, same in (pairs | steady).items() if same.size]
-    settling = by_settling(subset, pairs | {f"saltus, {name}": same for name, same in agreeing.items()})
-    return kept, [Table("The floor: programs beside themselves at another tolerance", FLOOR_COLUMNS, floors), settling]
+    kept = [
+        kept_row(rival.name, rival.seconds, unit, float(agreeing[rival.name].mean()), rival.cells)
+        for rival in rivals
+    ]
+    floors = [
+        (name, float(same.mean()), int(same.size))
+        for name, same in (pairs | steady).items()
+        if same.size
+    ]
+    settling = by_settling(
+        subset, pairs | {f"saltus, {name}": same for name, same in agreeing.items()}
+    )
+    return kept, [
+        Table("The floor: programs beside themselves at another tolerance", FLOOR_COLUMNS, floors),
+        settling,
+    ]
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -291,11 +400,16 @@ def main(argv: Sequence[str] | None = None) -> None:
     print(line("saltus, 2 threads", seconds, unit, "", "all cells"), flush=True)
     record = Record(
         "basins",
-        f"Basins of case b4 of the rig of de Langre et al. at 15 Hz, {chosen.cells} x {chosen.cells} cells; rivals on one pinned core, "
-        "timed on a random subset and scaled to the whole map. Finding the attractors is part of saltus's time; rivals are given the "
+        f"Basins of case b4 of the rig of de Langre et al. at 15 Hz, {chosen.cells} x "
+        f"{chosen.cells} cells; rivals on one pinned core, "
+        "timed on a random subset and scaled to the whole map. Finding the attractors is part of "
+        "saltus's time; rivals are given the "
         "orbits to compare with.",
     )
-    kept = [kept_row(f"saltus, {n} thread{'s' * (n > 1)}", time_, unit, None, ds.basin.size) for n, time_ in ((1, unit), (2, seconds))]
+    kept = [
+        kept_row(f"saltus, {n} thread{'s' * (n > 1)}", time_, unit, None, ds.basin.size)
+        for n, time_ in ((1, unit), (2, seconds))
+    ]
     tables: list[Table] = []
     if not chosen.alone:
         theirs, tables = beside(ds, unit, subset_of(ds, chosen.subset), chosen.few, record.left_out)

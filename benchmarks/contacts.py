@@ -1,12 +1,14 @@
-"""What a forcing period costs where several contacts share a system: saltus beside heyoka, same work, same run.
+"""What a forcing period costs where several contacts share a system: saltus beside heyoka, same
+work, same run.
 
-Masses in a row with stops, and the chain of two masses with two clearances: from random starts, every contact located. CPU time of one
-pinned core, medians over the repeats, the programs alternating. The difference is that of the states after two periods, relative to the
-largest: both programs follow the same motion.
+Masses in a row with stops, and the chain of two masses with two clearances: from random starts,
+every contact located. CPU time of one pinned core, medians over the repeats, the programs
+alternating. The difference is that of the states after two periods, relative to the largest: both
+programs follow the same motion.
 
-    python benchmarks/contacts.py                 the table
-    python benchmarks/contacts.py --repeats 15    more repeats
-    python benchmarks/contacts.py --write FOLDER  keep the table for the documentation (python -m benchmarks does that)
+    python benchmarks/contacts.py                 the table python benchmarks/contacts.py --repeats
+    15    more repeats python benchmarks/contacts.py --write FOLDER  keep the table for the
+    documentation (python -m benchmarks does that)
 """
 
 from __future__ import annotations
@@ -38,7 +40,8 @@ ROWS = ((1, 2), (2, 2), (2, 4), (4, 4), (4, 8))
 COLUMNS = (
     Column("system"), Column("boundaries", ".0f"), Column("contacts a period", ".2f"),
     Column("saltus, CPU time of a forcing period [µs]", ".3g"),
-    Column("heyoka [µs]", ".3g"), Column("times saltus", ".2f"), Column("largest difference after two periods", ".1e"),
+    Column("heyoka [µs]", ".3g"), Column("times saltus", ".2f"), Column("largest difference after "
+        "two periods", ".1e"),
 )  # fmt: skip
 
 
@@ -46,12 +49,24 @@ def problems() -> list[tuple[str, sl.System, Any, np.ndarray]]:
     """(title, system, what gives heyoka's problem, range of the starts) of each row."""
     chain = sl.models.chain()
     rows: list[tuple[str, sl.System, Any, np.ndarray]] = [
-        ("two masses, two clearances", chain, lambda rival: rival.chain(dict(chain.values)), np.full(4, 1e-3))
+        (
+            "two masses, two clearances",
+            chain,
+            lambda rival: rival.chain(dict(chain.values)),
+            np.full(4, 1e-3),
+        )
     ]
     for masses, stops in ROWS:
         title = f"{masses} mass{'es' if masses > 1 else ''} in a row, {stops} stops"
         scale = np.repeat([0.15, 1.0], masses)
-        rows.append((title, row_of_masses(masses, stops), lambda rival, size=(masses, stops): rival.row_of_masses(*size), scale))
+        rows.append(
+            (
+                title,
+                row_of_masses(masses, stops),
+                lambda rival, size=(masses, stops): rival.row_of_masses(*size),
+                scale,
+            )
+        )
     return rows
 
 
@@ -75,7 +90,10 @@ def alternating(jobs: list[Callable[[], object]], repeats: int) -> list[float]:
 
 def line(row: tuple[str | float | None, ...]) -> str:
     """A row of the table, as text."""
-    cells = [f"{cell:{column.form}}" if column.form and cell is not None else str(cell) for cell, column in zip(row, COLUMNS, strict=True)]
+    cells = [
+        f"{cell:{column.form}}" if column.form and cell is not None else str(cell)
+        for cell, column in zip(row, COLUMNS, strict=True)
+    ]
     return f"| {cells[0]:<28} | " + " | ".join(f"{cell:>8}" for cell in cells[1:]) + " |"
 
 
@@ -87,12 +105,19 @@ def main() -> None:
         from benchmarks.rivals import heyoka_stops as rival
     except ImportError:
         rival = None  # type: ignore[assignment]
-    record = Record("contacts", f"{STARTS} random starts, {PERIODS} periods; CPU time of one pinned core, medians of {options.repeats}.")
+    record = Record(
+        "contacts",
+        f"{STARTS} random starts, {PERIODS} periods; CPU time of one "
+        f"pinned core, medians of {options.repeats}.",
+    )
     if rival is None:
         record.left_out.append("heyoka isn't installed (pip install 'saltus[reference]')")
         print(f"{record.left_out[-1]}; left out", file=sys.stderr)
     print(f"{processor()}, one core; {STARTS} starts, {PERIODS} periods; {lane_width()} lanes")
-    print("| system                       | bounds   | contacts | saltus us| heyoka us| times    | differ   |")
+    print(
+        "| system                       | bounds   | contacts | saltus us| heyoka us| times    | "
+        "differ   |"
+    )
     kept: list[tuple[str | float | None, ...]] = []
     for title, system, problem, scale in problems():
         start = np.random.default_rng(5).uniform(-1.0, 1.0, (STARTS, len(system.states))) * scale
@@ -104,13 +129,27 @@ def main() -> None:
             jobs.append(lambda flow=flow, at=start, end=PERIODS * period: flow.run(at, end))
             two, theirs = ours(system, start, 2).state, flow.run(start, 2 * period)
             difference = float(np.max(np.abs(two - theirs) / np.max(np.abs(theirs), axis=0)))
-        contacts = float(ours(system, start, PERIODS).counters[:, engine.st.EVENTS].sum()) / (STARTS * PERIODS)
+        contacts = float(ours(system, start, PERIODS).counters[:, engine.st.EVENTS].sum()) / (
+            STARTS * PERIODS
+        )
         us = [seconds / (STARTS * PERIODS) * 1e6 for seconds in alternating(jobs, options.repeats)]
         theirs_us = us[1] if rival is not None else None
-        kept.append((title, float(len(system.guards)), contacts, us[0], theirs_us, theirs_us and theirs_us / us[0], difference))
+        kept.append(
+            (
+                title,
+                float(len(system.guards)),
+                contacts,
+                us[0],
+                theirs_us,
+                theirs_us and theirs_us / us[0],
+                difference,
+            )
+        )
         print(line(kept[-1]), flush=True)
     if options.write is not None:
-        record.tables.append(Table("One trajectory, one forcing period, several contacts", COLUMNS, kept))
+        record.tables.append(
+            Table("One trajectory, one forcing period, several contacts", COLUMNS, kept)
+        )
         print(f"kept in {record.write(options.write)}")
 
 

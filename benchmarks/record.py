@@ -1,4 +1,6 @@
-"""What a benchmark measured, as a file that the documentation shows: numbers, machine, date, versions, and the command that made it."""
+"""What a benchmark measured, as a file that the documentation shows: numbers, machine, date,
+versions, and the command that made it.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +21,19 @@ from saltus.codegen.module import lane_width
 PACKAGES = ("saltus", "numpy", "llvmlite", "numba", "scipy", "heyoka", "pynamicalsys")
 
 
-def options_of(name: str, description: str | None, repeats: int, what: str) -> argparse.ArgumentParser:
-    """The command line that benchmarks share: how often ``what`` is done, and where the tables are kept as ``<name>.json``."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+def options_of(
+    name: str, description: str | None, repeats: int, what: str
+) -> argparse.ArgumentParser:
+    """The command line that benchmarks share: how often ``what`` is done, and where the tables are
+    kept as ``<name>.json``.
+    """
+    parser = argparse.ArgumentParser(
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--repeats", type=int, default=repeats, help=what)
-    parser.add_argument("--write", type=Path, metavar="FOLDER", help=f"keep the tables there as {name}.json")
+    parser.add_argument(
+        "--write", type=Path, metavar="FOLDER", help=f"keep the tables there as {name}.json"
+    )
     return parser
 
 
@@ -68,7 +78,9 @@ class Record:
     def write(self, folder: Path) -> Path:
         """Write ``<name>.json`` to a folder; returns the file."""
         made = {
-            "command": shlex.join(["python", f"benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]]),
+            "command": shlex.join(
+                ["python", f"benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]]
+            ),
             "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
             "machine": f"{processor()}, {lane_width()} lanes",
             "python": ".".join(map(str, sys.version_info[:3])),
@@ -76,7 +88,10 @@ class Record:
         }
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / f"{self.name}.json"
-        file.write_text(json.dumps({**asdict(self), **made}, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        file.write_text(
+            json.dumps({**asdict(self), **made}, indent=1, ensure_ascii=False) + "\n",
+            encoding="utf-8",
+        )
         return file
 
 

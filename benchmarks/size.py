@@ -1,4 +1,6 @@
-"""How much there is to read: lines of code of each package, without comments, docstrings, blank lines and imports.
+"""How much there is to read in each package, without comments, docstrings, blank lines and imports.
+
+Lines of code depend on how wide they are; tokens (names, numbers, strings, operators) don't.
 
 Usage: ``python benchmarks/size.py [FOLDER]``
 """
@@ -12,14 +14,26 @@ import tokenize
 from collections import defaultdict
 from pathlib import Path
 
-SKIPPED = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+SKIPPED = {
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENDMARKER,
+}
 
 
-def lines_of_code(text: str) -> int:
-    """Lines that hold a token of code; a statement over five lines counts five."""
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    lines = {line for token in tokens if token.type not in SKIPPED for line in range(token.start[0], token.end[0] + 1)}
-    return len(lines - left_out(ast.parse(text)))
+def lines_and_tokens(text: str) -> tuple[int, int]:
+    """Lines that hold a token of code (a statement over five lines counts five), and the tokens."""
+    out = left_out(ast.parse(text))
+    tokens = [
+        token
+        for token in tokenize.generate_tokens(io.StringIO(text).readline)
+        if token.type not in SKIPPED and token.start[0] not in out
+    ]
+    lines = {line for token in tokens for line in range(token.start[0], token.end[0] + 1)}
+    return len(lines), len(tokens)
 
 
 def left_out(tree: ast.Module) -> set[int]:
@@ -28,21 +42,27 @@ def left_out(tree: ast.Module) -> set[int]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             nodes.append(node)
-        if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(node, clean=False) is not None:
+        if (
+            isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef)
+            and ast.get_docstring(node, clean=False) is not None
+        ):
             nodes.append(node.body[0])
-    return {line for node in nodes for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)}
+    return {
+        line for node in nodes for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
+    }
 
 
 def main(root: Path) -> None:
     """A row for each package, and their sum."""
-    rows: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0])
+    rows: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0, 0])
     for file in root.rglob("*.py"):
         text, parts = file.read_text(encoding="utf-8"), file.relative_to(root).parts
         for name in (parts[0] if len(parts) > 1 else ".", "all"):
-            rows[name] = [a + b for a, b in zip(rows[name], (1, text.count("\n"), lines_of_code(text)), strict=True)]
-    print(f"{'package':12s} {'files':>6s} {'lines':>7s} {'code':>7s}")
+            counts = (1, text.count("\n"), *lines_and_tokens(text))
+            rows[name] = [a + b for a, b in zip(rows[name], counts, strict=True)]
+    print(f"{'package':12s} {'files':>6s} {'lines':>7s} {'code':>7s} {'tokens':>8s}")
     for name, row in sorted(rows.items(), key=lambda item: item[1][2]):
-        print(f"{name:12s} {row[0]:6d} {row[1]:7d} {row[2]:7d}")
+        print(f"{name:12s} {row[0]:6d} {row[1]:7d} {row[2]:7d} {row[3]:8d}")
 
 
 if __name__ == "__main__":

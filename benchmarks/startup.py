@@ -1,14 +1,16 @@
-"""What it costs to begin: from the shell to the first trajectory, and one more in a process that has warmed up.
+"""What it costs to begin: from the shell to the first trajectory, and one more in a process that
+has warmed up.
 
-Case b4 of the deLangre rig at 15 Hz from rest. Every row of the first table is a fresh process that does what its name says and ends; its
-machine code lies on disk, as after any earlier run, and so does the byte code of Python. The last row alone finds neither machine code
-nor Matplotlib's list of fonts, as the first command on a machine. The libraries alone stand first: what is above
-them is saltus. The second table is one call among many in a process: a click. CPU time counts all threads, and is disturbed less than
-wall time by others on the machine. Medians.
+Case b4 of the deLangre rig at 15 Hz from rest. Every row of the first table is a fresh process that
+does what its name says and ends; its machine code lies on disk, as after any earlier run, and so
+does the byte code of Python. The last row alone finds neither machine code nor Matplotlib's list of
+fonts, as the first command on a machine. The libraries alone stand first: what is above them is
+saltus. The second table is one call among many in a process: a click. CPU time counts all threads,
+and is disturbed less than wall time by others on the machine. Medians.
 
-    python benchmarks/startup.py                 both tables
-    python benchmarks/startup.py --repeats 20    more processes
-    python benchmarks/startup.py --write FOLDER  keep the tables for the documentation (python -m benchmarks does that)
+    python benchmarks/startup.py                 both tables python benchmarks/startup.py --repeats
+    20    more processes python benchmarks/startup.py --write FOLDER  keep the tables for the
+    documentation (python -m benchmarks does that)
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.record import Column, Record, Table, options_of
 
 #: The demo with its picture, written to the working folder.
-DEMO = 'import sys; sys.argv = ["saltus", "demo", "--out", "."]; from saltus.cli import main; main()'
+DEMO = (
+    'import sys; sys.argv = ["saltus", "demo", "--out", "."]; from saltus.cli import main; main()'
+)
 BARE = 'import os; os.environ |= dict.fromkeys(("SALTUS_CACHE", "MPLCONFIGDIR"), os.getcwd()); '
 MODEL = 'import saltus as sl; rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")'
 #: What each fresh process does.
@@ -41,7 +45,8 @@ PROGRAMS = {
     "import xarray (which imports pandas)": "import xarray",
     "import saltus": "import saltus",
     "import saltus, a system": MODEL,
-    "import saltus, a system, 20 periods of it": MODEL + "; sl.simulate(rig, start=(0.0, 0.0), periods=20, progress=False)",
+    "import saltus, a system, 20 periods of it": MODEL + "; sl.simulate(rig, start=(0.0, 0.0), "
+    "periods=20, progress=False)",
     "saltus demo, to its picture": DEMO,
     "the same, first on a machine": BARE + DEMO,
 }
@@ -50,33 +55,51 @@ CALLS = 40
 #: What is kept for the documentation.
 PROCESS_COLUMNS = (Column("process"), Column("CPU time [s]", ".2f"), Column("wall time [s]", ".2f"))
 CALL_COLUMNS = (
-    Column("call"), Column("CPU time [ms]", ".2f"), Column("of it the engine [ms]", ".2f"), Column("wall time [ms]", ".2f"),
+    Column("call"), Column("CPU time [ms]", ".2f"), Column("of it the engine [ms]", ".2f"),
+    Column("wall time [ms]", ".2f"),
 )  # fmt: skip
 
 
 def fresh(program: str) -> tuple[float, float]:
-    """CPU time and wall time of a process in an empty folder, from its start to its end, other processes that it starts included [s]."""
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    """CPU time and wall time of a process in an empty folder, from its start to its end, other
+    processes that it starts included [s].
+    """
+    environment = {
+        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+    }
     before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([sys.executable, "-c", program], env=environment, check=True, cwd=folder, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env=environment,
+            check=True,
+            cwd=folder,
+            stdout=subprocess.DEVNULL,
+        )
         wall, after = time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, wall
 
 
 def processes(repeats: int) -> list[tuple[str, float, float]]:
-    """(name, CPU time [s], wall time [s]) of every program. They take turns, so that all see the same machine."""
+    """(name, CPU time [s], wall time [s]) of every program. They take turns, so that all see the
+    same machine.
+    """
     for program in PROGRAMS.values():
         fresh(program)  # compiles what isn't there, and fills the caches of files
     taken = {name: [] for name in PROGRAMS}
     for _ in range(repeats):
         for name, program in PROGRAMS.items():
             taken[name].append(fresh(program))
-    return [(name, median(cpu for cpu, _ in times), median(wall for _, wall in times)) for name, times in taken.items()]
+    return [
+        (name, median(cpu for cpu, _ in times), median(wall for _, wall in times))
+        for name, times in taken.items()
+    ]
 
 
 def calls(count: int) -> list[tuple[str, float, float, float]]:
-    """(name, CPU time, CPU time in the engine, wall time [ms]) of a call with one start, once everything is warm."""
+    """(name, CPU time, CPU time in the engine, wall time [ms]) of a call with one start, once
+    everything is warm.
+    """
     rig, plain, inside = sl.models.delangre("b", force="4 N", frequency="15 Hz"), engine.run, [0.0]
 
     def timed(*args: object, **kwargs: object) -> object:
@@ -94,7 +117,13 @@ def calls(count: int) -> list[tuple[str, float, float, float]]:
                 taken = []
                 for _ in range(count + 3):
                     inside[0], cpu, wall = 0.0, time.process_time(), time.perf_counter()
-                    sl.simulate(rig, start=(0.0, 0.0), periods=periods, time_errors=time_errors, progress=False)
+                    sl.simulate(
+                        rig,
+                        start=(0.0, 0.0),
+                        periods=periods,
+                        time_errors=time_errors,
+                        progress=False,
+                    )
                     taken.append((time.process_time() - cpu, inside[0], time.perf_counter() - wall))
                 medians = (1e3 * median(part) for part in zip(*taken[3:], strict=True))
                 rows.append((f'{periods} periods, time_errors="{time_errors}"', *medians))
@@ -107,7 +136,8 @@ def table(repeats: int, folder: Path | None = None) -> None:
     """Print both tables, and keep them in a folder if there is one."""
     record = Record(
         "startup",
-        f"Case b4 of the rig of de Langre et al. at 15 Hz, one start, 200 samples a period; medians of {repeats} fresh processes and of "
+        f"Case b4 of the rig of de Langre et al. at 15 Hz, one start, 200 samples a period; "
+        f"medians of {repeats} fresh processes and of "
         f"{CALLS} calls; machine code on disk.",
     )
     print(f"{processor()}; {repeats} processes each")

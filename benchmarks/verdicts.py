@@ -1,6 +1,8 @@
-"""Whether two runs of a replication give the same verdicts: compares two claims.csv, claim by claim.
+"""Whether two runs of a replication give the same verdicts: compares two claims.csv, claim by
+claim.
 
-Usage: ``python benchmarks/verdicts.py BEFORE.csv AFTER.csv``. Ends with 1 if a verdict differs, or a claim is missing.
+Usage: ``python benchmarks/verdicts.py BEFORE.csv AFTER.csv``. Ends with 1 if a verdict differs, or
+a claim is missing.
 """
 
 from __future__ import annotations
@@ -16,7 +18,10 @@ READINGS = ("its own settings give here", "exact arithmetic gives")
 def claims(file: Path) -> dict[str, dict[str, str]]:
     """The rows of a claims.csv, by claim."""
     with file.open(encoding="utf-8", newline="") as lines:
-        return {row["claim"]: row for row in csv.DictReader(line for line in lines if not line.startswith("#"))}
+        return {
+            row["claim"]: row
+            for row in csv.DictReader(line for line in lines if not line.startswith("#"))
+        }
 
 
 def main(before: dict[str, dict[str, str]], after: dict[str, dict[str, str]]) -> int:
@@ -31,7 +36,10 @@ def main(before: dict[str, dict[str, str]], after: dict[str, dict[str, str]]) ->
         read += bool(changed)
         for column in changed:
             print(f"{name}, {column}:\n    {old.get(column)}\n    {new.get(column)}")
-    print(f"{len(before)} and {len(after)} claims: {wrong} verdicts differ, {read} are read differently.")
+    print(
+        f"{len(before)} and {len(after)} claims: {wrong} verdicts differ, {read} are read "
+        f"differently."
+    )
     return wrong
 
 

@@ -1,4 +1,6 @@
-"""The documentation: `sphinx-build -W --keep-going -b html docs docs/_build`. Needs no network; notebooks are executed as it builds."""
+"""The documentation: `sphinx-build -W --keep-going -b html docs docs/_build`. Needs no network;
+notebooks are executed as it builds.
+"""
 
 import os
 import sys
@@ -16,29 +18,33 @@ version = release = saltus.__version__
 
 extensions = [
     "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "myst_nb",
-    "glossary_terms", "decision_notes", "study_tables", "result_tables", "measured", "claims", "offline",
+    "glossary_terms", "decision_notes", "study_tables", "result_tables", "measured", "claims",
+    "offline",
 ]  # fmt: skip
 # pictures/ holds those of the README, comparison/ and replication/ data that pages read.
 exclude_patterns = ["_build", "_ext", "pictures", "comparison", "replication"]
 templates_path = []
 
-# -- look ----------------------------------------------------------------------------------------------------------------------
+# -- look ------------------------------------------------------------------------------------------
 html_theme = "furo"
 html_title = "saltus"
 html_static_path = ["_static"]
 html_css_files = ["saltus.css"]
 html_copy_source = False
 html_show_sphinx = False
-# No server but the reader's own: MathJax lies beside the pages, and `offline` fails the build if one loads anything from elsewhere.
+# No server but the reader's own: MathJax lies beside the pages, and `offline` fails the build if
+# one loads anything from elsewhere.
 mathjax_path = "mathjax/tex-svg.js"
 pygments_style, pygments_dark_style = "friendly", "monokai"
 
-# -- text and notebooks --------------------------------------------------------------------------------------------------------
+# -- text and notebooks ----------------------------------------------------------------------------
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-# Where MathJax looks: the formulas of a System are HTML that a cell put out. Its class "text_html" isn't among MyST's own.
+# Where MathJax looks: the formulas of a System are HTML that a cell put out. Its class "text_html"
+# isn't among MyST's own.
 myst_mathjax_classes = "tex2jax_process|mathjax_process|math|output_area|text_html"
-# Always executed: a page can't show what the code of today doesn't print. In a folder of its own, so that nothing is left behind.
+# Always executed: a page can't show what the code of today doesn't print. In a folder of its own,
+# so that nothing is left behind.
 nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
@@ -47,14 +53,16 @@ nb_execution_timeout = 600
 nb_execution_show_tb = True
 nb_merge_streams = True
 nb_output_stderr = "remove"  # what is being compiled, and how far it is, belongs on a terminal
-# A caller's backend for files would leave the notebooks without pictures; the notebooks' own has a sharp 150 dots an inch from the style.
+# A caller's backend for files would leave the notebooks without pictures; the notebooks' own has a
+# sharp 150 dots an inch from the style.
 os.environ.pop("MPLBACKEND", None)
 os.environ["MATPLOTLIBRC"] = str(HERE / "matplotlibrc")
-# The commands `saltus ...` of the notebooks are those of this interpreter, and their tables are as wide as those of a terminal.
+# The commands `saltus ...` of the notebooks are those of this interpreter, and their tables are as
+# wide as those of a terminal.
 os.environ["COLUMNS"] = "170"
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
-# -- API -----------------------------------------------------------------------------------------------------------------------
+# -- API -------------------------------------------------------------------------------------------
 autodoc_typehints = "none"  # the docstrings say types, with units and shapes
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False

@@ -1,4 +1,6 @@
-"""Functions in the Python of generated heads, compiled as an equation is: by codegen/lane_ir.py and LLVM."""
+"""Functions in the Python of generated heads, compiled as an equation is: by codegen/lane_ir.py and
+LLVM.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,12 @@ def compiled(text: str, arguments: tuple[str, ...], lanes: int):
     function = ctypes.CFUNCTYPE(None, *(_CTYPES[kind] for kind in arguments))(loaded.address)
 
     def call(*values: np.ndarray | float) -> None:
-        function(*(value.ctypes.data if kind == ARRAY else value for value, kind in zip(values, arguments, strict=True)))
+        function(
+            *(
+                value.ctypes.data if kind == ARRAY else value
+                for value, kind in zip(values, arguments, strict=True)
+            )
+        )
 
     call.keeper = loaded
     return call

@@ -1,4 +1,6 @@
-"""What holds for all tests: files that take long begin first, and no flow is compiled a second time because it has worked for long."""
+"""What holds for all tests: files that take long begin first, and no flow is compiled a second time
+because it has worked for long.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-#: Files in which tests take longest, longest first: no process is to begin one of them when all others have ended.
+#: Files in which tests take longest, longest first: no process is to begin one of them when all
+#: others have ended.
 LONGEST = (
     "faults/test_study_faults.py",
     "truth/test_basins.py",
@@ -45,12 +48,16 @@ LONGEST = (
 
 
 def pytest_configure():
-    """Collecting makes a million objects, all of which stay: it isn't looked again and again for some that don't."""
+    """Collecting makes a million objects, all of which stay: it isn't looked again and again for
+    some that don't.
+    """
     gc.disable()
 
 
 def pytest_collection_finish():
-    """Nor later, while tests run. What they make is looked at once there is more of it than by default."""
+    """Nor later, while tests run. What they make is looked at once there is more of it than by
+    default.
+    """
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 10, 50)
@@ -58,7 +65,9 @@ def pytest_collection_finish():
 
 
 def pytest_collection_modifyitems(config, items):
-    """Whole files, in the order of LONGEST; all others stay as they are. --no-loadscope-reorder keeps the order (pyproject.toml)."""
+    """Whole files, in the order of LONGEST; all others stay as they are. --no-loadscope-reorder
+    keeps the order (pyproject.toml).
+    """
     here = Path(__file__).parent
     order = {here / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: order.get(item.path, len(order)))
@@ -66,7 +75,9 @@ def pytest_collection_modifyitems(config, items):
 
 @pytest.fixture(autouse=True, scope="session")
 def never_steady():
-    """A flow would be compiled again, in a process beside it, after two seconds of work: no test works long enough to gain by it."""
+    """A flow would be compiled again, in a process beside it, after two seconds of work: no test
+    works long enough to gain by it.
+    """
     from saltus.codegen import kernels
 
     with pytest.MonkeyPatch.context() as patch:

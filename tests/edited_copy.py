@@ -7,8 +7,14 @@ from saltus.study import code
 
 
 def edited_copy(folder: Path, edited: str, patch, more: str = "EDITED = True\n") -> None:
-    """Let the hash of the code read a copy in ``folder`` in which the modules of this name have ``more``, another statement."""
-    copy = shutil.copytree(code.PACKAGE, folder / "saltus", ignore=shutil.ignore_patterns("__pycache__", "bitcode", "*.so"))
+    """Let the hash of the code read a copy in ``folder`` in which the modules of this name have
+    ``more``, another statement.
+    """
+    copy = shutil.copytree(
+        code.PACKAGE,
+        folder / "saltus",
+        ignore=shutil.ignore_patterns("__pycache__", "bitcode", "*.so"),
+    )
     found = list(copy.rglob(edited))
     assert found
     for file in found:

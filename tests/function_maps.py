@@ -1,4 +1,6 @@
-"""Maps given as functions of states, with closed forms to test the engine of orbits against: it takes any map."""
+"""Maps given as functions of states, with closed forms to test the engine of orbits against: it
+takes any map.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from saltus.kernels import status as st
 
 
 def orbit_near(map_: Map, start: np.ndarray, n: int, scale: np.ndarray) -> Orbit | None:
-    """The orbit of period n, or a part of it, near one state float64[D]: a batch of one. The noise is that of a box."""
+    """The orbit of period n, or a part of it, near one state float64[D]: a batch of one. The noise
+    is that of a box.
+    """
     found = find_orbits(map_, start[None], np.array([n]), scale[None], np.array([map_.noise]))
     return found[0] if found.period[0] else None
 
@@ -24,7 +28,8 @@ def attracts(orbit: Orbit) -> bool:
 
 
 class FunctionMap:
-    """A map given as a function of arrays: ``image = function(states)`` with float64[k, D] in and out.
+    """A map given as a function of arrays: ``image = function(states)`` with float64[k, D] in and
+    out.
 
     Parameters
     ----------
@@ -48,7 +53,12 @@ class FunctionMap:
         noise: float = 1e-12,
         exact: Map | None = None,
     ):
-        self.states, self.period, self.noise, self.exact_map = tuple(states.split()), np.ones(1), noise, exact
+        self.states, self.period, self.noise, self.exact_map = (
+            tuple(states.split()),
+            np.ones(1),
+            noise,
+            exact,
+        )
         self._function, self._derivative = function, derivative
 
     @property
@@ -68,10 +78,17 @@ class FunctionMap:
         """See :class:`Map`."""
         return _Iterates(self._function, start)
 
-    def tangent(self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def tangent(
+        self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`Map`."""
         size = start.shape[1]
-        state, matrix = start.copy(), np.broadcast_to(np.eye(size) if directions is None else directions, (*start.shape, size)).copy()
+        state, matrix = (
+            start.copy(),
+            np.broadcast_to(
+                np.eye(size) if directions is None else directions, (*start.shape, size)
+            ).copy(),
+        )
         left = np.broadcast_to(count, len(start))
         with np.errstate(all="ignore"):
             for j in range(int(left.max(initial=0))):
@@ -132,7 +149,13 @@ class FunctionFlow(TangentFlow):
         """See :class:`TangentFlow`."""
         travel = self.map.launch(start, count)
         points = np.concatenate([start[:, None], travel.advance(count)], axis=1)[:, first:]
-        return Segment(points, travel.status, 0 * travel.unresolved, travel.unresolved, np.full(len(start), np.inf))
+        return Segment(
+            points,
+            travel.status,
+            0 * travel.unresolved,
+            travel.unresolved,
+            np.full(len(start), np.inf),
+        )
 
     def sample(self, start: np.ndarray) -> np.ndarray:
         """See :class:`TangentFlow`."""

@@ -1,4 +1,6 @@
-"""A paper of two figures whose jobs take no time: what a replication does with it, whatever it computes."""
+"""A paper of two figures whose jobs take no time: what a replication does with it, whatever it
+computes.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,15 @@ from saltus.study.table import TextTable
 def small_result(value):
     """A Dataset that any file can hold: one attractor of some peak."""
     table = AttractorTable(
-        kind=["periodic"], period=np.array([1]), contacts=np.array([2.0]), itinerary=[""], peak=np.array([value]), rms=np.array([value]),
-        margin=np.array([1.0]), multipliers=np.array([[0.5, 0.1]]), exponent=np.array([-1.0]), exponent_error=np.array([0.0]),
+        kind=["periodic"], period=np.array([1]), contacts=np.array([2.0]), itinerary=[""],
+        peak=np.array([value]), rms=np.array([value]),
+        margin=np.array([1.0]), multipliers=np.array([[0.5, 0.1]]), exponent=np.array([-1.0]),
+        exponent_error=np.array([0.0]),
         points=[np.array([[value, 0.0]])],
     )  # fmt: skip
-    return made_results.attractors(states=("x", "v"), units={"x": "m", "v": "m/s"}, attractors=table)
+    return made_results.attractors(
+        states=("x", "v"), units={"x": "m", "v": "m/s"}, attractors=table
+    )
 
 
 def compute(system, *inputs, value, progress, **_):
@@ -51,13 +57,15 @@ _SOUND = compute, draw, judge
 
 
 def small_paper(compute=compute, draw=draw, judge=judge, table=table):
-    """Fig. 2, by the functions given: ``fig2/first`` and ``fig2/second``, which needs it. Fig. 10, always sound: ``fig10/other``.
+    """Fig. 2, by the functions given: ``fig2/first`` and ``fig2/second``, which needs it. Fig. 10,
+    always sound: ``fig10/other``.
 
     Its study files are those of a paper that there is; it doesn't read them.
     """
     sound, sound_draw, sound_judge = _SOUND
     jobs = [
-        small_job("fig2/first", 1.0, compute), small_job("fig2/second", 2.0, sound, ("fig2/first",)),
+        small_job("fig2/first", 1.0, compute),
+        small_job("fig2/second", 2.0, sound, ("fig2/first",)),
         small_job("fig10/other", 3.0, sound),
     ]  # fmt: skip
     return Paper(

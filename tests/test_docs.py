@@ -1,4 +1,6 @@
-"""The pages of the documentation are programs: their code, studies and commands run. Notebooks run when the docs are built."""
+"""The pages of the documentation are programs: their code, studies and commands run. Notebooks run
+when the docs are built.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,16 @@ import saltus
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-#: Commands of other programs that pages may show: CI runs the first (see .ci/run), people the second.
+#: Commands of other programs that pages may show: CI runs the first (see .ci/run), people the
+#: second.
 OTHERS = {"pip install .", "python -m benchmarks"}
-#: What other tests run, or CI does: `reproduce` with its smallest figure, since the whole takes minutes.
-ELSEWHERE = {"saltus demo", "saltus reproduce saunders2021 --quick", "saltus reproduce saunders2021"}
+#: What other tests run, or CI does: `reproduce` with its smallest figure, since the whole takes
+#: minutes.
+ELSEWHERE = {
+    "saltus demo",
+    "saltus reproduce saunders2021 --quick",
+    "saltus reproduce saunders2021",
+}
 
 #: Languages of the programs that a page compares saltus with; saltus's own code beside them runs.
 FOREIGN = {"matlab", "julia"}
@@ -39,7 +47,9 @@ WITH_CODE = [page for page in PAGES if blocks(page)]
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.stem)
 def test_code_of_a_page_runs(page, tmp_path, monkeypatch):
-    """In order, in one namespace and one folder; a study is saved under the name that the next command uses."""
+    """In order, in one namespace and one folder; a study is saved under the name that the next
+    command uses.
+    """
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "page"}
     for language, text in blocks(page):
@@ -76,12 +86,16 @@ def test_notebooks_are_executed_and_fail_loudly():
     assert "nb_execution_raise_on_error = True" in conf
     notebooks = [page for page in PAGES if "{code-cell}" in page.read_text(encoding="utf-8")]
     assert notebooks
-    assert [page.name for page in notebooks if not is_notebook(page.read_text(encoding="utf-8"))] == []
+    assert [
+        page.name for page in notebooks if not is_notebook(page.read_text(encoding="utf-8"))
+    ] == []
 
 
 def test_every_public_name_is_documented():
     text = (DOCS / "api.md").read_text(encoding="utf-8")
-    documented = {name.rpartition(".")[2] for name in re.findall(r"^\.\. auto\w+:: (\S+)", text, re.MULTILINE)}
+    documented = {
+        name.rpartition(".")[2] for name in re.findall(r"^\.\. auto\w+:: (\S+)", text, re.MULTILINE)
+    }
     named = set(re.findall(r"`sl\.(\w+)`", text))
     assert set(saltus.__all__) - {"models", "plot"} - documented - named == set()
     assert set(saltus.models.MODELS) <= documented

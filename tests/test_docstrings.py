@@ -10,7 +10,10 @@ import saltus as sl
 #: Functions that stand for those of mathematics, in equations.
 MATHEMATICS = ("saltus.system.functions", "saltus.system.compositions")
 FUNCTIONS = sorted(
-    name for name in sl.__all__ if inspect.isfunction(getattr(sl, name)) and inspect.unwrap(getattr(sl, name)).__module__ not in MATHEMATICS
+    name
+    for name in sl.__all__
+    if inspect.isfunction(getattr(sl, name))
+    and inspect.unwrap(getattr(sl, name)).__module__ not in MATHEMATICS
 )
 
 
@@ -28,4 +31,6 @@ def test_its_example_gives_what_it_says(name, tmp_path, monkeypatch):
     names = {"sl": sl, name: function}
     for example in doctest.DocTestFinder(recurse=False).find(function, name, globs=names):
         assert example.examples
-        assert doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(example).failed == 0
+        assert (
+            doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(example).failed == 0
+        )

@@ -1,4 +1,6 @@
-"""The examples run as they stand but for their grids: a system of one's own through every question of one study."""
+"""The examples run as they stand but for their grids: a system of one's own through every question
+of one study.
+"""
 
 from __future__ import annotations
 
@@ -37,16 +39,37 @@ def answered(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pipeline, "SCOUTS", 64)
         patch.setattr(pipeline, "CHECKED", 16)
-        yield place, saltus("run", place / "study.toml", "--system", f"{place / 'two_masses.py'}:rig", "--out", place / "out")
+        yield (
+            place,
+            saltus(
+                "run",
+                place / "study.toml",
+                "--system",
+                f"{place / 'two_masses.py'}:rig",
+                "--out",
+                place / "out",
+            ),
+        )
 
 
 def test_every_question_is_answered(answered):
     place, printed = answered
-    for name in ("run", "frequency-response", "bifurcation-diagram", "lyapunov-exponents", "basins"):
+    for name in (
+        "run",
+        "frequency-response",
+        "bifurcation-diagram",
+        "lyapunov-exponents",
+        "basins",
+    ):
         ds = sl.load(place / "out" / f"{name}.nc")
         assert ds.attrs["system"] == "rig"
         assert (place / "out" / f"{name}.png").stat().st_size > 5000, name
-    for title in ("Frequency response", "Bifurcation diagram", "Lyapunov exponents", "share of starts"):
+    for title in (
+        "Frequency response",
+        "Bifurcation diagram",
+        "Lyapunov exponents",
+        "share of starts",
+    ):
         assert title in printed
     assert saltus("status", place / "out").count("done") >= 4
 
@@ -58,9 +81,13 @@ def test_the_sum_of_the_exponents_is_the_trace_of_damping(answered):
 
 
 def test_far_below_the_stop_the_response_is_linear(answered):
-    """At 14 Hz the second mass stays off the stop: amplitude of the linear system, its complex stiffness solved by hand."""
+    """At 14 Hz the second mass stays off the stop: amplitude of the linear system, its complex
+    stiffness solved by hand.
+    """
     ds = sl.load(answered[0] / "out" / "frequency-response.nc")
     w = 2 * np.pi * 14
-    dynamic = np.array([[6000 - 2 * w**2 + 12j * w, -2000 - 4j * w], [-2000 - 4j * w, 2000 - w**2 + 4j * w]])
+    dynamic = np.array(
+        [[6000 - 2 * w**2 + 12j * w, -2000 - 4j * w], [-2000 - 4j * w, 2000 - w**2 + 4j * w]]
+    )
     amplitude = abs(np.linalg.solve(dynamic, [2.0, 0.0])[0])
     assert ds["peak"].sel(frequency=14).values == pytest.approx([amplitude] * 3, rel=1e-6)

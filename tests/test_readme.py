@@ -1,4 +1,6 @@
-"""The README is a program: its code runs, its commands are the ones that CI runs, its study can be read."""
+"""The README is a program: its code runs, its commands are the ones that CI runs, its study can be
+read.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,11 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^(?:<!-- (?P<marker>.*?) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$", README, re.DOTALL | re.MULTILINE)
+BLOCKS = re.findall(
+    r"^(?:<!-- (?P<marker>.*?) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$",
+    README,
+    re.DOTALL | re.MULTILINE,
+)
 PROGRAMS = [text for _, language, text in BLOCKS if language == "python"]
 
 
@@ -28,14 +34,21 @@ def test_first_example_fits_the_first_screen():
 
 def test_set_up_commands():
     commands = {marker: text.strip() for marker, _, text in BLOCKS if marker.startswith("ci: ")}
-    assert commands == {"ci: main command": "pip install . && saltus demo", "ci: test command": 'pip install -e ".[test]" && pytest'}
+    assert commands == {
+        "ci: main command": "pip install . && saltus demo",
+        "ci: test command": 'pip install -e ".[test]" && pytest',
+    }
 
 
 def test_ci_finds_the_test_command():
     script = (ROOT / ".ci" / "run").read_text()
     finder = next(line for line in script.splitlines() if line.startswith("readme_block()"))
     found = subprocess.run(
-        ["bash", "-c", f"{finder}\nreadme_block 'test command'"], cwd=ROOT, capture_output=True, text=True, check=True
+        ["bash", "-c", f"{finder}\nreadme_block 'test command'"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout
     assert found == 'pip install -e ".[test]" && pytest\n'
 

@@ -1,7 +1,9 @@
-"""Basins with heyoka: its expert's integrator (heyoka_flow.py), a fixed number of periods, the last ones compared with the known orbits.
+"""Basins with heyoka: its expert's integrator (heyoka_flow.py), a fixed number of periods, the last
+ones compared with the known orbits.
 
-heyoka has no notion of an attractor: the orbits come from our map. Both loops that a user might write are here, the plain one
-(:func:`labels`) and one that looks every few periods and goes on with what hasn't arrived (:func:`labels_early`).
+heyoka has no notion of an attractor: the orbits come from our map. Both loops that a user might
+write are here, the plain one (:func:`labels`) and one that looks every few periods and goes on with
+what hasn't arrived (:func:`labels_early`).
 """
 
 from __future__ import annotations
@@ -20,8 +22,11 @@ def flow(tolerance: float) -> Flow:
     return Flow(hy.recommended_simd_size(), tolerance)
 
 
-def labels(flow: Flow, x: np.ndarray, v: np.ndarray, orbits: Sequence[np.ndarray], periods: int, keep: int) -> np.ndarray:
-    """Orbit of each start after ``periods`` and ``keep`` more that are compared, int64[k]; -1: on none.
+def labels(
+    flow: Flow, x: np.ndarray, v: np.ndarray, orbits: Sequence[np.ndarray], periods: int, keep: int
+) -> np.ndarray:
+    """Orbit of each start after ``periods`` and ``keep`` more that are compared, int64[k]; -1: on
+    none.
 
     Parameters
     ----------
@@ -37,13 +42,18 @@ def labels(flow: Flow, x: np.ndarray, v: np.ndarray, orbits: Sequence[np.ndarray
     return known_orbits.label(flow.stroboscope(x, v, periods + keep, keep), orbits)
 
 
-def labels_early(flow: Flow, x: np.ndarray, v: np.ndarray, orbits: Sequence[np.ndarray], most: int, look: int) -> np.ndarray:
-    """The same, but a start is done when ``look`` points in a row follow an orbit, looked at every so many periods up to ``most``."""
+def labels_early(
+    flow: Flow, x: np.ndarray, v: np.ndarray, orbits: Sequence[np.ndarray], most: int, look: int
+) -> np.ndarray:
+    """The same, but a start is done when ``look`` points in a row follow an orbit, looked at every
+    so many periods up to ``most``.
+    """
     found = np.full(x.size, -1, np.int64)
     going = np.arange(x.size)
     state = np.stack([x, v], axis=1)
     for _ in range(0, most, look):
-        points = flow.stroboscope(state[going, 0], state[going, 1], look, look)  # the forcing repeats: each round begins at t = 0
+        # the forcing repeats: each round begins at t = 0
+        points = flow.stroboscope(state[going, 0], state[going, 1], look, look)
         found[going] = known_orbits.label(points, orbits)
         state[going] = points[:, -1]
         going = going[found[going] < 0]

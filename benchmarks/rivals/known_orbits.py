@@ -1,4 +1,6 @@
-"""Which of the known orbits a trajectory has settled on: the label that rivals need and don't have, given to them for free."""
+"""Which of the known orbits a trajectory has settled on: the label that rivals need and don't have,
+given to them for free.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +10,9 @@ import numpy as np
 
 #: Ranges of the map's axes, 10 mm and 2 m/s: the units of a distance.
 RANGES = np.array([10e-3, 2.0])
-#: Distance within which all the last points must follow an orbit. Any two orbits of the rig are further apart, and so are the halves of its
-#: 24T (1.5e-3); at 1e-4, three of 400 cells are still on their way after 648 periods.
+#: Distance within which all the last points must follow an orbit. Any two orbits of the rig are
+#: further apart, and so are the halves of its 24T (1.5e-3); at 1e-4, three of 400 cells are still
+#: on their way after 648 periods.
 MATCH = 1e-3
 
 
@@ -28,7 +31,12 @@ def label(points: np.ndarray, orbits: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _distance(points: np.ndarray, orbit: np.ndarray) -> np.ndarray:
-    """Largest distance of the points from an orbit at its best phase, in units of the ranges, float64[k]."""
+    """Largest distance of the points from an orbit at its best phase, in units of the ranges,
+    float64[k].
+    """
     steps = np.arange(points.shape[1])
-    phases = [np.abs((points - orbit[(steps + phase) % len(orbit)]) / RANGES).max(axis=(1, 2)) for phase in range(len(orbit))]
+    phases = [
+        np.abs((points - orbit[(steps + phase) % len(orbit)]) / RANGES).max(axis=(1, 2))
+        for phase in range(len(orbit))
+    ]
     return np.min(phases, axis=0)

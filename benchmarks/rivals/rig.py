@@ -1,4 +1,6 @@
-"""The job that every rival does: the deLangre rig in case b with 4 N at 15 Hz, many starts, contacts located."""
+"""The job that every rival does: the deLangre rig in case b with 4 N at 15 Hz, many starts,
+contacts located.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ class Measured:
     contacts_per_period : float
         Contacts per forcing period per trajectory over the timed periods.
     contacts : int array (starts,)
-        Contacts of each start in the first 5 periods; empty if the rival counts over all starts only.
+        Contacts of each start in the first 5 periods; empty if the rival counts over all starts
+        only.
     """
 
     us_per_period: float

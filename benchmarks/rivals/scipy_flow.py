@@ -1,7 +1,8 @@
-"""scipy's solve_ivp (DOP853) on the rig, as an expert would: a smooth field per mode, its exits as terminal events, restarts at contacts.
+"""scipy's solve_ivp (DOP853) on the rig, as an expert would: a smooth field per mode, its exits as
+terminal events, restarts at contacts.
 
-A restart is one floating-point number inside the new mode. From the boundary itself, a step that leaves and comes back would report
-the old contact again, for ever.
+A restart is one floating-point number inside the new mode. From the boundary itself, a step that
+leaves and comes back would report the old contact again, for ever.
 """
 
 from __future__ import annotations
@@ -48,24 +49,45 @@ EXITS = {
 }
 
 
-def trajectory(x: float, v: float, periods: int, *, rtol: float, atol: float, method: str = "DOP853") -> tuple[float, float, int]:
-    """Displacement [m], velocity [m/s] after some periods, and the number of contacts. The start isn't on a boundary."""
+def trajectory(
+    x: float, v: float, periods: int, *, rtol: float, atol: float, method: str = "DOP853"
+) -> tuple[float, float, int]:
+    """Displacement [m], velocity [m/s] after some periods, and the number of contacts. The start
+    isn't on a boundary.
+    """
     t, t_end, contacts = 0.0, periods * rig.PERIOD, 0
     mode = UPPER if x > rig.UPPER_GAP else LOWER if x < -rig.LOWER_GAP else FREE
     while True:
         exits = EXITS[mode]
-        arc = solve_ivp(FIELDS[mode], (t, t_end), (x, v), method=method, rtol=rtol, atol=atol, events=[event for _, event in exits])
+        arc = solve_ivp(
+            FIELDS[mode],
+            (t, t_end),
+            (x, v),
+            method=method,
+            rtol=rtol,
+            atol=atol,
+            events=[event for _, event in exits],
+        )
         t, (x, v) = arc.t[-1], arc.y[:, -1]
         if arc.status == 0:
             return x, v, contacts
         contacts += 1
-        which = next(number for (number, _), times in zip(exits, arc.t_events, strict=True) if times.size)
+        which = next(
+            number for (number, _), times in zip(exits, arc.t_events, strict=True) if times.size
+        )
         mode = which if mode == FREE else FREE
         x = np.nextafter(BOUNDARY[which], math.copysign(math.inf, v))
 
 
 def measure(
-    x: np.ndarray, v: np.ndarray, *, periods: int = 10, rtol: float = 1e-12, atol: float = 1e-12, method: str = "DOP853", repeats: int = 3
+    x: np.ndarray,
+    v: np.ndarray,
+    *,
+    periods: int = 10,
+    rtol: float = 1e-12,
+    atol: float = 1e-12,
+    method: str = "DOP853",
+    repeats: int = 3,
 ) -> rig.Measured:
     """CPU time, end states and contacts of solve_ivp; some 5 ms a period, so give it few starts.
 
@@ -87,4 +109,6 @@ def measure(
 
     work = periods * x.size
     seconds = rig.cpu_seconds(job, repeats)
-    return rig.Measured(seconds / work * 1e6, ends[:, :2], sum(found) / work, ends[:, 2].astype(int))
+    return rig.Measured(
+        seconds / work * 1e6, ends[:, :2], sum(found) / work, ends[:, 2].astype(int)
+    )

@@ -1,4 +1,6 @@
-"""The directive ``claims``: the verdicts of a replication, from the claims.csv that its full run wrote, kept in docs/replication/."""
+"""The directive ``claims``: the verdicts of a replication, from the claims.csv that its full run
+wrote, kept in docs/replication/.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,10 @@ def markdown(file: Path) -> str:
     counts = Counter(row["verdict"] for row in rows)
     told = ", ".join(f"{count} {verdict}" for verdict, count in counts.most_common())
     table = ["| figure | what the paper says | verdict |", "|---|---|---|"]
-    table += [f"| {row['figure']} | {row['what the paper says']} | {row['verdict']} |".replace("\n", " ") for row in rows]
+    table += [
+        f"| {row['figure']} | {row['what the paper says']} | {row['verdict']} |".replace("\n", " ")
+        for row in rows
+    ]
     return f"{len(rows)} claims: {told}.\n\n" + "\n".join(table) + "\n"
 
 
@@ -33,7 +38,10 @@ class Claims(SphinxDirective):
         """See docutils."""
         file = FOLDER / f"{self.arguments[0]}.csv"
         if not file.exists():
-            raise self.error(f"docs/replication/{file.name} isn't there: copy claims.csv of `saltus reproduce {self.arguments[0]}`.")
+            raise self.error(
+                f"docs/replication/{file.name} isn't there: copy claims.csv of "
+                f"`saltus reproduce {self.arguments[0]}`."
+            )
         self.env.note_dependency(str(file))
         return self.parse_text_to_nodes(markdown(file))
 

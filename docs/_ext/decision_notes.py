@@ -1,4 +1,6 @@
-"""The notes on decisions get their places in the sidebar; in the repository their list stays a plain table."""
+"""The notes on decisions get their places in the sidebar; in the repository their list stays a
+plain table.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The glossary's table, made into terms that pages can link to; in the repository docs/glossary.md stays a plain table."""
+"""The glossary's table, made into terms that pages can link to; in the repository docs/glossary.md
+stays a plain table.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,15 @@ _TERM = re.compile(r"\*\*(.+?)\*\*")
 
 
 def terms(text: str) -> list[tuple[list[str], str]]:
-    """(words, meaning) of every row of the table; what stands behind the words, ``**event** (of a branch)``, begins the meaning."""
+    """(words, meaning) of every row of the table; what stands behind the words, ``**event** (of a
+    branch)``, begins the meaning.
+    """
     rows = (_ROW.match(line) for line in text.splitlines())
-    return [(_TERM.findall(row[1]), f"{row[1].rpartition('**')[2].strip()} {row[2]}".strip()) for row in rows if row]
+    return [
+        (_TERM.findall(row[1]), f"{row[1].rpartition('**')[2].strip()} {row[2]}".strip())
+        for row in rows
+        if row
+    ]
 
 
 def as_glossary(text: str) -> str:

@@ -1,4 +1,6 @@
-"""The directive ``result-tables``: every variable of every result, read off the tables that results are made and checked by."""
+"""The directive ``result-tables``: every variable of every result, read off the tables that results
+are made and checked by.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,10 @@ from saltus.results.dataset.variable import Variable
 
 def markdown() -> str:
     """A section for each kind of result."""
-    return "\n\n".join("\n".join(_section(kind, table)) for kind, table in schema.TABLES.items()) + "\n"
+    return (
+        "\n\n".join("\n".join(_section(kind, table)) for kind, table in schema.TABLES.items())
+        + "\n"
+    )
 
 
 def _section(kind: str, table: dict[str, Variable]) -> Iterator[str]:
@@ -27,7 +32,9 @@ def _section(kind: str, table: dict[str, Variable]) -> Iterator[str]:
     yield "|---|---|---|---|"
     for name, one in table.items():
         unit = {"": "text" if one.dtype == "str" else "", "1": ""}.get(one.units, one.units)
-        yield f"| `{name}` | {_cell(', '.join(one.dims))} | {_cell(unit)} | {_cell(one.long_name)} |"
+        yield (
+            f"| `{name}` | {_cell(', '.join(one.dims))} | {_cell(unit)} | {_cell(one.long_name)} |"
+        )
 
 
 def _cell(text: str) -> str:

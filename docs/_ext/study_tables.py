@@ -1,4 +1,6 @@
-"""The directive ``study-tables``: every table and key that a study file may hold, read off the classes that check study files."""
+"""The directive ``study-tables``: every table and key that a study file may hold, read off the
+classes that check study files.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,11 @@ _WORDS = {int: "whole number", float: "number", str: "text", bool: "true or fals
 _UNIONS = (typing.Union, types.UnionType)
 
 
-# -- tables --------------------------------------------------------------------------------------------------------------------
+# -- tables ----------------------------------------------------------------------------------------
 def tables(model: type[Table] = Study, place: str = "") -> Iterator[tuple[str, type[Table]]]:
-    """(place such as ``[[basins.map]]``, class) of every table, the outer ones first; a table that has its place already isn't repeated."""
+    """(place such as ``[[basins.map]]``, class) of every table, the outer ones first; a table that
+    has its place already isn't repeated.
+    """
     for name, field in model.model_fields.items():
         path = f"{place}.{name}" if place else name
         for inner, one in _tables_in(field.annotation, path):
@@ -46,7 +50,7 @@ def _tables_in(annotation: Any, path: str, form: str = "[{}]") -> Iterator[tuple
             yield from _tables_in(part, path, form)
 
 
-# -- keys ----------------------------------------------------------------------------------------------------------------------
+# -- keys ------------------------------------------------------------------------------------------
 def type_text(annotation: Any) -> str:
     """What a key may hold, in words."""
     origin, inside = typing.get_origin(annotation), typing.get_args(annotation)
@@ -98,7 +102,9 @@ def key_rows(model: type[Table]) -> list[tuple[str, str, str, str]]:
         text = _cell(field.description or "")
         if field.examples:
             text += f" Example: `{_cell(toml(field.examples[0]))}`"
-        rows.append((f"`{name}`", _cell(type_text(field.annotation)), _cell(_default(field)), text.strip()))
+        rows.append(
+            (f"`{name}`", _cell(type_text(field.annotation)), _cell(_default(field)), text.strip())
+        )
     if model.model_config.get("extra") == "allow":
         rows.append(("*any parameter*", "quantity", "-", 'Its value. Example: `force = "4 N"`'))
     return rows
@@ -114,7 +120,11 @@ def markdown() -> str:
     for place, model in tables():
         rows = key_rows(model)
         named = model.model_fields["name"].annotation if "name" in model.model_fields else None
-        title = f"{place} name = {toml(typing.get_args(named)[0])}" if typing.get_origin(named) is typing.Literal else place
+        title = (
+            f"{place} name = {toml(typing.get_args(named)[0])}"
+            if typing.get_origin(named) is typing.Literal
+            else place
+        )
         summary = (model.__doc__ or "").strip().split(": ", 1)[-1]
         body = [f"| {' | '.join(row)} |" for row in rows]
         blocks.append(
@@ -133,7 +143,7 @@ def markdown() -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-# -- Sphinx --------------------------------------------------------------------------------------------------------------------
+# -- Sphinx ----------------------------------------------------------------------------------------
 class StudyTables(SphinxDirective):
     """Every table of a study file."""
 

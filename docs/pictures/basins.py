@@ -1,4 +1,6 @@
-"""Draws docs/pictures/basins.png: the basins of the rig's five responses at 15 Hz, a start a pixel. Takes ten seconds."""
+"""Draws docs/pictures/basins.png: the basins of the rig's five responses at 15 Hz, a start a pixel.
+Takes ten seconds.
+"""
 
 import sys
 from pathlib import Path

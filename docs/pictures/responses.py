@@ -1,4 +1,6 @@
-"""The picture of the README: five ways in which one rig can vibrate, all at 15 Hz and 4 N. Run: python docs/pictures/responses.py"""
+"""The picture of the README: five ways in which one rig can vibrate, all at 15 Hz and 4 N. Run:
+python docs/pictures/responses.py
+"""
 
 from __future__ import annotations
 
@@ -23,9 +25,18 @@ def main(file: Path) -> None:
     run = sl.simulate(rig, start=STARTS, periods=2000, keep=96)
     periods = sl.settled(run).response_period.values
     with sl.plot.style():
-        figure, axes = plt.subplot_mosaic([["history"] * 5, list("01234")], figsize=(11, 5), height_ratios=(1, 1.25), layout="constrained")
-        sl.plot.history(run, len(periods) - 1, periods=24, ax=axes["history"], time="T", legend=True)
-        axes["history"].set_title(f"{_times(periods[-1])}: 24 forcing periods, every contact marked")
+        figure, axes = plt.subplot_mosaic(
+            [["history"] * 5, list("01234")],
+            figsize=(11, 5),
+            height_ratios=(1, 1.25),
+            layout="constrained",
+        )
+        sl.plot.history(
+            run, len(periods) - 1, periods=24, ax=axes["history"], time="T", legend=True
+        )
+        axes["history"].set_title(
+            f"{_times(periods[-1])}: 24 forcing periods, every contact marked"
+        )
         for i, n in enumerate(periods):
             sl.plot.phase(run, i, ax=axes[str(i)], legend=False, units={"v": "mm/s"})
             axes[str(i)].set_title(_times(n), pad=24)

@@ -1,4 +1,6 @@
-"""Figs. 6, 8, 11 and 13: basins by ode45 with and without event location, and exact, in common colours."""
+"""Figs. 6, 8, 11 and 13: basins by ode45 with and without event location, and exact, in common
+colours.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ COLUMNS = (ON, OFF, EXACT)
 
 @dataclass(frozen=True)
 class _Entry:
-    """An attractor that one of the three maps has: in words, with its share in each, NaN where it isn't there."""
+    """An attractor that one of the three maps has: in words, with its share in each, NaN where it
+    isn't there.
+    """
 
     text: str
     shares: tuple[float, float, float]
@@ -37,7 +41,9 @@ class _Entry:
 
 @dataclass(frozen=True)
 class _Row:
-    """Three maps of one setting in one numbering: cells of each, what the numbers are, agreement with the exact map."""
+    """Three maps of one setting in one numbering: cells of each, what the numbers are, agreement
+    with the exact map.
+    """
 
     cells: dict[str, np.ndarray]
     entries: list[_Entry]
@@ -47,7 +53,13 @@ class _Row:
 def grid(data: Data, figure: str, settings: Sequence[str]) -> Figure:
     """A row for each setting, a column for each way of integrating."""
     drawn, panels = plt.subplots(
-        len(settings), 3, figsize=(9.0, 2.75 * len(settings) + 0.2), sharex=True, sharey=True, squeeze=False, layout="constrained"
+        len(settings),
+        3,
+        figsize=(9.0, 2.75 * len(settings) + 0.2),
+        sharex=True,
+        sharey=True,
+        squeeze=False,
+        layout="constrained",
     )
     for row, setting in zip(panels, settings, strict=True):
         found = {look.label: data[f"{figure}/{setting}, {look.end}"] for look in COLUMNS}
@@ -67,7 +79,10 @@ def _common(found: dict[str, xr.Dataset]) -> _Row:
     """The three maps in the numbers of the exact one; attractors that only ode45 has follow."""
     exact = found[EXACT.label]
     count = exact.sizes["attractor"]
-    entries = [[_words(exact.isel(attractor=i)), [np.nan, np.nan, float(exact["attractor_fraction"][i])]] for i in range(count)]
+    entries = [
+        [_words(exact.isel(attractor=i)), [np.nan, np.nan, float(exact["attractor_fraction"][i])]]
+        for i in range(count)
+    ]
     cells, agreement = {EXACT.label: exact["basin"].values.astype(int)}, {}
     for column, look in enumerate((ON, OFF)):
         both = compare(exact, found[look.label])
@@ -75,7 +90,13 @@ def _common(found: dict[str, xr.Dataset]) -> _Row:
         number = np.arange(both.sizes["pair"])
         for pair in range(count, both.sizes["pair"]):
             number[pair] = len(entries)
-            entries.append([f"{kind_text(str(both['match_type'].values[pair]), int(both['match_period'][pair]))}, not exact", [np.nan] * 3])
+            entries.append(
+                [
+                    f"{kind_text(str(both['match_type'].values[pair]), int(both['match_period'][pair]))}, "
+                    f"not exact",
+                    [np.nan] * 3,
+                ]
+            )
         for pair in range(both.sizes["pair"]):
             if int(both["match_b"][pair]) >= 0:
                 entries[number[pair]][1][column] = float(both["match_fraction_b"][pair])
@@ -85,7 +106,10 @@ def _common(found: dict[str, xr.Dataset]) -> _Row:
 
 
 def _words(one: xr.Dataset) -> str:
-    return f"{kind_text(str(one['attractor_type'].item()), int(one['attractor_period']))}, {maps.peak_text(one)}"
+    return (
+        f"{kind_text(str(one['attractor_type'].item()), int(one['attractor_period']))}, "
+        f"{maps.peak_text(one)}"
+    )
 
 
 def _panel(ax: Axes, ds: xr.Dataset, row: _Row, look: Look) -> None:
@@ -97,7 +121,10 @@ def _panel(ax: Axes, ds: xr.Dataset, row: _Row, look: Look) -> None:
     for place in (-values["lower_gap"], values["upper_gap"]):
         ax.axvline(place * scales[0].factor, color="#222222", lw=0.6, ls=(0, (4, 3)), alpha=0.6)
     share = row.agreement.get(look.label)
-    ax.set_title(look.label if share is None else f"{look.label}: {maps.share_text(share)} as exact", fontsize=8)
+    ax.set_title(
+        look.label if share is None else f"{look.label}: {maps.share_text(share)} as exact",
+        fontsize=8,
+    )
 
 
 def _legend(ax: Axes, row: _Row, exact: xr.Dataset) -> None:
@@ -111,6 +138,16 @@ def _legend(ax: Axes, row: _Row, exact: xr.Dataset) -> None:
     if any(lost):
         handles.append(Patch(fc=maps.UNSETTLED[-2].color, label="not settled"))
     title = f"located | not located | exact\nof {exact['basin'].size} starts"
-    legend = ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=6.8, title=title, title_fontsize=6.8,
-                       labelspacing=0.5, handlelength=1.0, handleheight=1.0, frameon=False)  # fmt: skip
+    legend = ax.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(1.02, 1.0),
+        fontsize=6.8,
+        title=title,
+        title_fontsize=6.8,
+        labelspacing=0.5,
+        handlelength=1.0,
+        handleheight=1.0,
+        frameon=False,
+    )
     legend.get_title().set_color("#555555")

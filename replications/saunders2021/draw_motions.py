@@ -24,18 +24,29 @@ ZOOM = 1.2e-3
 
 
 def located(data: Data) -> Figure:
-    """Fig. 2: the run of Table 2 coloured by region, a zoom onto a contact, and what its residuals hide."""
+    """Fig. 2: the run of Table 2 coloured by region, a zoom onto a contact, and what its residuals
+    hide.
+    """
     run, exact = data["fig2/ode45"], data["fig2/exact"]
     figure = plt.figure(figsize=(9.0, 6.0), layout="constrained")
     grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1), width_ratios=(1, 3.2))
-    top, near, bottom = (figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1]))
+    top, near, bottom = (
+        figure.add_subplot(place) for place in (grid[0, :], grid[1, 0], grid[1, 1])
+    )
     plot.history(run, ax=top, periods=(0, 3))
     top.set_title("Case b4, 7 Hz, from rest: ode45 (1e-4, 1e-7), located", pad=18)
     times = run["contact_time"].values
     marked = {letter: number for letter, number, _ in printed.contacts()}
     for letter, number in marked.items():
         x = float(run["contact_x"][number]) * 1e3
-        top.annotate(letter, (times[number], x), (0, 9 if x < 0.2 else -14), textcoords="offset points", ha="center", fontweight="bold")
+        top.annotate(
+            letter,
+            (times[number], x),
+            (0, 9 if x < 0.2 else -14),
+            textcoords="offset points",
+            ha="center",
+            fontweight="bold",
+        )
     _zoom(near, run, marked["D"])
     _residuals(bottom, run, exact, marked)
     return figure
@@ -45,7 +56,13 @@ def _zoom(ax: Axes, run: xr.Dataset, number: int) -> None:
     """One contact near by: the motion, and the located point on the boundary."""
     at, place = float(run["contact_time"][number]), float(run["contact_x"][number])
     near = np.abs(run["time"].values - at) < ZOOM
-    ax.plot((run["time"].values[near] - at) * 1e3, (run["x"].values[near] - place) * 1e6, "-", color="#777777", lw=1.0)
+    ax.plot(
+        (run["time"].values[near] - at) * 1e3,
+        (run["x"].values[near] - place) * 1e6,
+        "-",
+        color="#777777",
+        lw=1.0,
+    )
     ax.axhline(0, color="#222222", lw=0.7, ls=(0, (4, 3)))
     ax.plot(0, 0, "o", ms=5, color=OKABE_ITO["black"])
     ax.set(xlabel="time since D [ms]", ylabel="x − j [µm]", title="Contact D")
@@ -58,13 +75,35 @@ def _residuals(ax: Axes, run: xr.Dataset, exact: xr.Dataset, marked: Mapping[str
     error = np.abs(run["contact_time"].values[:count] - exact["contact_time"].values[:count])
     suggested = residuals(run)[:count] / np.abs(run["contact_velocity"].values[:count])
     ours = np.maximum(np.abs(exact["contact_time_error"].values[:count]), 1e-18)
-    ax.semilogy(number, error, "o-", ms=3.5, color=OKABE_ITO["vermillion"], label="true error of ode45's contact time", lw=0.8)
     ax.semilogy(
-        number, np.maximum(suggested, 1e-18), "s", ms=3.5, color=OKABE_ITO["blue"], label="error that |x − j| suggests: |x − j| / |v|"
+        number,
+        error,
+        "o-",
+        ms=3.5,
+        color=OKABE_ITO["vermillion"],
+        label="true error of ode45's contact time",
+        lw=0.8,
     )
-    ax.semilogy(number, ours, "-", color="#999999", lw=1.0, label="claimed error of the exact times")
+    ax.semilogy(
+        number,
+        np.maximum(suggested, 1e-18),
+        "s",
+        ms=3.5,
+        color=OKABE_ITO["blue"],
+        label="error that |x − j| suggests: |x − j| / |v|",
+    )
+    ax.semilogy(
+        number, ours, "-", color="#999999", lw=1.0, label="claimed error of the exact times"
+    )
     for letter, place in marked.items():
-        ax.annotate(letter, (place + 1, error[place]), (0, 5), textcoords="offset points", ha="center", fontweight="bold")
+        ax.annotate(
+            letter,
+            (place + 1, error[place]),
+            (0, 5),
+            textcoords="offset points",
+            ha="center",
+            fontweight="bold",
+        )
     ax.set(xlabel="contact", ylabel="time [s]", ylim=(1e-18, 1e-2), xlim=(0, count + 1))
     ax.set_title("A state on the boundary to 1e-16 m says nothing about when it got there")
     ax.legend(loc="center right")
@@ -88,16 +127,28 @@ def _rows(run: xr.Dataset, titles: Sequence[str], shown: Sequence[int]) -> Figur
     from saltus.results.dataset.schema import period_text
 
     found = settled(run)["response_period"].values
-    figure, grid = plt.subplots(len(titles), 2, figsize=(9.0, 1.9 * len(titles) + 0.3), width_ratios=(2.4, 1), layout="constrained")
+    figure, grid = plt.subplots(
+        len(titles),
+        2,
+        figsize=(9.0, 1.9 * len(titles) + 0.3),
+        width_ratios=(2.4, 1),
+        layout="constrained",
+    )
     for i, (row, title, periods) in enumerate(zip(grid, titles, shown, strict=True)):
         plot.history(run, i, periods=periods, ax=row[0], time="T", legend=False)
-        plot.phase(run, i, periods=max(int(found[i]), 1) if found[i] else 48, ax=row[1], legend=False)
+        plot.phase(
+            run, i, periods=max(int(found[i]), 1) if found[i] else 48, ax=row[1], legend=False
+        )
         row[0].set_title(f"{title}: {period_text(int(found[i]))}")
         for text in list(row[1].texts):
             text.remove()
         if i < len(titles) - 1:
             row[0].set_xlabel("")
-    named = {label: handle for one in grid.flat for handle, label in zip(*one.get_legend_handles_labels(), strict=True)}
+    named = {
+        label: handle
+        for one in grid.flat
+        for handle, label in zip(*one.get_legend_handles_labels(), strict=True)
+    }
     figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=len(named))
     return figure
 
@@ -115,7 +166,13 @@ def doubled(data: Data) -> Figure:
     for ax in axes:
         for one, look in zip((outer, inner), looks, strict=True):
             n = int(one["attractor_period"])
-            ax.plot(one["attractor_x"] * 1e3, one["attractor_v"] * 1e3, ls="none", label=f"{n}T, {_multipliers(one)}", **look)
+            ax.plot(
+                one["attractor_x"] * 1e3,
+                one["attractor_v"] * 1e3,
+                ls="none",
+                label=f"{n}T, {_multipliers(one)}",
+                **look,
+            )
         ax.set(xlabel="x [mm]", ylabel="v [mm/s]")
     axes[0].set_title("States at whole forcing periods")
     pair = _widest_pair(outer, inner)
@@ -137,13 +194,21 @@ def _widest_pair(outer: xr.Dataset, inner: xr.Dataset) -> np.ndarray:
 
 
 def _multipliers(one: xr.Dataset) -> str:
-    parts = zip(one["attractor_multiplier_real"].values, one["attractor_multiplier_imag"].values, strict=True)
-    texts = [f"{real:.4f}" if imag == 0 else f"{real:.4f} ± {abs(imag):.4f}i" for real, imag in parts]
+    parts = zip(
+        one["attractor_multiplier_real"].values,
+        one["attractor_multiplier_imag"].values,
+        strict=True,
+    )
+    texts = [
+        f"{real:.4f}" if imag == 0 else f"{real:.4f} ± {abs(imag):.4f}i" for real, imag in parts
+    ]
     return f"multipliers {', '.join(dict.fromkeys(texts))}"
 
 
 def where_a_step_leads(data: Data) -> Figure:
-    """Fig. 4: which response at 17 Hz the motion at 16 Hz turns into, by where it is when the frequency changes."""
+    """Fig. 4: which response at 17 Hz the motion at 16 Hz turns into, by where it is when the
+    frequency changes.
+    """
     ds, run = data["fig4/step"], data["fig4/exact"].isel(trajectory=0)
     colors = maps.colors_of(ds, None)
     dim = run["x"].dims[0]
@@ -153,7 +218,20 @@ def where_a_step_leads(data: Data) -> Figure:
     for key in ds["attractor"].values.tolist():
         here = ds["basin"].values == key
         label = f"{maps.describe(ds.sel(attractor=key))}: {maps.share_text(here.mean())}"
-        ax.plot(last["x"].values[here] * 1e3, last["v"].values[here], "o", ms=4.5, mfc=colors[key], mec="white", mew=0.4, label=label)
-    ax.set(xlabel="x [mm]", ylabel="v [m/s]", title="State at the step from 16 Hz to 17 Hz, and what it turns into")
+        ax.plot(
+            last["x"].values[here] * 1e3,
+            last["v"].values[here],
+            "o",
+            ms=4.5,
+            mfc=colors[key],
+            mec="white",
+            mew=0.4,
+            label=label,
+        )
+    ax.set(
+        xlabel="x [mm]",
+        ylabel="v [m/s]",
+        title="State at the step from 16 Hz to 17 Hz, and what it turns into",
+    )
     ax.legend(loc="center")
     return figure

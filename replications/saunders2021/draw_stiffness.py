@@ -1,4 +1,6 @@
-"""Figs. 3 and 7: frequency responses, bifurcation diagrams, and where ode45 goes wrong as the contact gets harder."""
+"""Figs. 3 and 7: frequency responses, bifurcation diagrams, and where ode45 goes wrong as the
+contact gets harder.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +31,30 @@ _HATCHED: dict[str, Any] = {"fc": "none", "ec": "#B0B0B0", "hatch": "////", "lw"
 
 
 def six_cases(data: Data) -> Figure:
-    """Fig. 3: a panel for each case, exact, with ode45 at the paper's tolerances laid over, and measured points if there are any."""
+    """Fig. 3: a panel for each case, exact, with ode45 at the paper's tolerances laid over, and
+    measured points if there are any.
+    """
     figure, grid = plt.subplots(3, 2, figsize=(9.0, 9.2), sharex=True, layout="constrained")
     for ax, case in zip(grid.flat, CASES, strict=True):
         path = folder_of("saunders2021") / f"measured_{case}.csv"
-        plot.frequency_response(data[f"fig3/{case}, exact"], measured=path if path.exists() else None, events=False, legend=False, ax=ax)
+        plot.frequency_response(
+            data[f"fig3/{case}, exact"],
+            measured=path if path.exists() else None,
+            events=False,
+            legend=False,
+            ax=ax,
+        )
         own = data[f"fig3/{case}, ode45"]
-        ax.plot(own["response_frequency"], own["response_rms"] * 1e3, "o", ms=5.0, mfc="none", mec="#222222", mew=0.8,
-                label="ode45 (1e-12, 1e-12), located")  # fmt: skip
+        ax.plot(
+            own["response_frequency"],
+            own["response_rms"] * 1e3,
+            "o",
+            ms=5.0,
+            mfc="none",
+            mec="#222222",
+            mew=0.8,
+            label="ode45 (1e-12, 1e-12), located",
+        )
         ax.set_title(f"case {case[0]}, {case[1:]} N")
         ax.set_yscale("log")
         sizes = 1e3 * data[f"fig3/{case}, exact"]["response_rms"].values
@@ -68,9 +86,26 @@ def _legend_of_kinds(figure: Figure, data: Data) -> None:
     every = np.concatenate(periods)
     handles = []
     for code in sorted(codes):
-        look: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 5, "color": kinds.color(code), "label": kinds.label(code, every)}
+        look: dict[str, Any] = {
+            "ls": "none",
+            "marker": "o",
+            "ms": 5,
+            "color": kinds.color(code),
+            "label": kinds.label(code, every),
+        }
         handles.append(Line2D([], [], **look))
-    handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="none", mec="#222222", label="ode45 (1e-12, 1e-12), located"))
+    handles.append(
+        Line2D(
+            [],
+            [],
+            ls="none",
+            marker="o",
+            ms=5,
+            mfc="none",
+            mec="#222222",
+            label="ode45 (1e-12, 1e-12), located",
+        )
+    )
     figure.legend(handles=handles, loc="outside lower center", ncols=6)
 
 
@@ -85,11 +120,22 @@ def three_stiffnesses(data: Data) -> Figure:
         ):
             ds = data[f"fig7/{panel}, {end}"]
             frequency = np.broadcast_to(ds["frequency"].values[:, None], ds["rms"].shape)
-            ax.plot(frequency.ravel(), 1e3 * ds["rms"].values.ravel(), "o", ms=size, mfc=color, mec="none", label=label, rasterized=True)
+            ax.plot(
+                frequency.ravel(),
+                1e3 * ds["rms"].values.ravel(),
+                "o",
+                ms=size,
+                mfc=color,
+                mec="none",
+                label=label,
+                rasterized=True,
+            )
         ax.set(title=f"({panel})  Kc = {stiffness}", xlabel="frequency [Hz]", yscale="log")
         _plain_numbers(ax)
     axes[0].set_ylabel("rms of x [mm]")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, markerscale=1.5)
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, markerscale=1.5
+    )
     return figure
 
 
@@ -102,14 +148,21 @@ def _turning(ax: Axes, ds: xr.Dataset, color: str, size: float) -> None:
 
 def diagrams(data: Data) -> Figure:
     """Fig. 7(d-f): turning points by the paper's two ways above, exact below."""
-    figure, grid = plt.subplots(3, 2, figsize=(9.0, 9.6), sharex=True, sharey="row", layout="constrained")
+    figure, grid = plt.subplots(
+        3, 2, figsize=(9.0, 9.6), sharex=True, sharey="row", layout="constrained"
+    )
     for row, (panel, frequency) in zip(grid, PANELS.items(), strict=True):
         many = data[f"fig7/{panel}, exact"].sizes["contact_stiffness"] > 500
         for ax, ends in zip(row, ((ON, OFF), (None,)), strict=True):
             for i, look in enumerate(ends):
                 ds = data[f"fig7/{panel}, {look.end if look else 'exact'}"]
                 base = 0.9 if many else 2.0
-                _turning(ax, ds, look.color if look else "#222222", base * (1.6 if look is ON else 0.9) if i == 0 else 0.7 * base)
+                _turning(
+                    ax,
+                    ds,
+                    look.color if look else "#222222",
+                    base * (1.6 if look is ON else 0.9) if i == 0 else 0.7 * base,
+                )
             for gap in (0.0, 0.8):
                 ax.axhline(gap, color="#777777", lw=0.6, ls=(0, (4, 3)), zorder=0)
             ax.set_xscale("log")
@@ -122,7 +175,9 @@ def diagrams(data: Data) -> Figure:
 
 
 def differences(data: Data) -> Figure:
-    """The central question: how often ode45 ends in another response, and how large its own error is, over the stiffness."""
+    """The central question: how often ode45 ends in another response, and how large its own error
+    is, over the stiffness.
+    """
     figure, axes = plt.subplots(4, 1, figsize=(9.0, 9.6), sharex=True, layout="constrained")
     for ax, (panel, frequency) in zip(axes, PANELS.items(), strict=False):
         ds = data[f"fig7/{panel}, compared"]
@@ -135,20 +190,41 @@ def differences(data: Data) -> Figure:
     for panel, style in zip(PANELS, ("-", (0, (4, 2)), (0, (1, 1.2))), strict=True):
         ds = data[f"fig7/{panel}, compared"]
         for number, look in ((1, ON), (2, OFF)):
-            at, median = running_median(ds["contact_stiffness"].values, ds["step_error_rms"].values[number])
-            axes[3].plot(at, median, color=look.color, ls=style, lw=1.2, label=f"{look.label}, {PANELS[panel]}")
+            at, median = running_median(
+                ds["contact_stiffness"].values, ds["step_error_rms"].values[number]
+            )
+            axes[3].plot(
+                at,
+                median,
+                color=look.color,
+                ls=style,
+                lw=1.2,
+                label=f"{look.label}, {PANELS[panel]}",
+            )
             tighter = data[f"fig7/{panel}, tighter"]
-            at, median = running_median(tighter["contact_stiffness"].values, tighter["step_error_rms"].values[number - 1])
+            at, median = running_median(
+                tighter["contact_stiffness"].values, tighter["step_error_rms"].values[number - 1]
+            )
             axes[3].plot(at, median, color=look.color, ls=style, lw=0.7)
-    axes[3].set(yscale="log", xscale="log", xlabel="contact stiffness Kc [N/m]", ylabel="error after one period")
-    axes[3].set_title("Error of one forcing period begun on the exact response, in units of the motion's range (median)")
+    axes[3].set(
+        yscale="log",
+        xscale="log",
+        xlabel="contact stiffness Kc [N/m]",
+        ylabel="error after one period",
+    )
+    axes[3].set_title(
+        "Error of one forcing period begun on the exact response, in units of the "
+        "motion's range (median)"
+    )
     axes[3].set_ylim(top=1.0)
     axes[3].legend(ncols=3, fontsize=7, loc="upper left")
     extra = [
         Line2D([], [], color="#555555", ls=(0, (1, 1.5)), label="of these: never settles"),
         Patch(label="exact: chaotic", **_HATCHED),
     ]
-    axes[0].legend(handles=[*axes[0].get_legend_handles_labels()[0], *extra], loc="upper left", ncols=2)
+    axes[0].legend(
+        handles=[*axes[0].get_legend_handles_labels()[0], *extra], loc="upper left", ncols=2
+    )
     return figure
 
 
@@ -162,5 +238,7 @@ def _shares(ax: Axes, ds: xr.Dataset, number: int, color: str, label: str) -> No
 
 
 def _chaos(ax: Axes, ds: xr.Dataset) -> None:
-    at, share, _, _ = running_share(ds["contact_stiffness"].values, ds["type"].values[0, :, 0] == "chaotic")
+    at, share, _, _ = running_share(
+        ds["contact_stiffness"].values, ds["type"].values[0, :, 0] == "chaotic"
+    )
     ax.fill_between(at, 0, share, zorder=0, **_HATCHED)

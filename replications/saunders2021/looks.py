@@ -1,4 +1,6 @@
-"""What all pictures of this paper share: a colour for each way of integrating, which is the same everywhere."""
+"""What all pictures of this paper share: a colour for each way of integrating, which is the same
+everywhere.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from saltus.plot.style import OKABE_ITO
 
 @dataclass(frozen=True)
 class Look:
-    """How one way of integrating is drawn: name in legends, end of the names of its jobs, colour, width and dashes of its lines."""
+    """How one way of integrating is drawn: name in legends, end of the names of its jobs, colour,
+    width and dashes of its lines.
+    """
 
     label: str
     end: str
@@ -22,7 +26,8 @@ class Look:
     dashes: tuple[float, ...] | str
 
 
-#: As in the paper, blue is with event location and red without; exact results lie under both, wider.
+#: As in the paper, blue is with event location and red without; exact results lie under both,
+#: wider.
 EXACT = Look("exact", "exact", "#9A9A9A", 3.2, "-")
 ON = Look("ode45, located", "ode45 located", OKABE_ITO["blue"], 1.3, "-")
 OFF = Look("ode45, not located", "ode45 not located", OKABE_ITO["vermillion"], 1.1, (0, (3.0, 2.0)))  # type: ignore[arg-type]
@@ -30,7 +35,9 @@ LOOKS = (EXACT, ON, OFF)
 
 
 def periods_of(run: xr.Dataset, trajectory: int) -> tuple[xr.Dataset, np.ndarray]:
-    """One trajectory of a batch, and its samples in forcing periods since the first that was kept."""
+    """One trajectory of a batch, and its samples in forcing periods since the first
+    that was kept.
+    """
     one = run.isel(trajectory=trajectory) if "trajectory" in run.dims else run
     return one, np.asarray(one["period"].values, float)
 
@@ -43,6 +50,8 @@ def strobe(run: xr.Dataset, trajectory: int) -> np.ndarray:
 
 
 def lag(reference: np.ndarray, points: np.ndarray, n: int) -> int:
-    """By how many periods ``points`` must be rolled back to lie best on an nT orbit ``reference``."""
+    """By how many periods ``points`` must be rolled back to lie best on an nT orbit
+    ``reference``.
+    """
     scale = np.maximum(np.ptp(reference, axis=0), 1e-3 * np.abs(reference).max(axis=0))
     return int(phase_distances(reference[:n], points[:n], scale).argmin())

@@ -1,4 +1,6 @@
-"""How claims read Datasets: attractors in words, counts, shares, and places along a frequency or a stiffness."""
+"""How claims read Datasets: attractors in words, counts, shares, and places along a frequency or a
+stiffness.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ ENDS = {"exact": "exact", "on": "ode45 located", "off": "ode45 not located"}
 
 
 def three(data: Data, of: str) -> dict[str, xr.Dataset]:
-    """The Datasets of one setting, exact and by the paper's two ways, as far as they are asked for."""
+    """The Datasets of one setting, exact and by the paper's two ways, as far as they
+    are asked for.
+    """
     return {end: data[f"{of}, {job}"] for end, job in ENDS.items() if f"{of}, {job}" in data}
 
 
@@ -37,7 +41,9 @@ def names(ds: xr.Dataset) -> list[str]:
 def listed(ds: xr.Dataset, shares: Iterable[float] | None = None) -> str:
     """The attractors with their shares of the starts: ``T 40 %, 3T 3.1 %``."""
     shares = ds["attractor_fraction"].values if shares is None else shares
-    return ", ".join(f"{name} {share_text(float(share))}" for name, share in zip(names(ds), shares, strict=True))
+    return ", ".join(
+        f"{name} {share_text(float(share))}" for name, share in zip(names(ds), shares, strict=True)
+    )
 
 
 def count(ds: xr.Dataset) -> int:
@@ -46,8 +52,12 @@ def count(ds: xr.Dataset) -> int:
 
 
 def counted(maps: Mapping[str, xr.Dataset]) -> dict[str, Any]:
-    """Attractors of three maps: how many (``exact``, ``on``, ``off``), and listed (``exact_are``, ...)."""
-    return {end: count(ds) for end, ds in maps.items()} | {f"{end}_are": listed(ds) for end, ds in maps.items()}
+    """Attractors of three maps: how many (``exact``, ``on``, ``off``), and listed (``exact_are``,
+    ...).
+    """
+    return {end: count(ds) for end, ds in maps.items()} | {
+        f"{end}_are": listed(ds) for end, ds in maps.items()
+    }
 
 
 def by_peak(ds: xr.Dataset) -> list[int]:
@@ -66,9 +76,21 @@ def certainty(maps: Iterable[xr.Dataset]) -> str:
     maps = list(maps)
     starts = [one["basin"].size for one in maps]
     seen = max(float(one.attrs["smallest_basin_seen"]) for one in maps)
-    flips = [float(one.attrs["flip_rate"]) for one in maps if np.isfinite(one.attrs.get("flip_rate", np.nan))]
-    told = f"{min(starts)} starts a map; a basin of less than {100 * seen:.2g} % of them may have been missed"
-    return told + (f"; {share_text(max(flips))} of the starts at most lead elsewhere when recomputed more exactly" if flips else "")
+    flips = [
+        float(one.attrs["flip_rate"])
+        for one in maps
+        if np.isfinite(one.attrs.get("flip_rate", np.nan))
+    ]
+    told = (
+        f"{min(starts)} starts a map; a basin of less than {100 * seen:.2g} % of them may have "
+        f"been missed"
+    )
+    return told + (
+        f"; {share_text(max(flips))} of the starts at most lead elsewhere when "
+        f"recomputed more exactly"
+        if flips
+        else ""
+    )
 
 
 def parameter(ds: xr.Dataset, name: str) -> float:

@@ -1,7 +1,8 @@
-"""When two ways of integrating gave the same steady response, by one rule for both of the paper's ways.
+"""When two ways of integrating gave the same steady response, by one rule for both of the paper's
+ways.
 
-The rms decides, as in the paper's own figures: ode45 smears an orbit, so that its period may be misread, while its rms is hardly changed.
-Two chaotic motions count as the same.
+The rms decides, as in the paper's own figures: ode45 smears an orbit, so that its period may be
+misread, while its rms is hardly changed. Two chaotic motions count as the same.
 """
 
 from __future__ import annotations
@@ -20,12 +21,16 @@ WINDOW = 0.2
 
 
 def classes(ds: xr.Dataset, method: int) -> np.ndarray:
-    """For a Dataset of ``compare_methods``: what a method gave at each value and start beside the reference, int64[values, starts]."""
+    """For a Dataset of ``compare_methods``: what a method gave at each value and start beside the
+    reference, int64[values, starts].
+    """
     rms, exact = ds["rms"].values[method], ds["rms"].values[0]
     with np.errstate(invalid="ignore"):
         alike = np.abs(rms - exact) <= SAME * exact
     alike |= (ds["type"].values[method] == "chaotic") & (ds["type"].values[0] == "chaotic")
-    return np.where(np.isfinite(rms) & np.isfinite(exact), np.where(alike, SAME_ONE, OTHER), UNSETTLED)
+    return np.where(
+        np.isfinite(rms) & np.isfinite(exact), np.where(alike, SAME_ONE, OTHER), UNSETTLED
+    )
 
 
 def share_other(ds: xr.Dataset, method: int) -> float:
@@ -33,11 +38,20 @@ def share_other(ds: xr.Dataset, method: int) -> float:
     return float((classes(ds, method) != SAME_ONE).mean())
 
 
-def running_share(stiffness: np.ndarray, wrong: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Share of ``wrong`` bool[n] in a window along log10(stiffness): the stiffness, the share, the ends of its 95 % interval."""
+def running_share(
+    stiffness: np.ndarray, wrong: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Share of ``wrong`` bool[n] in a window along log10(stiffness): the stiffness, the share, the
+    ends of its 95 % interval.
+    """
     at = np.log10(stiffness)
     places = np.linspace(at[0], at[-1], 241)
-    counts = np.array([(int(wrong[near].sum()), int(near.sum())) for near in (np.abs(at - place) <= WINDOW for place in places)])
+    counts = np.array(
+        [
+            (int(wrong[near].sum()), int(near.sum()))
+            for near in (np.abs(at - place) <= WINDOW for place in places)
+        ]
+    )
     ends = np.array([wilson(k, n) for k, n in counts.tolist()], float)
     return 10.0**places, counts[:, 0] / np.maximum(counts[:, 1], 1), ends[:, 0], ends[:, 1]
 

@@ -92,12 +92,15 @@ _HOMES = {
     "SaltusError": "saltus.errors",
     "Stop": "saltus.interrupt",
     **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
-    **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"), "saltus.results"),
+    **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"),
+        "saltus.results"),
     **dict.fromkeys(
-        ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise", "sin", "sqrt", "system", "tan", "tanh"),
+        ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise",
+            "sin", "sqrt", "system", "tan", "tanh"),
         "saltus.system",
     ),
-    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign", "sinh"), "saltus.system"),
+    **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
+        "sinh"), "saltus.system"),
     **dict.fromkeys(("table", "where"), "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
@@ -175,7 +178,9 @@ def __getattr__(name: str) -> Any:
         from saltus.errors import nearest
         from saltus.system.foreign import ADVICE
 
-        raise AttributeError(f"saltus has no {name!r}. {ADVICE.get(name) or nearest(name, __all__)}")
+        raise AttributeError(
+            f"saltus has no {name!r}. {ADVICE.get(name) or nearest(name, __all__)}"
+        )
     with ctrl_c_waits():
         value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value

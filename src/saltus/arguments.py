@@ -1,7 +1,9 @@
-"""What kind of thing an argument of a public function may be, read off its annotation: asked once, where the function is entered.
+"""What kind of thing an argument of a public function may be, read off its annotation: asked once,
+where the function is entered.
 
-Only the kinds are asked here, of arguments whose annotation consists of plain ones: ``int``, ``float``, ``bool``, ``str``, a ``Mapping``
-and ``None``. What a number or a text may say is the function's own matter.
+Only the kinds are asked here, of arguments whose annotation consists of plain ones: ``int``,
+``float``, ``bool``, ``str``, a ``Mapping`` and ``None``. What a number or a text may say is the
+function's own matter.
 """
 
 from __future__ import annotations
@@ -27,22 +29,31 @@ def _is_number(value: Any) -> bool:
     """A real number of Python, of NumPy or in an array without axes, or a Quantity of pint."""
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         return True
-    kind = getattr(getattr(value, "dtype", None), "kind", "f")  # NumPy's spans of time count as whole numbers
+    # NumPy's spans of time count as whole numbers
+    kind = getattr(getattr(value, "dtype", None), "kind", "f")
     plain = isinstance(value, numbers.Real | Decimal) or getattr(value, "shape", None) == ()
     return plain and kind in "fiu" and not isinstance(value, bool)
 
 
 def _is_whole(value: Any) -> bool:
-    if not isinstance(value, int | float | np.integer | np.floating) or isinstance(value, bool | np.timedelta64):
+    if not isinstance(value, int | float | np.integer | np.floating) or isinstance(
+        value, bool | np.timedelta64
+    ):
         return False
     return isinstance(value, int) or (math.isfinite(value) and value == int(value))
 
 
-#: Test and name of each kind, by its annotation; of the names the first that fits what else may stand there.
+#: Test and name of each kind, by its annotation; of the names the first that fits what else may
+#: stand there.
 _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "int": (_is_whole, "a whole number"),
     "float": (_is_number, "a number"),
-    "bool": (lambda value: isinstance(value, bool | np.bool_) or (isinstance(value, int) and value in (0, 1)), "True or False"),
+    "bool": (
+        lambda value: (
+            isinstance(value, bool | np.bool_) or (isinstance(value, int) and value in (0, 1))
+        ),
+        "True or False",
+    ),
     "str": (lambda value: isinstance(value, str), "a text"),
     "Mapping": (lambda value: isinstance(value, Mapping), "a mapping such as {'name': ...}"),
     "None": (lambda value: value is None, "None"),
@@ -50,33 +61,54 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
 
 
 def has_mask(value: Any, depth: int = 3) -> bool:
-    """Whether numbers in an array, or in arrays in lists and mappings, are masked: as plain numbers they would be whatever stands there."""
+    """Whether numbers in an array, or in arrays in lists and mappings, are masked: as plain numbers
+    they would be whatever stands there.
+    """
     if isinstance(value, np.ma.MaskedArray):
         return bool(np.ma.is_masked(value))
-    inside = value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else ()
+    inside = (
+        value.values()
+        if isinstance(value, Mapping)
+        else value
+        if isinstance(value, list | tuple)
+        else ()
+    )
     return depth > 0 and any(has_mask(one, depth - 1) for one in inside)
 
 
 class Kinds:
-    """The kinds of a function's arguments, so far as they are plain and the function doesn't say it better itself.
+    """The kinds of a function's arguments, so far as they are plain and the function doesn't say it
+    better itself.
 
-    It does of whole numbers, which have a least one, and of a text whose default is a text: that is one of a few words.
+    It does of whole numbers, which have a least one, and of a text whose default is a text: that is
+    one of a few words.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._of: dict[str, list[str]] = {}
         for name, parameter in inspect.signature(function).parameters.items():
-            kinds = [re.sub(r"\[[^|]*\]$", "", kind) for kind in str(parameter.annotation).split(" | ")]
-            own = set(kinds) <= {"int", "None"} or (kinds == ["str"] and isinstance(parameter.default, str))
-            if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD) and not own and set(kinds) <= set(_KINDS):
+            kinds = [
+                re.sub(r"\[[^|]*\]$", "", kind) for kind in str(parameter.annotation).split(" | ")
+            ]
+            own = set(kinds) <= {"int", "None"} or (
+                kinds == ["str"] and isinstance(parameter.default, str)
+            )
+            if (
+                parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+                and not own
+                and set(kinds) <= set(_KINDS)
+            ):
                 self._of[name] = kinds
 
     def check(self, caller: str, given: Mapping[str, Any]) -> None:
-        """Raise ParameterError for the first of the arguments that is of another kind, or has masked numbers."""
+        """Raise ParameterError for the first of the arguments that is of another kind, or has
+        masked numbers.
+        """
         for name, value in given.items():
             if has_mask(value):
                 raise ParameterError(
-                    f"{caller}: {name} has masked numbers, and masks aren't supported. Leave them out: array.compressed()."
+                    f"{caller}: {name} has masked numbers, and masks aren't supported. Leave them "
+                    f"out: array.compressed()."
                 )
             kinds = self._of.get(name)
             if kinds and not any(_KINDS[kind][0](value) for kind in kinds):
@@ -84,13 +116,21 @@ class Kinds:
                 if words[-1] == "a text" and len(words) > 1:
                     words[-1] = "a text with its unit"
                 default = " Leave it out for the default." if "None" in kinds else ""
-                raise ParameterError(f"{caller}: {name} must be {' or '.join(words)}, not {shown(value)}.{default}")
+                raise ParameterError(
+                    f"{caller}: {name} must be {' or '.join(words)}, not {shown(value)}.{default}"
+                )
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a function one that asks what kinds of arguments it is given. Verbs ask that themselves."""
+    """Make a function one that asks what kinds of arguments it is given. Verbs ask
+    that themselves.
+    """
     signature, kinds = inspect.signature(function), Kinds(function)
-    caller = f"{function.__module__.split('.')[1]}.{function.__qualname__}" if ".plot." in function.__module__ else function.__qualname__
+    caller = (
+        f"{function.__module__.split('.')[1]}.{function.__qualname__}"
+        if ".plot." in function.__module__
+        else function.__qualname__
+    )
 
     @functools.wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> R:

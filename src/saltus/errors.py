@@ -17,7 +17,8 @@ _DIGITS = 60
 class SaltusError(Exception):
     """Base of everything that saltus raises on purpose.
 
-    A message is at most :data:`LONGEST` characters long: of a longer one, which repeats what somebody gave, the middle is left out.
+    A message is at most :data:`LONGEST` characters long: of a longer one, which repeats what
+    somebody gave, the middle is left out.
     """
 
     def __init__(self, *args: object) -> None:
@@ -45,7 +46,9 @@ class CacheError(SaltusError, OSError):
 
 
 class SaltusWarning(UserWarning):
-    """Something that doesn't stop the work but should be known: trajectories that ended early, a cache that can't be used."""
+    """Something that doesn't stop the work but should be known: trajectories that ended early, a
+    cache that can't be used.
+    """
 
 
 class UnusedParameterWarning(SaltusWarning):
@@ -57,15 +60,22 @@ def _cut(message: str) -> str:
     if len(message) <= LONGEST:
         return message
     first, last = LONGEST * 2 // 3, LONGEST // 4
-    return f"{message[:first]} ... ({len(message) - first - last} characters left out) ... {message[-last:]}"
+    return (
+        f"{message[:first]} ... ({len(message) - first - last} characters left out) ... "
+        f"{message[-last:]}"
+    )
 
 
 class _Repr(reprlib.Repr):
-    """``repr`` of anything that somebody may give: numbers and texts of NumPy as plain ones, never an exception, never without an end."""
+    """``repr`` of anything that somebody may give: numbers and texts of NumPy as plain ones, never
+    an exception, never without an end.
+    """
 
     def __init__(self) -> None:
         super().__init__()
-        self.maxdict = self.maxlist = self.maxtuple = self.maxset = self.maxfrozenset = self.maxdeque = 40
+        self.maxdict = self.maxlist = self.maxtuple = self.maxset = self.maxfrozenset = (
+            self.maxdeque
+        ) = 40
         self.maxstring = self.maxother = 10_000
 
     def repr1(self, x: Any, level: int) -> str:
@@ -74,7 +84,11 @@ class _Repr(reprlib.Repr):
         return super().repr1(x, level)
 
     def repr_int(self, x: int, _level: int) -> str:
-        return repr(x) if abs(x) < 10**_DIGITS else f"a whole number of some {int(x.bit_length() * 0.30103) + 1} digits"
+        return (
+            repr(x)
+            if abs(x) < 10**_DIGITS
+            else (f"a whole number of some {int(x.bit_length() * 0.30103) + 1} digits")
+        )
 
 
 def shown(value: object, limit: int = 80) -> str:
@@ -88,7 +102,9 @@ def shown(value: object, limit: int = 80) -> str:
 
 
 def among(value: object, words: Iterable[str]) -> bool:
-    """Whether a value is text, and one of some words. Lists and arrays, for which ``in`` fails or asks each entry, are none of them."""
+    """Whether a value is text, and one of some words. Lists and arrays, for which ``in`` fails or
+    asks each entry, are none of them.
+    """
     return isinstance(value, str) and value in words
 
 
@@ -99,6 +115,10 @@ def nearest(name: object, known: Iterable[str]) -> str:
         return f"Known: {', '.join(sorted(known))}."
     alike = unicodedata.normalize("NFKC", name)
     if alike != name and alike in known:
-        return f"Write {alike!r} ({alike!a}), which is how Python reads {name!r} ({name!a}) in the function: they only appear alike."
+        return (
+            f"Write {alike!r} ({alike!a}), which is how Python reads {name!r} ({name!a}) "
+            f"in the "
+            f"function: they only appear alike."
+        )
     close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     return f"Did you mean {close[0]!r}?" if close else f"Known: {', '.join(sorted(known))}."

@@ -1,4 +1,6 @@
-"""Stopping on Ctrl-C or on request: the exception that carries what was finished, and how work on threads learns of it."""
+"""Stopping on Ctrl-C or on request: the exception that carries what was finished, and how work on
+threads learns of it.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +27,8 @@ class Interrupted(KeyboardInterrupt):
     Parameters
     ----------
     assemble : callable, optional
-        Puts together what was finished. It is called when ``partial`` is first read: ten million samples take seconds, and Ctrl-C doesn't
-        wait for a result that nobody asks for.
+        Puts together what was finished. It is called when ``partial`` is first read: ten million
+        samples take seconds, and Ctrl-C doesn't wait for a result that nobody asks for.
     """
 
     def __init__(self, assemble: Callable[[], Any] | None = None) -> None:
@@ -44,7 +46,9 @@ class Interrupted(KeyboardInterrupt):
         return self._assemble is not None
 
     def then(self, result: Callable[[Any], Any]) -> Interrupted:
-        """The interruption whose ``partial`` is what ``result`` makes of this one's, if there is any."""
+        """The interruption whose ``partial`` is what ``result`` makes of this one's, if there is
+        any.
+        """
         return Interrupted((lambda: result(self.partial)) if self.has_partial else None)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -65,9 +69,14 @@ def _interrupted(partial: Any) -> Interrupted:
 def ctrl_c_waits() -> Iterator[None]:
     """Ctrl-C within is raised where the block ends.
 
-    For what can't be stopped half done, or would swallow it: modules of other packages, while they are imported, lose one in a hundred.
+    For what can't be stopped half done, or would swallow it: modules of other packages, while they
+    are imported, lose one in a hundred.
     """
-    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    handler = (
+        signal.getsignal(signal.SIGINT)
+        if threading.current_thread() is threading.main_thread()
+        else None
+    )
     if not callable(handler):  # in another thread it doesn't arrive; or nobody listens
         yield
         return
@@ -85,14 +94,16 @@ def ctrl_c_waits() -> Iterator[None]:
 def no_ctrl_c_is_lost() -> Iterator[None]:
     """Within, a Ctrl-C that Python drops is pressed again.
 
-    It drops one that comes in the callback of a weak reference, or in a finalizer: nobody could catch what is raised
-    there, so it is handed to ``sys.unraisablehook``, which prints it and goes on.
+    It drops one that comes in the callback of a weak reference, or in a finalizer: nobody could
+    catch what is raised there, so it is handed to ``sys.unraisablehook``, which prints it and goes
+    on.
     """
     before = sys.unraisablehook
 
     def again(dropped: Any) -> None:
         if issubclass(dropped.exc_type, KeyboardInterrupt):
-            threading.Timer(0.01, _thread.interrupt_main).start()  # at once it would be dropped again, by this function
+            # at once it would be dropped again, by this function
+            threading.Timer(0.01, _thread.interrupt_main).start()
         else:
             before(dropped)
 
@@ -107,8 +118,9 @@ def no_ctrl_c_is_lost() -> Iterator[None]:
 class Stop:
     """A request to stop work, which another thread may make: ``stop.set()``.
 
-    Everything long that is called ``with stop:`` ends soon after it is made, as it does on Ctrl-C: with :class:`saltus.Interrupted`, whose
-    ``partial`` is what was finished. One that was made stays made.
+    Everything long that is called ``with stop:`` ends soon after it is made, as it does on Ctrl-C:
+    with :class:`saltus.Interrupted`, whose ``partial`` is what was finished. One that was made
+    stays made.
 
     Examples
     --------
@@ -140,11 +152,15 @@ class Stop:
 
     @property
     def inside(self) -> bool:
-        """Whether the work is part of other work, which Ctrl-C asks to stop and doesn't interrupt."""
+        """Whether the work is part of other work, which Ctrl-C asks to stop and
+        doesn't interrupt.
+        """
         return self._outer is not None and (self._outer._works or self._outer.inside)
 
     def hold(self) -> None:
-        """Let all that this thread's context calls from now on ask this request (see :func:`check_stop`), as parts of one work."""
+        """Let all that this thread's context calls from now on ask this request (see
+        :func:`check_stop`), as parts of one work.
+        """
         self._works = True
         _CURRENT.set(self)
 

@@ -11,11 +11,18 @@ QUANTILE_95 = 1.959963984540054
 def wilson(count: np.ndarray | int, cells: np.ndarray | int) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the 95 % score interval of a share ``count / cells``; NaN for no cells.
 
-    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209. Unlike the textbook interval it stays within 0 and 1 and has a width at 0 and at 1.
+    E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209. Unlike the textbook interval it stays within 0
+    and 1 and has a width at 0 and at 1.
     """
-    count, cells = np.broadcast_arrays(np.asarray(count, dtype=float), np.where(np.equal(cells, 0), np.nan, cells))
+    count, cells = np.broadcast_arrays(
+        np.asarray(count, dtype=float), np.where(np.equal(cells, 0), np.nan, cells)
+    )
     share, z2 = count / cells, QUANTILE_95**2
     centre = (share + z2 / (2 * cells)) / (1 + z2 / cells)
-    half = QUANTILE_95 / (1 + z2 / cells) * np.sqrt(share * (1 - share) / cells + z2 / (4 * cells**2))
+    half = (
+        QUANTILE_95 / (1 + z2 / cells) * np.sqrt(share * (1 - share) / cells + z2 / (4 * cells**2))
+    )
     none = np.isnan(cells)
-    return np.where(~none & (count == 0), 0.0, centre - half), np.where(count == cells, 1.0, centre + half)
+    return np.where(~none & (count == 0), 0.0, centre - half), np.where(
+        count == cells, 1.0, centre + half
+    )

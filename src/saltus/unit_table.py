@@ -1,10 +1,11 @@
 """The units that saltus reads: a short table, and the grammar by which they are combined.
 
-A unit that isn't in the table is refused; none is guessed. The vocabulary of a general library is too large for that: in one of them ``Nm``
-is a measure of yarn and ``mil`` an angle. Symbols that mean different things to different people (``g``, ``lb``, ``mil``) are marked
-:attr:`Unit.doubtful`.
+A unit that isn't in the table is refused; none is guessed. The vocabulary of a general library is
+too large for that: in one of them ``Nm`` is a measure of yarn and ``mil`` an angle. Symbols that
+mean different things to different people (``g``, ``lb``, ``mil``) are marked :attr:`Unit.doubtful`.
 
-Factors are decimals of 60 digits. Powers of pi are counted separately, so that 900 rpm are 15 Hz exactly.
+Factors are decimals of 60 digits. Powers of pi are counted separately, so that 900 rpm are 15 Hz
+exactly.
 """
 
 from __future__ import annotations
@@ -17,13 +18,18 @@ from fractions import Fraction
 
 from saltus.errors import UnitError
 
-#: Symbols that a declared unit may be made of, the coherent SI units, each with its exponents of m, kg, s, A, K and rad. A hertz is one
-#: turn a second: the turn is counted apart, see :attr:`Unit.turns`.
+#: Symbols that a declared unit may be made of, the coherent SI units, each with its exponents of m,
+#: kg, s, A, K and rad. A hertz is one turn a second: the turn is counted apart, see
+#: :attr:`Unit.turns`.
 COHERENT: dict[str, dict[str, int]] = {
-    "m": {"m": 1}, "kg": {"kg": 1}, "s": {"s": 1}, "rad": {"rad": 1}, "Hz": {"s": -1, "rad": 1}, "N": {"kg": 1, "m": 1, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2}, "J": {"kg": 1, "m": 2, "s": -2}, "W": {"kg": 1, "m": 2, "s": -3}, "K": {"K": 1}, "A": {"A": 1},
-    "V": {"kg": 1, "m": 2, "s": -3, "A": -1}, "C": {"A": 1, "s": 1}, "F": {"kg": -1, "m": -2, "s": 4, "A": 2},
-    "H": {"kg": 1, "m": 2, "s": -2, "A": -2}, "T": {"kg": 1, "s": -2, "A": -1}, "Wb": {"kg": 1, "m": 2, "s": -2, "A": -1},
+    "m": {"m": 1}, "kg": {"kg": 1}, "s": {"s": 1}, "rad": {"rad": 1}, "Hz": {"s": -1, "rad": 1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "Pa": {"kg": 1, "m": -1, "s": -2}, "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3}, "K": {"K": 1}, "A": {"A": 1},
+    "V": {"kg": 1, "m": 2, "s": -3, "A": -1}, "C": {"A": 1, "s": 1},
+    "F": {"kg": -1, "m": -2, "s": 4, "A": 2},
+    "H": {"kg": 1, "m": 2, "s": -2, "A": -2}, "T": {"kg": 1, "s": -2, "A": -1},
+    "Wb": {"kg": 1, "m": 2, "s": -2, "A": -1},
     "ohm": {"kg": 1, "m": 2, "s": -3, "A": -2},
 }  # fmt: skip
 
@@ -69,11 +75,15 @@ class Unit:
         return self.parts.get("Hz", Fraction(0))
 
     def convert(self, number: Decimal, other: Unit) -> Decimal:
-        """So many of this unit in another, of the same dimension but for the angle; a turn is 2 pi rad."""
+        """So many of this unit in another, of the same dimension but for the angle; a turn is 2 pi
+        rad.
+        """
         turns = self.turns - other.turns
         factor = _WIDE.divide(self.factor, other.factor)
         factor = _WIDE.multiply(factor, _power(Decimal(2), turns))
-        return _WIDE.multiply(_WIDE.multiply(number, factor), _power(_PI, self.pi - other.pi + turns))
+        return _WIDE.multiply(
+            _WIDE.multiply(number, factor), _power(_PI, self.pi - other.pi + turns)
+        )
 
     def times(self, other: Unit, exponent: Fraction = Fraction(1)) -> Unit:
         """Its product with a power of another."""
@@ -89,13 +99,26 @@ class Unit:
 
 
 def _power(base: Decimal, exponent: Fraction) -> Decimal:
-    return _WIDE.power(base, _WIDE.divide(Decimal(exponent.numerator), Decimal(exponent.denominator)))
+    return _WIDE.power(
+        base, _WIDE.divide(Decimal(exponent.numerator), Decimal(exponent.denominator))
+    )
 
 
-# -- the table -----------------------------------------------------------------------------------------------------------------
+# -- the table -------------------------------------------------------------------------------------
 _SMALL, _LARGE = "fpnuµμmcd", "hkMGT"
-_PREFIXES = dict(zip("fpnuµμmcdhkMGT", (-15, -12, -9, -6, -6, -6, -3, -2, -1, 2, 3, 6, 9, 12), strict=True)) | {"da": 1}
-_LONG_PREFIXES = {"nano": -9, "micro": -6, "milli": -3, "centi": -2, "deci": -1, "kilo": 3, "mega": 6, "giga": 9}
+_PREFIXES = dict(
+    zip("fpnuµμmcdhkMGT", (-15, -12, -9, -6, -6, -6, -3, -2, -1, 2, 3, 6, 9, 12), strict=True)
+) | {"da": 1}
+_LONG_PREFIXES = {
+    "nano": -9,
+    "micro": -6,
+    "milli": -3,
+    "centi": -2,
+    "deci": -1,
+    "kilo": 3,
+    "mega": 6,
+    "giga": 9,
+}
 
 
 def _entries() -> dict[str, tuple[Unit, str]]:
@@ -110,7 +133,10 @@ def _entries() -> dict[str, tuple[Unit, str]]:
             powers[symbol] = Fraction(power or 1)
         top, _, bottom = factor.partition("/")
         for symbol in symbols.split():
-            table[symbol] = Unit(powers, _WIDE.divide(Decimal(top), Decimal(bottom or 1)), Fraction(pi)), prefixes
+            table[symbol] = (
+                Unit(powers, _WIDE.divide(Decimal(top), Decimal(bottom or 1)), Fraction(pi)),
+                prefixes,
+            )
 
     for symbol in ("Hz", "N", "Pa", "J", "W", "V", "A", "K", "C", "F", "H", "T", "Wb", "ohm"):
         add(symbol, "1", symbol, usual)
@@ -155,36 +181,54 @@ def _entries() -> dict[str, tuple[Unit, str]]:
     add("dyn", "1e-5", "N")
     add("bar", "1e5", "Pa", "m")
     add("atm", "101325", "Pa")
-    add("psi pound_force_per_square_inch", "6894.757293168361336722673445346890693781387562775", "Pa", "k")
+    add(
+        "psi pound_force_per_square_inch",
+        "6894.757293168361336722673445346890693781387562775",
+        "Pa",
+        "k",
+    )
     add("% percent", "0.01", "")
     return table
 
 
 _TABLE = _entries()
 _LONG = {
-    "meter": "m", "metre": "m", "gram": "g", "second": "s", "radian": "rad", "hertz": "Hz", "newton": "N", "pascal": "Pa", "joule": "J",
-    "watt": "W", "kelvin": "K", "ampere": "A", "volt": "V", "coulomb": "C", "farad": "F", "henry": "H", "tesla": "T", "weber": "Wb",
+    "meter": "m", "metre": "m", "gram": "g", "second": "s", "radian": "rad", "hertz": "Hz",
+    "newton": "N", "pascal": "Pa", "joule": "J",
+    "watt": "W", "kelvin": "K", "ampere": "A", "volt": "V", "coulomb": "C", "farad": "F",
+    "henry": "H", "tesla": "T", "weber": "Wb",
     "liter": "l", "litre": "l",
 }  # fmt: skip
 
-#: Symbols with more than one meaning, as written, and what to write instead; {0} stands for the number.
+#: Symbols with more than one meaning, as written, and what to write instead; {0} stands for the
+#: number.
 DOUBTFUL = {
     "g": "may mean gravity or gram: write '{0} g0' for gravity (9.80665 m/s^2), or '{0} gram'",
     "lb": "may mean a force or a mass: write '{0} lbf' or '{0} lbm'",
-    "mil": "may mean a length or an angle: write '{0} thou' for thousandths of an inch, or '{0} mrad'",
+    "mil": "may mean a length or an angle: write '{0} thou' for thousandths of an inch, or '{0} "
+    "mrad'",
     "C": "may mean coulomb or degrees Celsius: write '{0} coulomb', or a temperature in K",
     "F": "may mean farad or degrees Fahrenheit: write '{0} farad', or a temperature in K",
 }
 for _prefix in ("m", "u", "µ", "μ"):
     DOUBTFUL[f"{_prefix}g"] = (
-        f"may mean gravity or gram: write '{{0}}e{-3 if _prefix == 'm' else -6} g0' for gravity (9.80665 m/s^2), or "
+        f"may mean gravity or gram: write '{{0}}e{-3 if _prefix == 'm' else -6} g0' for gravity "
+        f"(9.80665 m/s^2), or "
         f"'{{0}} {'milli' if _prefix == 'm' else 'micro'}gram'"
     )
-_SCALE = "is no plain multiple of an SI unit, for it counts from another zero or on a logarithmic scale: write {}"
+_SCALE = (
+    "is no plain multiple of an SI unit, for it counts from another zero or on a logarithmic "
+    "scale: write {}"
+)
 #: Symbols that are refused with a word of their own.
 _REFUSED = {
-    **dict.fromkeys(("degC", "°C", "celsius", "degF", "°F", "fahrenheit"), _SCALE.format("the temperature in K")),
-    **dict.fromkeys(("dB", "dBA", "dBm", "Np", "neper", "decibel", "octave", "decade"), _SCALE.format("the ratio as a number")),
+    **dict.fromkeys(
+        ("degC", "°C", "celsius", "degF", "°F", "fahrenheit"), _SCALE.format("the temperature in K")
+    ),
+    **dict.fromkeys(
+        ("dB", "dBA", "dBm", "Np", "neper", "decibel", "octave", "decade"),
+        _SCALE.format("the ratio as a number"),
+    ),
     "ton": "may mean 1000 kg, 2000 lb or 2240 lb: write tonne, or the mass in kg",
     "oz": "may mean a mass, a force or a volume: write it in kg, N or m^3",
     "hp": "may mean 745.7 W or 735.5 W: write it in W or kW",
@@ -225,7 +269,7 @@ def _taken(symbol: str) -> tuple[str, ...]:
     return (*given.removesuffix("da"), *(["da"] if given.endswith("da") else []))
 
 
-# -- the grammar ---------------------------------------------------------------------------------------------------------------
+# -- the grammar -----------------------------------------------------------------------------------
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _TOKEN = re.compile(
     r"(?P<symbol>g_?0(?![0-9])|[A-Za-zµμΩ°%]+(?:_[A-Za-z]+)*)(?P<direct>[+-]?[0-9]+(?![0-9.]))?"
@@ -235,12 +279,14 @@ _TOKEN = re.compile(
 
 
 def read_unit(text: str) -> Unit:
-    """A unit from its text: symbols of the table joined by ``*``, ``/``, blanks, parentheses and powers.
+    """A unit from its text: symbols of the table joined by ``*``, ``/``, blanks, parentheses and
+    powers.
 
     Parameters
     ----------
     text : str
-        Such as ``"kN/mm"``, ``"kg m^2"``, ``"N/m^1.5"``, ``"m/s2"``, ``"J/(kg*K)"``; ``""`` is the plain number.
+        Such as ``"kN/mm"``, ``"kg m^2"``, ``"N/m^1.5"``, ``"m/s2"``, ``"J/(kg*K)"``; ``""`` is the
+        plain number.
 
     Returns
     -------
@@ -249,7 +295,8 @@ def read_unit(text: str) -> Unit:
     Raises
     ------
     UnitError
-        With the beginning of a sentence, no full stop: what can't be read, and what to write instead.
+        With the beginning of a sentence, no full stop: what can't be read, and what to write
+        instead.
     """
     return _Reader(text).whole()
 
@@ -278,7 +325,8 @@ class _Reader:
             sign = token.strip()
             if sign != "/" and divided and sign != "*":
                 raise UnitError(
-                    f"{self.text!r} can be read in two ways: use parentheses, as in N/(m*s), or put what multiplies first, as in N*s/m"
+                    f"{self.text!r} can be read in two ways: use parentheses, as in N/(m*s), or "
+                    f"put what multiplies first, as in N*s/m"
                 )
             divided = divided or sign == "/"
             unit = self.factor(unit, Fraction(-1 if sign == "/" else 1))
@@ -287,7 +335,11 @@ class _Reader:
     def factor(self, before: Unit, sign: Fraction) -> Unit:
         """The product of what came before with the next symbol or parenthesis, and its power."""
         match = _TOKEN.match(self.text, self.at)
-        if match is None or match.lastgroup not in ("symbol", "direct", "one", "bracket") or match["bracket"] == ")":
+        if (
+            match is None
+            or match.lastgroup not in ("symbol", "direct", "one", "bracket")
+            or match["bracket"] == ")"
+        ):
             raise self.wrong()
         self.at = match.end()
         if match["bracket"]:
@@ -295,7 +347,11 @@ class _Reader:
             self.token("bracket")
         else:
             unit = _symbol(match["symbol"]) if match["symbol"] else Unit()
-        return before.times(unit, sign * (self.limited(Fraction(match["direct"])) if match["direct"] else self.exponent()))
+        return before.times(
+            unit,
+            sign
+            * (self.limited(Fraction(match["direct"])) if match["direct"] else self.exponent()),
+        )
 
     def exponent(self) -> Fraction:
         """The power behind a symbol: 1 if there is none."""
@@ -303,7 +359,11 @@ class _Reader:
         if match is None or not (match["power"] or match["raised"]):
             return Fraction(1)
         self.at = match.end()
-        digits = match["raised"].translate(_SUPERSCRIPTS) if match["raised"] else re.sub(r"[\s()^*]", "", match["power"])
+        digits = (
+            match["raised"].translate(_SUPERSCRIPTS)
+            if match["raised"]
+            else re.sub(r"[\s()^*]", "", match["power"])
+        )
         top, _, bottom = digits.partition("/")
         return self.limited(Fraction(top) / Fraction(int(bottom) or 1) if bottom else Fraction(top))
 
@@ -322,4 +382,8 @@ class _Reader:
 
     def wrong(self) -> UnitError:
         rest = self.text[self.at :]
-        return UnitError(f"{rest[:20]!r} can't stand in a unit" if rest else f"the unit {self.text!r} isn't complete")
+        return UnitError(
+            f"{rest[:20]!r} can't stand in a unit"
+            if rest
+            else f"the unit {self.text!r} isn't complete"
+        )

@@ -1,11 +1,13 @@
 """Units at the edge: text such as ``"0.4 mm"`` becomes a number in SI here, and nowhere below.
 
-A declared unit is a product of coherent SI units (``"m"``, ``"N/m^3"``, ``"Hz"``, ``"rad/s"``, ``"1"``), so that a bare number always means
-SI. The angle is a dimension of its own where it decides between a frequency [Hz] and an angular frequency [rad/s]: ``"94.2 rad/s"``
-given to a parameter in Hz is divided by 2 pi, and a bare rate in 1/s, which could mean either, is refused.
+A declared unit is a product of coherent SI units (``"m"``, ``"N/m^3"``, ``"Hz"``, ``"rad/s"``,
+``"1"``), so that a bare number always means SI. The angle is a dimension of its own where it
+decides between a frequency [Hz] and an angular frequency [rad/s]: ``"94.2 rad/s"`` given to a
+parameter in Hz is divided by 2 pi, and a bare rate in 1/s, which could mean either, is refused.
 
-The units that can be read are in a table of our own (unit_table.py, docs/decisions/0020). Its arithmetic runs on decimals: ``"0.4 mm"`` is
-the double nearest to 0.0004, ``"900 rpm"`` is 15 Hz exactly.
+The units that can be read are in a table of our own (unit_table.py, docs/decisions/0020). Its
+arithmetic runs on decimals: ``"0.4 mm"`` is the double nearest to 0.0004, ``"900 rpm"`` is 15 Hz
+exactly.
 """
 
 from __future__ import annotations
@@ -22,21 +24,26 @@ from typing import Any
 from saltus.errors import ParameterError, UnitError, shown
 from saltus.unit_table import COHERENT, DOUBTFUL, Unit, read_unit
 
-_NUMBER = re.compile(r"\s*(?P<number>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?(?P<tens>[0-9]+))?)(?P<unit>.*)", re.DOTALL)
+_NUMBER = re.compile(
+    r"\s*(?P<number>[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?(?P<tens>[0-9]+))?)(?P<unit>.*)",
+    re.DOTALL,
+)
 _HEAD = re.compile(r"(?:m|s|Hz|Nms|Nm|Ns|N|Pa|J|W|V|A)(?=$|[*/])")
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-#: The longest text that is read as a quantity: the longest that anybody writes has some 30 characters.
+#: The longest text that is read as a quantity: the longest that anybody writes has some 30
+#: characters.
 LONGEST = 100
 
 
-# -- declared units ------------------------------------------------------------------------------------------------------------
+# -- declared units --------------------------------------------------------------------------------
 def check_declared(unit: str, name: str) -> str:
     """A declared unit, checked: a product of coherent SI units.
 
     Parameters
     ----------
     unit : str
-        Such as ``"N/m"``, ``"kg*m^2"``, ``"N/m^1.5"``, ``"1"`` (a plain number) or ``""`` (not known).
+        Such as ``"N/m"``, ``"kg*m^2"``, ``"N/m^1.5"``, ``"1"`` (a plain number) or ``""`` (not
+        known).
     name : str
         What carries the unit; used in the message.
 
@@ -59,14 +66,22 @@ def check_declared(unit: str, name: str) -> str:
     try:
         parsed = _parsed(unit)
     except UnitError as error:
-        raise UnitError(f"the unit {shown(unit)} of {name!r} can't be read: {error}. Write it like {_LIKE_DECLARED}.") from None
+        raise UnitError(
+            f"the unit {shown(unit)} of {name!r} can't be read: {error}. Write it like "
+            f"{_LIKE_DECLARED}."
+        ) from None
     if parsed.factor != 1 or parsed.pi:
         raise UnitError(
-            f"{name!r} is declared in {shown(unit)}, which isn't a coherent SI unit. Numbers inside equations are in SI: declare it by "
-            f"{', '.join(list(COHERENT)[:8])}, ..., such as {_join(parsed.parts)!r}, and give values as text, such as '0.4 mm', which is "
+            f"{name!r} is declared in {shown(unit)}, which isn't a coherent SI unit. Numbers "
+            f"inside equations are in SI: declare it by "
+            f"{', '.join(list(COHERENT)[:8])}, ..., such as {_join(parsed.parts)!r}, and give "
+            f"values as text, such as '0.4 mm', which is "
             "converted."
         )
-    own = all(symbol in COHERENT or symbol in ("Nm", "Ns", "Nms") for symbol in re.findall(r"[^\W\d_]+", unit))
+    own = all(
+        symbol in COHERENT or symbol in ("Nm", "Ns", "Nms")
+        for symbol in re.findall(r"[^\W\d_]+", unit)
+    )
     return unit if own else _join(parsed.parts)
 
 
@@ -74,13 +89,14 @@ _LIKE_DECLARED = "'N/m', 'N*s/m', 'kg*m^2/s^2' or '1'"
 
 
 def coherent_unit(text: str, name: str) -> str:
-    """The coherent SI unit in which a text value is stored: ``"14 kN/m"`` gives ``"N/m"``, ``"0.4 mm"`` gives ``"m"``, ``"2 lbf/in"`` gives
-    ``"N/m"``, ``"900 rpm"`` gives ``"rad/s"``.
+    """The coherent SI unit in which a text value is stored: ``"14 kN/m"`` gives ``"N/m"``, ``"0.4
+    mm"`` gives ``"m"``, ``"2 lbf/in"`` gives ``"N/m"``, ``"900 rpm"`` gives ``"rad/s"``.
 
     Raises
     ------
     UnitError
-        If the text can't be read, or its unit has several meanings and nothing says which: ``"2 g"``.
+        If the text can't be read, or its unit has several meanings and nothing says which: ``"2
+        g"``.
     """
     number, unit = _split(text, name)
     if unit is None:
@@ -90,7 +106,9 @@ def coherent_unit(text: str, name: str) -> str:
 
 
 def dimension(unit: str) -> dict[str, Fraction]:
-    """Exponents of m, kg, s, A and K in a declared unit; the angle counts as a plain number. ``"N/m"`` gives ``{"kg": 1, "s": -2}``."""
+    """Exponents of m, kg, s, A and K in a declared unit; the angle counts as a plain number.
+    ``"N/m"`` gives ``{"kg": 1, "s": -2}``.
+    """
     return _without_angle(_parsed(unit))[0]
 
 
@@ -105,7 +123,8 @@ def unit_text(exponents: Mapping[str, Fraction]) -> str:
 
 #: Units that messages call a dimension by, the first that fits.
 _USUAL = (
-    "1", "m", "m/s", "m/s^2", "kg", "s", "1/s", "1/s^2", "N", "N/m", "N*s/m", "N/m^2", "N/m^3", "N/m^1.5", "N*m", "N*m*s", "N*s", "kg*m^2",
+    "1", "m", "m/s", "m/s^2", "kg", "s", "1/s", "1/s^2", "N", "N/m", "N*s/m", "N/m^2", "N/m^3",
+    "N/m^1.5", "N*m", "N*m*s", "N*s", "kg*m^2",
     "W", "V", "ohm", "N*s/m^2", "N*s", "kg/m^3", "m^2", "m^3", "N/kg", "N*m/s^2", "N*m^2", "N/s",
 )  # fmt: skip
 
@@ -117,25 +136,31 @@ def _join(parts: Mapping[str, Fraction]) -> str:
         if exponent == 1:
             return symbol
         exact = exponent.denominator == 1 or 10**6 % exponent.denominator == 0
-        return f"{symbol}^{_plain(Decimal(exponent.numerator) / exponent.denominator)}" if exact else f"{symbol}^({exponent})"
+        return (
+            f"{symbol}^{_plain(Decimal(exponent.numerator) / exponent.denominator)}"
+            if exact
+            else f"{symbol}^({exponent})"
+        )
 
     above = "*".join(power(symbol, exponent) for symbol, exponent in parts.items() if exponent > 0)
-    below = "".join("/" + power(symbol, -exponent) for symbol, exponent in parts.items() if exponent < 0)
+    below = "".join(
+        "/" + power(symbol, -exponent) for symbol, exponent in parts.items() if exponent < 0
+    )
     return (above or "1") + below
 
 
-# -- text and numbers to SI ----------------------------------------------------------------------------------------------------
+# -- text and numbers to SI ------------------------------------------------------------------------
 def to_si(value: Any, unit: str, name: str) -> float:
     """A value as a number in SI.
 
     Parameters
     ----------
     value : float or str or pint.Quantity
-        A bare number is in the declared unit already. Text holds number and unit: ``"0.4 mm"``, ``"14 kN/m"``, ``"900 rpm"``; it has at
-        most 100 characters.
+        A bare number is in the declared unit already. Text holds number and unit: ``"0.4 mm"``,
+        ``"14 kN/m"``, ``"900 rpm"``; it has at most 100 characters.
     unit : str
-        The declared unit (coherent SI), ``"1"`` for a plain number, ``""`` if not known: text is then taken to SI base units, except
-        frequencies, which need a declaration.
+        The declared unit (coherent SI), ``"1"`` for a plain number, ``""`` if not known: text is
+        then taken to SI base units, except frequencies, which need a declaration.
     name : str
         What the value is for; used in the messages.
 
@@ -160,8 +185,11 @@ def to_si(value: Any, unit: str, name: str) -> float:
 
 
 def _real(value: Any, unit: str, name: str) -> float:
-    """A number of Python, of NumPy, or in an array without axes, as a double; infinite if it is too large for one."""
-    kind = getattr(getattr(value, "dtype", None), "kind", "f")  # NumPy's dates and spans of time would turn into numbers of ticks
+    """A number of Python, of NumPy, or in an array without axes, as a double; infinite if it is too
+    large for one.
+    """
+    # NumPy's dates and spans of time would turn into numbers of ticks
+    kind = getattr(getattr(value, "dtype", None), "kind", "f")
     plain = isinstance(value, numbers.Real | Decimal) or getattr(value, "shape", None) == ()
     if plain and kind in "fiu" and not isinstance(value, bool):
         try:
@@ -170,7 +198,10 @@ def _real(value: Any, unit: str, name: str) -> float:
             return math.inf
         except ValueError:  # a decimal that signals that it is none
             return math.nan
-    raise ParameterError(f"{name} = {shown(value)} is not a number. Write a number in SI, or text with a unit, such as {_example(unit)!r}.")
+    raise ParameterError(
+        f"{name} = {shown(value)} is not a number. Write a number in SI, or text "
+        f"with a unit, such as {_example(unit)!r}."
+    )
 
 
 def _convert(text: str, unit: str, name: str) -> float:
@@ -179,7 +210,8 @@ def _convert(text: str, unit: str, name: str) -> float:
     if given is None:
         if unit not in ("", "1"):
             raise UnitError(
-                f"{name} = {shown(text)} has no unit; it is measured in {unit}. Write {shown(f'{text.strip()} {unit}')}, or the bare "
+                f"{name} = {shown(text)} has no unit; it is measured in {unit}. Write "
+                f"{shown(f'{text.strip()} {unit}')}, or the bare "
                 f"number {text.strip()} if it is in {unit} already."
             )
         return _double(number, text, name)
@@ -187,8 +219,10 @@ def _convert(text: str, unit: str, name: str) -> float:
     if unit == "":
         if set(dimension) == {"s"}:
             raise UnitError(
-                f"{name} = {shown(text)}, but the unit of {name} isn't known, and a frequency in Hz and an angular one in rad/s are "
-                f"different numbers. Declare it: units={{{name!r}: 'Hz'}} or 'rad/s'; or give the bare number that the equation uses."
+                f"{name} = {shown(text)}, but the unit of {name} isn't known, and a frequency in "
+                f"Hz and an angular one in rad/s are "
+                f"different numbers. Declare it: units={{{name!r}: 'Hz'}} or 'rad/s'; or give the "
+                f"bare number that the equation uses."
             )
         _refuse_doubtful(given, number, text, name)
         return _double(given.convert(number, Unit({"Hz": given.turns})), text, name)
@@ -197,11 +231,16 @@ def _convert(text: str, unit: str, name: str) -> float:
     if dimension != own_dimension:
         _refuse_doubtful(given, number, text, name)
         expected = "a plain number" if unit == "1" else f"measured in {unit}"
-        raise UnitError(f"{name} = {shown(text)} has the wrong unit: {name} is {expected}. Write it like {_example(unit)!r}.")
+        raise UnitError(
+            f"{name} = {shown(text)} has the wrong unit: {name} is {expected}. Write "
+            f"it like {_example(unit)!r}."
+        )
     if angle != own_angle and set(dimension) <= {"s"}:
         raise UnitError(
-            f"{name} = {shown(text)} can't be told apart: {name} is {f'measured in {unit}' if unit != '1' else 'a plain number'}, and an "
-            f"angle (rad, turns, Hz = turns per second) isn't a plain number here. Say Hz, rpm, rad/s or rad where you mean it, or give "
+            f"{name} = {shown(text)} can't be told apart: {name} is "
+            f"{f'measured in {unit}' if unit != '1' else 'a plain number'}, and an "
+            f"angle (rad, turns, Hz = turns per second) isn't a plain number here. Say Hz, rpm, "
+            f"rad/s or rad where you mean it, or give "
             f"the bare number{f' in {unit}' if unit != '1' else ''}."
         )
     return _double(given.convert(number, own), text, name)
@@ -211,7 +250,10 @@ def _double(number: Decimal, text: str, name: str) -> float:
     """The number as a double; neither overflow nor underflow goes unsaid."""
     double = float(number)
     if math.isinf(double) or (number and not double):
-        raise UnitError(f"{name} = {shown(text)} is too {'large' if double else 'small'} for a number of the computer.")
+        raise UnitError(
+            f"{name} = {shown(text)} is too {'large' if double else 'small'} for a "
+            f"number of the computer."
+        )
     return double
 
 
@@ -220,9 +262,14 @@ def _split(text: str, name: str) -> tuple[Decimal, Unit | None]:
     match = _NUMBER.fullmatch(text.replace("\N{MINUS SIGN}", "-")) if len(text) <= LONGEST else None
     if match is None or match["unit"].startswith(","):
         hint = " Write a decimal point, not a comma." if re.match(r"\s*[+-]?\d+,\d", text) else ""
-        raise UnitError(f"{name} = {shown(text)} can't be read as a number and a unit, such as '0.4 mm' or '1.4e4 N/m'.{hint}")
+        raise UnitError(
+            f"{name} = {shown(text)} can't be read as a number and a unit, such as "
+            f"'0.4 mm' or '1.4e4 N/m'.{hint}"
+        )
     if len((match["tens"] or "").lstrip("0")) > 4:
-        raise UnitError(f"{name} = {shown(text)} has an exponent beyond the numbers of the computer.")
+        raise UnitError(
+            f"{name} = {shown(text)} has an exponent beyond the numbers of the computer."
+        )
     number, unit = Decimal(match["number"]), match["unit"].strip()
     if not unit:
         return number, None
@@ -230,7 +277,8 @@ def _split(text: str, name: str) -> tuple[Decimal, Unit | None]:
         return number, _parsed(unit)
     except UnitError as error:
         raise UnitError(
-            f"{name} = {shown(text)}: the unit {shown(unit)} can't be read: {error}. Write it like mm, N/m, kN/mm, N*s/m, kg*m^2, Hz, rpm "
+            f"{name} = {shown(text)}: the unit {shown(unit)} can't be read: {error}. Write it like "
+            f"mm, N/m, kN/mm, N*s/m, kg*m^2, Hz, rpm "
             "or rad/s."
         ) from None
 
@@ -253,9 +301,10 @@ def _without_angle(unit: Unit) -> tuple[dict[str, Fraction], Fraction]:
     return dimension, angle
 
 
-# -- SI to text ----------------------------------------------------------------------------------------------------------------
+# -- SI to text ------------------------------------------------------------------------------------
 def from_si(value: float, unit: str, digits: int | None = 6) -> str:
-    """A number in SI as people write it: ``0.0004, "m"`` gives ``"0.4 mm"``, ``14000.0, "N/m"`` gives ``"14 kN/m"``.
+    """A number in SI as people write it: ``0.0004, "m"`` gives ``"0.4 mm"``, ``14000.0, "N/m"``
+    gives ``"14 kN/m"``.
 
     Parameters
     ----------
@@ -274,12 +323,14 @@ def from_si(value: float, unit: str, digits: int | None = 6) -> str:
     head = _HEAD.match(unit)
     exponent = 0
     if head and exact:
-        highest = 0 if head[0] in ("m", "s") else 9  # 1200 m, not 1.2 km: lengths and times of vibrations are short
+        # 1200 m, not 1.2 km: lengths and times of vibrations are short
+        highest = 0 if head[0] in ("m", "s") else 9
         lift = 2 if unit == "m" else 0  # 0.4 mm, not 400 µm: the field writes gaps in mm
         exponent = min(3 * ((exact.adjusted() + lift) // 3), highest)
         if unit == "m" and exact.adjusted() in (-2, -1):  # and 20 mm, as pictures do
             exponent = -3
-        if exponent < min(_PREFIXES) or exact.adjusted() - exponent >= 6:  # 3e-19 J and 2e15 N, not 3e-7 pJ and 2e6 GN
+        # 3e-19 J and 2e15 N, not 3e-7 pJ and 2e6 GN
+        if exponent < min(_PREFIXES) or exact.adjusted() - exponent >= 6:
             exponent = 0
     text = _plain(exact.scaleb(-exponent))
     return text if unit in ("", "1") else f"{text} {_PREFIXES[exponent]}{unit}"
@@ -298,4 +349,11 @@ def _plain(number: Decimal) -> str:
 
 def _example(unit: str) -> str:
     """A well-formed value in a unit, for messages."""
-    return {"": "0.4 mm", "1": "0.03", "m": "0.4 mm", "N/m": "14 kN/m", "Hz": "15 Hz", "rad/s": "94.2 rad/s"}.get(unit, f"3 {unit}")
+    return {
+        "": "0.4 mm",
+        "1": "0.03",
+        "m": "0.4 mm",
+        "N/m": "14 kN/m",
+        "Hz": "15 Hz",
+        "rad/s": "94.2 rad/s",
+    }.get(unit, f"3 {unit}")

@@ -1,4 +1,5 @@
-"""Systems that the conformance and property tests share: one compilation each, parameters make the cases.
+"""Systems that the conformance and property tests share: one compilation each, parameters make the
+cases.
 
 Every motion that they are asked for has a closed form, or an invariant that needs none.
 """
@@ -17,17 +18,26 @@ EPS = 2.0**-52
 
 @sl.system(states="x v", forced_at="frequency")
 def lab(
-    t, x, v, *, lift=0.0, spring=0.0, damping=0.0, cubic=0.0, force=0.0, boundary=1.0, stiffness=0.0, dashpot=0.0, preload=0.0,
+    t, x, v, *, lift=0.0, spring=0.0, damping=0.0, cubic=0.0, force=0.0, boundary=1.0,
+    stiffness=0.0, dashpot=0.0, preload=0.0,
     frequency=0.01,
 ):  # fmt: skip
-    """A unit mass with one boundary, at which the force may bend (stiffness) or jump (preload, dashpot)."""
-    contact = sl.piecewise((stiffness * (x - boundary) + dashpot * v + preload, x > boundary), otherwise=0)
-    return v, lift + force * sl.cos(2 * sl.pi * frequency * t) - spring * x - damping * v - cubic * x**3 - contact
+    """A unit mass with one boundary, at which the force may bend (stiffness) or jump (preload,
+    dashpot).
+    """
+    contact = sl.piecewise(
+        (stiffness * (x - boundary) + dashpot * v + preload, x > boundary), otherwise=0
+    )
+    return v, lift + force * sl.cos(
+        2 * sl.pi * frequency * t
+    ) - spring * x - damping * v - cubic * x**3 - contact
 
 
 @sl.system(states="x v a j")
 def quartic(t, x, v, a, j, *, snap=24.0, push=0.0, lacunary=0.0):
-    """x is a polynomial of degree 4 in time: gaps of any shape, exact in a single step of any length."""
+    """x is a polynomial of degree 4 in time: gaps of any shape, exact in a single step of any
+    length.
+    """
     return v, a, j, snap + sl.piecewise((push, x > 0), otherwise=0) - lacunary * t**4 * x
 
 
@@ -38,8 +48,25 @@ def quartic_with_roots(*roots: float) -> tuple[float, float, float, float]:
 
 
 @sl.system(states="x1 v1 x2 v2")
-def pair(t, x1, v1, x2, v2, *, lift=0.0, spring=0.0, stop1=1.0, stop2=1.0, gap=1.0, stiffness1=0.0, stiffness2=0.0, stiffness=0.0):
-    """Two unit masses, each with a stop of its own, and a spring between them that begins to act when they are a gap apart."""
+def pair(
+    t,
+    x1,
+    v1,
+    x2,
+    v2,
+    *,
+    lift=0.0,
+    spring=0.0,
+    stop1=1.0,
+    stop2=1.0,
+    gap=1.0,
+    stiffness1=0.0,
+    stiffness2=0.0,
+    stiffness=0.0,
+):
+    """Two unit masses, each with a stop of its own, and a spring between them that begins to act
+    when they are a gap apart.
+    """
     between = sl.piecewise((stiffness * (x1 - x2 - gap), x1 - x2 > gap), otherwise=0)
     first = sl.piecewise((stiffness1 * (x1 - stop1), x1 > stop1), otherwise=0)
     second = sl.piecewise((stiffness2 * (x2 - stop2), x2 > stop2), otherwise=0)
@@ -54,8 +81,22 @@ def ring(t, x, y, u, w, *, radius=1.0, wind=0.0):
 
 
 @sl.system(states="x v", forced_at="frequency")
-def walls(t, x, v, *, amplitude=0.5, moving_stiffness=0.0, width=2.0, stiffness=0.0, ceiling=4.0, ceiling_stiffness=0.0, frequency=1.0):
-    """A unit mass between walls: one that moves with time, two at equal distance (abs), and a soft ceiling (max)."""
+def walls(
+    t,
+    x,
+    v,
+    *,
+    amplitude=0.5,
+    moving_stiffness=0.0,
+    width=2.0,
+    stiffness=0.0,
+    ceiling=4.0,
+    ceiling_stiffness=0.0,
+    frequency=1.0,
+):
+    """A unit mass between walls: one that moves with time, two at equal distance (abs), and a soft
+    ceiling (max).
+    """
     wall = amplitude * sl.cos(2 * sl.pi * frequency * t)
     moving = sl.piecewise((moving_stiffness * (x - wall), x > wall), otherwise=0)
     fixed = sl.piecewise((stiffness * (sl.abs(x) - width) * x, sl.abs(x) > width), otherwise=0)
@@ -65,24 +106,33 @@ def walls(t, x, v, *, amplitude=0.5, moving_stiffness=0.0, width=2.0, stiffness=
 @sl.system(states="v", forced_at="frequency")
 def slider(t, v, *, force=2.0, friction=1.0, belt=0.0, frequency=1.0):
     """A block on a belt, shaken: Coulomb friction, so both sides may push onto v = belt."""
-    return force * sl.cos(2 * sl.pi * frequency * t) - sl.piecewise((friction, v > belt), otherwise=-friction)
+    return force * sl.cos(2 * sl.pi * frequency * t) - sl.piecewise(
+        (friction, v > belt), otherwise=-friction
+    )
 
 
 @sl.system(states="x v")
 def latch(t, x, v, *, half_width=0.5, gain=0.0):
-    """An oscillator with a switch that has hysteresis: its threshold jumps when the velocity changes sign."""
+    """An oscillator with a switch that has hysteresis: its threshold jumps when the velocity
+    changes sign.
+    """
     threshold = sl.piecewise((half_width, v > 0), otherwise=-half_width)
     return v, -x - sl.piecewise((gain, x > threshold), otherwise=0)
 
 
 @sl.system(states="x y v w", forced_at="f")
 def two_masses(
-    t, x, y, v, w, *, k1=30.0, k2=12.0, c1=0.3, c2=0.2, ka=500.0, ga=0.05, kb=300.0, gb=0.07, kd=400.0, gd=0.03, ke=90.0, ge=0.04,
+    t, x, y, v, w, *, k1=30.0, k2=12.0, c1=0.3, c2=0.2, ka=500.0, ga=0.05, kb=300.0, gb=0.07,
+    kd=400.0, gd=0.03, ke=90.0, ge=0.04,
     A=2.0, f=0.9, mu=2.0,
 ):  # fmt: skip
-    """Two masses with a stop on either side of the first, and clearances of both signs between the two."""
+    """Two masses with a stop on either side of the first, and clearances of both signs between the
+    two.
+    """
     stop = sl.piecewise((ka * (x - ga), x > ga), (kb * (x + gb), x < -gb), otherwise=0)
-    between = sl.piecewise((kd * (y - x - gd), y - x > gd), (ke * (y - x + ge), y - x < -ge), otherwise=0)
+    between = sl.piecewise(
+        (kd * (y - x - gd), y - x > gd), (ke * (y - x + ge), y - x < -ge), otherwise=0
+    )
     inner = k2 * (y - x) + c2 * (w - v) + between
     return v, w, A * sl.cos(2 * sl.pi * f * t) - k1 * x - c1 * v - stop + inner, -mu * inner
 
@@ -90,7 +140,9 @@ def two_masses(
 @sl.system(states="x y z")
 def circuit(t, x, y, z, *, al=9.0, be=14.0, m0=-1.14, m1=-0.71, b=1.0, e=0.02, h=2.0):
     """Chua's circuit with a third kink and a cubic term."""
-    diode = sl.piecewise((m1 * x + (m0 - m1) * b, x > b), (m1 * x - (m0 - m1) * b, x < -b), otherwise=m0 * x)
+    diode = sl.piecewise(
+        (m1 * x + (m0 - m1) * b, x > b), (m1 * x - (m0 - m1) * b, x < -b), otherwise=m0 * x
+    )
     return al * (y - x - diode), x - y + z - e * y**3, -be * y - 0.05 * sl.abs(x - h)
 
 
@@ -109,13 +161,29 @@ class Contact(NamedTuple):
 
 def contacts(run: xr.Dataset, trajectory: int | None = None) -> list[Contact]:
     """The table of contacts, of one trajectory if the run has many."""
-    names = ("time", "guard", "kind", "direction", "velocity", "mode_before", "mode_after", "time_error")
+    names = (
+        "time",
+        "guard",
+        "kind",
+        "direction",
+        "velocity",
+        "mode_before",
+        "mode_after",
+        "time_error",
+    )
     own = slice(None) if trajectory is None else run.contact_trajectory.values == trajectory
-    return [Contact(*row) for row in zip(*(run.variables[f"contact_{name}"].values[own].tolist() for name in names), strict=True)]
+    return [
+        Contact(*row)
+        for row in zip(
+            *(run.variables[f"contact_{name}"].values[own].tolist() for name in names), strict=True
+        )
+    ]
 
 
 def bits(run: xr.Dataset, trajectory: int | None = None) -> dict[str, bytes]:
-    """Every number of a run (of one of its trajectories), as bytes: equal if and only if the runs are equal to the bit."""
+    """Every number of a run (of one of its trajectories), as bytes: equal if and only if the runs
+    are equal to the bit.
+    """
     of_one = {}
     if trajectory is not None:
         of_one["trajectory"] = trajectory
@@ -123,7 +191,10 @@ def bits(run: xr.Dataset, trajectory: int | None = None) -> dict[str, bytes]:
             of_one["contact"] = np.flatnonzero(run.contact_trajectory.values == trajectory)
     left_out = ("contact_trajectory", "trajectory", "guard_boundary")
     found = {}
-    for name, variable in run.variables.items():  # not run[name]: a DataArray takes longer to make than a trajectory to compute
+    # not run[name]: a DataArray takes longer to make than a trajectory to compute
+    for name, variable in run.variables.items():
         if name not in left_out and variable.dtype.kind in "fiu":
-            found[str(name)] = variable.values[tuple(of_one.get(dim, slice(None)) for dim in variable.dims)].tobytes()
+            found[str(name)] = variable.values[
+                tuple(of_one.get(dim, slice(None)) for dim in variable.dims)
+            ].tobytes()
     return found

@@ -1,4 +1,6 @@
-"""Rule 6: events of several guards at one instant are one set, and lead to one fixed point of the modes."""
+"""Rule 6: events of several guards at one instant are one set, and lead to one fixed point of the
+modes.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ import pytest
 import saltus as sl
 from conformance.systems import contacts, latch, pair, slider, walls
 
-pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")  # these tests look at the status themselves
+# these tests look at the status themselves
+pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
 
 
 def test_two_bodies_meet_their_stops_at_one_instant():
@@ -17,7 +20,12 @@ def test_two_bodies_meet_their_stops_at_one_instant():
     system = pair.with_values(stop1=0.5, stop2=0.5, gap=9.0, stiffness1=1.0, stiffness2=1.0)
     run = sl.simulate(system, (0.0, 1.0, 0.0, 1.0), t_end=6.0, samples=4)
     found = contacts(run)
-    assert [(c.guard, c.direction) for c in found] == [("stop1", 1), ("stop2", 1), ("stop1", -1), ("stop2", -1)]
+    assert [(c.guard, c.direction) for c in found] == [
+        ("stop1", 1),
+        ("stop2", 1),
+        ("stop1", -1),
+        ("stop2", -1),
+    ]
     assert found[0].time == found[1].time == 0.5
     assert found[2].time == found[3].time == pytest.approx(0.5 + math.pi, abs=1e-15)
     assert float(run.end_x1) == float(run.end_x2)
@@ -35,7 +43,9 @@ def test_coincident_events_of_different_speed():
 
 @pytest.mark.parametrize("speed", [1.0, 0.3, 1 / 7, math.pi])
 def test_coincident_to_rounding(speed):
-    """Two stops and the distance, reached at one time that isn't a double: three events within 10 ulp, all into contact, mode 7 after."""
+    """Two stops and the distance, reached at one time that isn't a double: three events within 10
+    ulp, all into contact, mode 7 after.
+    """
     system = pair.with_values(stop1=1.0, stop2=-1.0, gap=2.0, stiffness1=1.0, stiffness=1.0)
     run = sl.simulate(system, (0.0, speed, 0.0, -speed), t_end=1.2 / speed, samples=4)
     found = contacts(run)
@@ -52,8 +62,12 @@ def test_coincident_to_rounding(speed):
 
 @pytest.mark.parametrize("separation", [1e-15, 1e-14, 1e-12, 1e-9])
 def test_almost_coincident_events_keep_their_order(separation):
-    """Stops met `separation` apart in time: two events, each at its own time, none lost, in order."""
-    system = pair.with_values(stop1=0.5, stop2=0.5 + separation, gap=9.0, stiffness1=4.0, stiffness2=4.0)
+    """Stops met `separation` apart in time: two events, each at its own time, none
+    lost, in order.
+    """
+    system = pair.with_values(
+        stop1=0.5, stop2=0.5 + separation, gap=9.0, stiffness1=4.0, stiffness2=4.0
+    )
     run = sl.simulate(system, (0.0, 1.0, 0.0, 1.0), t_end=0.6, samples=4)
     first, second = contacts(run)
     assert (first.guard, second.guard) == ("stop1", "stop2")
@@ -61,8 +75,12 @@ def test_almost_coincident_events_keep_their_order(separation):
 
 
 def test_nested_boundaries_cross_together():
-    """|x| has its corner where the moving wall stands still at zero: x = 0 and the wall are crossed at one instant, |x| - width isn't."""
-    run = sl.simulate(walls.with_values(amplitude=0.0, width=0.5), (-1.0, 1.0), t_end=2.0, samples=4)
+    """|x| has its corner where the moving wall stands still at zero: x = 0 and the wall are crossed
+    at one instant, |x| - width isn't.
+    """
+    run = sl.simulate(
+        walls.with_values(amplitude=0.0, width=0.5), (-1.0, 1.0), t_end=2.0, samples=4
+    )
     assert [(c.guard, c.time, c.direction) for c in contacts(run)] == [
         ("width", 0.5, -1),
         ("x = amplitude*cos(2*pi*frequency*t)", 1.0, 1),
@@ -73,19 +91,26 @@ def test_nested_boundaries_cross_together():
 
 @pytest.mark.parametrize("width", [0.0, 1e-15, 1e-9])
 def test_corner_of_a_gap_on_its_own_boundary(width):
-    """|x| - width has a corner at x = 0 and is (almost) zero there. However that is recorded: the mode after is right, no side violated."""
-    run = sl.simulate(walls.with_values(amplitude=9.0, width=width), (-1.0, 1.0), t_end=2.0, samples=8)
+    """|x| - width has a corner at x = 0 and is (almost) zero there. However that is recorded: the
+    mode after is right, no side violated.
+    """
+    run = sl.simulate(
+        walls.with_values(amplitude=9.0, width=width), (-1.0, 1.0), t_end=2.0, samples=8
+    )
     after = run.mode.values[run.time.values > 1.01]
     assert (after & 0b0110 == 0b0110).all()
-    assert sum(c.direction for c in contacts(run) if c.guard == "width" and c.kind == "crossing") == 0
+    assert (
+        sum(c.direction for c in contacts(run) if c.guard == "width" and c.kind == "crossing") == 0
+    )
     assert int(run.mode_violations) == 0
 
 
 def test_boundary_that_jumps_past_the_state():
-    """A switch with hysteresis: when the velocity turns, its threshold jumps from 0.5 to -0.5 past x = 0.4, and the switch follows at once.
+    """A switch with hysteresis: when the velocity turns, its threshold jumps from 0.5 to -0.5 past
+    x = 0.4, and the switch follows at once.
 
-    x = -0.4 cos t: starts above the lower threshold... v > 0 from the start, so the threshold is 0.5 and the switch is off; at t = pi the
-    velocity turns, the threshold becomes -0.5: on.
+    x = -0.4 cos t: starts above the lower threshold... v > 0 from the start, so the threshold is
+    0.5 and the switch is off; at t = pi the velocity turns, the threshold becomes -0.5: on.
     """
     run = sl.simulate(latch, (-0.4, 0.0), t_end=2 * math.pi - 0.1, samples=50)
     assert run.mode.values[1:].tolist() == [1 if t < math.pi else 2 for t in run.time.values[1:]]
@@ -94,11 +119,15 @@ def test_boundary_that_jumps_past_the_state():
 
 
 def test_sliding_is_given_up_by_name():
-    """Friction stronger than the drive when the velocity reaches the belt's: both sides push onto it. A named status at that instant."""
+    """Friction stronger than the drive when the velocity reaches the belt's: both sides push onto
+    it. A named status at that instant.
+    """
     run = sl.simulate(slider.with_values(force=2.0, friction=1.9), (0.3,), t_end=5.0, samples=4)
     assert str(run.status.values) == "sliding"
     assert float(run.end_v) == 0.0
     first = contacts(run)[0]
     assert (float(run.end_time), first.direction) == (first.time, -1)
-    assert abs(0.3 + 2 * math.sin(2 * math.pi * first.time) / (2 * math.pi) - 1.9 * first.time) < 1e-15
+    assert (
+        abs(0.3 + 2 * math.sin(2 * math.pi * first.time) / (2 * math.pi) - 1.9 * first.time) < 1e-15
+    )
     assert int(run.steps) < 200

@@ -1,4 +1,6 @@
-"""Rule 7: the interval (t0, t_end]. What lies at t0 is an initial condition, what lies at t_end is reported once, and never twice."""
+"""Rule 7: the interval (t0, t_end]. What lies at t0 is an initial condition, what lies at t_end is
+reported once, and never twice.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,13 @@ def test_event_exactly_at_the_end_is_reported_once(t_end):
     """x = t - t_end arrives at the boundary at t_end exactly, the first event of its life."""
     run = sl.simulate(FLIGHT, (-t_end, 1.0), t_end=t_end, samples=4)
     (only,) = contacts(run)
-    assert (only.time, only.kind, only.direction, only.before, only.after) == (t_end, "crossing", 1, 0, 1)
+    assert (only.time, only.kind, only.direction, only.before, only.after) == (
+        t_end,
+        "crossing",
+        1,
+        0,
+        1,
+    )
     assert (float(run.end_x), int(run.events)) == (0.0, 1)
 
 
@@ -27,9 +35,13 @@ def test_second_event_exactly_at_the_end_is_reported_once():
 
 
 def test_event_at_the_end_of_one_run_is_not_an_event_of_the_next():
-    """Ended exactly on the boundary and continued from there: in contact by its velocity, no second report."""
+    """Ended exactly on the boundary and continued from there: in contact by its velocity, no second
+    report.
+    """
     first = sl.simulate(FLIGHT, (-1.0, 1.0), t_end=1.0, samples=4)
-    second = sl.simulate(FLIGHT, (float(first.end_x), float(first.end_v)), t_start=1.0, t_end=2.0, samples=4)
+    second = sl.simulate(
+        FLIGHT, (float(first.end_x), float(first.end_v)), t_start=1.0, t_end=2.0, samples=4
+    )
     assert [c.time for c in contacts(first) + contacts(second)] == [1.0]
     assert int(second.mode_violations) == 0
 
@@ -40,7 +52,9 @@ def test_event_just_beyond_the_end_is_not_reported():
 
 
 def test_no_contact_is_later_than_the_end():
-    """t_start + (t_end - t_start) rounds beyond t_end: a contact there, the end of the run and its last sample are at t_end."""
+    """t_start + (t_end - t_start) rounds beyond t_end: a contact there, the end of the run and its
+    last sample are at t_end.
+    """
     rng = np.random.default_rng(5)
     begin, end = rng.uniform(0, 1, 400), rng.uniform(1, 5, 400)
     late = np.flatnonzero(begin + (end - begin) > end)
@@ -48,7 +62,13 @@ def test_no_contact_is_later_than_the_end():
     for i in late[:5]:
         for system in (FLIGHT, pair.with_values(stop1=0.0, stop2=9.0, gap=99.0)):
             still = [0.0] * (len(system.states) - 2)
-            run = sl.simulate(system, (-(end[i] - begin[i]), 1.0, *still), t_start=begin[i], t_end=end[i], samples=4)
+            run = sl.simulate(
+                system,
+                (-(end[i] - begin[i]), 1.0, *still),
+                t_start=begin[i],
+                t_end=end[i],
+                samples=4,
+            )
             assert [c.time for c in contacts(run)] == [end[i]]
             assert float(run.end_time) == end[i]
             assert run.time.values.max() <= end[i]
@@ -56,7 +76,9 @@ def test_no_contact_is_later_than_the_end():
 
 @pytest.mark.parametrize("whole", [1, 2, 5])
 def test_event_exactly_at_a_whole_period_is_reported_once(whole):
-    """The clock turns over at every period; an event exactly there is reported in one of the two, at the end of a run too."""
+    """The clock turns over at every period; an event exactly there is reported in one of the two,
+    at the end of a run too.
+    """
     system = FLIGHT.with_values(frequency=1.0)
     for periods in (whole, 6):
         run = sl.simulate(system, (-float(whole), 1.0), periods=periods, samples=4)
@@ -64,23 +86,37 @@ def test_event_exactly_at_a_whole_period_is_reported_once(whole):
 
 
 def test_several_boundaries_exactly_at_the_end():
-    """Two bodies and their distance arrive at t = 1, the end: three events, once each; none when continued."""
+    """Two bodies and their distance arrive at t = 1, the end: three events, once each; none when
+    continued.
+    """
     system = pair.with_values(stop1=1.0, stop2=-1.0, gap=2.0)
     run = sl.simulate(system, (0.0, 1.0, 0.0, -1.0), t_end=1.0, samples=4)
-    assert sorted((c.guard, c.time, c.direction) for c in contacts(run)) == [("gap", 1.0, 1), ("stop1", 1.0, 1), ("stop2", 1.0, -1)]
-    on = sl.simulate(system, [float(run[f"end_{name}"]) for name in system.states], t_start=1.0, t_end=2.0, samples=4)
+    assert sorted((c.guard, c.time, c.direction) for c in contacts(run)) == [
+        ("gap", 1.0, 1),
+        ("stop1", 1.0, 1),
+        ("stop2", 1.0, -1),
+    ]
+    on = sl.simulate(
+        system,
+        [float(run[f"end_{name}"]) for name in system.states],
+        t_start=1.0,
+        t_end=2.0,
+        samples=4,
+    )
     assert contacts(on) == []
 
 
 def test_moving_boundary_at_the_end_far_from_the_origin_of_time():
-    """x = 0.3 meets 0.5 cos(2 pi t) near t = 0.148; a run from 1e6 s that ends 1e-9 s before doesn't report it, 1e-9 s after does."""
+    """x = 0.3 meets 0.5 cos(2 pi t) near t = 0.148; a run from 1e6 s that ends 1e-9 s before
+    doesn't report it, 1e-9 s after does.
+    """
     instant = np.arccos(0.6) / (2 * np.pi)
     for ends, count in ((instant - 1e-9, 0), (instant + 1e-9, 1)):
         run = sl.simulate(walls, (0.3, 0.0), t_start=1e6, t_end=1e6 + ends, samples=4)
         assert len(contacts(run)) == count
 
 
-# -- a run cut in two ------------------------------------------------------------------------------------------------------------------
+# -- a run cut in two ------------------------------------------------------------------------------
 def _halves(system, start, cut, t_end):
     first = sl.simulate(system, start, t_end=cut, samples=4)
     state = [float(first[f"end_{name}"]) for name in system.states]
@@ -88,7 +124,9 @@ def _halves(system, start, cut, t_end):
     return contacts(first), contacts(second), second
 
 
-BOUND = pair.with_values(spring=4.0, stop1=0.3, stop2=0.4, gap=0.5, stiffness1=50.0, stiffness2=9.0, stiffness=20.0)
+BOUND = pair.with_values(
+    spring=4.0, stop1=0.3, stop2=0.4, gap=0.5, stiffness1=50.0, stiffness2=9.0, stiffness=20.0
+)
 MOTIONS = {
     "rig": (sl.models.delangre("b"), (1e-3, 0.0), 0.4),
     "slider": (slider.with_values(friction=0.5), (0.1,), 5.0),
@@ -99,20 +137,26 @@ MOTIONS = {
 @pytest.mark.parametrize("shift", [-1, 0, 1])
 @pytest.mark.parametrize("name", MOTIONS)
 def test_cut_at_a_contact(name, shift):
-    """Cut at each contact of a run, or an ulp beside it, and continued: every contact is reported once in all, none twice, none lost."""
+    """Cut at each contact of a run, or an ulp beside it, and continued: every contact is reported
+    once in all, none twice, none lost.
+    """
     system, start, t_end = MOTIONS[name]
     whole = contacts(sl.simulate(system, start, t_end=t_end, samples=4))
     assert len(whole) >= 8
     for contact in whole[:8]:
         cut = contact.time + shift * np.spacing(contact.time)
         before, after, end = _halves(system, start, cut, t_end)
-        assert [(c.guard, c.direction) for c in before + after] == [(c.guard, c.direction) for c in whole], (contact, before, after)
+        assert [(c.guard, c.direction) for c in before + after] == [
+            (c.guard, c.direction) for c in whole
+        ], (contact, before, after)
         assert [c.time for c in before + after] == pytest.approx([c.time for c in whole], abs=1e-12)
         assert int(end.mode_violations) == 0
 
 
 def test_cut_anywhere():
-    """Cut at 20 random times: the same contacts and the same end, to the rounding of a chaotic motion over half a second."""
+    """Cut at 20 random times: the same contacts and the same end, to the rounding of a chaotic
+    motion over half a second.
+    """
     rig = sl.models.delangre("b")
     whole = sl.simulate(rig, (1e-3, 0.0), t_end=0.4, samples=4)
     for cut in np.random.default_rng(7).uniform(0.01, 0.39, 20):

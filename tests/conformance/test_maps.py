@@ -1,4 +1,6 @@
-"""The contract of a map: whatever is asked of orbits, attractors and exponents, it is asked by these few calls, so every map keeps them."""
+"""The contract of a map: whatever is asked of orbits, attractors and exponents, it is asked by
+these few calls, so every map keeps them.
+"""
 
 import numpy as np
 import pytest
@@ -26,17 +28,27 @@ def rows_of(system, name, factors):
 def henon():
     def derivative(z):
         one = np.ones(len(z))
-        return np.stack([np.stack([-2 * z[:, 0], one], axis=1), np.stack([0.3 * one, 0 * one], axis=1)], axis=1)
+        return np.stack(
+            [np.stack([-2 * z[:, 0], one], axis=1), np.stack([0.3 * one, 0 * one], axis=1)], axis=1
+        )
 
-    return FunctionMap(lambda z: np.stack([1 - z[:, 0] ** 2 + z[:, 1], 0.3 * z[:, 0]], axis=1), "x y", derivative)
+    return FunctionMap(
+        lambda z: np.stack([1 - z[:, 0] ** 2 + z[:, 1], 0.3 * z[:, 0]], axis=1), "x y", derivative
+    )
 
 
 MAPS = {
     "one row": lambda: Stroboscope(RIG, sl.Taylor()),
     "a row for each": lambda: Stroboscope(RIG, sl.Taylor(), rows_of(RIG, "force", [1.0, 0.9, 1.2])),
-    "another period for each": lambda: Stroboscope(RIG, sl.Taylor(), rows_of(RIG, "frequency", [1.0, 0.9, 1.2])),
+    "another period for each": lambda: Stroboscope(
+        RIG, sl.Taylor(), rows_of(RIG, "frequency", [1.0, 0.9, 1.2])
+    ),
     "without forcing": lambda: Stroboscope(pendulum, sl.Taylor(), every=0.7),
-    "other looks for each": lambda: Stroboscope(pendulum, sl.Taylor(), every=0.7).rows(np.arange(3)).with_period(np.array([0.7, 1.0, 0.3])),
+    "other looks for each": lambda: (
+        Stroboscope(pendulum, sl.Taylor(), every=0.7)
+        .rows(np.arange(3))
+        .with_period(np.array([0.7, 1.0, 0.3]))
+    ),
     "ode45": lambda: Stroboscope(RIG, sl.ODE45(1e-8, 1e-11)),
     "a function": henon,
 }
@@ -59,7 +71,9 @@ def test_trajectories_go_on_as_they_are_asked_to(map_):
     assert len(at_once) == 3
     assert at_once.going.all()
     np.testing.assert_array_equal(points[:, -1], at_once.state)
-    np.testing.assert_allclose(np.concatenate([one_by_one.advance(1) for _ in range(4)], axis=1), points, **close_to(map_))
+    np.testing.assert_allclose(
+        np.concatenate([one_by_one.advance(1) for _ in range(4)], axis=1), points, **close_to(map_)
+    )
 
 
 def test_those_that_are_kept_move_as_if_the_others_had_stayed(map_):
@@ -84,7 +98,12 @@ def test_the_derivative_is_that_of_the_image(map_):
     step = 1e-6 * (1.0 if map_.exact else 10.0)
     for j, direction in enumerate(np.eye(2)):
         ahead, behind = (map_.sequences(START + way * step * direction, 1)[0] for way in (1, -1))
-        np.testing.assert_allclose((ahead - behind) / (2 * step), matrix[:, :, j], rtol=1e-3, atol=1e-3 * np.abs(matrix).max())
+        np.testing.assert_allclose(
+            (ahead - behind) / (2 * step),
+            matrix[:, :, j],
+            rtol=1e-3,
+            atol=1e-3 * np.abs(matrix).max(),
+        )
     assert np.isfinite(end).all()
 
 
@@ -110,7 +129,9 @@ def test_each_row_may_be_iterated_as_often_as_it_needs(map_):
 def test_some_of_the_rows_are_a_map_of_these_rows(map_):
     all_of_them = map_.sequences(START, 2)[0]
     for which in (np.array([2, 0, 2]), np.array([False, True, True])):
-        np.testing.assert_array_equal(map_.rows(which).sequences(START[which], 2)[0], all_of_them[which])
+        np.testing.assert_array_equal(
+            map_.rows(which).sequences(START[which], 2)[0], all_of_them[which]
+        )
 
 
 def test_errors_that_are_more_than_rounding_have_a_map_without_them(map_):

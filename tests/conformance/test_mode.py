@@ -1,4 +1,6 @@
-"""Rule 11: at every node the gap has the sign that the mode says. No stop is ever passed through unnoticed."""
+"""Rule 11: at every node the gap has the sign that the mode says. No stop is ever passed through
+unnoticed.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from conformance.systems import contacts, pair, walls
 
 
 def _check_sides(run, gaps, slack):
-    """Mode bits against the signs of the gaps, where these are larger than the slack; everything on the way was counted."""
+    """Mode bits against the signs of the gaps, where these are larger than the slack; everything on
+    the way was counted.
+    """
     for bit, gap in enumerate(gaps):
         clear = np.abs(gap.values) > slack
         assert clear.mean() > 0.9
@@ -21,10 +25,16 @@ def _check_sides(run, gaps, slack):
 
 
 def _flips_match(run, guards):
-    """Crossings of each guard make the difference of its side between start and end, alternating."""
+    """Crossings of each guard make the difference of its side between start and end,
+    alternating.
+    """
     for i in range(run.sizes["trajectory"]):
         for bit, guard in enumerate(guards):
-            directions = [c.direction for c in contacts(run, i) if c.guard == guard and c.kind != "graze" and c.before != c.after]
+            directions = [
+                c.direction
+                for c in contacts(run, i)
+                if c.guard == guard and c.kind != "graze" and c.before != c.after
+            ]
             assert all(a == -b for a, b in itertools.pairwise(directions))
             if directions:
                 assert bool(run.mode.values[i, -1] >> bit & 1) == (directions[-1] > 0)
@@ -32,10 +42,16 @@ def _flips_match(run, guards):
 
 @pytest.mark.parametrize(
     ("case", "frequency", "stiffness", "count", "periods"),
-    [("a", 16.0, 1.4e4, 256, 40), ("b", 15.0, 1.4e4, 256, 40), ("c", 5.0, 1.4e7, 16, 5), ("c", 23.0, 1.4e10, 16, 5)],
+    [
+        ("a", 16.0, 1.4e4, 256, 40),
+        ("b", 15.0, 1.4e4, 256, 40),
+        ("c", 5.0, 1.4e7, 16, 5),
+        ("c", 23.0, 1.4e10, 16, 5),
+    ],
 )
 def test_sides_of_the_rig(case, frequency, stiffness, count, periods):
-    """Random starts, soft and hard springs: at every sample the sides are those of the gaps; no spring is bent beyond what energy allows.
+    """Random starts, soft and hard springs: at every sample the sides are those of the gaps; no
+    spring is bent beyond what energy allows.
 
     The stiffest bounces thousands of times while the beams press the mass onto the stop.
     """
@@ -51,11 +67,21 @@ def test_sides_of_the_rig(case, frequency, stiffness, count, periods):
 
 
 def test_sides_of_a_chain_of_three_boundaries():
-    """64 random starts of two bodies with stops and a gap between them, and the same in extremely stiff."""
+    """64 random starts of two bodies with stops and a gap between them, and the same in extremely
+    stiff.
+    """
     rng = np.random.default_rng(6)
     start = {name: rng.uniform(-1, 1, 64) for name in ("x1", "v1", "x2", "v2")}
     for stiff in (50.0, 1e8):
-        system = pair.with_values(spring=4.0, stop1=0.3, stop2=0.4, gap=0.5, stiffness1=stiff, stiffness2=stiff / 3, stiffness=stiff / 2)
+        system = pair.with_values(
+            spring=4.0,
+            stop1=0.3,
+            stop2=0.4,
+            gap=0.5,
+            stiffness1=stiff,
+            stiffness2=stiff / 3,
+            stiffness=stiff / 2,
+        )
         run = sl.simulate(system, start, t_end=50.0, samples=1000, time_errors="local")
         _check_sides(run, [run.x1 - 0.3, run.x1 - run.x2 - 0.5, run.x2 - 0.4], 1e-12)
         _flips_match(run, ["stop1", "gap", "stop2"])
@@ -65,19 +91,30 @@ def test_sides_of_a_chain_of_three_boundaries():
 def test_sides_of_walls_with_corners():
     """The moving wall, |x| and the ceiling at once, all with springs."""
     rng = np.random.default_rng(8)
-    system = walls.with_values(moving_stiffness=300.0, stiffness=200.0, ceiling=1.5, ceiling_stiffness=500.0, width=1.0)
-    run = sl.simulate(system, {"x": rng.uniform(-1.5, 1.5, 64), "v": rng.uniform(-2, 2, 64)}, periods=20, samples=50, time_errors="local")
+    system = walls.with_values(
+        moving_stiffness=300.0, stiffness=200.0, ceiling=1.5, ceiling_stiffness=500.0, width=1.0
+    )
+    run = sl.simulate(
+        system,
+        {"x": rng.uniform(-1.5, 1.5, 64), "v": rng.uniform(-2, 2, 64)},
+        periods=20,
+        samples=50,
+        time_errors="local",
+    )
     wall = 0.5 * np.cos(2 * np.pi * run.time)
     assert [str(name) for name in run.guard.values[1:]] == ["x = 0", "width", "ceiling"]
     _check_sides(run, [run.x - wall, run.x, np.abs(run.x) - 1.0, run.x - 1.5], 1e-12)
 
 
 def test_a_large_batch_violates_nothing():
-    """10^5 contacts of 2000 random starts in case b at 15 Hz: every trajectory ends by name, none on a wrong side."""
+    """10^5 contacts of 2000 random starts in case b at 15 Hz: every trajectory ends by name, none
+    on a wrong side.
+    """
     rng = np.random.default_rng(9)
     start = {"x": rng.uniform(-5e-3, 5e-3, 2000), "v": rng.uniform(-1, 1, 2000)}
     run = sl.simulate(sl.models.delangre("b"), start, periods=20, samples=1, time_errors="local")
     assert int(run.events.sum()) > 90_000
     assert int(run.mode_violations.sum()) == 0
     assert set(run.status.values.tolist()) <= {"ok", "graze_unresolved"}
-    assert run.sizes["contact"] == int(run.events.sum() + run.grazes.sum())  # no graze within rounding among them
+    # no graze within rounding among them
+    assert run.sizes["contact"] == int(run.events.sum() + run.grazes.sum())

@@ -1,7 +1,9 @@
-"""Rule 4 at large: random rigs, random starts, against the closed form of piecewise-linear arcs. None missed, none invented.
+"""Rule 4 at large: random rigs, random starts, against the closed form of piecewise-linear arcs.
+None missed, none invented.
 
-The rig without its cubic term; every trajectory has its own damping, stiffness, gaps, force and frequency. Ten periods each, about a
-hundred contacts. The oracle (oracles/piecewise_linear.py) shares no code and no idea with the flow: it knows the arcs in closed form.
+The rig without its cubic term; every trajectory has its own damping, stiffness, gaps, force and
+frequency. Ten periods each, about a hundred contacts. The oracle (oracles/piecewise_linear.py)
+shares no code and no idea with the flow: it knows the arcs in closed form.
 """
 
 from __future__ import annotations
@@ -40,7 +42,9 @@ def _check(trajectories, seed, compiled=False):
 
 
 def test_ten_thousand_random_contacts():
-    """10^4 contacts of 100 rigs: none missed, none invented, times within 1e-12 t and 20 deviations of the oracle's own rounding."""
+    """10^4 contacts of 100 rigs: none missed, none invented, times within 1e-12 t and 20 deviations
+    of the oracle's own rounding.
+    """
     truth, run, crossing = _check(100, 2021)
     who = run.contact_trajectory.values[crossing]
     checked = 0
@@ -50,7 +54,9 @@ def test_ten_thousand_random_contacts():
         n = min(len(rows), len(mine))
         off = np.abs(run.contact_time.values[mine[:n]] - truth.time[rows[:n]])
         allowed = run.contact_time_error.values[mine[:n]] + 20 * truth.time_error[rows[:n]] + 1e-15
-        assert (off[truth.time_error[rows[:n]] < 1e-9] <= allowed[truth.time_error[rows[:n]] < 1e-9]).all(), i
+        assert (
+            off[truth.time_error[rows[:n]] < 1e-9] <= allowed[truth.time_error[rows[:n]] < 1e-9]
+        ).all(), i
         checked += n
     assert checked > 9000
 

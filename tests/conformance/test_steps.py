@@ -1,4 +1,6 @@
-"""The answer doesn't depend on how it is stepped: orders, tolerances, the cutting into periods; and no step is longer than its series."""
+"""The answer doesn't depend on how it is stepped: orders, tolerances, the cutting into periods; and
+no step is longer than its series.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +19,18 @@ STARTS = {"x": np.linspace(-5e-3, 5e-3, 16), "v": np.linspace(1, -1, 16)}
 
 def _ends(method, periods=5):
     run = sl.simulate(RIG, STARTS, periods=periods, samples=1, method=method, time_errors="local")
-    return run.end_x.values, run.end_v.values, int(run.steps.sum()), run.contact_guard.values.tolist()
+    return (
+        run.end_x.values,
+        run.end_v.values,
+        int(run.steps.sum()),
+        run.contact_guard.values.tolist(),
+    )
 
 
 def test_tolerances_agree_to_their_tolerance():
-    """From 2^-10 to 2^-46: errors fall with the tolerance, down to rounding, at a cost that rises with its logarithm; contacts stay."""
+    """From 2^-10 to 2^-46: errors fall with the tolerance, down to rounding, at a cost that rises
+    with its logarithm; contacts stay.
+    """
     exact_x, _, most, guards = _ends(sl.Taylor(tolerance=2.0**-52))
     errors, steps = [], []
     for power in (10, 16, 22, 28, 34, 40, 46):
@@ -30,9 +39,12 @@ def test_tolerances_agree_to_their_tolerance():
         steps.append(count)
         assert same == guards
         assert errors[-1] < 500 * 2.0**-power * 5e-3 + 2e-14
-    assert all(later < earlier / 4 or later < 2e-14 for earlier, later in itertools.pairwise(errors))
+    assert all(
+        later < earlier / 4 or later < 2e-14 for earlier, later in itertools.pairwise(errors)
+    )
     assert errors[-1] < 1e-14
-    assert steps[::2] == sorted(steps[::2])  # of 12 bits: a coarse step that proves nothing is tried shorter, so 6 may cost nothing
+    # of 12 bits: a coarse step that proves nothing is tried shorter, so 6 may cost nothing
+    assert steps[::2] == sorted(steps[::2])
     assert steps[-1] < most < 3 * steps[0] * 5
 
 
@@ -46,7 +58,9 @@ def test_orders_agree():
 
 
 def test_cutting_the_span_changes_nothing_but_rounding():
-    """An undamped oscillator with a boundary, forced at zero force with periods from a thousandth of its own to a hundred of its own."""
+    """An undamped oscillator with a boundary, forced at zero force with periods from a thousandth
+    of its own to a hundred of its own.
+    """
     ends = []
     for frequency in (0.0015, 0.011, 0.3, 7.0, 150.0):
         system = lab.with_values(spring=1.0, stiffness=8.0, boundary=0.3, frequency=frequency)
@@ -58,7 +72,9 @@ def test_cutting_the_span_changes_nothing_but_rounding():
 
 
 def test_a_series_with_gaps_does_not_let_the_step_run_away():
-    """x'''' = -t^4 x from t = 0: only every eighth coefficient of x isn't zero, the last two of every state are."""
+    """x'''' = -t^4 x from t = 0: only every eighth coefficient of x isn't zero, the last two of
+    every state are.
+    """
     system = quartic.with_values(snap=0.0, lacunary=1.0)
     t, term, exact, k = 4.0, 1.0, 0.0, 0
     for _ in range(60):
@@ -70,8 +86,11 @@ def test_a_series_with_gaps_does_not_let_the_step_run_away():
 
 
 def test_a_start_at_rest_with_a_jerk_takes_few_steps():
-    """Displacement, velocity and acceleration are zero, the jerk isn't: a step must not shrink to nothing."""
-    system = lab.with_values(force=1.0, lift=-1.0, spring=1.0, boundary=9.0, frequency=0.5)  # x'' = cos(pi t) - 1 - x
+    """Displacement, velocity and acceleration are zero, the jerk isn't: a step must not shrink to
+    nothing.
+    """
+    # x'' = cos(pi t) - 1 - x
+    system = lab.with_values(force=1.0, lift=-1.0, spring=1.0, boundary=9.0, frequency=0.5)
     run = sl.simulate(system, (0.0, 0.0), t_end=1.0, samples=1)
     w = math.pi
     exact = (math.cos(w) - math.cos(1.0)) / (1 - w**2) - 1 + math.cos(1.0)
@@ -81,8 +100,12 @@ def test_a_start_at_rest_with_a_jerk_takes_few_steps():
 
 @pytest.mark.parametrize("scale", [1e-12, 1e-3, 1.0, 1e6])
 def test_slow_and_fast_neighbours_in_one_state(scale):
-    """A displacement far from zero with a tiny oscillation on it: the oscillation keeps its digits relative to the whole."""
+    """A displacement far from zero with a tiny oscillation on it: the oscillation keeps its digits
+    relative to the whole.
+    """
     system = lab.with_values(spring=1.0, lift=1.0, boundary=1e9)  # rest at x = 1
     run = sl.simulate(system, (1.0 + scale, 0.0), t_end=50.0, samples=1)
     begun = (1.0 + scale) - 1.0
-    assert float(run.end_x) == pytest.approx(1 + begun * math.cos(50.0), abs=200 * EPS * max(1, scale))
+    assert float(run.end_x) == pytest.approx(
+        1 + begun * math.cos(50.0), abs=200 * EPS * max(1, scale)
+    )

@@ -1,4 +1,6 @@
-"""A flow is the same to the bit however it was compiled: at once, with its sizes known, all in one piece, for an older processor."""
+"""A flow is the same to the bit however it was compiled: at once, with its sizes known, all in one
+piece, for an older processor.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +26,28 @@ from saltus.system.tangent import tangent_system
 
 pytestmark = pytest.mark.skipif(jit_disabled(), reason="nothing is compiled with the JIT off")
 TAYLOR = sl.Taylor(lanes=2)
-#: (system, spread of the starts, method): contacts, grazes, jumps of a threshold, sliding, a saltating tangent.
+#: (system, spread of the starts, method): contacts, grazes, jumps of a threshold, sliding, a
+#: saltating tangent.
 CASES = {
-    "walls": (walls.with_values(moving_stiffness=30.0, stiffness=5.0, ceiling_stiffness=3.0), 1.0, TAYLOR),
+    "walls": (
+        walls.with_values(moving_stiffness=30.0, stiffness=5.0, ceiling_stiffness=3.0),
+        1.0,
+        TAYLOR,
+    ),
     "latch": (latch.with_values(gain=0.4), 2.0, TAYLOR),
     "slides": (slider.with_values(force=2.0), 2.0, TAYLOR),
-    "tangent": (tangent_system(pair.with_values(lift=0.5, spring=1.0, stiffness1=40.0, stiffness2=30.0, stiffness=20.0)), 1.0, TAYLOR),
-    "ode45": (walls.with_values(moving_stiffness=30.0, stiffness=5.0, ceiling_stiffness=3.0), 1.0, sl.ODE45(1e-5, 1e-8)),
+    "tangent": (
+        tangent_system(
+            pair.with_values(lift=0.5, spring=1.0, stiffness1=40.0, stiffness2=30.0, stiffness=20.0)
+        ),
+        1.0,
+        TAYLOR,
+    ),
+    "ode45": (
+        walls.with_values(moving_stiffness=30.0, stiffness=5.0, ceiling_stiffness=3.0),
+        1.0,
+        sl.ODE45(1e-5, 1e-8),
+    ),
 }
 
 
@@ -130,23 +147,35 @@ import json, sys
 sys.path[:0] = {path!r}
 from conformance import test_tiers as t
 system, spread, _ = t.CASES["walls"]
-print(json.dumps(t.bits(t.engine.run(system, t.sl.Taylor(lanes={lanes}), t.request(system, spread), threads=1))))
+method, request = t.sl.Taylor(lanes={lanes}), t.request(system, spread)
+print(json.dumps(t.bits(t.engine.run(system, method, request, threads=1))))
 """
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="these are processors of one family")
+@pytest.mark.skipif(
+    platform.machine() not in ("x86_64", "AMD64"), reason="these are processors of one family"
+)
 @pytest.mark.parametrize(
-    ("processor", "lanes"), [("x86-64-v3", 8), pytest.param("x86-64-v3", 4, marks=pytest.mark.nightly), ("x86-64-v2", 2)]
+    ("processor", "lanes"),
+    [("x86-64-v3", 8), pytest.param("x86-64-v3", 4, marks=pytest.mark.nightly), ("x86-64-v2", 2)],
 )
 def test_an_older_processor_gives_the_same_bits(processor, lanes):
-    """With eight lanes in four registers, with four; without fused multiply-add, which the C library then does."""
+    """With eight lanes in four registers, with four; without fused multiply-add, which the C
+    library then does.
+    """
     import json
 
     system, spread, _ = CASES["walls"]
     here = bits(engine.run(system, TAYLOR, request(system, spread), threads=1))
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "SALTUS_PROCESSOR": processor}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(sys.path),
+        "SALTUS_PROCESSOR": processor,
+    }
     tests = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     command = [sys.executable, "-c", ELSEWHERE.format(path=[tests], lanes=lanes)]
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    said = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=True
+    ).stdout
     assert json.loads(said.splitlines()[-1]) == here

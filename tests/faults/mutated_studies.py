@@ -1,11 +1,16 @@
-"""Valid study files, and ways to spoil them: what a typing error, a bad copy or a malicious sender makes of a study."""
+"""Valid study files, and ways to spoil them: what a typing error, a bad copy or a malicious sender
+makes of a study.
+"""
 
 import random
 import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-SEEDS = [(ROOT / "replications" / "saunders2021" / f"{name}.toml").read_text(encoding="utf-8") for name in ("fig5", "fig6b", "table2")] + [
+SEEDS = [
+    (ROOT / "replications" / "saunders2021" / f"{name}.toml").read_text(encoding="utf-8")
+    for name in ("fig5", "fig6b", "table2")
+] + [
     """
 [study]
 name = "all questions"
@@ -61,41 +66,58 @@ compare = "soft"
 ]
 #: Values as TOML writes them.
 TEXTS = [
-    "", "a", "4 N", "1e400 N", "nan N", "inf Hz", "-0 Hz", "1e-400 Hz", "4 N N", "4 N^99999999", "4 m^(1/0)", "4 kg**", "1e308 GHz",
-    "1e99999999 N", "4 dB", r"4 \u00b5m", "４ N", r"4\u00a0N", r"\u0000", "$x^$", "../../x", "/etc/passwd", r"a\nb", "random 0",
-    "random 99999999999", r"random \u0665", "random ²", "sweep_up", "sweep", "os:system", "x" * 5000, "(" * 3000, "1 " + "m*" * 3000 + "m",
+    "", "a", "4 N", "1e400 N", "nan N", "inf Hz", "-0 Hz", "1e-400 Hz", "4 N N", "4 N^99999999",
+    "4 m^(1/0)", "4 kg**", "1e308 GHz",
+    "1e99999999 N", "4 dB", r"4 \u00b5m", "４ N", r"4\u00a0N", r"\u0000", "$x^$", "../../x",
+    "/etc/passwd", r"a\nb", "random 0",
+    "random 99999999999", r"random \u0665", "random ²", "sweep_up", "sweep", "os:system",
+    "x" * 5000, "(" * 3000, "1 " + "m*" * 3000 + "m",
     "1 " + "(" * 500 + "m" + ")" * 500, "1 " + "k" * 9000, "1 m^" + "9" * 5000,
 ]  # fmt: skip
 NUMBERS = [
-    "0", "-1", "1", "2", "9223372036854775807", "-9223372036854775808", "99999999999999999999999999", "1e308", "-1e308", "5e-324", "nan",
-    "inf", "-inf", "-0.0", "0x10", "1_000", "1" + "0" * 5000, "true", "false", "1979-05-27", "07:32:00", "1979-05-27T07:32:00Z",
+    "0", "-1", "1", "2", "9223372036854775807", "-9223372036854775808",
+    "99999999999999999999999999", "1e308", "-1e308", "5e-324", "nan",
+    "inf", "-inf", "-0.0", "0x10", "1_000", "1" + "0" * 5000, "true", "false", "1979-05-27",
+    "07:32:00", "1979-05-27T07:32:00Z",
 ]  # fmt: skip
 TABLES_AND_LISTS = [
-    "[]", "[[]]", '["1 mm"]', '[1, "2 mm"]', "{}", "{ a = 1 }", "[{}]", "[" * 200 + "]" * 200, "{ values = [] }",
+    "[]", "[[]]", '["1 mm"]', '[1, "2 mm"]', "{}", "{ a = 1 }", "[{}]", "[" * 200 + "]" * 200,
+    "{ values = [] }",
     '{ values = ["1 Hz", "1 Hz"] }',
-    '{ first = "1 Hz", last = "1 Hz", count = 2 }', '{ first = "2 Hz", last = "1 Hz", count = 5 }', '{ name = "Taylor", order = 7 }',
+    '{ first = "1 Hz", last = "1 Hz", count = 2 }', '{ first = "2 Hz", last = "1 Hz", count '
+                                                    '= 5 }', '{ name = '
+        '"Taylor", order = 7 }',
     '{ name = "taylor" }', "{ name = 5 }",
 ]  # fmt: skip
 VALUES = [f'"{text}"' for text in TEXTS] + NUMBERS + TABLES_AND_LISTS
 KEYS = [
-    "name", "model", "case", "force", "x", "v", "start", "periods", "keep", "samples", "t_end", "values", "map", "compare",
-    "axes", "axes.x", "axes.y", "count", "first", "scale", "order", "__class__", "model_config", "self", "__pydantic_extra__",
-    "surface", "surface.x", "direction", "transient", "states", "window", "last", "bins", "contact_side", "intervals",
-    "box", "seed", "every", "at", "vary.gap", "sample", '""', '"a b"', r'"\u0000"', "ζ", "values.force", "forced_at", "__init__",
+    "name", "model", "case", "force", "x", "v", "start", "periods", "keep", "samples", "t_end",
+    "values", "map", "compare",
+    "axes", "axes.x", "axes.y", "count", "first", "scale", "order", "__class__", "model_config",
+    "self", "__pydantic_extra__",
+    "surface", "surface.x", "direction", "transient", "states", "window", "last", "bins",
+    "contact_side", "intervals",
+    "box", "seed", "every", "at", "vary.gap", "sample", '""', '"a b"', r'"\u0000"', "ζ",
+    "values.force", "forced_at", "__init__",
     "with_values", "system", "start.x", "method", "flow", "printed", "measured", "exact",
 ]  # fmt: skip
 TABLES = [
-    "study", "system", "method", "simulate", "compare", "lyapunov", "frequency_response", "bifurcation_diagram", "basins", "basins.map",
+    "study", "system", "method", "simulate", "compare", "lyapunov", "frequency_response",
+    "bifurcation_diagram", "basins", "basins.map",
     "poincare", "spectrum", "impacts", "energy", "poincare.surface",
-    "basins.axes", "x", "basins.axes.x", "study.study", '""', r'"\u0000"', "system.values", "method.Taylor",
+    "basins.axes", "x", "basins.axes.x", "study.study", '""', r'"\u0000"', "system.values",
+    "method.Taylor",
 ]  # fmt: skip
 CHARACTERS = [
-    '"', "'", "[", "]", "{", "}", "=", "\n", "\r\n", "\t", "\0", "\ufeff", "#", ",", ".", "\\", "\u2028", "é", "𝟜", "😀", "-", "e", "inf",
+    '"', "'", "[", "]", "{", "}", "=", "\n", "\r\n", "\t", "\0", "\ufeff", "#", ",", ".", "\\",
+    "\u2028", "é", "𝟜", "😀", "-", "e", "inf",
 ]  # fmt: skip
 
 
 def mutated(text: str, draw: random.Random) -> str:
-    """A study with one to six faults: characters, cuts, values, keys, tables, lines in another place."""
+    """A study with one to six faults: characters, cuts, values, keys, tables, lines in another
+    place.
+    """
     for _ in range(draw.choice([1, 1, 1, 2, 3, 6])):
         place, lines = draw.randrange(len(text) + 1), text.split("\n")
         at, to = draw.randrange(len(lines)), draw.randrange(len(lines))
@@ -105,7 +127,9 @@ def mutated(text: str, draw: random.Random) -> str:
             case 1:
                 lines = [text[:place] + text[place + draw.choice([1, 2, 5, 40]) :]]
             case 2 | 3 | 4:
-                given = [i for i, line in enumerate(lines) if "=" in line and not line.startswith("#")]
+                given = [
+                    i for i, line in enumerate(lines) if "=" in line and not line.startswith("#")
+                ]
                 at = draw.choice(given or [at])
                 lines[at] = _other_value(lines[at], draw)
             case 5:

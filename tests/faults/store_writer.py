@@ -1,4 +1,6 @@
-"""What the writers in the tests of a store do: cheap values that follow from the number of the chunk. Run in processes of their own."""
+"""What the writers in the tests of a store do: cheap values that follow from the number of the
+chunk. Run in processes of their own.
+"""
 
 import os
 import signal
@@ -11,7 +13,12 @@ import numpy as np
 from saltus.results.store.store import Store
 
 IDENTITY = {"study": "0a1b2c", "system": "rig", "version": "0.1.0"}
-MAKE = {"shape": (7, 11), "chunk": 8, "arrays": {"basin": "i2", "peak": "f8", "settled": "?"}, "note": {"title": "a test"}}
+MAKE = {
+    "shape": (7, 11),
+    "chunk": 8,
+    "arrays": {"basin": "i2", "peak": "f8", "settled": "?"},
+    "note": {"title": "a test"},
+}
 SMALL = MAKE | {"shape": (4, 5), "arrays": {"basin": "i2", "peak": "f8"}}
 FINE = MAKE | {"chunk": 2}
 
@@ -19,7 +26,11 @@ FINE = MAKE | {"chunk": 2}
 def values(store, index):
     """Values of a chunk; the last one is cut off at the end of the grid."""
     cells = np.arange(store.chunks.cells)[store.chunks.extent(index)]
-    every = {"settled": cells % 3 == 0, "peak": np.sin(cells) * 1e-3, "basin": (cells**2 % 5 - 2).astype("i2")}
+    every = {
+        "settled": cells % 3 == 0,
+        "peak": np.sin(cells) * 1e-3,
+        "basin": (cells**2 % 5 - 2).astype("i2"),
+    }
     return {name: part for name, part in every.items() if name in store.chunks.arrays}
 
 
@@ -64,8 +75,18 @@ def hold_and_fork(path, ready):
 
 
 def die_at(path, step):
-    """Be killed at the n-th time that the writer touches the disk: before a file is opened, flushed, renamed, linked or removed."""
-    watched = {"open", "os.rename", "os.mkdir", "os.remove", "os.rmdir", "os.truncate", "os.listdir"}
+    """Be killed at the n-th time that the writer touches the disk: before a file is opened,
+    flushed, renamed, linked or removed.
+    """
+    watched = {
+        "open",
+        "os.rename",
+        "os.mkdir",
+        "os.remove",
+        "os.rmdir",
+        "os.truncate",
+        "os.listdir",
+    }
     prefix, count = str(Path(path)), 0
 
     def touch():
@@ -75,7 +96,9 @@ def die_at(path, step):
         count += 1
 
     def hook(event, arguments):
-        if (event in watched and any(prefix in str(argument) for argument in arguments[:2])) or event == "os.truncate":
+        if (
+            event in watched and any(prefix in str(argument) for argument in arguments[:2])
+        ) or event == "os.truncate":
             touch()
 
     flush = os.fsync

@@ -1,4 +1,6 @@
-"""Odd arguments of what takes a result, of a System's methods, of pictures and of the functions of an equation are refused in words."""
+"""Odd arguments of what takes a result, of a System's methods, of pictures and of the functions of
+an equation are refused in words.
+"""
 
 import inspect
 import random
@@ -21,29 +23,59 @@ from unit.results.dataset.responses_data import responses
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 #: What is long, beside what is odd.
-LONG = ["y" * 10_000, b"z" * 10_000, list(range(9000)), {str(i): i for i in range(3000)}, ["q" * 5000], {"x": "w" * 9999},
-        np.arange(5000.0), np.array(["one"])[0], "\x1b[31m" * 500, [[[[[[1]]]]]]]  # fmt: skip
-RESULTS = [sine_run(), sine_run((2e-3, 1e-3), batch=True), sine_points(), responses(), resonance(20), motions_data.section(),
-           motions_data.spectrum(2), motions_data.impacts(), motions_data.energy(), xr.Dataset(),
-           sine_run().assign_attrs(states=5)]  # fmt: skip
+LONG = [
+    "y" * 10_000,
+    b"z" * 10_000,
+    list(range(9000)),
+    {str(i): i for i in range(3000)},
+    ["q" * 5000],
+    {"x": "w" * 9999},
+    np.arange(5000.0),
+    np.array(["one"])[0],
+    "\x1b[31m" * 500,
+    [[[[[[1]]]]]],
+]
+RESULTS = [
+    sine_run(),
+    sine_run((2e-3, 1e-3), batch=True),
+    sine_points(),
+    responses(),
+    resonance(20),
+    motions_data.section(),
+    motions_data.spectrum(2),
+    motions_data.impacts(),
+    motions_data.energy(),
+    xr.Dataset(),
+    sine_run().assign_attrs(states=5),
+]
 #: What suits an argument, by its name.
 SUITS = {
-    "state": ["x", "v", ["x", "v"]], "window": ["hann", "none"], "last": [1, 2], "tolerance": [1e-3], "output": ["x"], "to": ["v"],
-    "by": ["rms"], "series": [np.sin(np.arange(400) ** 1.1)], "sampling_interval": [0.1, np.arange(400.0)], "t": [0.0, np.zeros(3)],
-    "y": [(1e-3, 0.0), np.zeros((2, 3))], "name": ["x", "force"], "value": [1.0, "1 N"], "values": [None, {}, {"frequency": 5.0}],
-    "trajectory": [0, None], "units": [{"x": "mm"}], "periods": [1, (0, 1)], "quantity": ["peak"], "a": [0.5], "b": [0.5],
-    "stiffness": [2.0], "gap": [0.25], "surface": [("x", 0.0)], "start": [(1e-3, 0.0)], "direction": [0, 1], "system": [rig],
-    "condition": [True], "energy": [lambda x: x * x], "supplied": [lambda x: x], "dissipated": [lambda x: x],
+    "state": ["x", "v", ["x", "v"]], "window": ["hann", "none"], "last": [1, 2],
+    "tolerance": [1e-3], "output": ["x"], "to": ["v"],
+    "by": ["rms"], "series": [np.sin(np.arange(400) ** 1.1)],
+    "sampling_interval": [0.1, np.arange(400.0)], "t": [0.0, np.zeros(3)],
+    "y": [(1e-3, 0.0), np.zeros((2, 3))], "name": ["x", "force"], "value": [1.0, "1 N"],
+    "values": [None, {}, {"frequency": 5.0}],
+    "trajectory": [0, None], "units": [{"x": "mm"}], "periods": [1, (0, 1)], "quantity": ["peak"],
+    "a": [0.5], "b": [0.5],
+    "stiffness": [2.0], "gap": [0.25], "surface": [("x", 0.0)], "start": [(1e-3, 0.0)],
+    "direction": [0, 1], "system": [rig],
+    "condition": [True], "energy": [lambda x: x * x], "supplied": [lambda x: x],
+    "dissipated": [lambda x: x],
 }  # fmt: skip
 FUNCTIONS = {
     f"sl.{name}": getattr(sl, name)
-    for name in ("transmissibility", "compare", "spectrum", "settled", "wolf", "contacts", "samples", "describe", "poincare",
-                 "impact_statistics", "energy_balance", "abs", "atan2", "clip", "cosh", "freeplay", "heaviside", "hypot", "log", "mod",
+    for name in ("transmissibility", "compare", "spectrum", "settled", "wolf", "contacts",
+        "samples", "describe", "poincare",
+                 "impact_statistics", "energy_balance", "abs", "atan2", "clip", "cosh", "freeplay",
+                 "heaviside", "hypot", "log", "mod",
                  "piecewise", "sign", "sin", "sqrt", "where")
 } | {
-    f"sl.plot.{name}": getattr(sl.plot, name) for name in sl.plot.__all__ if name not in ("OKABE_ITO", "style")
+    f"sl.plot.{name}": getattr(sl.plot,
+        name) for name in sl.plot.__all__ if name not in ("OKABE_ITO", "style")
 } | {
-    f"rig.{name}": getattr(rig, name) for name in ("rhs", "with_values", "resolve", "period", "state_unit", "parameter_text", "from_dict")
+    f"rig.{name}": getattr(rig, name) for name in ("rhs", "with_values", "resolve", "period",
+        "state_unit", "parameter_text", "from_dict")
 }  # fmt: skip
 
 
@@ -65,7 +97,9 @@ def arguments(function, draw):
     return given
 
 
-@pytest.mark.parametrize(("seed", "trials"), [(3, 3000), pytest.param(None, 60_000, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(
+    ("seed", "trials"), [(3, 3000), pytest.param(None, 60_000, marks=pytest.mark.nightly)]
+)
 def test_arguments_of_another_kind_are_refused_in_words(only_arguments, seed, trials):  # noqa: F811
     seed = random.randrange(2**31) if seed is None else seed
     draw, refused, taken, messages = random.Random(seed), set(), set(), []
@@ -79,7 +113,9 @@ def test_arguments_of_another_kind_are_refused_in_words(only_arguments, seed, tr
             refused.add(name)
             messages.append(f"{name}: {error}")
         except Exception as error:
-            raise AssertionError(f"seed {seed}, trial {trial}: {name}({given}) ends in {error!r}") from error
+            raise AssertionError(
+                f"seed {seed}, trial {trial}: {name}({given}) ends in {error!r}"
+            ) from error
         plt.close("all")
     assert refused == set(FUNCTIONS)
     assert len(taken) > len(FUNCTIONS) / 2, taken
@@ -87,22 +123,46 @@ def test_arguments_of_another_kind_are_refused_in_words(only_arguments, seed, tr
     assert not [message for message in messages if "np.str_" in message or "np.float" in message]
 
 
-# -- the words -------------------------------------------------------------------------------------------------------------------
+# -- the words -------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda: rig.rhs(0, 5), "delangre has the states x, v, but y holds no row of them. Give one entry or row for each."),
+        (
+            lambda: rig.rhs(0, 5),
+            "delangre has the states x, v, but y holds no row of them. Give "
+            "one entry or row for each.",
+        ),
         (lambda: rig.rhs("now", (0, 0)), "t must be a time"),
-        (lambda: rig.rhs(np.zeros(3), np.zeros((2, 4))), r"t of the shape \(3,\) and y of the shape \(2, 4\) don't fit"),
+        (
+            lambda: rig.rhs(np.zeros(3), np.zeros((2, 4))),
+            r"t of the shape \(3,\) and y of the "
+            r"shape \(2, 4\) don't fit",
+        ),
         (
             lambda: sl.poincare(rig, (0, 0), ("x", 0.0), direction=np.array([1, 1]), periods=1),
             r"direction must be 0, 1 or -1, not array\(\[1, 1\]\)",
         ),
-        (lambda: sl.frequency_response(rig, (14, 15, 2), threads=-1), "threads must be a whole number of at least 1"),
-        (lambda: sl.settled(sine_run(), tolerance=None), "sl.settled: tolerance must be a number, not None."),
-        (lambda: sl.spectrum(sine_run(), last=[1]), r"last must be a whole number of at least 1, not \[1\]"),
-        (lambda: sl.plot.history(sine_run(), units="mm"), "plot.history: units must be a mapping such as"),
-        (lambda: sl.plot.history(sine_run(), stat="x"), "plot.history: got an unexpected keyword argument 'stat'"),
+        (
+            lambda: sl.frequency_response(rig, (14, 15, 2), threads=-1),
+            "threads must be a whole number of at least 1",
+        ),
+        (
+            lambda: sl.settled(sine_run(), tolerance=None),
+            "sl.settled: tolerance must be a number, not None.",
+        ),
+        (
+            lambda: sl.spectrum(sine_run(), last=[1]),
+            r"last must be a whole number of at least 1, "
+            r"not \[1\]",
+        ),
+        (
+            lambda: sl.plot.history(sine_run(), units="mm"),
+            "plot.history: units must be a mapping such as",
+        ),
+        (
+            lambda: sl.plot.history(sine_run(), stat="x"),
+            "plot.history: got an unexpected keyword argument 'stat'",
+        ),
         (lambda: sl.sqrt(-1.0), r"sl.sqrt\(-1.0\) has no finite real value"),
         (lambda: sl.sin([1.0]), "an equation holds"),
         (lambda: rig.with_values(force=np.str_("one")), "force = 'one' can't be read"),
@@ -117,7 +177,9 @@ def test_what_once_ended_inside(call, told):
 
 def test_numbers_of_numpy_and_without_axes_are_numbers():
     run = sine_run()
-    assert sl.settled(run, tolerance=np.float32(2**-20), last=np.int64(2)).identical(sl.settled(run, tolerance=2**-20, last=2))
+    assert sl.settled(run, tolerance=np.float32(2**-20), last=np.int64(2)).identical(
+        sl.settled(run, tolerance=2**-20, last=2)
+    )
     np.testing.assert_array_equal(rig.rhs(0, [1, 0]), rig.rhs(0.0, (1.0, 0.0)))
 
 
@@ -137,7 +199,15 @@ class Angry:
         ("a  b\n", r"'a  b\n'"),
         ("x" * 100, "'" + "x" * 75 + "...'"),
     ],
-    ids=["text of numpy", "number of numpy", "array", "large", "beyond what Python writes", "line end", "long"],
+    ids=[
+        "text of numpy",
+        "number of numpy",
+        "array",
+        "large",
+        "beyond what Python writes",
+        "line end",
+        "long",
+    ],
 )
 def test_a_value_as_a_message_shows_it(value, text):
     assert shown(value) == text
@@ -158,7 +228,7 @@ def test_a_long_message_keeps_its_beginning_and_its_end(kind):
     assert str(kind("short")) == "short"
 
 
-# -- what would be lost in silence ---------------------------------------------------------------------------------------------------
+# -- what would be lost in silence -----------------------------------------------------------------
 MASKED = np.ma.array([1e-3, 9.0], mask=[False, True])
 
 
@@ -183,9 +253,15 @@ def test_an_array_that_may_have_a_mask_and_has_none_is_an_array():
     assert sl.stroboscope(rig, masked, 2).identical(sl.stroboscope(rig, plain, 2))
 
 
-@pytest.mark.parametrize("column", [pd.Series, lambda values, index: xr.DataArray(values, {"run": index})])
+@pytest.mark.parametrize(
+    "column", [pd.Series, lambda values, index: xr.DataArray(values, {"run": index})]
+)
 def test_columns_whose_labels_differ_are_not_paired_row_by_row(column):
-    x, v, turned = column([1e-3, 2e-3], index=[0, 1]), column([0.1, 0.2], index=[0, 1]), column([0.2, 0.1], index=[1, 0])
+    x, v, turned = (
+        column([1e-3, 2e-3], index=[0, 1]),
+        column([0.1, 0.2], index=[0, 1]),
+        column([0.2, 0.1], index=[1, 0]),
+    )
     with pytest.raises(ParameterError, match="different labels in their index"):
         sl.stroboscope(rig, {"x": x, "v": turned}, 2)
     with pytest.raises(ParameterError, match="different labels"):

@@ -1,4 +1,6 @@
-"""Ctrl-C while trajectories are computed: at whatever moment it comes, what is kept is the beginning of the undisturbed answer."""
+"""Ctrl-C while trajectories are computed: at whatever moment it comes, what is kept is the
+beginning of the undisturbed answer.
+"""
 
 import _thread
 import contextlib
@@ -35,14 +37,20 @@ class Interrupting(list):
 
 @pytest.fixture(autouse=True)
 def ctrl_c():
-    """Ctrl-C counts, also where the tests were started in the background, for which shells switch it off."""
+    """Ctrl-C counts, also where the tests were started in the background, for which shells switch
+    it off.
+    """
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.parametrize(("threads", "chunk", "progress"), [(1, 8, None), (2, 8, None), (2, 24, None), (2, 24, False)])
-def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, chunk, progress, monkeypatch):
+@pytest.mark.parametrize(
+    ("threads", "chunk", "progress"), [(1, 8, None), (2, 8, None), (2, 24, None), (2, 24, False)]
+)
+def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(
+    threads, chunk, progress, monkeypatch
+):
     """Pressed while a table of contacts is put away, and again and again while the run ends."""
     rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
     monkeypatch.setattr(engine, "CHUNK", chunk)
@@ -66,7 +74,7 @@ def test_contacts_of_an_interrupted_run_are_the_first_of_the_whole(threads, chun
         np.testing.assert_array_equal(mine, theirs[: len(mine)])
 
 
-# -- a request from another thread --------------------------------------------------------------------------------------------------
+# -- a request from another thread -----------------------------------------------------------------
 class Holding:
     """Holds work at a moment until another thread has asked it to stop."""
 
@@ -130,7 +138,11 @@ def test_a_run_ends_on_request_as_it_does_on_ctrl_c(monkeypatch):
 
 
 def test_a_map_ends_on_request_as_it_does_on_ctrl_c(monkeypatch):
-    rig, holding, labelled = sl.models.delangre("b", force="4 N", frequency="16 Hz"), Holding(), threading.Event()
+    rig, holding, labelled = (
+        sl.models.delangre("b", force="4 N", frequency="16 Hz"),
+        Holding(),
+        threading.Event(),
+    )
     axes = {"x": ("-5 mm", "5 mm", 12), "v": ("-1 m/s", "1 m/s", 12)}
     monkeypatch.setattr(pipeline, "CHUNK", 24)
     monkeypatch.setattr(pipeline, "SCOUTS", 64)
@@ -144,7 +156,13 @@ def test_a_map_ends_on_request_as_it_does_on_ctrl_c(monkeypatch):
 
     monkeypatch.setattr(pipeline.BasinPlan, "chunk", held)
     part = holding.partial(
-        lambda: sl.basins(rig, **axes, threads=1, progress=lambda share: share > basins.SCOUTING and labelled.set()), labelled
+        lambda: sl.basins(
+            rig,
+            **axes,
+            threads=1,
+            progress=lambda share: share > basins.SCOUTING and labelled.set(),
+        ),
+        labelled,
     )
     there = part.basin.values != Kind.NOT_COMPUTED
     assert 24 <= there.sum() <= 72
@@ -206,11 +224,16 @@ def test_a_frequency_response_hands_out_what_it_has():
     seen = threading.Event()
     presser = press_when(seen)
     with pytest.raises(sl.Interrupted, match="stopped"):
-        sl.frequency_response(rig, ("2 Hz", "30 Hz", 4000), periods=2000, progress=lambda share: share > 0 and seen.set())
+        sl.frequency_response(
+            rig,
+            ("2 Hz", "30 Hz", 4000),
+            periods=2000,
+            progress=lambda share: share > 0 and seen.set(),
+        )
     presser.join()
 
 
-# -- a single piece is done by the thread that asks ---------------------------------------------------------------------------------
+# -- a single piece is done by the thread that asks ------------------------------------------------
 @pytest.mark.parametrize("around", [contextlib.nullcontext, sl.Stop])
 def test_ctrl_c_waits_for_a_single_piece_and_asks_it_to_stop(around):
     """Within a request of the user's own too, which isn't a part of other work."""
@@ -271,13 +294,13 @@ def test_a_piece_within_a_piece_is_stopped_with_it():
         on_threads(lambda _: 1 / 0, [1], lambda *_: None)
 
 
-# -- while modules are imported ----------------------------------------------------------------------------------------------------
+# -- while modules are imported --------------------------------------------------------------------
 _SWALLOWS = """
 import _thread, time
 try:
     _thread.interrupt_main()
     time.sleep(0.1)
-except KeyboardInterrupt:  # as C code of NumPy and pandas does that asks no further why something failed
+except KeyboardInterrupt:  # as C code of NumPy and pandas does
     pass
 function = 5
 """
@@ -305,7 +328,7 @@ def test_where_nobody_listens_for_ctrl_c_nobody_is_told():
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
 
 
-# -- where Python drops it -----------------------------------------------------------------------------------------------------------
+# -- where Python drops it -------------------------------------------------------------------------
 class Pressing:
     """An object while whose end Ctrl-C comes."""
 
@@ -317,7 +340,11 @@ class Pressing:
 def test_a_ctrl_c_that_python_drops_is_pressed_again(told):
     def goes():
         one = Pressing() if told == "its finalizer" else Stop()
-        return weakref.ref(one, lambda _: signal.raise_signal(signal.SIGINT)) if told == "a weak reference" else None
+        return (
+            weakref.ref(one, lambda _: signal.raise_signal(signal.SIGINT))
+            if told == "a weak reference"
+            else None
+        )
 
     def wait():
         kept = goes()

@@ -1,4 +1,6 @@
-"""Result files that something befell: each is refused in a sentence before a parser sees it; none keeps anybody waiting."""
+"""Result files that something befell: each is refused in a sentence before a parser sees it; none
+keeps anybody waiting.
+"""
 
 import os
 import random
@@ -25,7 +27,9 @@ def saved(request, tmp_path, monkeypatch):
 
 
 def damaged(data: bytes, draw: random.Random) -> bytes:
-    """A bit flipped, a block zeroed, or a block put in another place; mostly near the beginning, where files keep their structure."""
+    """A bit flipped, a block zeroed, or a block put in another place; mostly near the beginning,
+    where files keep their structure.
+    """
     inside = bytearray(data[:-ENDING])
     place = draw.randrange(min(8192, len(inside)) if draw.random() < 0.7 else len(inside))
     size = draw.choice([8, 16, 64, 128, 512])
@@ -67,7 +71,10 @@ def test_a_result_moved_alone_is_read(saved, tmp_path):
 
 def test_a_file_that_xarray_wrote_is_read(saved, tmp_path):
     run = load(saved)
-    run.to_netcdf(tmp_path / "by_xarray.nc", engine="h5netcdf" if saved.read_bytes()[:4] == b"\x89HDF" else "scipy")
+    run.to_netcdf(
+        tmp_path / "by_xarray.nc",
+        engine="h5netcdf" if saved.read_bytes()[:4] == b"\x89HDF" else "scipy",
+    )
     xr.testing.assert_identical(load(tmp_path / "by_xarray.nc"), run)
 
 
@@ -88,7 +95,11 @@ def test_reading_that_comes_to_no_end_is_stopped(saved, monkeypatch):
     saved.write_bytes(saved.read_bytes()[:-ENDING])
     monkeypatch.setattr(ending, "_TRIAL", "while True: pass")
     monkeypatch.setattr(ending, "PATIENCE", 0.2)
-    with pytest.raises(ResultFileError, match=r"reading it came to no end within 0 s\. Restore it from a copy or compute it again\."):
+    with pytest.raises(
+        ResultFileError,
+        match=r"reading it came to no end within 0 s\. Restore it "
+        r"from a copy or compute it again\.",
+    ):
         load(saved)
 
 
@@ -111,9 +122,13 @@ def test_a_nul_in_a_text_is_told(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("where", ["attribute", "attribute of a variable", "text", "turn of the direction"])
+@pytest.mark.parametrize(
+    "where", ["attribute", "attribute of a variable", "text", "turn of the direction"]
+)
 def test_a_file_that_would_write_to_the_terminal_is_refused(tmp_path, where, monkeypatch):
-    """Whole, with all its checksums: the sequence sets the title of a terminal; others rewrite what is seen."""
+    """Whole, with all its checksums: the sequence sets the title of a terminal; others rewrite what
+    is seen.
+    """
     run = sine_run()
     if where == "attribute":
         run = run.assign_attrs(source="\x1b]0;owned\x07")
@@ -125,9 +140,12 @@ def test_a_file_that_would_write_to_the_terminal_is_refused(tmp_path, where, mon
         run = run.assign_attrs(source="\u202egpj.exe")
     with pytest.raises(ParameterError, match="holds control characters"):
         save(run, tmp_path / "run.nc")
-    monkeypatch.setattr("saltus.results.files.export.place_of_control", lambda _: "")  # as another program would write it
+    # as another program would write it
+    monkeypatch.setattr("saltus.results.files.export.place_of_control", lambda _: "")
     save(run, tmp_path / "run.nc")
-    with pytest.raises(ResultFileError, match="holds control characters, which a terminal would obey") as refused:
+    with pytest.raises(
+        ResultFileError, match="holds control characters, which a terminal would obey"
+    ) as refused:
         load(tmp_path / "run.nc")
     assert not has_control(str(refused.value))
 
@@ -143,7 +161,11 @@ def stranger(tmp_path, monkeypatch):
 def test_only_what_was_not_written_here_is_tried_elsewhere_and_once(stranger, monkeypatch):
     """Anybody can write a right checksum over a file that HDF5 reads for ever."""
     tried = []
-    monkeypatch.setattr(sys.modules["saltus.results.files.load"], "try_elsewhere", lambda path, _engine: tried.append(path.name))
+    monkeypatch.setattr(
+        sys.modules["saltus.results.files.load"],
+        "try_elsewhere",
+        lambda path, _engine: tried.append(path.name),
+    )
     mine = save(sine_run(samples=50), stranger / "mine.nc")
     content = sine_run(samples=51).to_netcdf(engine="h5netcdf")
     (stranger / "theirs.nc").write_bytes(ending.with_ending(content))
@@ -159,20 +181,31 @@ def test_only_what_was_not_written_here_is_tried_elsewhere_and_once(stranger, mo
 
 @pytest.mark.skipif(sys.platform == "win32", reason="memory is bounded on POSIX only")
 @pytest.mark.parametrize(
-    ("made", "told"), [("stored elsewhere", "leads to other files"), ("linked", "leads to other files"), ("huge", "allocate")]
+    ("made", "told"),
+    [
+        ("stored elsewhere", "leads to other files"),
+        ("linked", "leads to other files"),
+        ("huge", "allocate"),
+    ],
 )
 def test_a_forged_file_reads_no_other_file_and_takes_no_memory(stranger, made, told):
-    """Its checksums are right. Data stored elsewhere would be those of any file, and a pipe there would be waited on for ever."""
+    """Its checksums are right. Data stored elsewhere would be those of any file, and a pipe there
+    would be waited on for ever.
+    """
     h5py = pytest.importorskip("h5py")
     (stranger / "secret").write_bytes(bytes(range(100)))
     with h5py.File(stranger / "raw", "w") as file:
         file.attrs["saltus_result"] = "trajectory"
         if made == "stored elsewhere":
-            file.create_dataset("time", shape=(100,), dtype="i1", external=[(str(stranger / "secret"), 0, 100)]).make_scale("time")
+            file.create_dataset(
+                "time", shape=(100,), dtype="i1", external=[(str(stranger / "secret"), 0, 100)]
+            ).make_scale("time")
         elif made == "linked":
             file["time"] = h5py.ExternalLink(str(stranger / "secret"), "/x")
         else:
-            file.create_dataset("time", shape=(3 * 10**9,), dtype="f8", chunks=(1 << 20,)).make_scale("time")
+            file.create_dataset(
+                "time", shape=(3 * 10**9,), dtype="f8", chunks=(1 << 20,)
+            ).make_scale("time")
     (stranger / "run.nc").write_bytes(ending.with_ending((stranger / "raw").read_bytes()))
     with pytest.raises(ResultFileError, match=told):
         load(stranger / "run.nc")

@@ -1,4 +1,6 @@
-"""A store survives what befalls a computer: kill -9 at any moment, Ctrl-C, a full disk, damaged files, a second writer."""
+"""A store survives what befalls a computer: kill -9 at any moment, Ctrl-C, a full disk, damaged
+files, a second writer.
+"""
 
 import errno
 import multiprocessing
@@ -17,7 +19,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from faults.store_writer import FINE, IDENTITY, MAKE, SMALL, compute, die_at, hold, hold_and_fork, values
+from faults.store_writer import (
+    FINE,
+    IDENTITY,
+    MAKE,
+    SMALL,
+    compute,
+    die_at,
+    hold,
+    hold_and_fork,
+    values,
+)
 from saltus.results.store.chunks import TRAILER
 from saltus.results.store.store import Store, StoreError
 
@@ -26,21 +38,28 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 
 @pytest.fixture(scope="module")
 def processes():
-    """Processes that start in milliseconds: forked from a server that has imported the store, and used nothing of it."""
+    """Processes that start in milliseconds: forked from a server that has imported the store, and
+    used nothing of it.
+    """
     if sys.platform == "win32":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["faults.store_writer"])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))  # where the server looks for what it imports
+        # where the server looks for what it imports
+        patch.setenv("PYTHONPATH", os.pathsep.join(filter(None, sys.path)))
         forkserver.ensure_running()
     return context
 
 
 @pytest.fixture
 def memory():
-    """A folder in memory where there is one: what a kill leaves behind doesn't depend on the disk, and hundreds of maps are made."""
-    with tempfile.TemporaryDirectory(dir="/dev/shm" if os.path.isdir("/dev/shm") else None) as folder:
+    """A folder in memory where there is one: what a kill leaves behind doesn't depend on the disk,
+    and hundreds of maps are made.
+    """
+    with tempfile.TemporaryDirectory(
+        dir="/dev/shm" if os.path.isdir("/dev/shm") else None
+    ) as folder:
         yield Path(folder)
 
 
@@ -53,7 +72,9 @@ def undisturbed(tmp_path):
 def contents(path):
     """Every file of a finished store but the locks; nothing else may be in it, or beside it."""
     assert [one.name for one in path.parent.iterdir()] == [path.name]
-    files = {str(file.relative_to(path)): file.read_bytes() for file in path.rglob("*") if file.is_file()}
+    files = {
+        str(file.relative_to(path)): file.read_bytes() for file in path.rglob("*") if file.is_file()
+    }
     return {name: data for name, data in files.items() if not name.startswith("locks")}
 
 
@@ -63,17 +84,23 @@ def start(processes, function, *arguments):
     return process
 
 
-# -- killed ----------------------------------------------------------------------------------------------------------------------
+# -- killed ----------------------------------------------------------------------------------------
 @posix
 def test_killed_at_random_moments(processes, tmp_path):
-    """One map, its writer killed 20 times: a moment after it started, or after it got on by a chunk or two."""
+    """One map, its writer killed 20 times: a moment after it started, or after it got on by a chunk
+    or two.
+    """
     moments = random.Random(3)
     path, killed, progress = tmp_path / "map" / "map", 0, [0]
     path.parent.mkdir()
     for _ in range(20):
         writer = start(processes, compute, path, None, 1, 0.002, FINE)
         goal = progress[-1] + moments.randrange(3)
-        wait_for(lambda goal=goal, writer=writer: goal == 0 or committed(path) >= goal or not writer.is_alive())
+        wait_for(
+            lambda goal=goal, writer=writer: (
+                goal == 0 or committed(path) >= goal or not writer.is_alive()
+            )
+        )
         time.sleep(moments.uniform(0.0, 0.02))
         writer.kill()
         writer.join()
@@ -94,7 +121,9 @@ def committed(path):
 
 @posix
 def test_killed_at_every_touch_of_the_disk(processes, memory):
-    """A new map of three chunks each time, its writer killed at its n-th touch; the resumed map is the undisturbed one."""
+    """A new map of three chunks each time, its writer killed at its n-th touch; the resumed map is
+    the undisturbed one.
+    """
     (memory / "undisturbed").mkdir()
     undisturbed = contents(compute(memory / "undisturbed" / "map", make=SMALL).path)
     found = set()
@@ -104,7 +133,9 @@ def test_killed_at_every_touch_of_the_disk(processes, memory):
         writer = start(processes, die_at, path, step)
         writer.join()
         found.add(committed(path) if path.exists() else "nothing")
-        assert not path.exists() or Store.open(path).damaged() == [], "what is there is true before anything is mended"
+        assert not path.exists() or Store.open(path).damaged() == [], (
+            "what is there is true before anything is mended"
+        )
         forget_drafts(path)
         assert contents(compute(path, make=SMALL).path) == undisturbed, step
         if writer.exitcode == 0:
@@ -127,7 +158,7 @@ def test_interrupted(undisturbed, tmp_path):
     path.parent.mkdir()
     code = f"""
 import signal, sys
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in the background has it ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job has it ignored
 sys.path[:0] = {sys.path!r}
 from faults.store_writer import compute
 compute({str(path)!r}, pause=0.1)"""
@@ -148,14 +179,16 @@ def wait_for(condition):
         time.sleep(0.01)
 
 
-# -- a full disk -----------------------------------------------------------------------------------------------------------------
+# -- a full disk -----------------------------------------------------------------------------------
 @pytest.fixture
 def small_disk(tmp_path):
     """A file system of 256 kB, if this machine lets us make one."""
     place = tmp_path / "disk"
     place.mkdir()
     mounted = sys.platform == "linux" and subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(place)], capture_output=True, check=False
+        ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(place)],
+        capture_output=True,
+        check=False,
     )
     if not mounted or mounted.returncode:
         pytest.skip("mounting a small file system needs rights that this user doesn't have")
@@ -167,12 +200,17 @@ def test_full_disk(small_disk, undisturbed):
     store = Store.create(small_disk / "map", IDENTITY, **MAKE)
     ballast = fill(small_disk / "ballast")
     with store.lock():
-        with pytest.raises(StoreError, match=r"can't be written: No space left on device.*make room"):
+        with pytest.raises(
+            StoreError,
+            match=r"can't be written: No space left on "
+            r"device.*make room",
+        ):
             commit_all(store)
         halves = [
             file
             for file in store.path.rglob("*")
-            if file.is_file() and undisturbed.get(str(file.relative_to(store.path))) != file.read_bytes()
+            if file.is_file()
+            and undisturbed.get(str(file.relative_to(store.path))) != file.read_bytes()
         ]
         assert {file.parent.name for file in halves} == {"locks"}
         assert store.verify() == []
@@ -228,7 +266,7 @@ def test_disk_full_at_every_flush(undisturbed, tmp_path, monkeypatch):
     assert contents(compute(store.path).path) == undisturbed
 
 
-# -- damaged files ---------------------------------------------------------------------------------------------------------------
+# -- damaged files ---------------------------------------------------------------------------------
 def test_any_damaged_file_is_found_and_computed_again(memory):
     """Each file of a store in turn: cut short, one bit flipped, removed."""
     store = compute(memory / "map", make=SMALL)
@@ -243,17 +281,23 @@ def test_any_damaged_file_is_found_and_computed_again(memory):
             index = int(file.stem) if name.startswith("chunks") else None
             gone = damage is None
             if name == "store.json":
-                with pytest.raises(StoreError, match="not a store" if damage is None else "is damaged"):
+                with pytest.raises(
+                    StoreError, match="not a store" if damage is None else "is damaged"
+                ):
                     Store.open(store.path)
             if index is not None:
-                with pytest.raises(StoreError, match="isn't computed yet" if gone else "is damaged"):
+                with pytest.raises(
+                    StoreError, match="isn't computed yet" if gone else "is damaged"
+                ):
                     store.read(index)
                 with pytest.raises(StoreError):
                     store.read_all()
                 assert store.damaged() == ([] if gone else [index])
             if name.startswith("artifacts"):
                 assert not store.has("attractors")
-                with pytest.raises(StoreError, match="has no" if damage is None else "has a damaged"):
+                with pytest.raises(
+                    StoreError, match="has no" if damage is None else "has a damaged"
+                ):
                     store.get("attractors")
             compute(store.path, make=SMALL)
             assert contents(store.path) == undisturbed, name
@@ -261,7 +305,10 @@ def test_any_damaged_file_is_found_and_computed_again(memory):
 
 @posix
 @pytest.mark.parametrize("name", ["store.json", "chunks/1.chunk", "artifacts/attractors.json"])
-@pytest.mark.parametrize("device", [os.mkfifo if sys.platform != "win32" else None, lambda file: os.symlink("/dev/zero", file)])
+@pytest.mark.parametrize(
+    "device",
+    [os.mkfifo if sys.platform != "win32" else None, lambda file: os.symlink("/dev/zero", file)],
+)
 def test_a_pipe_or_a_device_in_place_of_a_file_is_not_waited_for(name, device, memory):
     store = compute(memory / "map", make=SMALL)
     undisturbed = contents(store.path)
@@ -294,7 +341,9 @@ def test_a_folder_that_is_gone_is_made_again(name, memory):
 
 
 def test_numbers_of_another_chunk_are_found(tmp_path):
-    """The numbers of one chunk before the last bytes of another, which alone are read where checksums aren't asked for."""
+    """The numbers of one chunk before the last bytes of another, which alone are read where
+    checksums aren't asked for.
+    """
     store = compute(tmp_path / "map")
     one, other = (store.path / "chunks" / f"{name}.chunk" for name in "34")
     one.write_bytes(other.read_bytes()[:-TRAILER] + one.read_bytes()[-TRAILER:])
@@ -303,26 +352,36 @@ def test_numbers_of_another_chunk_are_found(tmp_path):
 
 
 def test_whole_pairs_in_the_wrong_place_are_found_and_computed_again(memory):
-    """What a careless merge of folders does: the file of a chunk, intact, at another number or in another store."""
+    """What a careless merge of folders does: the file of a chunk, intact, at another number or in
+    another store.
+    """
     (memory / "other").mkdir()
     other = Store.create(memory / "other" / "map", IDENTITY | {"study": "another"}, **SMALL)
     with other.lock():
         other.put("attractors", [[3.0]])
         for index in other.missing():
-            other.commit(index, {name: part[::-1].copy() for name, part in values(other, index).items()})
+            other.commit(
+                index, {name: part[::-1].copy() for name, part in values(other, index).items()}
+            )
     (memory / "own").mkdir()
     store = compute(memory / "own" / "map", make=SMALL)
     undisturbed = contents(store.path)
-    carried = {(path, i, j) for path in (store.path, other.path) for i in range(3) for j in range(3)}
+    carried = {
+        (path, i, j) for path in (store.path, other.path) for i in range(3) for j in range(3)
+    }
     for path, i, j in sorted(carried - {(store.path, i, i) for i in range(3)}):
-        if (store.chunks.extent(i).stop - store.chunks.extent(i).start) == (store.chunks.extent(j).stop - store.chunks.extent(j).start):
+        if (store.chunks.extent(i).stop - store.chunks.extent(i).start) == (
+            store.chunks.extent(j).stop - store.chunks.extent(j).start
+        ):
             carry(path, i, store.path, j)
             assert store.damaged(checksums=False) == [j], "seen without reading the chunk"
             with pytest.raises(StoreError, match="is damaged"):
                 store.read(j)
             compute(store.path, make=SMALL)
             assert contents(store.path) == undisturbed, (path, i, j)
-    (store.path / "artifacts/attractors.json").write_bytes((other.path / "artifacts/attractors.json").read_bytes())
+    (store.path / "artifacts/attractors.json").write_bytes(
+        (other.path / "artifacts/attractors.json").read_bytes()
+    )
     compute(store.path, make=SMALL)
     assert contents(store.path) == undisturbed
 
@@ -344,16 +403,31 @@ def carry(source, i, target, j):
     place.write_bytes((source / "chunks" / f"{i}.chunk").read_bytes())
 
 
-# -- more than one process -------------------------------------------------------------------------------------------------------
+# -- more than one process -------------------------------------------------------------------------
 @pytest.mark.parametrize(
-    ("first", "second"), [(None, None), (None, (1, 2)), ((1, 2), None), ((1, 2), (1, 2)), ((1, 2), (3, 4)), ((0, 2), (2, 3))]
+    ("first", "second"),
+    [
+        (None, None),
+        (None, (1, 2)),
+        ((1, 2), None),
+        ((1, 2), (1, 2)),
+        ((1, 2), (3, 4)),
+        ((0, 2), (2, 3)),
+    ],
 )
 def test_second_writer_is_refused(first, second, processes, tmp_path):
     store = Store.create(tmp_path / "map", IDENTITY, **MAKE)
     ready, leave = processes.Queue(), processes.Event()
     holder = start(processes, hold, store.path, first, ready, leave)
     assert ready.get(timeout=20) == "held"
-    with pytest.raises(StoreError, match=rf"written by process {holder.pid} on \S+ since 20\d\d-.*Wait for it"), store.lock(second):
+    with (
+        pytest.raises(
+            StoreError,
+            match=rf"written by process {holder.pid} on \S+ since "
+            rf"20\d\d-.*Wait for it",
+        ),
+        store.lock(second),
+    ):
         pass
     assert len(store.status().writers) == 1
     leave.set()
@@ -395,7 +469,9 @@ def test_shards_at_once_are_one_map(processes, undisturbed, tmp_path):
     """Three processes race to make the store, each computes its shard, one of them backwards."""
     path = tmp_path / "map" / "map"
     path.parent.mkdir()
-    shards = [start(processes, compute, path, (k, 3), order, 0.01) for k, order in enumerate((1, -1, 1))]
+    shards = [
+        start(processes, compute, path, (k, 3), order, 0.01) for k, order in enumerate((1, -1, 1))
+    ]
     for shard in shards:
         shard.join()
         assert shard.exitcode == 0

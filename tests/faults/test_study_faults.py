@@ -1,6 +1,8 @@
-"""A study of basins survives what befalls a computer: kill -9 of the process or of a worker, Ctrl-C, a full disk, damage, a second process.
+"""A study of basins survives what befalls a computer: kill -9 of the process or of a worker,
+Ctrl-C, a full disk, damage, a second process.
 
-Everything here is the command itself, in processes of its own, on the rig at 16 Hz: 576 starts in 24 chunks, four attractors.
+Everything here is the command itself, in processes of its own, on the rig at 16 Hz: 576 starts in
+24 chunks, four attractors.
 """
 
 import json
@@ -44,9 +46,11 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and for
 
 STUDY = small_study(24)
 CHUNKS = 24
-#: The command with small chunks (in a process of --workers too, which imports this file first), and a moment between two commits, so that
-#: there is one to be killed in. Pictures are empty frames unless they are asked for: drawing takes longer than all else together. With
-#: `serve` it runs the study once, by which everything is loaded and compiled, and forks a child for each line: a child has nothing to load.
+#: The command with small chunks (in a process of --workers too, which imports this file first), and
+#: a moment between two commits, so that there is one to be killed in. Pictures are empty frames
+#: unless they are asked for: drawing takes longer than all else together. With `serve` it runs the
+#: study once, by which everything is loaded and compiled, and forks a child for each line: a child
+#: has nothing to load.
 COMMAND = """
 import gc, json, os, signal, sys, time
 import saltus.analysis.basins.pipeline
@@ -102,7 +106,7 @@ def serve(out, study):
         if child == 0:
             os.setsid()  # what is sent to the group of a run reaches its workers, and not the tests
             os.environ.update(environment)
-            signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the tests in the background has it ignored
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # else ignored
             to = os.open(log, os.O_CREAT | os.O_WRONLY | os.O_APPEND)
             os.dup2(to, 1)
             os.dup2(to, 2)
@@ -123,7 +127,12 @@ class Server:
     """Runs the command in children of a process that has loaded everything."""
 
     def __init__(self, place):
-        self.place, self.command, self.study, self.first = place, place / "command.py", place / "study.toml", place / "out"
+        self.place, self.command, self.study, self.first = (
+            place,
+            place / "command.py",
+            place / "study.toml",
+            place / "out",
+        )
         self.logs = {}
         self.command.write_text(COMMAND)
         self.study.write_text(STUDY)
@@ -135,13 +144,18 @@ class Server:
 
     def start(self, *arguments, pause=0.0, pictures=False):
         """Number of the process that runs the command."""
-        log, environment = self.place / f"log{len(self.logs)}.txt", {"PAUSE": str(pause)} | ({"PICTURES": "1"} if pictures else {})
+        log, environment = (
+            self.place / f"log{len(self.logs)}.txt",
+            {"PAUSE": str(pause)} | ({"PICTURES": "1"} if pictures else {}),
+        )
         child = self._answer([list(map(str, arguments)), environment, str(log)])
         self.logs[child] = log
         return child
 
     def end(self, child):
-        """Exit code of the process, minus the number of the signal that ended it; what it printed."""
+        """Exit code of the process, minus the number of the signal that ended it;
+        what it printed.
+        """
         code, log = self._answer(child), self.logs[child]
         return code, log.read_text() if log.exists() else ""
 
@@ -176,7 +190,11 @@ def undisturbed(server):
 
 def contents(folder):
     """Every file of the stores but the locks; drafts must be gone."""
-    files = {str(file.relative_to(folder)): file.read_bytes() for file in (folder / "stores").rglob("*") if file.is_file()}
+    files = {
+        str(file.relative_to(folder)): file.read_bytes()
+        for file in (folder / "stores").rglob("*")
+        if file.is_file()
+    }
     return {name: data for name, data in files.items() if "/locks/" not in name}
 
 
@@ -196,9 +214,11 @@ def wait_for(condition, seconds=300):
         time.sleep(0.005)
 
 
-# -- killed ----------------------------------------------------------------------------------------------------------------------
+# -- killed ----------------------------------------------------------------------------------------
 def test_killed_at_20_random_moments(server, undisturbed, tmp_path):
-    """While attractors are looked for, between chunks, while table and pictures are made; then it goes on as if nothing had been."""
+    """While attractors are looked for, between chunks, while table and pictures are made; then it
+    goes on as if nothing had been.
+    """
     moments, folder, progress, killed = random.Random(4), tmp_path / "out", [0], 0
     for _ in range(20):
         child = server.start(*arguments(server, folder), pause=0.004, pictures=True)
@@ -209,7 +229,9 @@ def test_killed_at_20_random_moments(server, undisturbed, tmp_path):
         killed += server.end(child)[0] == -signal.SIGKILL
         progress.append(committed(folder))
         if (folder / "stores" / "basins").exists():
-            assert Store.open(folder / "stores" / "basins").damaged() == [], "what has a record is true before anything is mended"
+            assert Store.open(folder / "stores" / "basins").damaged() == [], (
+                "what has a record is true before anything is mended"
+            )
         if (folder / "basins.nc").exists():
             load(folder / "basins.nc")
     assert progress == sorted(progress), "what is done stays done"
@@ -225,7 +247,10 @@ def test_killed_at_20_random_moments(server, undisturbed, tmp_path):
 
 
 def ended(child):
-    return Path(f"/proc/{child}/stat").exists() and Path(f"/proc/{child}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    return (
+        Path(f"/proc/{child}/stat").exists()
+        and Path(f"/proc/{child}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    )
 
 
 def test_shards_at_the_same_time_one_of_them_killed(server, undisturbed, tmp_path):
@@ -245,7 +270,7 @@ def test_shards_at_the_same_time_one_of_them_killed(server, undisturbed, tmp_pat
     as_if_undisturbed(folder, undisturbed)
 
 
-# -- processes -------------------------------------------------------------------------------------------------------------------
+# -- processes -------------------------------------------------------------------------------------
 def workers_of(process):
     """The workers that a run has started."""
     found = []
@@ -258,7 +283,9 @@ def workers_of(process):
 
 
 def with_workers(server, folder, count, pause):
-    return server.start("run", server.study, "--out", folder, "--workers", count, "--progress", "none", pause=pause)
+    return server.start(
+        "run", server.study, "--out", folder, "--workers", count, "--progress", "none", pause=pause
+    )
 
 
 def test_the_only_worker_killed(server, undisturbed, tmp_path):
@@ -297,17 +324,29 @@ def sockets_of(processes):
 
 def listening(sockets):
     """Those of the sockets that wait for connections, by any protocol."""
-    tcp = [line.split() for name in ("tcp", "tcp6") for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]]
+    tcp = [
+        line.split()
+        for name in ("tcp", "tcp6")
+        for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]
+    ]
     local = [line.split() for line in Path("/proc/net/unix").read_text().splitlines()[1:]]
-    udp = [line.split() for name in ("udp", "udp6") for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]]
-    waiting = {row[9] for row in tcp if row[3] == "0A"} | {row[6] for row in local if row[3] == "00010000"} | {row[9] for row in udp}
+    udp = [
+        line.split()
+        for name in ("udp", "udp6")
+        for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]
+    ]
+    waiting = (
+        {row[9] for row in tcp if row[3] == "0A"}
+        | {row[6] for row in local if row[3] == "00010000"}
+        | {row[9] for row in udp}
+    )
     return waiting & sockets
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="looks into /proc")
 def test_two_workers_listen_nowhere_and_one_of_them_is_killed(server, undisturbed, tmp_path):
-    """Nobody else can hand them work: no socket of the run waits for a connection, on any port or path. The other one and a successor
-    finish, with the bits of one thread.
+    """Nobody else can hand them work: no socket of the run waits for a connection, on any port or
+    path. The other one and a successor finish, with the bits of one thread.
     """
     with socket.create_server(("127.0.0.1", 0)):
         assert listening(sockets_of([os.getpid()])), "it would be seen"
@@ -337,7 +376,9 @@ def test_ctrl_c_with_workers(server, undisturbed, tmp_path):
     assert code == 130, text
     assert text.count("saltus: stopped") == 2, text  # what to type; and that files are whole
     assert "Traceback" not in text
-    wait_for(lambda: not [one for one in processes if Path(f"/proc/{one}").exists() and not ended(one)])
+    wait_for(
+        lambda: not [one for one in processes if Path(f"/proc/{one}").exists() and not ended(one)]
+    )
     code, text = server.run("resume", folder, "--threads", 1, "--progress", "none")
     assert code == 0, text
     as_if_undisturbed(folder, undisturbed)
@@ -354,14 +395,23 @@ with _without_ctrl_c():
 
 
 def test_no_process_sees_ctrl_c_from_its_first_moment_on():
-    """What multiprocessing starts beside the first process unblocks the signal: a worker that still started ended in a traceback."""
-    assert subprocess.run([sys.executable, "-c", MASK], capture_output=True, text=True, check=True).stdout == "True\n"
+    """What multiprocessing starts beside the first process unblocks the signal: a worker that still
+    started ended in a traceback.
+    """
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", MASK], capture_output=True, text=True, check=True
+        ).stdout
+        == "True\n"
+    )
 
 
-# -- Ctrl-C ----------------------------------------------------------------------------------------------------------------------
+# -- Ctrl-C ----------------------------------------------------------------------------------------
 @pytest.mark.parametrize("goal", [0, 5, CHUNKS])
 def test_ctrl_c(server, undisturbed, tmp_path, goal):
-    """While attractors are looked for, between chunks, while results are made: a message, exit code 130, nothing lost."""
+    """While attractors are looked for, between chunks, while results are made: a message, exit code
+    130, nothing lost.
+    """
     folder = tmp_path / "out"
     child = server.start(*arguments(server, folder), pause=0.02, pictures=True)
     wait_for(lambda: (folder / "stores" / "basins").exists() and committed(folder) >= goal)
@@ -380,7 +430,7 @@ def test_ctrl_c(server, undisturbed, tmp_path, goal):
     as_if_undisturbed(folder, undisturbed)
 
 
-# -- a full disk -----------------------------------------------------------------------------------------------------------------
+# -- a full disk -----------------------------------------------------------------------------------
 @pytest.fixture
 def small_disk(tmp_path):
     """A function that makes a file system of so many kB, if this machine lets us make one."""
@@ -389,7 +439,9 @@ def small_disk(tmp_path):
 
     def make(size):
         mounted = sys.platform == "linux" and subprocess.run(
-            ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(place)], capture_output=True, check=False
+            ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(place)],
+            capture_output=True,
+            check=False,
         )
         if not mounted or mounted.returncode:
             pytest.skip("mounting a small file system needs rights that this user doesn't have")
@@ -425,8 +477,11 @@ def test_full_disk_leaves_no_half_picture(server, small_disk):
     for file in disk.glob("out/basins*"):
         file.unlink()
     free = os.statvfs(disk).f_bavail * os.statvfs(disk).f_bsize
-    (disk / "ballast").write_bytes(b"\0" * (free - 80_000))  # room for map and table, not for the picture
-    code, text = server.run("resume", disk / "out", "--threads", 1, "--progress", "none", pictures=True)
+    # room for map and table, not for the picture
+    (disk / "ballast").write_bytes(b"\0" * (free - 80_000))
+    code, text = server.run(
+        "resume", disk / "out", "--threads", 1, "--progress", "none", pictures=True
+    )
     assert code == 2, text
     assert "No space left on device" in text
     assert load(disk / "out" / "basins.nc").sizes["attractor"] == 4
@@ -434,7 +489,7 @@ def test_full_disk_leaves_no_half_picture(server, small_disk):
         matplotlib.image.imread(picture)
 
 
-# -- damage, other studies, other processes --------------------------------------------------------------------------------------
+# -- damage, other studies, other processes --------------------------------------------------------
 @pytest.fixture(scope="module")
 def killed_half_way(server, tmp_path_factory):
     """A folder whose run was killed after five chunks."""
@@ -495,7 +550,9 @@ def test_a_second_process_is_refused(server, undisturbed, tmp_path, monkeypatch)
     assert committed(folder) < CHUNKS
     monkeypatch.setattr(pipeline, "CHUNK", 24)
     monkeypatch.setattr(maps, "CHUNK", 24)
-    second = CliRunner().invoke(app, ["resume", str(folder), "--threads", "1", "--progress", "none"], catch_exceptions=False)
+    second = CliRunner().invoke(
+        app, ["resume", str(folder), "--threads", "1", "--progress", "none"], catch_exceptions=False
+    )
     seen = CliRunner().invoke(app, ["status", str(folder)], catch_exceptions=False)
     os.kill(first, signal.SIGCONT)
     assert second.exit_code == 2, second.output
@@ -507,7 +564,7 @@ def test_a_second_process_is_refused(server, undisturbed, tmp_path, monkeypatch)
     as_if_undisturbed(folder, undisturbed)
 
 
-# -- a poison cell ---------------------------------------------------------------------------------------------------------------
+# -- a poison cell ---------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def small_chunks():
     with small_maps(48):
@@ -516,7 +573,9 @@ def small_chunks():
 
 @pytest.fixture(scope="module")
 def mapped(small_chunks, tmp_path_factory):
-    """A function that computes the map by a method, in the same chunks and with the same attractors each time."""
+    """A function that computes the map by a method, in the same chunks and with the same attractors
+    each time.
+    """
     (job,) = maps_of(parse(STUDY.replace("count = 24", "count = 12")))
     found = job.plan.scout(1)
 
@@ -568,7 +627,9 @@ def poisoned(mapped, monkeypatch):
 )
 @pytest.mark.parametrize("cell", [70, 96])
 def test_a_poison_cell_hurts_only_itself(healthy, poisoned, start, method, label, status, cell):
-    """A start that overflows, isn't a number, or never gets anywhere has a code; all other cells are those of a map without it."""
+    """A start that overflows, isn't a number, or never gets anywhere has a code; all other cells
+    are those of a map without it.
+    """
     healthy_, poisoned_ = healthy(method), poisoned(method, cell, start)
     here = np.unravel_index(cell, healthy_.basin.shape)
     assert int(poisoned_.basin.values[here]) == label
@@ -581,5 +642,7 @@ def test_a_poison_cell_hurts_only_itself(healthy, poisoned, start, method, label
     for name in ("attractor_period", "attractor_peak", "attractor_x"):
         np.testing.assert_array_equal(poisoned_[name], healthy_[name])
     assert poisoned_.attrs["unsettled_cells"] == healthy_.attrs["unsettled_cells"] + 1
-    told = f"{int((poisoned_.basin == label).sum())} starts {'escaped' if label == -1 else 'failed'}:"
+    told = (
+        f"{int((poisoned_.basin == label).sum())} starts {'escaped' if label == -1 else 'failed'}:"
+    )
     assert told in " ".join(attractor_table("a", poisoned_).notes)

@@ -1,4 +1,6 @@
-"""Study files from anywhere: what they may read, what is kept of them, and that no text of theirs ends in a traceback from inside."""
+"""Study files from anywhere: what they may read, what is kept of them, and that no text of theirs
+ends in a traceback from inside.
+"""
 
 import contextlib
 import os
@@ -19,7 +21,10 @@ from saltus.study.setting.inputs import Input, Inputs
 from saltus.study.tables.read import parse, read
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes and links are POSIX")
-HEAD = '[study]\nname = "one start"\n[system]\nmodel = "delangre"\ncase = "b"\nforce = "4 N"\nfrequency = "15 Hz"\n'
+HEAD = (
+    '[study]\nname = "one start"\n[system]\nmodel = "delangre"\ncase = "b"\nforce = "4 '
+    'N"\nfrequency = "15 Hz"\n'
+)
 MOTION = HEAD + '[simulate]\nstart = { x = "1 mm", v = "0 m/s" }\nperiods = 5\n'
 #: Contacts of this motion that nobody printed.
 PRINTED = "event_number,time_s\n1,0.02\n"
@@ -52,8 +57,10 @@ def study(tmp_path):
     return write
 
 
-# -- what a study reads ----------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("name", ["/etc/passwd", "../secret.csv", "a/../../secret.csv", "link.csv", "out/secret.csv"])
+# -- what a study reads ----------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    "name", ["/etc/passwd", "../secret.csv", "a/../../secret.csv", "link.csv", "out/secret.csv"]
+)
 def test_a_study_reads_nothing_outside_its_folder(study, tmp_path, name):
     """Absolute, by .., through a link to a file, through a link to a folder."""
     (tmp_path / "secret.csv").write_text("event_number,time_s\n1,hunter2\n")
@@ -71,8 +78,15 @@ def test_a_folder_that_the_user_allows_is_read(study, tmp_path):
     (tmp_path / "data" / "t.csv").write_text(PRINTED.replace("1,", "0,"))
     for name in ("../data/t.csv", str(tmp_path / "data" / "t.csv"), "t.csv"):
         file = study(MOTION + f'[compare]\nprinted = "{name}"\n')
-        refused(saltus("run", file, "--out", tmp_path / "result", "--inputs", tmp_path / "data"), "line 2", "no whole number from 1")
-    refused(saltus("run", file, "--out", tmp_path / "result", "--inputs", tmp_path / "nowhere"), "there is no such folder")
+        refused(
+            saltus("run", file, "--out", tmp_path / "result", "--inputs", tmp_path / "data"),
+            "line 2",
+            "no whole number from 1",
+        )
+    refused(
+        saltus("run", file, "--out", tmp_path / "result", "--inputs", tmp_path / "nowhere"),
+        "there is no such folder",
+    )
 
 
 @posix
@@ -81,8 +95,13 @@ def test_what_is_no_file_is_refused_at_once(study, tmp_path):
     os.mkfifo(file.parent / "pipe.csv")
     os.mkfifo(file.parent / "study.pipe")
     refused(saltus("run", file, "--out", tmp_path / "result"), "a pipe, a device or a socket")
-    refused(saltus("run", file.parent / "study.pipe", "--out", tmp_path / "result"), "a pipe, a device or a socket")
-    refused(saltus("run", "/dev/zero", "--out", tmp_path / "result"), "a pipe, a device or a socket")
+    refused(
+        saltus("run", file.parent / "study.pipe", "--out", tmp_path / "result"),
+        "a pipe, a device or a socket",
+    )
+    refused(
+        saltus("run", "/dev/zero", "--out", tmp_path / "result"), "a pipe, a device or a socket"
+    )
     refused(saltus("run", file.parent, "--out", tmp_path / "result"), "it is a folder")
     (file.parent / "pipe.csv").unlink()
     with (file.parent / "pipe.csv").open("wb") as large:
@@ -93,7 +112,7 @@ def test_what_is_no_file_is_refused_at_once(study, tmp_path):
     assert not (tmp_path / "result" / "inputs").exists(), "nothing is copied before it is checked"
 
 
-# -- what is kept of it ----------------------------------------------------------------------------------------------------------
+# -- what is kept of it ----------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     """A study with two inputs of one name, CRLF and a mark before the text, run once."""
@@ -117,7 +136,10 @@ def test_inputs_of_one_name_stay_two(out):
     before = (out / "run.csv").read_text()
     assert saltus("resume", out).exit_code == 0
     assert (out / "run.csv").read_text() == before
-    assert sorted(file.read_text() for file in (out / "inputs").iterdir()) == [PRINTED, PRINTED.replace("0.02", "0.03")]
+    assert sorted(file.read_text() for file in (out / "inputs").iterdir()) == [
+        PRINTED,
+        PRINTED.replace("0.02", "0.03"),
+    ]
 
 
 def test_the_answer_holds_the_hash_of_each_input(finished, out):
@@ -125,7 +147,9 @@ def test_the_answer_holds_the_hash_of_each_input(finished, out):
 
     table = (out / "run.csv").read_text()
     for name in ("a/t.csv", "b/t.csv"):
-        assert f"# {name}: SHA-256 {hashlib.sha256((finished / name).read_bytes()).hexdigest()}\n" in table
+        assert (
+            f"# {name}: SHA-256 {hashlib.sha256((finished / name).read_bytes()).hexdigest()}\n"
+        ) in table
 
 
 def test_the_copy_is_the_study_to_the_byte(finished, out):
@@ -134,9 +158,13 @@ def test_the_copy_is_the_study_to_the_byte(finished, out):
 
 @pytest.mark.parametrize("name", ["study.toml", "inputs/t.csv", "inputs/t-2.csv", "study.seal"])
 def test_what_changed_since_it_was_written_is_told(out, name):
-    """The copy of the study still is a study, the tables still are tables, and neither is what was asked."""
+    """The copy of the study still is a study, the tables still are tables, and neither is what was
+    asked.
+    """
     file = out / name
-    changed = file.read_bytes().replace(b"4 N", b"5 N").replace(b"0.0", b"0.1").replace(b'"sha', b'"hsa')
+    changed = (
+        file.read_bytes().replace(b"4 N", b"5 N").replace(b"0.0", b"0.1").replace(b'"sha', b'"hsa')
+    )
     assert changed != file.read_bytes()
     file.write_bytes(changed)
     refused(saltus("resume", out), "changed since it was written")
@@ -167,7 +195,7 @@ def test_a_link_that_leaves_the_folder_is_not_written_through(out, tmp_path):
     assert list((tmp_path / "elsewhere").iterdir()) == []
 
 
-# -- names -----------------------------------------------------------------------------------------------------------------------
+# -- names -----------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
@@ -176,10 +204,22 @@ def test_a_link_that_leaves_the_folder_is_not_written_through(out, tmp_path):
         ('"one start"', r'"x\n=cmd|calc,1"', "must be one line of plain text"),
         ('"one start"', r'" "', "must be one line of plain text"),
         ('"one start"', '"' + "x" * 5000 + '"', "a text of 5000 characters"),
-        ("periods = 5", "periods = 1000000000000000000", "must be less than or equal to 1000000000000"),
+        (
+            "periods = 5",
+            "periods = 1000000000000000000",
+            "must be less than or equal to 1000000000000",
+        ),
         ("periods = 5", "periods = 9223372036854775808", "2^63"),
-        ("periods = 5", "periods = 5\nsamples = 10000000000", "must be less than or equal to 2147483647"),
-        ("[simulate]", f'[lyapunov]\nname = "{"a" * 150}"\n[simulate]', "gives a file name of 150 characters"),
+        (
+            "periods = 5",
+            "periods = 5\nsamples = 10000000000",
+            "must be less than or equal to 2147483647",
+        ),
+        (
+            "[simulate]",
+            f'[lyapunov]\nname = "{"a" * 150}"\n[simulate]',
+            "gives a file name of 150 characters",
+        ),
         ('"4 N"', '"' + "(" * 3000 + '"', "a text of 3000 characters in 'force'"),
     ],
 )
@@ -191,10 +231,12 @@ def test_names_and_numbers_out_of_bounds(old, new, told):
     assert len(str(caught.value)) < 400
 
 
-# -- mutated studies -------------------------------------------------------------------------------------------------------------
+# -- mutated studies -------------------------------------------------------------------------------
 @pytest.mark.parametrize("seed", [7, pytest.param(None, marks=pytest.mark.nightly)])
 def test_a_mutated_study_is_read_or_refused_in_words(seed):
-    """Reader and check against the system, 2000 times; one that is valid goes no further, so that nothing is compiled."""
+    """Reader and check against the system, 2000 times; one that is valid goes no further, so that
+    nothing is compiled.
+    """
     seed = random.randrange(2**31) if seed is None else seed
     draw, outcomes, longest = random.Random(seed), {"valid": 0, "refused": 0}, 0
     for trial in range(2000):
@@ -206,7 +248,9 @@ def test_a_mutated_study_is_read_or_refused_in_words(seed):
             outcomes["refused"] += 1
             longest = max(longest, len(str(error)))
         except Exception as error:
-            raise AssertionError(f"seed {seed}, trial {trial}: {error!r} from\n{text[:3000]}") from error
+            raise AssertionError(
+                f"seed {seed}, trial {trial}: {error!r} from\n{text[:3000]}"
+            ) from error
     assert min(outcomes.values()) > 100, outcomes
     assert longest < 3000, "a message repeats no long value"
 

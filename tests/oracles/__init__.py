@@ -1,1 +1,3 @@
-"""Independent truth: solvers that share no code with the package, for tests and benchmarks to be held against."""
+"""Independent truth: solvers that share no code with the package, for tests and benchmarks to be
+held against.
+"""

@@ -1,6 +1,8 @@
-"""Write the 40-digit reference data of the deLangre rig: ``python -m tests.oracles.generate_reference`` (about 5 minutes, one core).
+"""Write the 40-digit reference data of the deLangre rig: ``python -m
+tests.oracles.generate_reference`` (about 5 minutes, one core).
 
-Every number handed to the integrator is the double that a user would type, so that a solver in double precision starts from the same one.
+Every number handed to the integrator is the double that a user would type, so that a solver in
+double precision starts from the same one.
 """
 
 from __future__ import annotations
@@ -17,14 +19,31 @@ from . import high_precision
 REFERENCE = Path(__file__).parents[1] / "reference"
 SEED = 20210
 RIG = {"mass": 3.0, "damping_ratio": 0.03, "natural_frequency": 5.0, "cubic": 7e8}
-B4 = {**RIG, "contact_stiffness": 1.4e4, "lower_gap": 0.0, "upper_gap": 0.4e-3, "force": 4.0, "frequency": 15.0}
+B4 = {
+    **RIG,
+    "contact_stiffness": 1.4e4,
+    "lower_gap": 0.0,
+    "upper_gap": 0.4e-3,
+    "force": 4.0,
+    "frequency": 15.0,
+}
 PERIODS = 5
 NUDGE = mpf(10) ** -20
-RESULT = ("contacts", "margin_m", "x_end_m", "v_end_m_per_s", "dxend_dx0", "dxend_dv0_s", "contact_times_s")
+RESULT = (
+    "contacts",
+    "margin_m",
+    "x_end_m",
+    "v_end_m_per_s",
+    "dxend_dx0",
+    "dxend_dv0_s",
+    "contact_times_s",
+)
 
 
 def solve(parameters: dict, x: float, v: float) -> list:
-    """The :data:`RESULT` columns of one start: end state to 30 digits, its sensitivity by a 1e-20 nudge, contact times to 22 digits."""
+    """The :data:`RESULT` columns of one start: end state to 30 digits, its sensitivity by a 1e-20
+    nudge, contact times to 22 digits.
+    """
     end = high_precision.simulate(parameters, x, v, PERIODS)
     with mp.workdps(50):
         along_x = (high_precision.simulate(parameters, x + NUDGE, v, PERIODS).x - end.x) / NUDGE
@@ -42,10 +61,16 @@ def solve(parameters: dict, x: float, v: float) -> list:
 
 
 def starts() -> list[tuple[str, float, float]]:
-    """Starts in case b4: an 8 x 8 grid of cell centres and 64 random ones in [-5, 5] mm x [-1, 1] m/s, and the paper's at rest."""
-    grid = [("grid", (-4.375 + 1.25 * i) * 1e-3, -0.875 + 0.25 * j) for i in range(8) for j in range(8)]
+    """Starts in case b4: an 8 x 8 grid of cell centres and 64 random ones in [-5, 5] mm x [-1, 1]
+    m/s, and the paper's at rest.
+    """
+    grid = [
+        ("grid", (-4.375 + 1.25 * i) * 1e-3, -0.875 + 0.25 * j) for i in range(8) for j in range(8)
+    ]
     rng = np.random.default_rng(SEED)
-    random = [("random", float(x), float(v)) for x, v in rng.uniform((-5e-3, -1.0), (5e-3, 1.0), (64, 2))]
+    random = [
+        ("random", float(x), float(v)) for x, v in rng.uniform((-5e-3, -1.0), (5e-3, 1.0), (64, 2))
+    ]
     paper = [("at_rest", x, 0.0) for x in (0.0, 0.2e-3, 0.32e-3, 0.4e-3, 1e-3, 2e-3)]
     return grid + random + paper
 

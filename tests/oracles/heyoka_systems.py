@@ -1,10 +1,13 @@
-"""Three published systems (and the rig) written by hand for heyoka: an independent solver for models that have no closed form.
+"""Three published systems (and the rig) written by hand for heyoka: an independent solver for
+models that have no closed form.
 
-heyoka's events go wrong in known ways: a start at rest on a boundary hangs it; its cool-down after an event swallows shallow grazes; a
-field that switches by itself is silently wrong; an event function that is exactly zero at the start of a step loses its next root (7.13.2:
-x'' = 1 - x, x = 0, v = -0.1: the return to x = 0 at t = 0.19934 isn't reported); ``x**3`` is NaN at x = 0. So here every mode has an
-integrator of its own, with a smooth field and terminal events for its exits only, each in the one direction that leaves the mode, without
-cool-down. Contacts are snapped to the boundary and the next arc starts one floating-point number inside its mode. The gaps' signs are
+heyoka's events go wrong in known ways: a start at rest on a boundary hangs it; its cool-down after
+an event swallows shallow grazes; a field that switches by itself is silently wrong; an event
+function that is exactly zero at the start of a step loses its next root (7.13.2: x'' = 1 - x, x =
+0, v = -0.1: the return to x = 0 at t = 0.19934 isn't reported); ``x**3`` is NaN at x = 0. So here
+every mode has an integrator of its own, with a smooth field and terminal events for its exits only,
+each in the one direction that leaves the mode, without cool-down. Contacts are snapped to the
+boundary and the next arc starts one floating-point number inside its mode. The gaps' signs are
 checked after each step, steps are bounded.
 """
 
@@ -34,7 +37,9 @@ class Clearance:
 
 @dataclass(frozen=True)
 class Equations:
-    """States, parameter names, clearances, and field(t, states, parameters, stretch): ``stretch`` of each contact spring, 0 when apart."""
+    """States, parameter names, clearances, and field(t, states, parameters, stretch): ``stretch``
+    of each contact spring, 0 when apart.
+    """
 
     states: tuple[str, ...]
     parameters: tuple[str, ...]
@@ -61,7 +66,8 @@ class Run:
     end : float array (states,)
         State at the end.
     margin : float
-        Smallest gap to a boundary of the mode at which a relative motion turned [m or rad]: how close another sequence of contacts is.
+        Smallest gap to a boundary of the mode at which a relative motion turned [m or rad]: how
+        close another sequence of contacts is.
     """
 
     times: np.ndarray
@@ -75,8 +81,16 @@ class Run:
 
 def _chain(t, y, p, stretch):
     x1, x2, v1, v2 = y
-    to_ground = p["ground_stiffness"] * x1 + p["ground_damping"] * v1 + p["ground_contact_stiffness"] * stretch[0]
-    between = p["coupling_stiffness"] * (x2 - x1) + p["coupling_damping"] * (v2 - v1) + p["coupling_contact_stiffness"] * stretch[1]
+    to_ground = (
+        p["ground_stiffness"] * x1
+        + p["ground_damping"] * v1
+        + p["ground_contact_stiffness"] * stretch[0]
+    )
+    between = (
+        p["coupling_stiffness"] * (x2 - x1)
+        + p["coupling_damping"] * (v2 - v1)
+        + p["coupling_contact_stiffness"] * stretch[1]
+    )
     force = p["force"] * hy.cos(2 * np.pi * p["frequency"] * t)
     return v1, v2, (force + between - to_ground) / p["first_mass"], -between / p["second_mass"]
 
@@ -85,7 +99,9 @@ def _gear_pair(t, y, p, stretch):
     wave = hy.cos(2 * np.pi * p["mesh_frequency"] * t)
     tooth = p["mesh_stiffness"] * (1 + p["stiffness_variation"] * wave) * stretch[0]
     dashpot = 2 * p["damping_ratio"] * hy.sqrt(p["mesh_stiffness"] * p["mesh_mass"]) * y[1]
-    return y[1], (p["mean_force"] + p["alternating_force"] * wave - dashpot - tooth) / p["mesh_mass"]
+    return y[1], (p["mean_force"] + p["alternating_force"] * wave - dashpot - tooth) / p[
+        "mesh_mass"
+    ]
 
 
 def _aeroelastic(t, y, p, stretch):
@@ -98,12 +114,21 @@ def _aeroelastic(t, y, p, stretch):
         lift * b * (0.5 + a) - p["pitch_damping"] * pitch_rate - p["pitch_stiffness"] * stretch[0],
     )
     m, s, i = p["mass"], p["mass"] * p["imbalance"] * b, p["inertia"]
-    return plunge_rate, pitch_rate, (i * right[0] - s * right[1]) / (m * i - s * s), (m * right[1] - s * right[0]) / (m * i - s * s)
+    return (
+        plunge_rate,
+        pitch_rate,
+        (i * right[0] - s * right[1]) / (m * i - s * s),
+        (m * right[1] - s * right[0]) / (m * i - s * s),
+    )
 
 
 def _rig(t, y, p, stretch):
     wn, w = 2 * np.pi * p["natural_frequency"], 2 * np.pi * p["frequency"]
-    force = p["force"] * (1 - 18 / (w * w)) * hy.cos(w * t) - p["contact_stiffness"] * stretch[0] - p["cubic"] * y[0] * y[0] * y[0]
+    force = (
+        p["force"] * (1 - 18 / (w * w)) * hy.cos(w * t)
+        - p["contact_stiffness"] * stretch[0]
+        - p["cubic"] * y[0] * y[0] * y[0]
+    )
     return y[1], force / p["mass"] - 2 * p["damping_ratio"] * wn * y[1] - wn * wn * y[0]
 
 
@@ -119,22 +144,30 @@ SYSTEMS = {
     "chain": Equations(
         ("x1", "x2", "v1", "v2"),
         _names(
-            "first_mass second_mass ground_stiffness coupling_stiffness ground_damping coupling_damping ground_contact_stiffness "
+            "first_mass second_mass ground_stiffness coupling_stiffness ground_damping "
+            "coupling_damping ground_contact_stiffness "
             "ground_gap coupling_contact_stiffness coupling_gap force frequency"
         ),
-        (_symmetric(lambda y: y[0], "ground_gap", 0), _symmetric(lambda y: y[1] - y[0], "coupling_gap", 1, 0)),
+        (
+            _symmetric(lambda y: y[0], "ground_gap", 0),
+            _symmetric(lambda y: y[1] - y[0], "coupling_gap", 1, 0),
+        ),
         _chain,
     ),
     "gear_pair": Equations(
         ("x", "v"),
-        _names("mesh_mass damping_ratio mesh_stiffness stiffness_variation gap mean_force alternating_force mesh_frequency"),
+        _names(
+            "mesh_mass damping_ratio mesh_stiffness stiffness_variation gap mean_force "
+            "alternating_force mesh_frequency"
+        ),
         (_symmetric(lambda y: y[0], "gap", 0),),
         _gear_pair,
     ),
     "aeroelastic": Equations(
         ("plunge", "pitch", "plunge_rate", "pitch_rate"),
         _names(
-            "airspeed mass inertia imbalance half_chord elastic_axis plunge_stiffness pitch_stiffness pitch_gap plunge_damping "
+            "airspeed mass inertia imbalance half_chord elastic_axis plunge_stiffness "
+            "pitch_stiffness pitch_gap plunge_damping "
             "pitch_damping air_density lift_slope"
         ),
         (_symmetric(lambda y: y[1], "pitch_gap", 1),),
@@ -142,7 +175,10 @@ SYSTEMS = {
     ),
     "delangre": Equations(
         ("x", "v"),
-        _names("mass damping_ratio natural_frequency cubic contact_stiffness lower_gap upper_gap force frequency"),
+        _names(
+            "mass damping_ratio natural_frequency cubic contact_stiffness lower_gap upper_gap "
+            "force frequency"
+        ),
         (Clearance(lambda y: y[0], lambda p: -p["lower_gap"], lambda p: p["upper_gap"], 0),),
         _rig,
     ),
@@ -152,7 +188,8 @@ SYSTEMS = {
 class _Arc:
     """heyoka's integrator for one mode: a side (-1, 0, +1) for each clearance.
 
-    ``exits`` holds (clearance, side of the boundary, sign of its displacement minus boundary inside the mode, expression of that).
+    ``exits`` holds (clearance, side of the boundary, sign of its displacement minus boundary inside
+    the mode, expression of that).
     """
 
     def __init__(self, name: str, sides: tuple[int, ...], tolerance: float):
@@ -162,18 +199,29 @@ class _Arc:
         moves = [clearance.displacement(states) for clearance in equations.clearances]
         self.equations, self.parameters, self.turning = equations, {}, []
         stretch, self.exits = [], []
-        for number, (clearance, side, move) in enumerate(zip(equations.clearances, sides, moves, strict=True)):
+        for number, (clearance, side, move) in enumerate(
+            zip(equations.clearances, sides, moves, strict=True)
+        ):
             bounds = {-1: clearance.low(values), 1: clearance.high(values)}
             stretch.append(move - bounds[side] if side else 0.0)
-            self.exits += [(number, at, side or -at, move - bounds[at]) for at in ((side,) if side else (-1, 1))]
+            self.exits += [
+                (number, at, side or -at, move - bounds[at])
+                for at in ((side,) if side else (-1, 1))
+            ]
         rates = equations.field(hy.time, states, values, stretch)
-        falling = [hy.event_direction.negative if sign > 0 else hy.event_direction.positive for *_, sign, _ in self.exits]
+        falling = [
+            hy.event_direction.negative if sign > 0 else hy.event_direction.positive
+            for *_, sign, _ in self.exits
+        ]
         self.integrator = hy.taylor_adaptive(
             list(zip(states, rates, strict=True)),
             [0.0] * len(states),
             pars=[1.0] * len(equations.parameters),
             tol=tolerance,
-            t_events=[hy.t_event(e[3], direction=d, cooldown=0.0) for e, d in zip(self.exits, falling, strict=True)],
+            t_events=[
+                hy.t_event(e[3], direction=d, cooldown=0.0)
+                for e, d in zip(self.exits, falling, strict=True)
+            ],
             nt_events=[self._turn(e, rates) for e in self.exits],
         )
 
@@ -188,7 +236,9 @@ class _Arc:
         return hy.nt_event(rate, note)
 
     def begin(self, parameters, state, time, crossed):
-        """Set the start of an arc; ``crossed`` is the (clearance, side) of the boundary it starts on, or None."""
+        """Set the start of an arc; ``crossed`` is the (clearance, side) of the boundary it starts
+        on, or None.
+        """
         self.parameters, integrator = parameters, self.integrator
         integrator.pars[:] = [parameters[key] for key in self.equations.parameters]
         integrator.state[:], integrator.time = state, time
@@ -228,7 +278,10 @@ def _start_sides(equations, state, parameters):
     half = len(state) // 2
     rates = np.r_[state[half:], np.zeros(half)]
     return tuple(
-        _start_side(c.displacement(state), c.displacement(rates), c.low(parameters), c.high(parameters)) for c in equations.clearances
+        _start_side(
+            c.displacement(state), c.displacement(rates), c.low(parameters), c.high(parameters)
+        )
+        for c in equations.clearances
     )
 
 
@@ -244,7 +297,10 @@ def _advance(arc: _Arc, t_end: float, budget):
         if outcome not in (hy.taylor_outcome.success, hy.taylor_outcome.time_limit):
             raise ArithmeticError(f"heyoka stopped: {outcome}")
         if min(arc.gap(exit_, integrator.state) for exit_ in arc.exits) < -1e-15:
-            raise ArithmeticError(f"heyoka passed a boundary without an event before {integrator.time} s: {integrator.state}")
+            raise ArithmeticError(
+                f"heyoka passed a boundary without an event before "
+                f"{integrator.time} s: {integrator.state}"
+            )
     return None
 
 
@@ -285,8 +341,12 @@ def simulate(name: str, parameters: dict, start, t_end: float, *, tolerance: flo
         number, at, sign, _ = left
         clearance, crossed = equations.clearances[number], (number, at)
         boundary = clearance.low(parameters) if at < 0 else clearance.high(parameters)
-        state[clearance.moved] = boundary + (0.0 if clearance.base is None else state[clearance.base])
-        sides = tuple((0 if sides[i] else at) if i == number else side for i, side in enumerate(sides))
+        state[clearance.moved] = boundary + (
+            0.0 if clearance.base is None else state[clearance.base]
+        )
+        sides = tuple(
+            (0 if sides[i] else at) if i == number else side for i, side in enumerate(sides)
+        )
         found.append((time, number, at, -sign, state.copy()))
     columns = list(zip(*found, strict=True)) or [[], [], [], [], np.empty((0, state.size))]
     return Run(

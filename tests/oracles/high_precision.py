@@ -1,9 +1,10 @@
 """The deLangre rig to 40 digits: Taylor series in mpmath, contacts isolated by proof.
 
-One arc is expanded to order :data:`ORDER` about its start. On the step s in [0, h] the gap polynomial g satisfies |g''| <= B with
-B = sum k (k - 1) |g_k| h^(k - 2), so no root lies before the first root of g + g' s - B s^2 / 2: the search marches by that root and then
-polishes with Newton's method. The step is cut at the contact, the displacement set to the boundary exactly, the series begun anew.
-Nothing here is shared with the package or with :mod:`piecewise_linear`.
+One arc is expanded to order :data:`ORDER` about its start. On the step s in [0, h] the gap
+polynomial g satisfies |g''| <= B with B = sum k (k - 1) |g_k| h^(k - 2), so no root lies before the
+first root of g + g' s - B s^2 / 2: the search marches by that root and then polishes with Newton's
+method. The step is cut at the contact, the displacement set to the boundary exactly, the series
+begun anew. Nothing here is shared with the package or with :mod:`piecewise_linear`.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ class Trajectory:
     x, v : mpf
         State at the end [m], [m/s].
     margin : mpf
-        Smallest distance to another sequence of contacts [m]: gap left when the motion turned back before a watched boundary, or depth
-        reached beyond one.
+        Smallest distance to another sequence of contacts [m]: gap left when the motion turned back
+        before a watched boundary, or depth reached beyond one.
     """
 
     times: list
@@ -59,7 +60,9 @@ def _series(rig, mode, t, x, v, order):
     for n in range(order):
         squares.append(mp.fdot(xs, reversed(xs)))
         cube = mp.fdot(squares, reversed(xs)) if rig["cubic"] else 0
-        rate = rig["drive"] * turn * wave[n % 4] - decay * v_n - linear * xs[n] - rig["cubic"] * cube
+        rate = (
+            rig["drive"] * turn * wave[n % 4] - decay * v_n - linear * xs[n] - rig["cubic"] * cube
+        )
         if n == 0:
             rate += constant
         xs.append(v_n / (n + 1))
@@ -69,7 +72,9 @@ def _series(rig, mode, t, x, v, order):
 
 
 def _step_size(xs, tolerance):
-    """Step over which the last terms stay below the tolerance, relative to the largest displacement term."""
+    """Step over which the last terms stay below the tolerance, relative to the largest displacement
+    term.
+    """
     order = len(xs) - 1
     scale = max(abs(xs[0]), abs(xs[1]) / 100, mpf(10) ** -8)
     sizes = [(tolerance * scale / abs(xs[k])) ** (mpf(1) / k) for k in (order - 1, order) if xs[k]]
@@ -96,7 +101,9 @@ def _turn(poly, s, after):
 
 
 class _Watch:
-    """One boundary of a mode: its gap polynomial on the present step, and what was seen of it since the mode was entered."""
+    """One boundary of a mode: its gap polynomial on the present step, and what was seen of it since
+    the mode was entered.
+    """
 
     def __init__(self, which, sign, boundary, entered):
         self.which, self.sign, self.boundary, self.entered = which, sign, boundary, entered
@@ -105,7 +112,9 @@ class _Watch:
     def load(self, xs, h, inside):
         self.poly = [self.sign * c for c in xs]
         self.poly[0] -= self.sign * self.boundary
-        self.bound = sum(k * (k - 1) * abs(c) * h ** (k - 2) for k, c in enumerate(self.poly) if k > 1)
+        self.bound = sum(
+            k * (k - 1) * abs(c) * h ** (k - 2) for k, c in enumerate(self.poly) if k > 1
+        )
         self.inside = inside  # False on the step that starts on this boundary
 
     def look(self, s, last):
@@ -122,11 +131,15 @@ class _Watch:
         return gap, slope
 
     def leave(self, h):
-        """Time until which the boundary that the step starts on can't be met again: g >= s^k (g_k - s sum of the later |g_j| h^(j-k-1))."""
+        """Time until which the boundary that the step starts on can't be met again: g >= s^k (g_k -
+        s sum of the later |g_j| h^(j-k-1)).
+        """
         k = next(k for k, c in enumerate(self.poly) if c)
         if self.poly[k] < 0:
             raise ArithmeticError("the motion leaves the mode at its start")
-        return self.poly[k] / (2 * sum(abs(c) * h ** (j - k - 1) for j, c in enumerate(self.poly) if j > k))
+        return self.poly[k] / (
+            2 * sum(abs(c) * h ** (j - k - 1) for j, c in enumerate(self.poly) if j > k)
+        )
 
     def reach(self, gap, slope):
         """Time until which this boundary can't be reached."""
@@ -160,11 +173,15 @@ def _first_contact(watches, h, tiny):
 def _watches(mode, rig, entered):
     if mode:
         return [_Watch(mode, 1 if mode == UPPER else -1, rig["boundary"][mode], entered == mode)]
-    return [_Watch(k, 1 if k == LOWER else -1, rig["boundary"][k], entered == k) for k in (LOWER, UPPER)]
+    return [
+        _Watch(k, 1 if k == LOWER else -1, rig["boundary"][k], entered == k) for k in (LOWER, UPPER)
+    ]
 
 
 def _start_mode(rig, t, x, v):
-    """Mode at the start and the boundary stood on; there the first non-zero derivative decides (the same in both modes up to the third)."""
+    """Mode at the start and the boundary stood on; there the first non-zero derivative decides (the
+    same in both modes up to the third).
+    """
     lower, upper = rig["boundary"][LOWER], rig["boundary"][UPPER]
     if x not in (lower, upper):
         return (UPPER if x > upper else LOWER if x < lower else FREE), FREE
@@ -198,8 +215,9 @@ def simulate(parameters, x, v, periods, *, digits=40, order=ORDER) -> Trajectory
     Parameters
     ----------
     parameters : dict of str to float or str
-        mass [kg], damping_ratio, natural_frequency [Hz], cubic [N/m^3] (0 if absent), contact_stiffness [N/m], lower_gap, upper_gap [m],
-        frequency [Hz] and either force [N] (see :func:`drive`) or drive [N], the amplitude itself. A string is read to full precision.
+        mass [kg], damping_ratio, natural_frequency [Hz], cubic [N/m^3] (0 if absent),
+        contact_stiffness [N/m], lower_gap, upper_gap [m], frequency [Hz] and either force [N] (see
+        :func:`drive`) or drive [N], the amplitude itself. A string is read to full precision.
     x, v : float or str
         Start [m], [m/s].
     periods : int

@@ -1,18 +1,25 @@
-"""Closed form of piecewise-linear arcs: a forced oscillator with two one-sided springs and no cubic term.
+"""Closed form of piecewise-linear arcs: a forced oscillator with two one-sided springs and no cubic
+term.
 
-Between two contacts the displacement is, with u measured from the boundary in contact and from the origin in free flight,
+Between two contacts the displacement is, with u measured from the boundary in contact and from the
+origin in free flight,
 
-    u(s) = offset + a cos(w s) + b sin(w s) + exp(-sigma s) (c cos(wd s) + d sin(wd s)),    s = time since the last contact.
+    u(s) = offset + a cos(w s) + b sin(w s) + exp(-sigma s) (c cos(wd s) + d sin(wd s)),    s = time
+    since the last contact.
 
-**Why no contact is missed.** Differentiating an exponential term multiplies its complex amplitude by ``-sigma + i wd``, whose modulus is
-the mode's natural frequency ``wm``. Hence for every later time ``|u''| <= B(s) = w^2 hypot(a, b) + wm^2 hypot(c, d) exp(-sigma s)``, and
-B falls with s. A watched gap g > 0 with slope g' can therefore not vanish before the first root of ``g + g' h - B h^2 / 2``. The search
-marches by that root (:func:`_safe_step`), the rounding of the closed form subtracted from g first. Every gap is positive on everything
-that was marched over, by proof and not by sampling. On a transversal root the march converges quadratically, as Newton's method does from
-the safe side. A root too close to a tangency for double precision ends the trajectory as ``undecided`` instead of guessing.
+**Why no contact is missed.** Differentiating an exponential term multiplies its complex amplitude
+by ``-sigma + i wd``, whose modulus is the mode's natural frequency ``wm``. Hence for every later
+time ``|u''| <= B(s) = w^2 hypot(a, b) + wm^2 hypot(c, d) exp(-sigma s)``, and B falls with s. A
+watched gap g > 0 with slope g' can therefore not vanish before the first root of ``g + g' h - B h^2
+/ 2``. The search marches by that root (:func:`_safe_step`), the rounding of the closed form
+subtracted from g first. Every gap is positive on everything that was marched over, by proof and not
+by sampling. On a transversal root the march converges quadratically, as Newton's method does from
+the safe side. A root too close to a tangency for double precision ends the trajectory as
+``undecided`` instead of guessing.
 
-**How exact.** Rounding is followed along the trajectory as a 2 x 2 covariance, mapped from contact to contact by the exact matrix
-exponential (the field is continuous at a soft contact, so the tangent doesn't jump). From it come ``time_error`` and ``margin_in_errors``.
+**How exact.** Rounding is followed along the trajectory as a 2 x 2 covariance, mapped from contact
+to contact by the exact matrix exponential (the field is continuous at a soft contact, so the
+tangent doesn't jump). From it come ``time_error`` and ``margin_in_errors``.
 """
 
 from __future__ import annotations
@@ -27,7 +34,16 @@ from numba.extending import register_jitable
 
 FREE, LOWER, UPPER = 0, 1, 2
 OK, UNDECIDED, FULL = 0, 1, 2
-PARAMETERS = ("mass", "damping_ratio", "natural_frequency", "contact_stiffness", "lower_gap", "upper_gap", "drive", "frequency")
+PARAMETERS = (
+    "mass",
+    "damping_ratio",
+    "natural_frequency",
+    "contact_stiffness",
+    "lower_gap",
+    "upper_gap",
+    "drive",
+    "frequency",
+)
 _EPS = 2.0**-52
 _CLEAR = 8.0  # how many units of rounding noise a decision must stand clear of
 
@@ -49,10 +65,12 @@ class Contacts:
     margin_so_far : float array (contacts,)
         Smallest margin (see below) on the way to this contact [m].
     count, status : int arrays (trajectories,)
-        Number of contacts; 0 ok, 1 undecided (a tangency below rounding; what came before stands), 2 full.
+        Number of contacts; 0 ok, 1 undecided (a tangency below rounding; what came before stands),
+        2 full.
     margin, margin_in_errors : float arrays (trajectories,)
-        Smallest distance to another sequence of contacts: the smallest gap at which the motion turned back before a watched boundary, and
-        the smallest depth by which it went beyond one; in metres, and in standard deviations of the displacement there.
+        Smallest distance to another sequence of contacts: the smallest gap at which the motion
+        turned back before a watched boundary, and the smallest depth by which it went beyond one;
+        in metres, and in standard deviations of the displacement there.
     end_x, end_v, end_x_error : float arrays (trajectories,)
         State at the end [m], [m/s] and one standard deviation of x.
     """
@@ -79,8 +97,19 @@ class Contacts:
 
 @register_jitable
 def _arc(mode, x, v, phase, p):
-    """Coefficients of the closed form in one mode: (origin, wm2, sigma, wd, w, offset, a, b, c, d, noise)."""
-    mass, zeta, natural, stiffness, lower, upper, drive, frequency = p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7]
+    """Coefficients of the closed form in one mode: (origin, wm2, sigma, wd, w, offset, a, b, c, d,
+    noise).
+    """
+    mass, zeta, natural, stiffness, lower, upper, drive, frequency = (
+        p[0],
+        p[1],
+        p[2],
+        p[3],
+        p[4],
+        p[5],
+        p[6],
+        p[7],
+    )
     wn, w = 2.0 * math.pi * natural, 2.0 * math.pi * frequency
     sigma = zeta * wn
     origin = 0.0
@@ -110,7 +139,9 @@ def _state(arc, s):
     cd, sd = math.cos(wd * s), math.sin(wd * s)
     decay = math.exp(-sigma * s)
     free = decay * (c * cd + d * sd)
-    return offset + a * cw + b * sw + free, w * (b * cw - a * sw) - sigma * free + decay * wd * (d * cd - c * sd)
+    return offset + a * cw + b * sw + free, w * (b * cw - a * sw) - sigma * free + decay * wd * (
+        d * cd - c * sd
+    )
 
 
 @register_jitable
@@ -122,7 +153,9 @@ def _bound(arc, s):
 
 @register_jitable
 def _gap(mode, which, u, v, p):
-    """A watched gap and its slope; the gap is positive inside the mode. ``which`` is the boundary (LOWER, UPPER)."""
+    """A watched gap and its slope; the gap is positive inside the mode. ``which`` is the boundary
+    (LOWER, UPPER).
+    """
     if mode == FREE:
         return (u + p[4], v) if which == LOWER else (p[5] - u, -v)
     return (-u, -v) if mode == LOWER else (u, v)
@@ -137,7 +170,9 @@ def _safe_step(gap, slope, bound):
 
 @register_jitable
 def _turning_gap(arc, mode, which, left, right, p):
-    """Gap at the extremum between two times whose slopes differ in sign (bisection to 1e-9 of the interval, then it is flat)."""
+    """Gap at the extremum between two times whose slopes differ in sign (bisection to 1e-9 of the
+    interval, then it is flat).
+    """
     _, slope_left = _gap(mode, which, *_state(arc, left), p)
     for _ in range(30):
         middle = 0.5 * (left + right)
@@ -191,7 +226,9 @@ def _turns(arc, mode, entered, s, after, margin, depth, p):
 
 @register_jitable
 def _first_safe_time(arc, mode, entered, speed, p):
-    """Time to march from the boundary just crossed: its gap grows at least as speed h - B h^2 / 2. -1 if that drowns in rounding."""
+    """Time to march from the boundary just crossed: its gap grows at least as speed h - B h^2 / 2.
+    -1 if that drowns in rounding.
+    """
     if entered == FREE:
         return 0.0
     bound, noise = _bound(arc, 0.0), arc[10]
@@ -205,8 +242,9 @@ def _first_safe_time(arc, mode, entered, speed, p):
 def _leave(arc, mode, entered, speed, s_end, p):
     """March along an arc to its first contact or to s_end.
 
-    ``entered`` is the boundary just crossed (FREE at a start off the boundaries) and ``speed`` the speed of entry. Returns (status, s,
-    which, margin): ``which`` is the boundary reached, FREE if none; margin the smallest turning gap or depth of the visit.
+    ``entered`` is the boundary just crossed (FREE at a start off the boundaries) and ``speed`` the
+    speed of entry. Returns (status, s, which, margin): ``which`` is the boundary reached, FREE if
+    none; margin the smallest turning gap or depth of the visit.
     """
     noise, margin, depth = arc[10], math.inf, 0.0
     s = _first_safe_time(arc, mode, entered, speed, p)
@@ -238,7 +276,9 @@ def _leave(arc, mode, entered, speed, s_end, p):
 
 @register_jitable
 def _start_mode(x, v, p):
-    """Mode of a state; on a boundary the velocity decides. Returns (mode, boundary it stands on or FREE)."""
+    """Mode of a state; on a boundary the velocity decides. Returns (mode, boundary it stands on or
+    FREE).
+    """
     if x == p[5]:
         return (UPPER, UPPER) if v > 0.0 else (FREE, UPPER)
     if x == -p[4]:
@@ -260,7 +300,9 @@ def _trajectory(p, x, v, t_end, number, at, table, ends):
         arc = _arc(mode, x, v, 2.0 * math.pi * (p[7] * t % 1.0), p)
         status, s, which, turned = _leave(arc, mode, entered, abs(v), t_end - t, p)
         u, v_new = _state(arc, s)
-        speed_noise = arc[10] * math.sqrt(arc[1]) + 4.0 * _EPS * (w * math.hypot(arc[6], arc[7]) + abs(v_new))
+        speed_noise = arc[10] * math.sqrt(arc[1]) + 4.0 * _EPS * (
+            w * math.hypot(arc[6], arc[7]) + abs(v_new)
+        )
         clock = _EPS * t_end
         cxx, cxv, cvv = _spread(arc, s, cxx, cxv, cvv)
         cxx += arc[10] ** 2 + (clock * v_new) ** 2
@@ -281,7 +323,12 @@ def _trajectory(p, x, v, t_end, number, at, table, ends):
         table[at, 4], table[at, 5] = math.hypot(deviation / v, clock), margin
         at += 1
         mode, entered = (which if mode == FREE else FREE), which
-    ends[number, 0], ends[number, 1], ends[number, 2], ends[number, 3] = x, v, math.sqrt(cxx), margin
+    ends[number, 0], ends[number, 1], ends[number, 2], ends[number, 3] = (
+        x,
+        v,
+        math.sqrt(cxx),
+        margin,
+    )
     ends[number, 4], ends[number, 5] = in_errors, status
     return at
 
@@ -306,8 +353,8 @@ def contacts(parameters, x0, v0, t_end, *, max_contacts=None, compiled=False) ->
     Parameters
     ----------
     parameters : dict of str to float or array (trajectories,)
-        :data:`PARAMETERS` in SI: ``drive`` is the amplitude of the cosine force [N] itself, frequencies in Hz; lower_gap + upper_gap > 0;
-        damping_ratio < 1; contact_stiffness >= 0.
+        :data:`PARAMETERS` in SI: ``drive`` is the amplitude of the cosine force [N] itself,
+        frequencies in Hz; lower_gap + upper_gap > 0; damping_ratio < 1; contact_stiffness >= 0.
     x0, v0, t_end : float or array (trajectories,)
         Start [m], [m/s] at t = 0 and end time [s]. A start on a boundary needs a velocity.
     max_contacts : int, optional
@@ -320,7 +367,9 @@ def contacts(parameters, x0, v0, t_end, *, max_contacts=None, compiled=False) ->
     ValueError
         If gaps add up to nothing, or an arc would be overdamped.
     """
-    columns = np.broadcast_arrays(*(np.asarray(parameters[name], float) for name in PARAMETERS), x0, v0, t_end)
+    columns = np.broadcast_arrays(
+        *(np.asarray(parameters[name], float) for name in PARAMETERS), x0, v0, t_end
+    )
     flat = [np.array(np.ravel(column), float) for column in columns]
     values = np.ascontiguousarray(np.stack(flat[: len(PARAMETERS)], axis=1))
     if np.any(values[:, 4] + values[:, 5] <= 0) or np.any(values[:, 1] >= 1):
@@ -350,9 +399,11 @@ def contacts(parameters, x0, v0, t_end, *, max_contacts=None, compiled=False) ->
 
 
 def random_cases(trajectories: int, seed: int) -> tuple[dict, np.ndarray, np.ndarray, np.ndarray]:
-    """Random rigs without cubic term: (parameters, x0 [m], v0 [m/s], t_end [s]), about 100 contacts a trajectory in 10 periods.
+    """Random rigs without cubic term: (parameters, x0 [m], v0 [m/s], t_end [s]), about 100 contacts
+    a trajectory in 10 periods.
 
-    ``force`` and ``drive`` are both given: drive = force (1 - 18 / w^2), w in rad/s, as the deLangre rig has it. One gap in four is zero.
+    ``force`` and ``drive`` are both given: drive = force (1 - 18 / w^2), w in rad/s, as the
+    deLangre rig has it. One gap in four is zero.
     """
     rng = np.random.default_rng(seed)
 

@@ -1,7 +1,8 @@
-"""Piecewise smooth systems of any size to 40 digits: Taylor series in mpmath, contacts isolated by proof as in :mod:`high_precision`.
+"""Piecewise smooth systems of any size to 40 digits: Taylor series in mpmath, contacts isolated by
+proof as in :mod:`high_precision`.
 
-A system is two functions: the Taylor coefficients of its states in a frozen mode, and those of its gaps. Nothing here is shared with the
-package.
+A system is two functions: the Taylor coefficients of its states in a frozen mode, and those of its
+gaps. Nothing here is shared with the package.
 """
 
 from __future__ import annotations
@@ -50,27 +51,45 @@ def simulate(series: Series, gaps: Gaps, parameters: dict, start: list, t_end) -
 
 
 def _step(terms: list[list]) -> mpf:
-    """Step over which the last terms of every state stay below the digits wanted, relative to its leading ones."""
+    """Step over which the last terms of every state stay below the digits wanted, relative to its
+    leading ones.
+    """
     steps = []
     for row in terms:
         scale = max(abs(row[0]), abs(row[1]) / 100, mpf(10) ** -12)
-        steps += [(mpf(10) ** -(DIGITS + 4) * scale / abs(row[k])) ** (mpf(1) / k) for k in (ORDER - 1, ORDER) if row[k]]
+        steps += [
+            (mpf(10) ** -(DIGITS + 4) * scale / abs(row[k])) ** (mpf(1) / k)
+            for k in (ORDER - 1, ORDER)
+            if row[k]
+        ]
     return min(steps)
 
 
-# -- the systems -----------------------------------------------------------------------------------------------------------------
+# -- the systems -----------------------------------------------------------------------------------
 def two_masses_series(p: dict, sides: list[bool], t, y: list, order: int) -> list[list]:
-    """x, y, v, w of two masses with clearances of both signs at the first and between the two (conformance/systems.py: two_masses)."""
+    """x, y, v, w of two masses with clearances of both signs at the first and between the two
+    (conformance/systems.py: two_masses).
+    """
     x, z, v, w = ([value] for value in y)
     phase, rate, factor = 2 * mp.pi * p["f"] * t, 2 * mp.pi * p["f"], p["A"]
     wave = (mp.cos(phase), -mp.sin(phase), -mp.cos(phase), mp.sin(phase))
-    stop, place = (p["ka"], p["ga"]) if sides[0] else (mpf(0), mpf(0)) if sides[1] else (p["kb"], -p["gb"])
-    between, gap = (p["kd"], p["gd"]) if sides[2] else (mpf(0), mpf(0)) if sides[3] else (p["ke"], -p["ge"])
+    stop, place = (
+        (p["ka"], p["ga"]) if sides[0] else (mpf(0), mpf(0)) if sides[1] else (p["kb"], -p["gb"])
+    )
+    between, gap = (
+        (p["kd"], p["gd"]) if sides[2] else (mpf(0), mpf(0)) if sides[3] else (p["ke"], -p["ge"])
+    )
     for n in range(order):
         apart = z[n] - x[n]
         one = 1 if n == 0 else 0
         inner = p["k2"] * apart + p["c2"] * (w[n] - v[n]) + between * (apart - one * gap)
-        a = factor * wave[n % 4] - p["k1"] * x[n] - p["c1"] * v[n] - stop * (x[n] - one * place) + inner
+        a = (
+            factor * wave[n % 4]
+            - p["k1"] * x[n]
+            - p["c1"] * v[n]
+            - stop * (x[n] - one * place)
+            + inner
+        )
         for row, derivative in ((x, v[n]), (z, w[n]), (v, a), (w, -p["mu"] * inner)):
             row.append(derivative / (n + 1))
         factor *= rate / (n + 1)
@@ -86,11 +105,17 @@ def two_masses_gaps(p: dict, terms: list[list]) -> list[list]:
 
 
 def circuit_series(p: dict, sides: list[bool], t, y: list, order: int) -> list[list]:
-    """x, y, z of Chua's circuit with a third kink abs(x - h) and a cubic term (conformance/systems.py: circuit)."""
+    """x, y, z of Chua's circuit with a third kink abs(x - h) and a cubic term
+    (conformance/systems.py: circuit).
+    """
     x, u, z = ([value] for value in y)
     squares: list = []
     slope, offset = (
-        (p["m1"], (p["m0"] - p["m1"]) * p["b"]) if sides[0] else (p["m0"], mpf(0)) if sides[1] else (p["m1"], (p["m1"] - p["m0"]) * p["b"])
+        (p["m1"], (p["m0"] - p["m1"]) * p["b"])
+        if sides[0]
+        else (p["m0"], mpf(0))
+        if sides[1]
+        else (p["m1"], (p["m1"] - p["m0"]) * p["b"])
     )
     side = 1 if sides[2] else -1
     for n in range(order):

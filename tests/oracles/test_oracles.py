@@ -1,4 +1,6 @@
-"""The oracles against each other, against formulas and against the reference data. None of this touches the package."""
+"""The oracles against each other, against formulas and against the reference data. None of this
+touches the package.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,13 @@ from oracles import generate_reference, high_precision, piecewise_linear
 from oracles.verdict import compare
 
 REFERENCE = Path(__file__).parents[1] / "reference"
-RIG = {"mass": 3.0, "damping_ratio": 0.03, "natural_frequency": 5.0, "cubic": 7e8, "contact_stiffness": 1.4e4}
+RIG = {
+    "mass": 3.0,
+    "damping_ratio": 0.03,
+    "natural_frequency": 5.0,
+    "cubic": 7e8,
+    "contact_stiffness": 1.4e4,
+}
 LINEAR = {**RIG, "cubic": 0.0}
 
 
@@ -34,7 +42,9 @@ def worst(values, reference):
 
 
 def run_row(row):
-    """Parameters of a row of forced_linear.csv or runs.csv; the force there is the amplitude itself."""
+    """Parameters of a row of forced_linear.csv or runs.csv; the force there is the amplitude
+    itself.
+    """
     return {
         "contact_stiffness": row["contact_stiffness_N_per_m"],
         "lower_gap": row["j1_m"],
@@ -48,18 +58,22 @@ def floats(parameters):
     return {key: float(value) for key, value in parameters.items()}
 
 
-# --- closed form of piecewise-linear arcs -------------------------------------------------------------------------------------------
+# --- closed form of piecewise-linear arcs ---------------------------------------------------------
 
 
 @pytest.mark.parametrize("row", rows("forced_linear"), ids=lambda row: row["id"])
 def test_closed_form_and_40_digits_give_the_forced_linear_runs(row):
     parameters = {**LINEAR, **run_row(row)}
-    exact = high_precision.simulate({**parameters, "damping_ratio": "0.03"}, row["x0_m"], row["v0_m_per_s"], int(row["periods"]))
+    exact = high_precision.simulate(
+        {**parameters, "damping_ratio": "0.03"}, row["x0_m"], row["v0_m_per_s"], int(row["periods"])
+    )
     assert len(exact.times) == int(row["events"])
     assert worst([exact.x, exact.v], [row["x_end_m"], row["v_end_m_per_s"]]) < 1e-20
     assert worst(exact.times[:3], row["first_event_times_s"].split()) < 4e-20
     end = float(row["periods"]) / float(row["frequency_Hz"])
-    closed = piecewise_linear.contacts(floats(parameters), float(row["x0_m"]), float(row["v0_m_per_s"]), end)
+    closed = piecewise_linear.contacts(
+        floats(parameters), float(row["x0_m"]), float(row["v0_m_per_s"]), end
+    )
     assert closed.guard.tolist() == exact.guards
     assert np.all(np.abs(closed.time - np.array(exact.times, float)) < 5 * closed.time_error)
     assert abs(closed.end_x[0] - float(row["x_end_m"])) < 1e-16
@@ -74,8 +88,12 @@ def test_closed_form_knows_its_own_rounding():
         exact = high_precision.simulate({**one, "cubic": 0.0}, float(x[i]), float(v[i]), 10)
         mine = closed.of(i)
         assert closed.guard[mine].tolist() == exact.guards
-        assert np.all(np.abs(closed.time[mine] - np.array(exact.times, float)) < 6 * closed.time_error[mine])
-        assert np.sign(np.array(exact.velocities, float)).tolist() == closed.direction[mine].tolist()
+        assert np.all(
+            np.abs(closed.time[mine] - np.array(exact.times, float)) < 6 * closed.time_error[mine]
+        )
+        assert (
+            np.sign(np.array(exact.velocities, float)).tolist() == closed.direction[mine].tolist()
+        )
         assert abs(float(exact.margin) - closed.margin[i]) < 1e-3 * closed.margin[i]
 
 
@@ -83,14 +101,25 @@ def test_closed_form_knows_its_own_rounding():
 def test_compiled_closed_form_is_the_plain_one():
     """Only the nightly million of contacts uses it."""
     case = piecewise_linear.random_cases(20, seed=5)
-    plain, compiled = (piecewise_linear.contacts(*case, compiled=compiled) for compiled in (False, True))
+    plain, compiled = (
+        piecewise_linear.contacts(*case, compiled=compiled) for compiled in (False, True)
+    )
     assert plain.count.tolist() == compiled.count.tolist()
     assert np.all(np.abs(plain.time - compiled.time) < 12 * plain.time_error)
 
 
-@pytest.mark.parametrize(("amplitude", "period"), [(0.5e-3, 0.16589082306112917), (1e-3, 0.10930388037521438)])
+@pytest.mark.parametrize(
+    ("amplitude", "period"), [(0.5e-3, 0.16589082306112917), (1e-3, 0.10930388037521438)]
+)
 def test_free_vibration_in_a_symmetric_clearance(amplitude, period):
-    still = {**LINEAR, "damping_ratio": 0.0, "lower_gap": 0.4e-3, "upper_gap": 0.4e-3, "drive": 0.0, "frequency": 1.0}
+    still = {
+        **LINEAR,
+        "damping_ratio": 0.0,
+        "lower_gap": 0.4e-3,
+        "upper_gap": 0.4e-3,
+        "drive": 0.0,
+        "frequency": 1.0,
+    }
     found = piecewise_linear.contacts(still, amplitude, 0.0, 10.5 * period)
     assert np.diff(found.time)[3::4].size >= 9
     assert abs((found.time[40] - found.time[0]) / 10 - period) < 1e-15
@@ -98,7 +127,11 @@ def test_free_vibration_in_a_symmetric_clearance(amplitude, period):
 
 @pytest.mark.parametrize(
     ("stiffness", "hertz", "tolerance"),
-    [(1.4e4, 7.0530955250738664, 1e-13), (7e4, 8.3232818492544424, 1e-13), (1.4e10, 9.9954032936792037, 1e-9)],
+    [
+        (1.4e4, 7.0530955250738664, 1e-13),
+        (7e4, 8.3232818492544424, 1e-13),
+        (1.4e10, 9.9954032936792037, 1e-9),
+    ],
 )
 def test_bilinear_frequency(stiffness, hertz, tolerance):
     one_sided = {
@@ -130,37 +163,61 @@ def test_verdict_sees_a_missed_and_an_invented_contact():
     case = piecewise_linear.random_cases(30, seed=8)
     truth = piecewise_linear.contacts(*case)
     same = compare(truth, truth.trajectory, truth.time, truth.guard)
-    assert (same.missed, same.invented, same.worst, same.compared + same.left_out) == ([], [], 0.0, truth.time.size)
+    assert (same.missed, same.invented, same.worst, same.compared + same.left_out) == (
+        [],
+        [],
+        0.0,
+        truth.time.size,
+    )
     k = truth.of(7)[3]
     without = np.delete(np.arange(truth.time.size), k)
-    assert compare(truth, truth.trajectory[without], truth.time[without], truth.guard[without]).missed == [7]
+    assert compare(
+        truth, truth.trajectory[without], truth.time[without], truth.guard[without]
+    ).missed == [7]
     between = 0.5 * (truth.time[k - 1] + truth.time[k])
-    more = [np.insert(column, k, value) for column, value in ((truth.trajectory, 7), (truth.time, between), (truth.guard, 1))]
+    more = [
+        np.insert(column, k, value)
+        for column, value in ((truth.trajectory, 7), (truth.time, between), (truth.guard, 1))
+    ]
     assert compare(truth, *more).invented == [7]
     later = dataclasses.replace(truth, time=truth.time * (1 + 3e-12))
     assert 0.5 < compare(truth, later.trajectory, later.time, later.guard).worst <= 3.001
 
 
-# --- 40 digits ----------------------------------------------------------------------------------------------------------------------
+# --- 40 digits ------------------------------------------------------------------------------------
 
 
 def test_40_digits_give_all_contacts_of_figure_2b():
-    b4 = {**RIG, "damping_ratio": "0.03", "lower_gap": 0.0, "upper_gap": "0.0004", "force": 4, "frequency": 7}
+    b4 = {
+        **RIG,
+        "damping_ratio": "0.03",
+        "lower_gap": 0.0,
+        "upper_gap": "0.0004",
+        "force": 4,
+        "frequency": 7,
+    }
     exact = high_precision.simulate(b4, 0, 0, 14)
     table = rows("fig2b_exact_events")
     assert worst(exact.times, [row["t_s"] for row in table]) < 1e-20
     assert worst(exact.velocities, [row["velocity_m_per_s"] for row in table]) < 1e-17
-    assert [1 if v > 0 else -1 for v in exact.velocities] == [int(row["direction"]) for row in table]
+    assert [1 if v > 0 else -1 for v in exact.velocities] == [
+        int(row["direction"]) for row in table
+    ]
 
 
 def test_40_digits_hold_when_the_order_changes():
-    exact = [high_precision.simulate(generate_reference.B4, 1e-3, 0.0, 3, order=order) for order in (48, 60)]
+    exact = [
+        high_precision.simulate(generate_reference.B4, 1e-3, 0.0, 3, order=order)
+        for order in (48, 60)
+    ]
     assert worst([exact[0].x, *exact[0].times], [exact[1].x, *exact[1].times]) < 1e-40
 
 
 def test_40_digits_give_the_run_of_the_full_rig():
     row = rows("runs")[0]
-    exact = high_precision.simulate({**RIG, **run_row(row)}, row["x0_m"], row["v0_m_per_s"], int(row["periods"]))
+    exact = high_precision.simulate(
+        {**RIG, **run_row(row)}, row["x0_m"], row["v0_m_per_s"], int(row["periods"])
+    )
     assert len(exact.times) == int(row["events"])
     assert abs(float(exact.x) - float(row["x_end_m"])) < 6e-16
     assert abs(float(exact.v) - float(row["v_end_m_per_s"])) < 1e-15 / 0.01
@@ -177,7 +234,7 @@ def test_reference_file_is_what_the_generator_makes(number):
     assert len(exact.times) == int(row["contacts"])
 
 
-# --- heyoka -------------------------------------------------------------------------------------------------------------------------
+# --- heyoka ---------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +253,12 @@ def test_heyoka_agrees_with_40_digits_on_case_b(systems):
     for row in rows("rig_b4_15hz_5periods"):
         if on_boundary_at_rest(row):
             continue
-        run = systems.simulate("delangre", generate_reference.B4, (float(row["x0_m"]), float(row["v0_m_per_s"])), 5 / 15)
+        run = systems.simulate(
+            "delangre",
+            generate_reference.B4,
+            (float(row["x0_m"]), float(row["v0_m_per_s"])),
+            5 / 15,
+        )
         assert run.times.size == int(row["contacts"])
         assert abs(run.end[0] - float(row["x_end_m"])) < 1e-15
         assert np.all(np.abs(run.times - numbers(row["contact_times_s"])) < 1e-14)
@@ -205,7 +267,12 @@ def test_heyoka_agrees_with_40_digits_on_case_b(systems):
 def test_heyoka_agrees_with_40_digits_on_random_rigs(systems):
     for row in rows("rig_random_5periods"):
         parameters = {key: float(row[key]) for key in systems.SYSTEMS["delangre"].parameters}
-        run = systems.simulate("delangre", parameters, (float(row["x0_m"]), float(row["v0_m_per_s"])), 5 / parameters["frequency"])
+        run = systems.simulate(
+            "delangre",
+            parameters,
+            (float(row["x0_m"]), float(row["v0_m_per_s"])),
+            5 / parameters["frequency"],
+        )
         assert run.times.size == int(row["contacts"])
         assert abs(run.end[0] - float(row["x_end_m"])) < 1e-13
         assert np.all(np.abs(run.times - numbers(row["contact_times_s"])) < 1e-12)
@@ -222,7 +289,9 @@ def test_orbits_close(systems, row):
         "frequency": float(row["f_Hz"]),
     }
     start = float(row["x0_m"]), float(row["v0_m_per_s"])
-    run = systems.simulate("delangre", parameters, start, int(row["period_in_T"]) / parameters["frequency"])
+    run = systems.simulate(
+        "delangre", parameters, start, int(row["period_in_T"]) / parameters["frequency"]
+    )
     assert run.times.size == int(row["contact_events_per_period"])
     assert np.all(np.abs(run.times - numbers(row["event_times_s"])) < 3e-15)
     assert abs(run.end[0] - start[0]) < 1e-15
@@ -271,7 +340,12 @@ SECTION = {
 
 
 def test_chain_without_coupling_is_the_closed_form(systems):
-    apart = {**CHAIN, "coupling_stiffness": 0.0, "coupling_damping": 0.0, "coupling_contact_stiffness": 0.0}
+    apart = {
+        **CHAIN,
+        "coupling_stiffness": 0.0,
+        "coupling_damping": 0.0,
+        "coupling_contact_stiffness": 0.0,
+    }
     run = systems.simulate("chain", apart, (0.3e-3, 0.0, 0.02, 0.1), 1.0)
     natural = np.sqrt(1e3)
     oscillator = {
@@ -292,7 +366,11 @@ def test_chain_without_coupling_is_the_closed_form(systems):
 
 
 def test_chain_against_the_two_mass_matrix_exponential(systems):
-    m, c, k = np.diag([1.0, 0.5]), np.array([[0.9, -0.3], [-0.3, 0.3]]), np.array([[1400.0, -400.0], [-400.0, 400.0]])
+    m, c, k = (
+        np.diag([1.0, 0.5]),
+        np.array([[0.9, -0.3], [-0.3, 0.3]]),
+        np.array([[1400.0, -400.0], [-400.0, 400.0]]),
+    )
     w = 16 * np.pi
     matrix = np.zeros((6, 6))  # x, v and the forcing as a rotating pair
     matrix[:2, 2:4] = np.eye(2)
@@ -301,7 +379,9 @@ def test_chain_against_the_two_mass_matrix_exponential(systems):
     start = np.array([0.3e-3, -0.2e-3, 0.02, 0.1])
     run = systems.simulate("chain", {**CHAIN, "ground_gap": 1.0, "coupling_gap": 1.0}, start, 0.7)
     assert run.times.size == 0
-    assert np.allclose(run.end, (expm(0.7 * matrix) @ np.r_[start, 1.0, 0.0])[:4], rtol=0, atol=1e-13)
+    assert np.allclose(
+        run.end, (expm(0.7 * matrix) @ np.r_[start, 1.0, 0.0])[:4], rtol=0, atol=1e-13
+    )
 
 
 def test_gears_in_mesh_rest_where_the_mean_force_puts_them_and_fly_apart_freely(systems):
@@ -317,7 +397,9 @@ def test_section_inside_its_freeplay_is_a_matrix_exponential(systems):
     b, a, speed = 0.135, -0.6, 12.0
     lift = 1.225 * speed**2 * b * 6.28 * np.array([0.0, 1.0, 1 / speed, (0.5 - a) * b / speed])
     mass = np.array([[12.4, 12.4 * 0.25 * b], [12.4 * 0.25 * b, 0.065]])
-    loads = np.array([-lift - [2840.0, 0.0, 27.4, 0.0], (0.5 + a) * b * lift - [0.0, 0.0, 0.0, 0.036]])
+    loads = np.array(
+        [-lift - [2840.0, 0.0, 27.4, 0.0], (0.5 + a) * b * lift - [0.0, 0.0, 0.0, 0.036]]
+    )
     matrix = np.vstack([np.eye(4)[2:], np.linalg.solve(mass, loads)])
     start = np.array([1e-3, 0.0, 0.0, 0.01])
     run = systems.simulate("aeroelastic", {**SECTION, "pitch_gap": 100.0}, start, 0.3)
@@ -333,7 +415,10 @@ def test_section_inside_its_freeplay_is_a_matrix_exponential(systems):
     ],
 )
 def test_heyoka_holds_when_its_tolerance_changes(systems, name, parameters, start, end):
-    fine, coarse = (systems.simulate(name, parameters, start, end, tolerance=tolerance) for tolerance in (1e-16, 1e-13))
+    fine, coarse = (
+        systems.simulate(name, parameters, start, end, tolerance=tolerance)
+        for tolerance in (1e-16, 1e-13)
+    )
     assert fine.times.size == coarse.times.size > 70
     assert np.all(fine.sides == coarse.sides)
     assert np.allclose(fine.times, coarse.times, rtol=0, atol=1e-11)
@@ -342,7 +427,9 @@ def test_heyoka_holds_when_its_tolerance_changes(systems, name, parameters, star
 
 
 def test_an_event_that_starts_at_zero_loses_its_next_root_in_heyoka():
-    """Why arcs begin one floating-point number inside their mode. If this fails, heyoka was repaired and the step may go."""
+    """Why arcs begin one floating-point number inside their mode. If this fails, heyoka was
+    repaired and the step may go.
+    """
     hy = pytest.importorskip("heyoka")
     x, v = hy.make_vars("x", "v")
     found = []

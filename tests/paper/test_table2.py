@@ -24,7 +24,9 @@ def table(name):
 def runs():
     rig = sl.models.delangre("b", force="4 N", frequency="7 Hz")
     return {
-        "ode45": sl.simulate(rig, start=(0.0, 0.0), t_end=2.0, method=sl.ODE45(rtol=1e-4, atol=1e-7)),
+        "ode45": sl.simulate(
+            rig, start=(0.0, 0.0), t_end=2.0, method=sl.ODE45(rtol=1e-4, atol=1e-7)
+        ),
         "taylor": sl.simulate(rig, start=(0.0, 0.0), t_end=2.0),
     }
 
@@ -51,7 +53,8 @@ def test_the_error_estimate_covers_the_true_error_of_all_63_contacts(runs, metho
     assert run.sizes["contact"] == len(exact) == 63
     true = np.abs(run.contact_time.values - exact)
     assert (true <= run.contact_time_error.values).all()
-    assert run.contact_time_error.values.max() < 20 * true.max()  # honest, not merely large: eight times what copies differ by
+    # honest, not merely large: eight times what copies differ by
+    assert run.contact_time_error.values.max() < 20 * true.max()
     if method == "taylor":
         assert true.max() < 1e-13
     else:

@@ -1,7 +1,8 @@
 """Rows of tests/reference/closed_forms.csv that soft contacts can express, each by its id.
 
-Left out: R05, R07, R11b (restitution: the state jumps), R08 (sticking), R10 (sliding along a boundary), R09 (a thermostat's mode depends on
-its past, not on the state). They need jumps, sliding or memory, which this version doesn't follow.
+Left out: R05, R07, R11b (restitution: the state jumps), R08 (sticking), R10 (sliding along a
+boundary), R09 (a thermostat's mode depends on its past, not on the state). They need jumps, sliding
+or memory, which this version doesn't follow.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ def magnet(frequency):
 
 
 def swing(rig, amplitude, guess, per_period, periods=10):
-    """Period [s] of a free vibration from a turning point: the time of ``periods`` returns to the same contact, divided."""
+    """Period [s] of a free vibration from a turning point: the time of ``periods`` returns to the
+    same contact, divided.
+    """
     run = sl.simulate(rig, (amplitude, 0.0), t_end=(periods + 1) * guess, samples=1)
     times = run.contact_time.values
     assert run.status.item() == "ok"
@@ -43,12 +46,15 @@ def swing(rig, amplitude, guess, per_period, periods=10):
     return (times[per_period * periods] - times[0]) / periods
 
 
-# -- free vibration --------------------------------------------------------------------------------------------------------------
+# -- free vibration --------------------------------------------------------------------------------
 
 
 def test_r01_dead_zone_only():
     clearance = sl.models.delangre(
-        "a", **{**STILL, "mass": 1.0, "natural_frequency": 0.0, "contact_stiffness": 1.0}, lower_gap=1.0, upper_gap=1.0
+        "a",
+        **{**STILL, "mass": 1.0, "natural_frequency": 0.0, "contact_stiffness": 1.0},
+        lower_gap=1.0,
+        upper_gap=1.0,
     )
     exact = float(VALUES["R01"])
     assert abs(swing(clearance, 2.0, exact, 4) - exact) < 4 * EPS * exact
@@ -57,12 +63,16 @@ def test_r01_dead_zone_only():
 @pytest.mark.parametrize(("row", "amplitude"), [("R02a", 0.5e-3), ("R02b", 1e-3)])
 def test_r02_symmetric_freeplay(row, amplitude):
     exact = float(VALUES[row])
-    assert abs(swing(sl.models.delangre("a", **STILL), amplitude, exact, 4) - exact) < 16 * EPS * exact
+    assert (
+        abs(swing(sl.models.delangre("a", **STILL), amplitude, exact, 4) - exact) < 16 * EPS * exact
+    )
 
 
 @pytest.mark.parametrize(("row", "stiffness"), [("R03a", 1.4e4), ("R03b", 7e4), ("R03c", 1.4e10)])
 def test_r03_bilinear_frequency(row, stiffness):
-    one_sided = sl.models.delangre("b", **STILL, contact_stiffness=stiffness, lower_gap=1.0, upper_gap=0.0)
+    one_sided = sl.models.delangre(
+        "b", **STILL, contact_stiffness=stiffness, lower_gap=1.0, upper_gap=0.0
+    )
     exact = 1 / float(VALUES[row])
     assert abs(swing(one_sided, -1e-3, exact, 2) - exact) < 16 * EPS * exact
 
@@ -70,7 +80,8 @@ def test_r03_bilinear_frequency(row, stiffness):
 @pytest.mark.parametrize("angle", [0.3, 0.6, 0.9, 1.2, 1.5])
 @pytest.mark.parametrize("turned", [1.0, 1.1, 1.6])
 def test_arcsine_from_the_middle(angle, turned):
-    """x = sin(w t) v/w meets a boundary at w t = angle. At the start the acceleration is zero: no curvature to judge a Newton step by.
+    """x = sin(w t) v/w meets a boundary at w t = angle. At the start the acceleration is zero: no
+    curvature to judge a Newton step by.
 
     The run ends at w t = angle * turned, so that the contact lies in different places of its step.
     """
@@ -81,17 +92,24 @@ def test_arcsine_from_the_middle(angle, turned):
     exact = math.asin(place * w / speed) / w
     assert run.sizes["contact"] >= 1
     assert abs(run.contact_time.values[0] - exact) < 8 * EPS * exact / math.cos(angle)
-    assert abs(run.contact_velocity.values[0] - speed * math.cos(angle)) < 8 * EPS * speed / math.cos(angle)
+    assert abs(
+        run.contact_velocity.values[0] - speed * math.cos(angle)
+    ) < 8 * EPS * speed / math.cos(angle)
 
 
-# -- grazing of a forced linear oscillator ---------------------------------------------------------------------------------------
+# -- grazing of a forced linear oscillator ---------------------------------------------------------
 
 
 def steady_state(rig):
     """State at t = 0 of the linear rig's steady motion without contact, and its amplitude [m]."""
     p = rig.values
     wn, w = 2 * math.pi * p["natural_frequency"], 2 * math.pi * p["frequency"]
-    motion = p["force"] * magnet(p["frequency"]) / p["mass"] / (wn**2 - w**2 + 2j * p["damping_ratio"] * wn * w)
+    motion = (
+        p["force"]
+        * magnet(p["frequency"])
+        / p["mass"]
+        / (wn**2 - w**2 + 2j * p["damping_ratio"] * wn * w)
+    )
     return (motion.real, (1j * w * motion).real), abs(motion)
 
 
@@ -136,12 +154,14 @@ def test_r06b_grazing_frequency_of_the_rig():
     assert below.sizes["contact"] >= 4
 
 
-# -- contacts whose force jumps --------------------------------------------------------------------------------------------------
+# -- contacts whose force jumps --------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def block():
-    """A unit mass on a unit spring, on a rough table, before a Kelvin-Voigt stop at 0 that may or may not pull."""
+    """A unit mass on a unit spring, on a rough table, before a Kelvin-Voigt stop at 0 that may or
+    may not pull.
+    """
 
     @sl.system(states="x v")
     def block(t, x, v, *, spring=0.0, friction=0.0, stiffness=1.0, damping=0.1, pull=1e9):
@@ -168,7 +188,9 @@ def test_r12b_stop_that_cannot_pull(block):
 
 
 def test_r11a_saltation_at_a_dry_friction_crossing(block):
-    """d v(after) / d v(before) across v = 0, at x = -2.2: the accelerations' ratio. Times so short that the spring's force stands still."""
+    """d v(after) / d v(before) across v = 0, at x = -2.2: the accelerations' ratio. Times so short
+    that the spring's force stands still.
+    """
     slide = block.with_values(spring=1.0, friction=0.4)
     before = np.array([-2e-4, -1e-4])
     run = sl.simulate(slide, {"x": [-2.2, -2.2], "v": before}, t_end=2e-4, samples=1)
@@ -176,7 +198,7 @@ def test_r11a_saltation_at_a_dry_friction_crossing(block):
     assert math.isclose(np.diff(run.end_v.values)[0] / 1e-4, float(VALUES["R11a"]), rel_tol=1e-6)
 
 
-# -- invariants of the rig's orbits ----------------------------------------------------------------------------------------------
+# -- invariants of the rig's orbits ----------------------------------------------------------------
 
 
 def orbits():
@@ -186,7 +208,9 @@ def orbits():
 
 @pytest.mark.parametrize("row", orbits(), ids=lambda row: row["name"])
 def test_r15_multipliers_and_exponents_of_orbits(row):
-    """Monodromy by central differences of the flow, to fourth order: determinant exp(-2 zeta wn n T), multipliers as in orbits.csv."""
+    """Monodromy by central differences of the flow, to fourth order: determinant exp(-2 zeta wn n
+    T), multipliers as in orbits.csv.
+    """
     rig = sl.models.delangre(
         "b",
         contact_stiffness=float(row["Kc_N_per_m"]),
@@ -197,7 +221,9 @@ def test_r15_multipliers_and_exponents_of_orbits(row):
     )
     size = np.array([1e-8, 1e-6])  # small beside the depth of the shallowest contact, 1e-6 m
     start = np.array([float(row["x0_m"]), float(row["v0_m_per_s"])])
-    places = np.array([start + k * size * direction for direction in np.eye(2) for k in (-2, -1, 1, 2)])
+    places = np.array(
+        [start + k * size * direction for direction in np.eye(2) for k in (-2, -1, 1, 2)]
+    )
     periods = int(row["period_in_T"])
     run = sl.simulate(rig, places, periods, samples=1, method=sl.Taylor(tolerance=EPS))
     ends = np.stack([run.end_x.values, run.end_v.values], axis=1).reshape(2, 4, 2)
@@ -207,7 +233,10 @@ def test_r15_multipliers_and_exponents_of_orbits(row):
     assert math.isclose(total, float(VALUES["R15b"]), rel_tol=1e-6)
     multipliers = np.sort_complex(np.linalg.eigvals(monodromy))
     exact = np.sort_complex(
-        [complex(text.strip("()").replace(" ", "")) for text in row["floquet_multipliers"].replace("i", "j").split(";")]
+        [
+            complex(text.strip("()").replace(" ", ""))
+            for text in row["floquet_multipliers"].replace("i", "j").split(";")
+        ]
     )
     assert np.allclose(multipliers, exact, rtol=0, atol=1e-6)
     exponent = math.log(np.max(np.abs(multipliers))) / span
@@ -219,7 +248,9 @@ def test_r15_multipliers_and_exponents_of_orbits(row):
 
 @pytest.mark.parametrize("length", [24, 25])
 def test_an_oscillator_driven_by_many_harmonics(length, monkeypatch):
-    """Its code is cut into blocks, here into short ones, at any place: between sine and cosine of a harmonic too."""
+    """Its code is cut into blocks, here into short ones, at any place: between sine and cosine of a
+    harmonic too.
+    """
     monkeypatch.setattr(blocks, "WHOLE", 50)
     monkeypatch.setattr(blocks, "LENGTH", length)
     decay, end, orders = 0.05, 0.5, np.arange(1, 13)
@@ -231,9 +262,13 @@ def test_an_oscillator_driven_by_many_harmonics(length, monkeypatch):
     w, own = 2 * np.pi * orders, math.sqrt(1 - decay**2)
     steady = 1 / orders**2 / (1 - w**2 + 2j * decay * w)
     x, v = 0.3 - steady.real.sum(), -(1j * w * steady).real.sum()
-    free = math.exp(-decay * end) * (x * math.cos(own * end) + (v + decay * x) / own * math.sin(own * end))
+    free = math.exp(-decay * end) * (
+        x * math.cos(own * end) + (v + decay * x) / own * math.sin(own * end)
+    )
     run = sl.simulate(driven, (0.3, 0.0), t_end=end, method=sl.Taylor(8), samples=1)
-    assert run.end_x.item() == pytest.approx(free + (steady * np.exp(1j * w * end)).real.sum(), rel=1e-13)
+    assert run.end_x.item() == pytest.approx(
+        free + (steady * np.exp(1j * w * end)).real.sum(), rel=1e-13
+    )
 
 
 def ladder(rungs):
@@ -255,7 +290,9 @@ def test_as_many_boundaries_as_a_system_may_have():
     x, v = run.end_x.item(), run.end_v.item()
     assert run.sizes["contact"] == 2 * 52
     assert run.mode.values.max() == 2**52 - 1
-    assert v**2 / 2 + x**2 / 2 + 0.05 / 2 * (np.maximum(x - levels, 0) ** 2).sum() == pytest.approx(2.0, abs=1e-14)
+    assert v**2 / 2 + x**2 / 2 + 0.05 / 2 * (np.maximum(x - levels, 0) ** 2).sum() == pytest.approx(
+        2.0, abs=1e-14
+    )
 
 
 def test_more_boundaries_than_that_are_refused(monkeypatch):

@@ -1,4 +1,6 @@
-"""Energy balances of the published models, and impact statistics against closed forms of a bouncing mass."""
+"""Energy balances of the published models, and impact statistics against closed forms of a bouncing
+mass.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +23,17 @@ ROUNDING = 1e-13
 SCALES = {"delangre": 1e-3, "chain": 2e-3, "gear_pair": 4e-5, "aeroelastic": 0.03}
 
 
-# -- the published models --------------------------------------------------------------------------------------------------------
+# -- the published models --------------------------------------------------------------------------
 @pytest.mark.parametrize("name", MODELS)
 def test_power_identity_of_every_model_in_every_mode(name):
-    """dE/dt along the equations = supplied - dissipated, at random states, times and sides of the guards."""
+    """dE/dt along the equations = supplied - dissipated, at random states, times and sides of the
+    guards.
+    """
     system = MODELS[name]()
     parts = {key: quantity(system, function) for key, function in energy(name).items()}
-    assert all(guards == system.guards for _, guards in parts.values()), "the same contacts as the equations, and no others"
+    assert all(guards == system.guards for _, guards in parts.values()), (
+        "the same contacts as the equations, and no others"
+    )
     stored = parts["energy"][0]
     slopes = [time_derivative(stored), *(differentiate(stored, state(y)) for y in system.states)]
     random = np.random.default_rng(3)
@@ -49,7 +55,11 @@ def test_power_identity_of_every_model_in_every_mode(name):
         ("delangre", {"start": (1e-3, 0.0), "periods": 60, "transient": 10}),
         pytest.param(
             "aeroelastic",
-            {"start": {"plunge": 0, "pitch": 0.02, "plunge_rate": 0, "pitch_rate": 0}, "t_end": 5, "transient": "1 s"},
+            {
+                "start": {"plunge": 0, "pitch": 0.02, "plunge_rate": 0, "pitch_rate": 0},
+                "t_end": 5,
+                "transient": "1 s",
+            },
             marks=pytest.mark.nightly,
         ),
         pytest.param("chain", {"periods": 60}, marks=pytest.mark.nightly),
@@ -73,13 +83,20 @@ def test_a_missing_term_shows():
     parts = energy("delangre")
 
     def beams_only(x, v, *, mass, natural_frequency, cubic):
-        return mass * v**2 / 2 + mass * (2 * sl.pi * natural_frequency) ** 2 * x**2 / 2 + cubic * x**4 / 4
+        return (
+            mass * v**2 / 2
+            + mass * (2 * sl.pi * natural_frequency) ** 2 * x**2 / 2
+            + cubic * x**4 / 4
+        )
 
     run = sl.energy_balance(rig(), (1e-3, 0.0), periods=10, **parts | {"energy": beams_only})
     whole = sl.energy_balance(rig(), (1e-3, 0.0), periods=10, **parts)
     left_over = np.diff(whole.energy.values - run.energy.values)
     assert float(run.imbalance) > 1e-2
-    assert np.abs(run.residual.values[1:] - left_over).max() < ROUNDING * np.abs(run.energy.values).max()
+    assert (
+        np.abs(run.residual.values[1:] - left_over).max()
+        < ROUNDING * np.abs(run.energy.values).max()
+    )
 
 
 def test_integrals_leave_the_motion_as_it_is():
@@ -92,13 +109,21 @@ def test_integrals_leave_the_motion_as_it_is():
 def test_on_a_periodic_orbit_work_is_dissipated():
     """Case b, 4 N, 15 Hz settles to 3T: over three periods nothing is stored."""
     balance = sl.energy_balance(rig(), (1e-3, 0.0), periods=3, transient=600, **energy("delangre"))
-    supplied, dissipated, change = (balance[name].values for name in ("supplied", "dissipated", "change"))
+    supplied, dissipated, change = (
+        balance[name].values for name in ("supplied", "dissipated", "change")
+    )
     assert abs(supplied.sum() - dissipated.sum()) < 1e-9 * dissipated.sum()
     assert np.abs(change).max() > 0.1 * dissipated.sum()  # in each period something is
 
 
 def test_many_trajectories_with_values_of_their_own():
-    both = sl.energy_balance(rig(), {"x": [1e-3, 0.0], "v": 0.0}, periods=5, values={"contact_stiffness": [1e4, 2e4]}, **energy("delangre"))
+    both = sl.energy_balance(
+        rig(),
+        {"x": [1e-3, 0.0], "v": 0.0},
+        periods=5,
+        values={"contact_stiffness": [1e4, 2e4]},
+        **energy("delangre"),
+    )
     assert both.residual.dims == ("trajectory", "period")
     assert (both.imbalance.values < ROUNDING).all()
 
@@ -117,7 +142,7 @@ def test_balances_that_cant_be_drawn(arguments, words):
         sl.energy_balance(rig(), **arguments, **energy("delangre"))
 
 
-# -- undamped, unforced ----------------------------------------------------------------------------------------------------------
+# -- undamped, unforced ----------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("values", "frequency"),
     [
@@ -128,15 +153,21 @@ def test_balances_that_cant_be_drawn(arguments, words):
     ],
 )
 def test_energy_wanders_as_roundings_do(values, frequency):
-    """Sixteen amplitudes, 20 000 periods: as many gain energy as lose it, and none more than a walk of one rounding a step does."""
+    """Sixteen amplitudes, 20 000 periods: as many gain energy as lose it, and none more than a walk
+    of one rounding a step does.
+    """
     periods, amplitude = 20_000, np.geomspace(0.3, 3.0, 16)
     values = {"spring": 1.0, "boundary": 99.0} | values
-    run = sl.stroboscope(lab.with_values(frequency=frequency, **values), {"x": amplitude, "v": 0.0}, periods, keep=1)
+    run = sl.stroboscope(
+        lab.with_values(frequency=frequency, **values), {"x": amplitude, "v": 0.0}, periods, keep=1
+    )
     x, v = run.x.values[:, -1], run.v.values[:, -1]
 
     def stored(x, v):
         beyond = np.maximum(x - values["boundary"], 0.0)
-        return (v**2 + x**2 + values.get("stiffness", 0.0) * beyond**2) / 2 + values.get("cubic", 0.0) * x**4 / 4
+        return (v**2 + x**2 + values.get("stiffness", 0.0) * beyond**2) / 2 + values.get(
+            "cubic", 0.0
+        ) * x**4 / 4
 
     drift = stored(x, v) / stored(amplitude, 0.0) - 1
     walk = 2.0**-53 * np.sqrt(run.steps.values)
@@ -145,14 +176,18 @@ def test_energy_wanders_as_roundings_do(values, frequency):
     assert 0 < (drift > 0).sum() < len(drift)
 
 
-# -- impacts ---------------------------------------------------------------------------------------------------------------------
+# -- impacts ---------------------------------------------------------------------------------------
 #: A mass that falls with 9.81 m/s^2 from 0.2 m above a spring, on and on.
 FALL = {"lift": 9.81, "boundary": 0.0, "stiffness": 4e3}
-FORCE = {"boundary": lambda x, v, stiffness, boundary, dashpot: stiffness * (x - boundary) + dashpot * v}
+FORCE = {
+    "boundary": lambda x, v, stiffness, boundary, dashpot: stiffness * (x - boundary) + dashpot * v
+}
 
 
 def bounce():
-    """Speed at contact, duration of contact, duration of a bounce, impulse, of the closed form (unit mass)."""
+    """Speed at contact, duration of contact, duration of a bounce, impulse, of the closed form
+    (unit mass).
+    """
     g, w = FALL["lift"], math.sqrt(FALL["stiffness"])
     speed = math.sqrt(2 * g * 0.2)
     duration = 2 / w * (math.pi - math.atan(speed * w / g))
@@ -162,7 +197,13 @@ def bounce():
 def test_statistics_of_a_bouncing_mass():
     speed, duration, cycle, impulse = bounce()
     found = sl.impact_statistics(
-        lab, (-0.2, 0.0), periods=100, transient=1, force=FORCE, bins=[0, 1, 2, 3], values=FALL | {"frequency": 1 / cycle}
+        lab,
+        (-0.2, 0.0),
+        periods=100,
+        transient=1,
+        force=FORCE,
+        bins=[0, 1, 2, 3],
+        values=FALL | {"frequency": 1 / cycle},
     )
     one = found.sel(guard="boundary")
     assert int(one.contact_side) == 1
@@ -176,14 +217,27 @@ def test_statistics_of_a_bouncing_mass():
     assert float(one.share_in_contact) == pytest.approx(duration / cycle, rel=1e-11)
     assert float(one.impulse_mean) == pytest.approx(impulse, rel=1e-11)
     assert one.speed_histogram.values.tolist() == [0, 100, 0]
-    for name in ("contacts_per_second_error", "speed_mean_error", "share_in_contact_error", "impulse_mean_error"):
+    for name in (
+        "contacts_per_second_error",
+        "speed_mean_error",
+        "share_in_contact_error",
+        "impulse_mean_error",
+    ):
         assert float(one[name]) < 1e-10  # every bounce is the same
     assert found.contact_exit_speed.values == pytest.approx(found.contact_speed.values, rel=1e-12)
 
 
 def test_impulse_is_the_change_of_momentum_less_the_other_forces():
-    """Gravity, a harmonic force and a dashpot: their impulses over a contact are elementary; the spring's and dashpot's is integrated."""
-    values = FALL | {"dashpot": 3.0, "force": 2.0, "frequency": 1.7, "damping": 0.4, "boundary": 0.05}
+    """Gravity, a harmonic force and a dashpot: their impulses over a contact are elementary; the
+    spring's and dashpot's is integrated.
+    """
+    values = FALL | {
+        "dashpot": 3.0,
+        "force": 2.0,
+        "frequency": 1.7,
+        "damping": 0.4,
+        "boundary": 0.05,
+    }
     found = sl.impact_statistics(lab, (-0.2, 0.0), periods=20, force=FORCE, values=values)
     begin, duration = found.contact_time.values, found.contact_duration.values
     w = 2 * math.pi * 1.7
@@ -192,15 +246,23 @@ def test_impulse_is_the_change_of_momentum_less_the_other_forces():
     momentum = -found.contact_exit_speed.values - found.contact_speed.values
     ended = np.isfinite(duration)
     assert ended.sum() > 10
-    assert found.contact_impulse.values[ended] == pytest.approx((others - momentum)[ended], rel=1e-11)
+    assert found.contact_impulse.values[ended] == pytest.approx(
+        (others - momentum)[ended], rel=1e-11
+    )
 
 
 def test_statistics_without_forcing():
-    """The same bounces of one of two masses that don't feel each other; the other one rests far from its stop."""
+    """The same bounces of one of two masses that don't feel each other; the other one rests far
+    from its stop.
+    """
     speed, duration, cycle, _ = bounce()
     values = {"lift": 9.81, "stop1": 0.0, "stiffness1": 4e3, "stop2": 1e6, "gap": 1e7}
-    t_end = 50.5 * cycle  # from the top of a flight to the bottom of a bounce: 50 contacts and a half, the first of which is transient
-    found = sl.impact_statistics(pair, (-0.2, 0.0, 0.0, 0.0), t_end=t_end, transient=cycle, values=values)
+    # from the top of a flight to the bottom of a bounce: 50 contacts and a half, the first of which
+    # is transient
+    t_end = 50.5 * cycle
+    found = sl.impact_statistics(
+        pair, (-0.2, 0.0, 0.0, 0.0), t_end=t_end, transient=cycle, values=values
+    )
     one = found.sel(guard="stop1")
     assert int(one.contacts) == 50
     assert float(one.contacts_per_second) == pytest.approx(50 / (49.5 * cycle), rel=1e-13)
@@ -216,21 +278,29 @@ def test_a_contact_under_way_counts_in_the_share_only():
     _, duration, cycle, _ = bounce()
     fall = (cycle - duration) / 2
     begin = fall + duration / 2  # the first contact is half over
-    found = sl.impact_statistics(lab, (-0.2, 0.0), t_end=begin, values=FALL | {"frequency": 0.01}, force=FORCE)
+    found = sl.impact_statistics(
+        lab, (-0.2, 0.0), t_end=begin, values=FALL | {"frequency": 0.01}, force=FORCE
+    )
     assert found.contact_speed.values == pytest.approx([bounce()[0]], rel=1e-12)
     assert np.isnan(found.contact_duration.values).all()
     assert np.isnan(found.contact_impulse.values).all()
     assert float(found.share_in_contact[0]) == pytest.approx(duration / 2 / begin, rel=1e-12)
-    inside = sl.impact_statistics(lab, (0.01, 0.0), t_end=1e-3, values=FALL | {"frequency": 0.01}, force=FORCE)
+    inside = sl.impact_statistics(
+        lab, (0.01, 0.0), t_end=1e-3, values=FALL | {"frequency": 0.01}, force=FORCE
+    )
     assert inside.sizes["contact"] == 0
     assert float(inside.share_in_contact[0]) == 1.0
     w, sag = (
         math.sqrt(FALL["stiffness"]),
         FALL["lift"] / FALL["stiffness"],
     )  # from rest at 4 sag: x = sag (1 + 3 cos wt) leaves at cos = -1/3
-    leaving = sl.impact_statistics(lab, (4 * sag, 0.0), t_end=0.05, values=FALL | {"frequency": 0.01}, force=FORCE)
+    leaving = sl.impact_statistics(
+        lab, (4 * sag, 0.0), t_end=0.05, values=FALL | {"frequency": 0.01}, force=FORCE
+    )
     assert leaving.sizes["contact"] == 0
-    assert float(leaving.share_in_contact[0]) == pytest.approx(math.acos(-1 / 3) / w / 0.05, rel=1e-12)
+    assert float(leaving.share_in_contact[0]) == pytest.approx(
+        math.acos(-1 / 3) / w / 0.05, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize(

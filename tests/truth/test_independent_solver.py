@@ -1,8 +1,10 @@
-"""Three systems that are not the rig, against heyoka: a chain with two clearances, a gear pair, a wing section with freeplay.
+"""Three systems that are not the rig, against heyoka: a chain with two clearances, a gear pair, a
+wing section with freeplay.
 
-heyoka runs from equations written by hand for it (oracles/heyoka_systems.py), one smooth field for each mode, its events terminal. Its own
-error is measured by a run at a tolerance of 1e-13: the two of them differ by at most 2e-14 s in a contact's time and 1e-13 of the range of
-a state. Agreement is asked for to ten times that.
+heyoka runs from equations written by hand for it (oracles/heyoka_systems.py), one smooth field for
+each mode, its events terminal. Its own error is measured by a run at a tolerance of 1e-13: the two
+of them differ by at most 2e-14 s in a contact's time and 1e-13 of the range of a state. Agreement
+is asked for to ten times that.
 """
 
 from __future__ import annotations
@@ -41,12 +43,15 @@ CASES = {
 def pair(request):
     """System, our run, heyoka's at its finest tolerance, heyoka's at 1e-13."""
     pytest.importorskip("heyoka", reason="extra `reference` isn't installed")
-    from oracles import heyoka_systems  # here, since only one of the processes that collect these tests runs them
+    # here, since only one of the processes that collect these tests runs them
+    from oracles import heyoka_systems
 
     system, start, span, contacts = CASES[request.param]
     run = sl.simulate(system, start, **span, samples=50)
     oracles = [
-        heyoka_systems.simulate(request.param, dict(system.values), start, run.end_time.item(), tolerance=tolerance)
+        heyoka_systems.simulate(
+            request.param, dict(system.values), start, run.end_time.item(), tolerance=tolerance
+        )
         for tolerance in (1e-16, 1e-13)
     ]
     assert oracles[0].times.size == contacts
@@ -54,9 +59,13 @@ def pair(request):
 
 
 def boundaries(run):
-    """Clearance and side of every contact, read off the guards' names: 'x2 - x1 = -coupling_gap' is the low side of the coupling."""
+    """Clearance and side of every contact, read off the guards' names: 'x2 - x1 = -coupling_gap' is
+    the low side of the coupling.
+    """
     names = [str(name) for name in run.contact_guard.values]
-    return [int("x2 - x1" in name) for name in names], [-1 if "= -" in name else 1 for name in names]
+    return [int("x2 - x1" in name) for name in names], [
+        -1 if "= -" in name else 1 for name in names
+    ]
 
 
 def test_heyoka_is_as_exact_as_we_say(pair):
@@ -98,6 +107,10 @@ def test_contact_velocity_is_the_rate_of_the_gap(pair):
     clearances, _ = boundaries(run)
     half = len(system.states) // 2
     speed = [np.asarray(run[f"contact_{name}"].values) for name in system.states[half:]]
-    rates = {"chain": [speed[0], speed[-1] - speed[0]], "gear_pair": [speed[0]], "aeroelastic": [speed[-1]]}[system.name]
+    rates = {
+        "chain": [speed[0], speed[-1] - speed[0]],
+        "gear_pair": [speed[0]],
+        "aeroelastic": [speed[-1]],
+    }[system.name]
     exact = np.array([rates[clearance][i] for i, clearance in enumerate(clearances)])
     assert np.max(np.abs(run.contact_velocity.values - exact)) < 1e-13 * np.max(np.abs(exact))

@@ -1,7 +1,8 @@
-"""Drives with breaks and recorded drives: the linear oscillator under each, against exact arcs joined at the breaks.
+"""Drives with breaks and recorded drives: the linear oscillator under each, against exact arcs
+joined at the breaks.
 
-Between breaks every drive here is the output of a linear system of its own (a line, a sine), so the state with the drive moves by a matrix
-exponential: mpmath's, at 40 digits.
+Between breaks every drive here is the output of a linear system of its own (a line, a sine), so the
+state with the drive moves by a matrix exponential: mpmath's, at 40 digits.
 """
 
 import itertools
@@ -24,12 +25,17 @@ VALUES = [0.5, -1.0, 2.0, 2.0, 0.0, 1.5]
 def recorded(points, values):
     @sl.system(states="x v")
     def driven(
-        t, x, v, *, stiffness=K, damping=C, half_sine=0.0, ramp=0.0, square=0.0, pulses=0.0, saw=0.0, record=0.0, duration=0.7, rise=0.4,
+        t, x, v, *, stiffness=K, damping=C, half_sine=0.0, ramp=0.0, square=0.0, pulses=0.0,
+        saw=0.0, record=0.0, duration=0.7, rise=0.4,
         beat=2.5, cycle=0.9, width=0.35, late=0.1,
     ):  # fmt: skip
         """An oscillator with every kind of input; amplitudes choose."""
-        push = half_sine * sl.where(t < duration, sl.sin(math.pi * t / duration), 0) + ramp * sl.clip(t / rise, 0, 1)
-        push += square * sl.where(sl.sin(beat * t) > 0.3, 1, -1) + pulses * sl.where(sl.mod(t, cycle) < width, 1, 0)
+        push = half_sine * sl.where(
+            t < duration, sl.sin(math.pi * t / duration), 0
+        ) + ramp * sl.clip(t / rise, 0, 1)
+        push += square * sl.where(sl.sin(beat * t) > 0.3, 1, -1) + pulses * sl.where(
+            sl.mod(t, cycle) < width, 1, 0
+        )
         push += saw * sl.mod(t, cycle) + record * sl.table(t - late, points, values)
         return v, push - stiffness * x - damping * v
 
@@ -40,13 +46,21 @@ driven = recorded(POINTS, VALUES)
 
 
 def arcs(breaks, drive_of, until=SPAN):
-    """The state at `until`: drive_of(middle of an arc) is (matrix of the drive's own system, its value and rate at the arc's start)."""
+    """The state at `until`: drive_of(middle of an arc) is (matrix of the drive's own system, its
+    value and rate at the arc's start).
+    """
     with mpmath.workdps(40):
-        edges = [mpmath.mpf(0), *sorted(b for b in map(mpmath.mpf, breaks) if 0 < b < until), mpmath.mpf(until)]
+        edges = [
+            mpmath.mpf(0),
+            *sorted(b for b in map(mpmath.mpf, breaks) if 0 < b < until),
+            mpmath.mpf(until),
+        ]
         x = mpmath.matrix(START)
         for begin, end in itertools.pairwise(edges):
             own, value, rate = drive_of(begin, (begin + end) / 2)
-            a = mpmath.matrix([[0, 1, 0, 0], [-mpmath.mpf(K), -mpmath.mpf(C), 1, 0], [0, 0, 0, 1], [0, 0, own, 0]])
+            a = mpmath.matrix(
+                [[0, 1, 0, 0], [-mpmath.mpf(K), -mpmath.mpf(C), 1, 0], [0, 0, 0, 1], [0, 0, own, 0]]
+            )
             x = (mpmath.expm(a * (end - begin)) * mpmath.matrix([x[0], x[1], value, rate]))[:2]
             x = mpmath.matrix(x)
         return float(x[0]), float(x[1])
@@ -67,7 +81,9 @@ def line(points, values):
 
 def half_sine(begin, middle):
     w = mpmath.pi / mpmath.mpf(0.7)
-    return (-(w**2), mpmath.sin(w * begin), w * mpmath.cos(w * begin)) if middle < 0.7 else (0, 0, 0)
+    return (
+        (-(w**2), mpmath.sin(w * begin), w * mpmath.cos(w * begin)) if middle < 0.7 else (0, 0, 0)
+    )
 
 
 def cycles(length, *parts):
@@ -83,16 +99,34 @@ RISE = math.asin(0.3) / 2.5
 CASES = {
     "half_sine": ([0.7], half_sine),
     "ramp": ([0.4], line([0, mpmath.mpf(0.4)], [0, 1])),
-    "square": (cycles(2 * math.pi / 2.5, RISE, math.pi / 2.5 - RISE), lambda begin, middle: turning(middle)),
-    "pulses": (cycles(0.9, 0, 0.35), lambda begin, middle: (0, 1 if middle % mpmath.mpf(0.9) < 0.35 else 0, 0)),
-    "saw": (cycles(0.9, 0), lambda begin, middle: (0, begin - mpmath.floor(middle / mpmath.mpf(0.9)) * mpmath.mpf(0.9), 1)),
-    "record": ([p + mpmath.mpf(0.1) for p in POINTS], line([p + mpmath.mpf(0.1) for p in POINTS], VALUES)),
+    "square": (
+        cycles(2 * math.pi / 2.5, RISE, math.pi / 2.5 - RISE),
+        lambda begin, middle: turning(middle),
+    ),
+    "pulses": (
+        cycles(0.9, 0, 0.35),
+        lambda begin, middle: (0, 1 if middle % mpmath.mpf(0.9) < 0.35 else 0, 0),
+    ),
+    "saw": (
+        cycles(0.9, 0),
+        lambda begin, middle: (
+            0,
+            begin - mpmath.floor(middle / mpmath.mpf(0.9)) * mpmath.mpf(0.9),
+            1,
+        ),
+    ),
+    "record": (
+        [p + mpmath.mpf(0.1) for p in POINTS],
+        line([p + mpmath.mpf(0.1) for p in POINTS], VALUES),
+    ),
 }
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_linear_oscillator_under_each_input(name):
-    run = sl.simulate(driven.with_values(**{name: 1.0}), START, t_end=SPAN, samples=1, method=METHOD)
+    run = sl.simulate(
+        driven.with_values(**{name: 1.0}), START, t_end=SPAN, samples=1, method=METHOD
+    )
     exact = arcs(*CASES[name])
     assert run.x.values[-1] == pytest.approx(exact[0], abs=1e-13)
     assert run.v.values[-1] == pytest.approx(exact[1], abs=3e-13)
@@ -103,17 +137,38 @@ def test_amplitudes_and_all_inputs_together():
     """The equation is linear: responses from rest add up, whatever breaks the others bring."""
     rest = (0.0, 0.0)
     amplitudes = dict(zip(CASES, [2.0, -1.0, 0.5, 3.0, -2.0, 1.5], strict=True))
-    together = sl.simulate(driven.with_values(**amplitudes), rest, t_end=SPAN, samples=1, method=METHOD)
-    single = [sl.simulate(driven.with_values(**{name: 1.0}), rest, t_end=SPAN, samples=1, method=METHOD) for name in CASES]
-    total = sum(amplitude * run.x.values[-1] for amplitude, run in zip(amplitudes.values(), single, strict=True))
+    together = sl.simulate(
+        driven.with_values(**amplitudes), rest, t_end=SPAN, samples=1, method=METHOD
+    )
+    single = [
+        sl.simulate(driven.with_values(**{name: 1.0}), rest, t_end=SPAN, samples=1, method=METHOD)
+        for name in CASES
+    ]
+    total = sum(
+        amplitude * run.x.values[-1]
+        for amplitude, run in zip(amplitudes.values(), single, strict=True)
+    )
     assert together.x.values[-1] == pytest.approx(total, abs=1e-13)
 
 
 def test_trajectories_with_breaks_of_their_own_do_not_disturb_each_other():
     values = {"cycle": [0.9, 0.31, 2.0], "pulses": 1.0, "saw": 1.0}
-    together = sl.simulate(driven, {"x": [0.1, 0.1, 0.1], "v": -0.3}, values=values, t_end=SPAN, samples=1, method=METHOD)
+    together = sl.simulate(
+        driven,
+        {"x": [0.1, 0.1, 0.1], "v": -0.3},
+        values=values,
+        t_end=SPAN,
+        samples=1,
+        method=METHOD,
+    )
     for i, cycle in enumerate(values["cycle"]):
-        alone = sl.simulate(driven.with_values(cycle=cycle, pulses=1.0, saw=1.0), START, t_end=SPAN, samples=1, method=METHOD)
+        alone = sl.simulate(
+            driven.with_values(cycle=cycle, pulses=1.0, saw=1.0),
+            START,
+            t_end=SPAN,
+            samples=1,
+            method=METHOD,
+        )
         assert together.x.values[i, -1] == alone.x.values[-1]
 
 
@@ -125,9 +180,17 @@ def test_a_long_record_is_data_and_not_code():
     assert taylor_head(long, 20, 2) == taylor_head(driven, 20, 2)
     assert long.fingerprint() != driven.fingerprint()
     assert table_data(long).size > 6 * count
-    run = sl.simulate(long.with_values(record=1.0, late=0.0), START, t_end=(count - 1) * step, samples=1, method=METHOD)
+    run = sl.simulate(
+        long.with_values(record=1.0, late=0.0),
+        START,
+        t_end=(count - 1) * step,
+        samples=1,
+        method=METHOD,
+    )
     with mpmath.workdps(40):
-        a = mpmath.matrix([[0, 1, 0, 0], [-mpmath.mpf(K), -mpmath.mpf(C), 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]])
+        a = mpmath.matrix(
+            [[0, 1, 0, 0], [-mpmath.mpf(K), -mpmath.mpf(C), 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]]
+        )
         move = np.array(mpmath.expm(a * step).tolist(), dtype=np.longdouble)[:2]
     state = np.array(START, dtype=np.longdouble)
     for value, rate in zip(values[:-1], np.diff(values) / step, strict=True):
@@ -137,7 +200,13 @@ def test_a_long_record_is_data_and_not_code():
 
 
 def test_ode45_stops_at_the_same_breaks():
-    run = sl.simulate(driven.with_values(square=1.0), START, t_end=SPAN, samples=1, method=sl.ODE45(rtol=1e-10, atol=1e-12))
+    run = sl.simulate(
+        driven.with_values(square=1.0),
+        START,
+        t_end=SPAN,
+        samples=1,
+        method=sl.ODE45(rtol=1e-10, atol=1e-12),
+    )
     assert run.x.values[-1] == pytest.approx(arcs(*CASES["square"])[0], abs=2e-9)
 
 
@@ -154,7 +223,12 @@ def test_tables_converge_at_their_order(kind, order):
     errors = []
     for count in (41, 81, 161):
         points = np.linspace(0, 6, count)
-        errors.append(max(abs(sl.table(float(one), points, np.sin(points), kind) - math.sin(one)) for one in x[::25]))
+        errors.append(
+            max(
+                abs(sl.table(float(one), points, np.sin(points), kind) - math.sin(one))
+                for one in x[::25]
+            )
+        )
     measured = math.log2(errors[1] / errors[2])
     assert order - 0.4 < measured < order + 1.4
 
@@ -163,4 +237,8 @@ def test_pchip_keeps_the_shape():
     points, values = [0.0, 1.0, 1.5, 4.0, 5.0], [0.0, 0.1, 2.0, 2.0, 7.0]
     for x in np.linspace(0, 5, 200):
         i = min(int(np.searchsorted(points, x, side="right")), len(points) - 1)
-        assert values[i - 1] - 1e-15 <= sl.table(float(x), points, values, "pchip") <= values[i] + 1e-15
+        assert (
+            values[i - 1] - 1e-15
+            <= sl.table(float(x), points, values, "pchip")
+            <= values[i] + 1e-15
+        )

@@ -1,4 +1,6 @@
-"""Drives with breaks that repeat with the forcing: exact fixed points, no drift, and a tangent that time's own breaks don't touch."""
+"""Drives with breaks that repeat with the forcing: exact fixed points, no drift, and a tangent that
+time's own breaks don't touch.
+"""
 
 import mpmath
 import numpy as np
@@ -16,11 +18,16 @@ VALUES = np.array([1.0, 3.0, -1.0, 0.5, 1.0])
 
 @sl.system(states="x v", forced_at="frequency")
 def beaten(
-    t, x, v, *, stiffness=9.0, damping=0.4, square=0.0, pulses=0.0, record=0.0, share=0.3, gap=10.0, stop=0.0, frequency=F
+    t, x, v, *, stiffness=9.0, damping=0.4, square=0.0, pulses=0.0, record=0.0, share=0.3, gap=10.0,
+    stop=0.0, frequency=F
 ):  # fmt: skip
-    """An oscillator under a square wave, pulses, or a record that is one period long; a stop far away."""
+    """An oscillator under a square wave, pulses, or a record that is one period long; a stop far
+    away.
+    """
     cycles = frequency * t
-    push = square * sl.where(sl.sin(2 * sl.pi * cycles) > 0, 1, -1) + pulses * sl.where(sl.mod(t, 1 / frequency) < share / frequency, 1, 0)
+    push = square * sl.where(sl.sin(2 * sl.pi * cycles) > 0, 1, -1) + pulses * sl.where(
+        sl.mod(t, 1 / frequency) < share / frequency, 1, 0
+    )
     push += record * sl.table(cycles, POINTS, VALUES, outside="periodic")
     return v, push - stiffness * x - damping * v - sl.where(x > gap, stop * (x - gap), 0)
 
@@ -45,7 +52,12 @@ def settled_states():
         period = 1 / mpmath.mpf(F)
         lines = zip(POINTS[:-1], POINTS[1:], VALUES[:-1], VALUES[1:], strict=True)
         record = [
-            arc(period * (mpmath.mpf(q) - p), mpmath.mpf(a), (mpmath.mpf(b) - a) / (mpmath.mpf(q) - p) / period) for p, q, a, b in lines
+            arc(
+                period * (mpmath.mpf(q) - p),
+                mpmath.mpf(a),
+                (mpmath.mpf(b) - a) / (mpmath.mpf(q) - p) / period,
+            )
+            for p, q, a, b in lines
         ]
         share = mpmath.mpf(0.3)
         return {
@@ -58,14 +70,18 @@ def settled_states():
 @pytest.mark.parametrize("name", ["square", "pulses", "record"])
 def test_the_fixed_point_is_exact_and_stays_for_100_000_periods(name):
     exact = settled_states()[name]
-    run = sl.stroboscope(beaten.with_values(**{name: 1.0}), exact, periods=100_000, keep=5, method=METHOD)
+    run = sl.stroboscope(
+        beaten.with_values(**{name: 1.0}), exact, periods=100_000, keep=5, method=METHOD
+    )
     assert np.abs(run.x.values - exact[0]).max() < 1e-13
     assert np.abs(run.v.values - exact[1]).max() < 1e-12
     assert run.grazes_unresolved.item() == 0
 
 
 def test_a_break_is_no_contact_and_the_tangent_does_not_see_it():
-    """Of a linear system all multipliers are those of the equation without a drive: exp(-damping T/2 +- i w T)."""
+    """Of a linear system all multipliers are those of the equation without a drive: exp(-damping
+    T/2 +- i w T).
+    """
     system = beaten.with_values(square=1.0, pulses=0.5, record=2.0)
     strobe = Stroboscope(system, METHOD)
     _, matrix = strobe.tangent(np.array([[0.3, -0.2]]), 3)

@@ -1,4 +1,6 @@
-"""Contact laws without a Taylor series on their boundary, K d^p with p not whole, held against closed forms and another solver."""
+"""Contact laws without a Taylor series on their boundary, K d^p with p not whole, held against
+closed forms and another solver.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ POWERS = (1.5, 2.5, 1.2, 0.5, math.sqrt(2), 2.0)
 
 
 def run_of(system, start, t_end, **options):
-    return sl.simulate(system, start, t_end=t_end, **{"method": METHOD, "time_errors": "local", **options})
+    return sl.simulate(
+        system, start, t_end=t_end, **{"method": METHOD, "time_errors": "local", **options}
+    )
 
 
 @pytest.mark.parametrize("stiffness", [1e3, 1e6, 1e9])
@@ -42,14 +46,22 @@ def test_the_hertz_contact_of_the_handbook():
 @pytest.mark.parametrize("dashpot", [0.1, 1.0, 5.0])
 @pytest.mark.parametrize("power", [1.5, 0.5])
 def test_rebound_from_a_hunt_crossley_stop_does_not_depend_on_stiffness_or_power(power, dashpot):
-    run = run_of(power_stop.with_values(dashpot=dashpot, power=power, stiffness=1e5), (-1e-3, 0.5), 0.1)
+    run = run_of(
+        power_stop.with_values(dashpot=dashpot, power=power, stiffness=1e5), (-1e-3, 0.5), 0.1
+    )
     assert run.sizes["contact"] == 2
     assert abs(-run.end_v.item() / rebound_of(0.5, dashpot) - 1) < 64 * EPS
 
 
 @pytest.mark.parametrize(
     ("v", "lift", "contacts", "status"),
-    [(0.1, 0, 1, "ok"), (-0.1, 0, 0, "ok"), (0, -1, 0, "ok"), (0, 0, 0, "resting"), (1e-6, -1, 1, "ok")],
+    [
+        (0.1, 0, 1, "ok"),
+        (-0.1, 0, 0, "ok"),
+        (0, -1, 0, "ok"),
+        (0, 0, 0, "resting"),
+        (1e-6, -1, 1, "ok"),
+    ],
 )
 def test_a_start_on_the_boundary_goes_where_the_motion_goes(v, lift, contacts, status):
     run = run_of(power_stop.with_values(lift=float(lift)), (0.0, v), 0.03)
@@ -57,10 +69,14 @@ def test_a_start_on_the_boundary_goes_where_the_motion_goes(v, lift, contacts, s
 
 
 @pytest.mark.parametrize("power", [1.5, 2.5, 0.5])
-def test_a_mass_pressed_from_rest_on_the_boundary_comes_back_after_the_period_of_the_closed_form(power):
+def test_a_mass_pressed_from_rest_on_the_boundary_comes_back_after_the_period_of_the_closed_form(
+    power,
+):
     """It enters at zero speed. At half the period it is deepest and at rest."""
     period = pressed_period(1.0, 1e4, power)
-    run = run_of(power_stop.with_values(lift=1.0, power=power, stiffness=1e4), (0.0, 0.0), 0.5 * period)
+    run = run_of(
+        power_stop.with_values(lift=1.0, power=power, stiffness=1e4), (0.0, 0.0), 0.5 * period
+    )
     deepest = ((power + 1) / 1e4) ** (1 / power)
     assert abs(run.end_x.item() / deepest - 1) < 16 * EPS
     assert abs(run.end_v.item()) < 64 * EPS * deepest / period
@@ -76,10 +92,20 @@ def test_a_mass_at_rest_is_met_by_a_moving_stop():
     assert abs(run.end_v.item() - truth[1]) < 1e-10 * abs(truth[1])
 
 
-@pytest.mark.parametrize(("power", "dashpot"), [(1.5, 0.0), (1.5, 0.3), (0.5, 0.0), (math.sqrt(2), 0.1)])
+@pytest.mark.parametrize(
+    ("power", "dashpot"), [(1.5, 0.0), (1.5, 0.3), (0.5, 0.0), (math.sqrt(2), 0.1)]
+)
 def test_a_forced_oscillator_agrees_with_another_solver(power, dashpot):
     system = power_stop.with_values(
-        power=power, stiffness=2e3, gap=0.3, dashpot=dashpot, spring=1.0, damping=0.1, force=1.0, frequency=0.17, shake=0.02
+        power=power,
+        stiffness=2e3,
+        gap=0.3,
+        dashpot=dashpot,
+        spring=1.0,
+        damping=0.1,
+        force=1.0,
+        frequency=0.17,
+        shake=0.02,
     )
     run = run_of(system, (0.1, 0.2), 30.0)
     assert run.sizes["contact"] >= 6
@@ -88,7 +114,9 @@ def test_a_forced_oscillator_agrees_with_another_solver(power, dashpot):
 
 
 def piecewise_solution(system, start, contacts, end, first_side):
-    """DOP853 from contact to contact, its own gap checked to be zero there; beside a boundary in the square root of the time."""
+    """DOP853 from contact to contact, its own gap checked to be zero there; beside a boundary in
+    the square root of the time.
+    """
     p = system.values
     w = 2 * math.pi * p["frequency"]
     state, now, side = np.array(start, float), 0.0, first_side
@@ -97,14 +125,33 @@ def piecewise_solution(system, start, contacts, end, first_side):
         def rate(t, y, side=side):
             drive = math.cos(w * t)
             depth = max(y[0] - p["gap"] - p["shake"] * drive, 0.0)
-            stop = p["stiffness"] * depth ** p["power"] * (1 + p["dashpot"] * y[1]) if side > 0 else 0.0
-            return np.array([y[1], p["lift"] + p["force"] * drive - p["spring"] * y[0] - p["damping"] * y[1] - stop])
+            stop = (
+                p["stiffness"] * depth ** p["power"] * (1 + p["dashpot"] * y[1])
+                if side > 0
+                else 0.0
+            )
+            return np.array(
+                [
+                    y[1],
+                    p["lift"]
+                    + p["force"] * drive
+                    - p["spring"] * y[0]
+                    - p["damping"] * y[1]
+                    - stop,
+                ]
+            )
 
         half = 0.5 * (then - now)
-        for low, sign in ((now, 1), (then, -1)):  # t = now + s^2 up to the middle, then t = then - s^2
+        # t = now + s^2 up to the middle, then t = then - s^2
+        for low, sign in ((now, 1), (then, -1)):
             span = (0.0, math.sqrt(half)) if sign > 0 else (math.sqrt(half), 0.0)
             solution = solve_ivp(
-                lambda s, y, low=low, sign=sign: 2 * sign * s * rate(low + sign * s * s, y), span, state, "DOP853", rtol=3e-14, atol=1e-15
+                lambda s, y, low=low, sign=sign: 2 * sign * s * rate(low + sign * s * s, y),
+                span,
+                state,
+                "DOP853",
+                rtol=3e-14,
+                atol=1e-15,
             )
             state = solution.y[:, -1]
         now, side = then, -side
@@ -114,12 +161,18 @@ def piecewise_solution(system, start, contacts, end, first_side):
 
 
 def test_energy_is_kept_over_a_thousand_contacts():
-    """A ball on a Hertz floor: lift pulls it to the boundary. 6e4 steps that each round by 1e-16 at random make 1e-13."""
+    """A ball on a Hertz floor: lift pulls it to the boundary. 6e4 steps that each round by 1e-16 at
+    random make 1e-13.
+    """
     system = power_stop.with_values(lift=9.81, stiffness=1e7)
     run = run_of(system, (-0.1, 0.0), 290.0)
     assert run.sizes["contact"] > 1900
     inside = run.end_x.item() > 0
-    energy = 0.5 * run.end_v.item() ** 2 - 9.81 * run.end_x.item() + (1e7 * run.end_x.item() ** 2.5 / 2.5 if inside else 0.0)
+    energy = (
+        0.5 * run.end_v.item() ** 2
+        - 9.81 * run.end_x.item()
+        + (1e7 * run.end_x.item() ** 2.5 / 2.5 if inside else 0.0)
+    )
     assert abs(energy / 0.981 - 1) < 4e-13
 
 
@@ -144,7 +197,9 @@ def test_digits_do_not_depend_on_neighbours():
 
 @pytest.mark.parametrize("late", [1e-10, 1e-8, 1e-6, 1e-5])
 def test_samples_and_ends_beside_the_boundary_are_exact(late):
-    """v0 - v = K v0^p t^(p+1)/(p+1) to first order; nothing depends on the frequency, whose period makes the samples."""
+    """v0 - v = K v0^p t^(p+1)/(p+1) to first order; nothing depends on the frequency, whose period
+    makes the samples.
+    """
     run = run_of(power_stop.with_values(frequency=1 / late), (0.0, 0.1), late, samples=4)
     times = late * np.arange(5) / 4
     lost = 1e6 * 0.1**1.5 * times**2.5 / 2.5
@@ -158,7 +213,9 @@ def test_the_tangent_flow_across_a_contact(power):
     assert_tangent_across_a_contact(power_stop.with_values(stiffness=1e4, power=power), power)
 
 
-@pytest.mark.parametrize("law", [lambda d: d * sl.sqrt(d), lambda d: d**2 / sl.sqrt(d)], ids=["root", "quotient"])
+@pytest.mark.parametrize(
+    "law", [lambda d: d * sl.sqrt(d), lambda d: d**2 / sl.sqrt(d)], ids=["root", "quotient"]
+)
 def test_the_tangent_flow_of_a_law_written_with_a_root(law):
     """Its derivative holds d/sqrt(d), which is 0/0 on the boundary."""
 
@@ -180,7 +237,9 @@ def assert_tangent_across_a_contact(stop, power, stiffness=1e4, x0=-1e-2, v0=0.5
 
 @sl.system(states="x v")
 def lossy_stop(t, x, v, *, stiffness=2.47e6, stop=0.005):
-    """A Hertz stop with a loss on the way in, a root in a root: example 4 of DISODE45 (Calvo, Montijano & Randez)."""
+    """A Hertz stop with a loss on the way in, a root in a root: example 4 of DISODE45 (Calvo,
+    Montijano & Randez).
+    """
     depth = x - stop
     force, loss = stiffness * depth**1.5, 1.98 * sl.sqrt(2 * stiffness * sl.sqrt(depth)) * v
     contact = sl.piecewise((force + loss, (depth > 0) & (v > 0)), (force, depth > 0), otherwise=0)
@@ -188,7 +247,9 @@ def lossy_stop(t, x, v, *, stiffness=2.47e6, stop=0.005):
 
 
 def test_the_published_switches_of_a_lossy_hertz_stop():
-    """Entry, turn and exit, six times; the first entry is printed to ten digits. Turns outside the stop switch nothing."""
+    """Entry, turn and exit, six times; the first entry is printed to ten digits. Turns outside the
+    stop switch nothing.
+    """
     run = run_of(lossy_stop, (0.0, 0.0), 3.0, method=sl.Taylor(order=12, lanes=2))
     assert run.status.item() == "ok"
     at_stop = run.contact_guard.values == "stop"

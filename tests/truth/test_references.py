@@ -1,7 +1,8 @@
 """The Taylor flow against tests/reference: every row, to the digits that double precision holds.
 
-Bounds are not tuned to what the flow happens to reach. They are either those that the package promises (states to 1e-14 m and 1e-12 m/s,
-times of contacts to 1e-13 s) or follow from :func:`rounding`.
+Bounds are not tuned to what the flow happens to reach. They are either those that the package
+promises (states to 1e-14 m and 1e-12 m/s, times of contacts to 1e-13 s) or follow from
+:func:`rounding`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ import saltus as sl
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 EPS = 2.0**-52
-#: Truncation below rounding, so that rounding alone is judged; the default tolerance leaves some 64 times as much.
+#: Truncation below rounding, so that rounding alone is judged; the default tolerance leaves some 64
+#: times as much.
 FINE = sl.Taylor(tolerance=EPS)
 
 
@@ -33,18 +35,25 @@ def column(table, name):
 def errors(values, texts):
     """|value - exact| for doubles and decimal texts, without rounding the texts first."""
     with mp.workdps(50):
-        return np.array([float(abs(mpf(float(value)) - mpf(text))) for value, text in zip(values, texts, strict=True)])
+        return np.array(
+            [
+                float(abs(mpf(float(value)) - mpf(text)))
+                for value, text in zip(values, texts, strict=True)
+            ]
+        )
 
 
 def name_of(row):
     return row.get("id") or row["name"]
 
 
-# -- single runs ---------------------------------------------------------------------------------------------------------------------------
+# -- single runs -----------------------------------------------------------------------------------
 
 
 def run_of(row, cubic):
-    """A row of forced_linear.csv or runs.csv; applied_force_N there is the amplitude of the cosine itself."""
+    """A row of forced_linear.csv or runs.csv; applied_force_N there is the amplitude of the cosine
+    itself.
+    """
     w = 2 * np.pi * float(row["frequency_Hz"])
     rig = sl.models.delangre(
         "b",
@@ -55,7 +64,9 @@ def run_of(row, cubic):
         force=float(row["applied_force_N"]) / (1 - 18 / w**2),
         frequency=float(row["frequency_Hz"]),
     )
-    return sl.simulate(rig, (float(row["x0_m"]), float(row["v0_m_per_s"])), int(row["periods"]), samples=1)
+    return sl.simulate(
+        rig, (float(row["x0_m"]), float(row["v0_m_per_s"])), int(row["periods"]), samples=1
+    )
 
 
 CASES = [(row, 0.0) for row in rows("forced_linear")] + [(row, 7e8) for row in rows("runs")]
@@ -74,7 +85,9 @@ def test_runs_end_where_they_should(row, cubic):
 
 @pytest.fixture(scope="module")
 def figure_2b():
-    return sl.simulate(sl.models.delangre("b", frequency="7 Hz"), (0.0, 0.0), 14, samples=1), rows("fig2b_exact_events")
+    return sl.simulate(sl.models.delangre("b", frequency="7 Hz"), (0.0, 0.0), 14, samples=1), rows(
+        "fig2b_exact_events"
+    )
 
 
 def test_all_contacts_of_figure_2b(figure_2b):
@@ -102,7 +115,7 @@ def test_contact_time_error_covers_the_error_and_is_not_absurd(figure_2b):
     assert np.median(claimed / np.maximum(error, np.spacing(run.contact_time.values))) < 100
 
 
-# -- orbits --------------------------------------------------------------------------------------------------------------------------------
+# -- orbits ----------------------------------------------------------------------------------------
 
 SAMPLES = 2000
 
@@ -124,14 +137,16 @@ def test_orbit_returns_to_itself(row):
     assert errors([run.end_v], [row["v0_m_per_s"]]) < 1e-12
     assert np.all(errors(run.contact_time.values, row["event_times_s"].split()) < 1e-13)
     step = run.attrs["forcing_period_s"] / SAMPLES
-    missed = np.max(np.abs(np.diff(run.v.values))) * step / 8 * 1.01  # an extremum between samples: |acceleration| step^2 / 8
+    # an extremum between samples: |acceleration| step^2 / 8
+    missed = np.max(np.abs(np.diff(run.v.values))) * step / 8 * 1.01
     assert 0 <= float(row["xmax_m"]) - run.x.values.max() + 1e-15 < missed
     assert 0 <= run.x.values.min() - float(row["xmin_m"]) + 1e-15 < missed
     rms = float(row["rms_m"])
-    assert abs(np.sqrt(np.mean(run.x.values[:-1] ** 2)) - rms) < 1e-12 * rms  # trapezoid rule on a periodic function
+    # trapezoid rule on a periodic function
+    assert abs(np.sqrt(np.mean(run.x.values[:-1] ** 2)) - rms) < 1e-12 * rms
 
 
-# -- 230 runs to 40 digits ---------------------------------------------------------------------------------------------------------------
+# -- 230 runs to 40 digits -------------------------------------------------------------------------
 
 NUDGE = 1e-9
 
@@ -156,7 +171,9 @@ def simulate(table, values, method, nudge=(0.0, 0.0)):
 
 @pytest.fixture(scope="module", params=RIGS)
 def rigs(request):
-    """Table, values, and the sensitivity d(end x, end v)/d(start x, start v) of every row, (rows, 2, 2)."""
+    """Table, values, and the sensitivity d(end x, end v)/d(start x, start v) of every row, (rows,
+    2, 2).
+    """
     table, values = RIGS[request.param]()
     columns = []
     for nudge in ((NUDGE, 0.0), (0.0, 100 * NUDGE)):
@@ -169,9 +186,11 @@ def rigs(request):
 def rounding(run, sensitivity, tolerance):
     """Bound of the error of the end state, (rows, 2).
 
-    Every step leaves each state wrong by at most ``tolerance`` (what its last terms are cut to) and half an ulp in each of a handful of
-    operations, relative to the state's range: taken as ``tolerance + eps``. Every such error grows by what an error at the start grows
-    by, or not at all if that is larger: a contact amplifies what came before it as much as what was there at the start.
+    Every step leaves each state wrong by at most ``tolerance`` (what its last terms are cut to) and
+    half an ulp in each of a handful of operations, relative to the state's range: taken as
+    ``tolerance + eps``. Every such error grows by what an error at the start grows by, or not at
+    all if that is larger: a contact amplifies what came before it as much as what was there at the
+    start.
     """
     size = np.stack([np.abs(run[name].values).max(axis=1) for name in "xv"], axis=1)
     grown = np.einsum("tij,tj->ti", np.abs(sensitivity), size)
@@ -180,13 +199,20 @@ def rounding(run, sensitivity, tolerance):
 
 def end_errors(run, table):
     return np.stack(
-        [errors(run.end_x.values, [r["x_end_m"] for r in table]), errors(run.end_v.values, [r["v_end_m_per_s"] for r in table])], 1
+        [
+            errors(run.end_x.values, [r["x_end_m"] for r in table]),
+            errors(run.end_v.values, [r["v_end_m_per_s"] for r in table]),
+        ],
+        1,
     )
 
 
 def test_sensitivities_are_those_of_the_reference(rigs):
     table, _, sensitivity = rigs
-    away = np.array([row["v0_m_per_s"] != "0.0" or row["x0_m"] not in ("0.0", "0.0004") for row in table])  # not at rest on a boundary
+    # not at rest on a boundary
+    away = np.array(
+        [row["v0_m_per_s"] != "0.0" or row["x0_m"] not in ("0.0", "0.0004") for row in table]
+    )
     for j, name in enumerate(("dxend_dx0", "dxend_dv0_s")):
         exact = column(table, name)
         scale = np.abs(sensitivity[:, 0, j]) + np.median(np.abs(exact))
@@ -215,13 +241,18 @@ def test_the_bound_can_fail(rigs):
 def test_every_contact_is_there_and_its_time_is_as_exact_as_it_says(rigs, method):
     table, values, sensitivity = rigs
     run = simulate(table, values, method)
-    assert np.bincount(run.contact_trajectory.values, minlength=len(table)).tolist() == column(table, "contacts").astype(int).tolist()
+    assert (
+        np.bincount(run.contact_trajectory.values, minlength=len(table)).tolist()
+        == column(table, "contacts").astype(int).tolist()
+    )
     exact = [text for row in table for text in row["contact_times_s"].split()]
     error, claimed = errors(run.contact_time.values, exact), run.contact_time_error.values
     assert np.max(error) < 1e-13
     speed = np.abs(run.contact_velocity.values)
-    carried = rounding(run, sensitivity, method.tolerance)[run.contact_trajectory.values, 0] / speed  # by what the steps before left
-    slow = speed < 0.01  # only there is it more than a claim from two runs, which round alike, shows
+    # by what the steps before left
+    carried = rounding(run, sensitivity, method.tolerance)[run.contact_trajectory.values, 0] / speed
+    # only there is it more than a claim from two runs, which round alike, shows
+    slow = speed < 0.01
     assert np.all(error[~slow] <= claimed[~slow])
     assert np.all(error[slow] <= claimed[slow] + carried[slow])
     assert np.median(claimed / np.maximum(error, np.spacing(run.contact_time.values))) < 100
@@ -229,7 +260,9 @@ def test_every_contact_is_there_and_its_time_is_as_exact_as_it_says(rigs, method
 
 @pytest.mark.parametrize(("rig", "number"), [("b4", 128), ("b4", 129), ("b4", 131), ("random", 48)])
 def test_smallest_gap_margin_is_where_the_motion_turned_back(rig, number):
-    """Rows whose margin is the gap left at a turning point (in the others it is the depth of a contact)."""
+    """Rows whose margin is the gap left at a turning point (in the others it is the depth of a
+    contact).
+    """
     table, values = RIGS[rig]()
     margin = simulate(table, values, sl.Taylor()).smallest_gap_margin.values[number]
     assert np.isclose(margin, float(table[number]["margin_m"]), rtol=0.05, atol=0)
@@ -237,4 +270,5 @@ def test_smallest_gap_margin_is_where_the_motion_turned_back(rig, number):
 
 def test_smallest_gap_margin_is_infinite_where_the_motion_never_turned_back():
     table, values = RIGS["b4"]()
-    assert np.all(np.isinf(simulate(table, values, sl.Taylor()).smallest_gap_margin.values[:64]))  # fast starts: straight through
+    # fast starts: straight through
+    assert np.all(np.isinf(simulate(table, values, sl.Taylor()).smallest_gap_margin.values[:64]))

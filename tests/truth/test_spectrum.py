@@ -1,4 +1,6 @@
-"""Spectra against the closed form of a linear oscillator, Parseval's relation, and lines whose places are known."""
+"""Spectra against the closed form of a linear oscillator, Parseval's relation, and lines whose
+places are known.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +15,37 @@ from conformance.systems import lab, pair
 from saltus.errors import ParameterError
 
 #: m = 1, c = 0.3, k = 4, force 0.7 N at 0.5 Hz, a constant lift of 0.2 N; no contact.
-LINEAR = {"spring": 4.0, "damping": 0.3, "force": 0.7, "frequency": 0.5, "lift": 0.2, "boundary": 50.0}
+LINEAR = {
+    "spring": 4.0,
+    "damping": 0.3,
+    "force": 0.7,
+    "frequency": 0.5,
+    "lift": 0.2,
+    "boundary": 50.0,
+}
 #: Settles to 5T; with a softer stop it doesn't repeat.
-SUBHARMONIC = {"spring": 0.2, "damping": 0.1, "force": 0.8, "boundary": 0.3, "stiffness": 100.0, "frequency": 0.3}
-STOP = {"spring": 1.0, "damping": 0.1, "force": 0.8, "boundary": 0.3, "stiffness": 40.0, "frequency": 0.2}
+SUBHARMONIC = {
+    "spring": 0.2,
+    "damping": 0.1,
+    "force": 0.8,
+    "boundary": 0.3,
+    "stiffness": 100.0,
+    "frequency": 0.3,
+}
+STOP = {
+    "spring": 1.0,
+    "damping": 0.1,
+    "force": 0.8,
+    "boundary": 0.3,
+    "stiffness": 40.0,
+    "frequency": 0.2,
+}
 
 
 def steady():
-    """Complex amplitude of the steady response of LINEAR: x = X exp(iwt), and its state at t = 0."""
+    """Complex amplitude of the steady response of LINEAR: x = X exp(iwt), and its
+    state at t = 0.
+    """
     w = 2 * math.pi * 0.5
     line = 0.7 / (4.0 - w**2 + 0.3j * w)
     return line, (0.05 + line.real, (1j * w * line).real)
@@ -33,7 +58,9 @@ def mean_square(amplitude):
 @pytest.fixture(scope="module")
 def contacting():
     """A periodic response with contacts."""
-    return sl.simulate(lab, (0.0, 0.0), periods=400, keep=12, samples=256, values=STOP, time_errors="local")
+    return sl.simulate(
+        lab, (0.0, 0.0), periods=400, keep=12, samples=256, values=STOP, time_errors="local"
+    )
 
 
 def test_a_linear_response_is_one_line_and_its_mean():
@@ -56,7 +83,13 @@ def test_the_phase_doesnt_depend_on_where_the_samples_begin():
     for part in (run, run.isel(time=slice(137, None))):
         assert sl.spectrum(part).x_phase.values[1] == pytest.approx(cmath.phase(line), abs=1e-12)
     turned = line * cmath.exp(1j * math.pi * 0.3)  # the state of the same motion at t = 0.3 s
-    later = sl.simulate(lab, (0.05 + turned.real, (1j * math.pi * turned).real), periods=8, t_start=0.3, values=LINEAR)
+    later = sl.simulate(
+        lab,
+        (0.05 + turned.real, (1j * math.pi * turned).real),
+        periods=8,
+        t_start=0.3,
+        values=LINEAR,
+    )
     assert sl.spectrum(later).x_phase.values[1] == pytest.approx(cmath.phase(line), abs=1e-12)
 
 
@@ -69,7 +102,8 @@ def test_a_hann_window_keeps_the_height_of_a_line():
     assert found.x_amplitude.values[at] == pytest.approx(abs(line), rel=1e-12)
     assert found.x_amplitude.values[0] == pytest.approx(0.05, rel=1e-12)
     assert float(found.noise_bandwidth) == pytest.approx(1.5, rel=1e-15)
-    assert found.x_amplitude.values[at - 1] == pytest.approx(abs(line) / 2, rel=1e-12)  # the window's own two neighbours
+    # the window's own two neighbours
+    assert found.x_amplitude.values[at - 1] == pytest.approx(abs(line) / 2, rel=1e-12)
     assert "v_amplitude" not in found
 
 
@@ -79,10 +113,15 @@ def test_parseval_with_contacts(contacting):
     assert n > 0
     for name in ("x", "v"):
         samples = contacting[name].values[-n * 256 - 1 : -1]
-        assert mean_square(found[f"{name}_amplitude"].values) == pytest.approx(np.mean(samples**2), rel=1e-13)
+        assert mean_square(found[f"{name}_amplitude"].values) == pytest.approx(
+            np.mean(samples**2), rel=1e-13
+        )
     hann = sl.spectrum(contacting, window="hann", last=12)
-    power = hann.x_amplitude.values[0] ** 2 + (hann.x_amplitude.values[1:] ** 2).sum() / 2 / float(hann.noise_bandwidth)
-    assert power == pytest.approx(np.mean(contacting.x.values[:-1] ** 2), rel=1e-9)  # exact for lines of whole periods
+    power = hann.x_amplitude.values[0] ** 2 + (hann.x_amplitude.values[1:] ** 2).sum() / 2 / float(
+        hann.noise_bandwidth
+    )
+    # exact for lines of whole periods
+    assert power == pytest.approx(np.mean(contacting.x.values[:-1] ** 2), rel=1e-9)
 
 
 def test_lines_of_a_response_lie_on_multiples_of_its_own_frequency(contacting):
@@ -96,13 +135,18 @@ def test_lines_of_a_response_lie_on_multiples_of_its_own_frequency(contacting):
 
 
 def test_only_whole_responses_are_taken_and_what_doesnt_repeat_gets_a_window():
-    """Beside a 5T response the undamped free motion of an oscillator without a stop: its frequency isn't commensurate with the force's."""
+    """Beside a 5T response the undamped free motion of an oscillator without a stop: its frequency
+    isn't commensurate with the force's.
+    """
     values = SUBHARMONIC | {"stiffness": [100.0, 0.0], "damping": [0.1, 0.0]}
-    run = sl.simulate(lab, (0.0, 0.0), periods=500, keep=24, samples=64, time_errors="local", values=values)
+    run = sl.simulate(
+        lab, (0.0, 0.0), periods=500, keep=24, samples=64, time_errors="local", values=values
+    )
     found = sl.spectrum(run, "x", last=24)
     assert found.response_period.values.tolist() == [5, 0]
     assert found.window.values.tolist() == ["none", "hann"]
-    assert found.order.values[1] == pytest.approx(1 / 20, rel=1e-15)  # of 24 periods 20 are whole responses
+    # of 24 periods 20 are whole responses
+    assert found.order.values[1] == pytest.approx(1 / 20, rel=1e-15)
     between = np.arange(found.sizes["frequency"]) % 4 != 0
     lines = found.x_amplitude.values
     assert lines[0, between].max() < 1e-6 * lines[0].max()
@@ -110,7 +154,13 @@ def test_only_whole_responses_are_taken_and_what_doesnt_repeat_gets_a_window():
 
 
 def test_a_system_without_forcing():
-    run = sl.simulate(pair, (1.0, 0.0, 0.3, 0.0), t_end=40 * math.pi, samples=400, values={"spring": 1.0, "stop1": 9, "stop2": 9, "gap": 9})
+    run = sl.simulate(
+        pair,
+        (1.0, 0.0, 0.3, 0.0),
+        t_end=40 * math.pi,
+        samples=400,
+        values={"spring": 1.0, "stop1": 9, "stop2": 9, "gap": 9},
+    )
     found = sl.spectrum(run)
     assert str(found.window.values) == "hann"
     assert "order" not in found
@@ -120,14 +170,33 @@ def test_a_system_without_forcing():
 
 
 def test_trajectories_share_a_stretch_of_whole_responses():
-    run = sl.simulate(lab, (0.0, 0.0), periods=300, keep=12, values=STOP | {"stiffness": [40.0, 20.0]}, time_errors="local")
+    run = sl.simulate(
+        lab,
+        (0.0, 0.0),
+        periods=300,
+        keep=12,
+        values=STOP | {"stiffness": [40.0, 20.0]},
+        time_errors="local",
+    )
     both = sl.spectrum(run)
     alone = sl.spectrum(run.isel(trajectory=1))
     assert both.x_amplitude.dims == ("trajectory", "frequency")
-    assert both.x_amplitude.values[1].max() == pytest.approx(alone.x_amplitude.values.max(), rel=1e-9)
-    tuned = sl.spectrum(sl.simulate(lab, (0.0, 0.0), periods=20, values=LINEAR | {"frequency": [0.5, 0.25]}, time_errors="local"))
+    assert both.x_amplitude.values[1].max() == pytest.approx(
+        alone.x_amplitude.values.max(), rel=1e-9
+    )
+    tuned = sl.spectrum(
+        sl.simulate(
+            lab,
+            (0.0, 0.0),
+            periods=20,
+            values=LINEAR | {"frequency": [0.5, 0.25]},
+            time_errors="local",
+        )
+    )
     assert tuned.x_amplitude.dims == ("trajectory", "order")
-    assert tuned.frequency.values == pytest.approx(np.outer([0.5, 0.25], tuned.order.values), rel=1e-14)
+    assert tuned.frequency.values == pytest.approx(
+        np.outer([0.5, 0.25], tuned.order.values), rel=1e-14
+    )
 
 
 @pytest.mark.parametrize(

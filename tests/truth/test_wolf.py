@@ -1,4 +1,6 @@
-"""Wolf's method: published exponents from recorded series, what isn't chaos, and series that can't be used."""
+"""Wolf's method: published exponents from recorded series, what isn't chaos, and series that can't
+be used.
+"""
 
 import math
 
@@ -8,18 +10,25 @@ import pytest
 import saltus as sl
 from saltus.errors import ParameterError, SaltusWarning, UnitError
 
-LORENZ, ROESSLER, HENON = 0.9056, 0.0900, 0.41922  # Sprott (2003), appendix A; Wolf et al. (1985), Table I
+# Sprott (2003), appendix A; Wolf et al. (1985), Table I
+LORENZ, ROESSLER, HENON = 0.9056, 0.0900, 0.41922
 
 
-#: Series of an ensemble: one chaotic series scatters by some 5 %, and another processor makes another series of it.
+#: Series of an ensemble: one chaotic series scatters by some 5 %, and another processor makes
+#: another series of it.
 SERIES = 12
-#: So many of them for each other setting: the mean is good to 2 %, and five of six intervals hold it in 97 of 100 ensembles.
+#: So many of them for each other setting: the mean is good to 2 %, and five of six intervals hold
+#: it in 97 of 100 ensembles.
 SOME = 6
 
 
 def ensemble(field, start, interval, count, lead, parts=2):
-    """Float64[SERIES, count, 3]: motions from starts around one point, by Runge-Kutta steps of interval/parts, in NumPy alone."""
-    states = np.array(start, float)[:, None] + np.random.default_rng(0).normal(size=(len(start), SERIES))
+    """Float64[SERIES, count, 3]: motions from starts around one point, by Runge-Kutta steps of
+    interval/parts, in NumPy alone.
+    """
+    states = np.array(start, float)[:, None] + np.random.default_rng(0).normal(
+        size=(len(start), SERIES)
+    )
     step, skipped = interval / parts, round(lead / interval)
     kept = np.empty((skipped + count, *states.shape))
     k1, k2, k3, k4 = np.empty((4, *states.shape))
@@ -66,15 +75,18 @@ def henon():
 
 def value(ds):
     """Exponent, and half of its interval."""
-    return float(ds["lyapunov_exponent"].item()), float(ds["lyapunov_high"].item() - ds["lyapunov_exponent"].item())
+    return float(ds["lyapunov_exponent"].item()), float(
+        ds["lyapunov_high"].item() - ds["lyapunov_exponent"].item()
+    )
 
 
 def assert_mean_is(runs, exact, bias):
-    """The mean of an ensemble is right to the bias and three of its standard errors; the intervals are as wide as the scatter.
+    """The mean of an ensemble is right to the bias and three of its standard errors; the intervals
+    are as wide as the scatter.
 
-    Half of a 95 % interval is two standard deviations. Of six series their estimate is below twice the true one in 999 of 1000 ensembles,
-    so 0.6 of the estimate holds for right intervals on every machine.
-    Of intervals a third as wide one ensemble in three fails, and there are eight.
+    Half of a 95 % interval is two standard deviations. Of six series their estimate is below twice
+    the true one in 999 of 1000 ensembles, so 0.6 of the estimate holds for right intervals on every
+    machine. Of intervals a third as wide one ensemble in three fails, and there are eight.
     """
     exponents, halves = np.array([value(run) for run in runs]).T
     error = exponents.std(ddof=1) / math.sqrt(len(runs))
@@ -83,9 +95,11 @@ def assert_mean_is(runs, exact, bias):
     assert 0.6 * exponents.std(ddof=1) < halves.mean() < 0.2 * exact
 
 
-# -- published values ----------------------------------------------------------------------------------------------------------
+# -- published values ------------------------------------------------------------------------------
 def test_lorenz_from_one_quantity_with_all_defaults(lorenz):
-    """The bias, up to 10 %, isn't in the intervals: a new neighbour isn't quite in the old direction."""
+    """The bias, up to 10 %, isn't in the intervals: a new neighbour isn't quite in the old
+    direction.
+    """
     runs = [sl.wolf(series[:, 0], 0.02) for series in lorenz]
     assert_mean_is(runs, LORENZ, bias=0.1)
     assert np.mean([ds["replacements"].item() for ds in runs]) > 400
@@ -130,25 +144,33 @@ def test_henon_is_seen_to_be_a_map(henon, column):
     exponent, half = value(ds)
     assert abs(exponent - HENON) < half < 0.03 * HENON
     assert ds.attrs["evolve_samples"] == 1
-    assert value(sl.wolf(henon[:, column], 1, unit="bit/s"))[0] == pytest.approx(exponent / math.log(2), rel=1e-14)
+    assert value(sl.wolf(henon[:, column], 1, unit="bit/s"))[0] == pytest.approx(
+        exponent / math.log(2), rel=1e-14
+    )
 
 
 def test_units_and_sampling_scale_the_exponent_only(lorenz):
-    """Metres or millimetres, seconds or hours: the evolutions are the same. All times are as good as the interval."""
+    """Metres or millimetres, seconds or hours: the evolutions are the same. All times are as good
+    as the interval.
+    """
     series = lorenz[0, :6000, 0]
     exponent, _ = value(sl.wolf(series, 0.02))
     assert value(sl.wolf(1e-3 * series, 72.0))[0] * 3600 == pytest.approx(exponent, rel=1e-6)
-    assert value(sl.wolf(series, 5.0 + 0.02 * np.arange(6000)))[0] == pytest.approx(exponent, rel=1e-6)
+    assert value(sl.wolf(series, 5.0 + 0.02 * np.arange(6000)))[0] == pytest.approx(
+        exponent, rel=1e-6
+    )
 
 
 def test_short_series_scatter_more_and_say_so(roessler, from_x):
-    """A quarter of the series doubles the intervals, and they are as wide as the scatter about the exponent."""
+    """A quarter of the series doubles the intervals, and they are as wide as the scatter about the
+    exponent.
+    """
     exponents, halves = np.array([value(sl.wolf(series[:4000, 0], 0.1)) for series in roessler]).T
     assert 0.6 * math.sqrt(np.mean((exponents - ROESSLER) ** 2)) < halves.mean()
     assert 1.5 < halves.mean() / np.mean([value(run)[1] for run in from_x]) < 3.0
 
 
-# -- what isn't chaos ----------------------------------------------------------------------------------------------------------
+# -- what isn't chaos ------------------------------------------------------------------------------
 @pytest.mark.parametrize("turn", [50, 50.37, 20 * math.pi])
 def test_a_sine_has_none(turn):
     ds = sl.wolf(np.sin(2 * math.pi * np.arange(8000) / turn), 1.0)
@@ -180,7 +202,7 @@ def test_sparse_points_are_told():
         sl.wolf(noise, 1.0)
 
 
-# -- what can't be used --------------------------------------------------------------------------------------------------------
+# -- what can't be used ----------------------------------------------------------------------------
 SINE = np.sin(0.1 * np.arange(1000))
 
 
@@ -210,7 +232,12 @@ def broken(place):
         (SINE, 1.0, {"smallest_distance": 0.0}, "share of the range"),
         (SINE, 1.0, {"largest_distance": 2.0}, "share of the range"),
         (SINE, 1.0, {"smallest_distance": 0.2, "largest_distance": 0.1}, "must be above"),
-        (np.arange(300.0), 1.0, {"exclude": 50, "largest_distance": 0.01, "embed": False, "evolve": 1}, "no point of the series"),
+        (
+            np.arange(300.0),
+            1.0,
+            {"exclude": 50, "largest_distance": 0.01, "embed": False, "evolve": 1},
+            "no point of the series",
+        ),
         (SINE, 1.0, {"dimension": 0}, "whole number of at least 1"),
         (SINE, 1.0, {"unit": "bits/s"}, "Did you mean 'bit/s'"),
     ],
@@ -220,13 +247,18 @@ def test_series_that_can_not_be_used(series, interval, settings, message):
         sl.wolf(series, interval, **settings)
 
 
-# -- beside the variational method ---------------------------------------------------------------------------------------------
+# -- beside the variational method -----------------------------------------------------------------
 def test_on_the_motions_of_the_rig():
-    """A periodic motion has the flow's zero; chaotic ones, on average, what the variational method has, to 20 %."""
+    """A periodic motion has the flow's zero; chaotic ones, on average, what the variational method
+    has, to 20 %.
+    """
     rig = sl.models.delangre("c", frequency="5 Hz")
     start = {"x": [0.32e-3, *np.linspace(0.1e-3, 0.5e-3, 8)], "v": 0.0}
     stiffness = {"contact_stiffness": np.array([2.55e4, *8 * [2.89e7]])}
-    both = {method: sl.lyapunov(rig, start, values=stiffness, method=method, periods=800) for method in ("wolf", "variational")}
+    both = {
+        method: sl.lyapunov(rig, start, values=stiffness, method=method, periods=800)
+        for method in ("wolf", "variational")
+    }
     assert both["wolf"]["kind"].values.tolist() == ["regular", *8 * ["chaotic"]]
     periodic, *chaotic = both["wolf"]["lyapunov_exponent"].values[:, 0]
     assert abs(periodic) < 1e-6

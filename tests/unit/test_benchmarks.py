@@ -1,4 +1,6 @@
-"""Benchmarks run, and rivals' labels of basins mean what ours mean. Rivals themselves are left out: they take minutes."""
+"""Benchmarks run, and rivals' labels of basins mean what ours mean. Rivals themselves are left out:
+they take minutes.
+"""
 
 from pathlib import Path
 
@@ -28,7 +30,9 @@ def test_our_part_runs(basins, small_map):
     assert seconds.wall > 0
     assert ds.basin.shape == (6, 6)
     row = basins.line("saltus, 1 thread", seconds, seconds, "", "all cells")
-    assert row.count("|") == basins.line("other", seconds.scaled(2.0), seconds, basins.percent(ds.basin.values >= 0), "").count("|")
+    assert row.count("|") == basins.line(
+        "other", seconds.scaled(2.0), seconds, basins.percent(ds.basin.values >= 0), ""
+    ).count("|")
 
 
 def test_orbits_are_labelled_as_themselves_at_any_phase(basins, small_map):
@@ -59,6 +63,9 @@ def test_what_it_costs_to_begin(monkeypatch):
     plain = startup.engine.run
     assert all(cpu > 0 and wall > 0 for _, cpu, wall in startup.processes(1))
     rows = startup.calls(2)
-    assert [name for name, *_ in rows] == ['2 periods, time_errors="measured"', '2 periods, time_errors="local"']
+    assert [name for name, *_ in rows] == [
+        '2 periods, time_errors="measured"',
+        '2 periods, time_errors="local"',
+    ]
     assert all(0 < inside < cpu and wall > 0 for _, cpu, inside, wall in rows)
     assert startup.engine.run is plain

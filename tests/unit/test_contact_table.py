@@ -1,4 +1,6 @@
-"""The table of contacts of a run: its columns are views, it is joined in the order of trajectories, and knows where each begins."""
+"""The table of contacts of a run: its columns are views, it is joined in the order of trajectories,
+and knows where each begins.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,9 @@ from saltus.kernels import status as st
 
 
 def table(trajectories, first=0.0):
-    """Contacts of the given trajectories with two states; the time counts them from ``first`` on."""
+    """Contacts of the given trajectories with two states; the time counts them from
+    ``first`` on.
+    """
     made = ContactTable.empty(len(trajectories), 2)
     made.integers[:], made.floats[:] = 0, 0.0
     made.trajectory[:] = trajectories
@@ -19,7 +23,16 @@ def table(trajectories, first=0.0):
 
 def test_columns_are_views_of_all_that_the_kernels_write():
     contacts = table([0, 1])
-    integers = ("trajectory", "period", "guard", "direction", "kind", "mode_before", "mode_after", "steps")
+    integers = (
+        "trajectory",
+        "period",
+        "guard",
+        "direction",
+        "kind",
+        "mode_before",
+        "mode_after",
+        "steps",
+    )
     floats = ("phase", "velocity", "time_error", "state", "time")
     for number, name in enumerate((*integers, *floats)):
         getattr(contacts, name)[...] = number
@@ -39,7 +52,11 @@ def test_tables_are_joined_by_trajectory_and_keep_the_order_of_time():
 
 def test_a_contact_changes_its_own_side_and_a_graze_none():
     contacts = table([0, 0, 0])
-    contacts.guard[:], contacts.mode_before[:], contacts.mode_after[:] = [1, 0, 1], [0, 1, 1], [2, 1, 3]
+    contacts.guard[:], contacts.mode_before[:], contacts.mode_after[:] = (
+        [1, 0, 1],
+        [0, 1, 1],
+        [2, 1, 3],
+    )
     contacts.kind[:] = [st.CROSSING, st.GRAZE, st.GRAZE_SHALLOW]
     assert contacts.changes_side.tolist() == [True, False, True]
     assert contacts.kind_name.tolist() == ["crossing", "graze", "graze_unresolved"]

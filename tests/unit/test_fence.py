@@ -9,7 +9,9 @@ import pytest
 from saltus import fence
 from saltus.fence import RefusedError
 
-posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes and devices in the file system are POSIX")
+posix = pytest.mark.skipif(
+    sys.platform == "win32", reason="pipes and devices in the file system are POSIX"
+)
 
 
 def test_a_file_is_its_bytes(tmp_path):
@@ -23,8 +25,15 @@ def test_a_file_is_its_bytes(tmp_path):
 def test_what_is_no_file_is_refused_and_never_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to("pipe")
-    for path, kind in ((tmp_path / "pipe", "a pipe"), (tmp_path / "link", "a pipe"), (tmp_path, "a folder"), ("/dev/zero", "a device")):
-        with pytest.raises(RefusedError, match=f"it is .*{kind}" if kind != "a device" else "a device"):
+    for path, kind in (
+        (tmp_path / "pipe", "a pipe"),
+        (tmp_path / "link", "a pipe"),
+        (tmp_path, "a folder"),
+        ("/dev/zero", "a device"),
+    ):
+        with pytest.raises(
+            RefusedError, match=f"it is .*{kind}" if kind != "a device" else "a device"
+        ):
             fence.content(path, 100)
     for path in (tmp_path / "none", "a\0b"):
         with pytest.raises(RefusedError, match="can't be read"):
@@ -80,12 +89,16 @@ def test_toml_that_is_none_says_so_as_before():
         fence.toml("a = ")
 
 
-@pytest.mark.parametrize("cell", ["=cmd|' /C calc'!A0", "+1+cmd|' /C calc'!A0", "-1+1", "@SUM(A1)", "\t=1"])
+@pytest.mark.parametrize(
+    "cell", ["=cmd|' /C calc'!A0", "+1+cmd|' /C calc'!A0", "-1+1", "@SUM(A1)", "\t=1"]
+)
 def test_a_formula_becomes_text(cell):
     assert fence.csv_cell(cell) == f"'{cell}"
 
 
-@pytest.mark.parametrize("cell", ["-1.5e-3", "-7.7e-3 mm", "+4", "-", "x = 1", "-inf", -1.0, 3, "-2 N·m/rad"])
+@pytest.mark.parametrize(
+    "cell", ["-1.5e-3", "-7.7e-3 mm", "+4", "-", "x = 1", "-inf", -1.0, 3, "-2 N·m/rad"]
+)
 def test_a_number_stays(cell):
     assert fence.csv_cell(cell) == cell
 

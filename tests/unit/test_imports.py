@@ -1,4 +1,6 @@
-"""Modules import in one direction: no circle, but by an import inside a function whose comment says why it stands there."""
+"""Modules import in one direction: no circle, but by an import inside a function whose comment says
+why it stands there.
+"""
 
 import ast
 from graphlib import CycleError, TopologicalSorter
@@ -8,21 +10,28 @@ import saltus
 
 SOURCE = Path(saltus.__file__).parents[1]
 MODULES = {
-    ".".join(file.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__"): file for file in SOURCE.rglob("saltus/**/*.py")
+    ".".join(file.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__"): file
+    for file in SOURCE.rglob("saltus/**/*.py")
 }
 
 
 def imported(node):
-    """Modules of saltus that a statement imports: the module that is named in it, or that holds the name."""
+    """Modules of saltus that a statement imports: the module that is named in it, or that holds the
+    name.
+    """
     if isinstance(node, ast.ImportFrom) and node.module:
         for alias in node.names:
-            yield from [name for name in (f"{node.module}.{alias.name}", node.module) if name in MODULES][:1]
+            yield from [
+                name for name in (f"{node.module}.{alias.name}", node.module) if name in MODULES
+            ][:1]
     elif isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names if alias.name in MODULES)
 
 
 def statements(tree, inside=False):
-    """Import statements with whether they stand in a function; those for type checkers don't count."""
+    """Import statements with whether they stand in a function; those for type
+    checkers don't count.
+    """
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             yield node, inside

@@ -1,4 +1,6 @@
-"""What a process imports that does one thing: told by the modules, since a clock would depend on the load."""
+"""What a process imports that does one thing: told by the modules, since a clock would depend on
+the load.
+"""
 
 import subprocess
 import sys
@@ -7,7 +9,8 @@ import pytest
 
 #: What takes long to import, installed or not. pandas isn't among them: xarray imports it.
 HEAVY = {
-    "scipy.stats", "scipy.optimize", "scipy.spatial", "scipy.interpolate", "scipy.io", "matplotlib", "pydantic", "typer", "rich",
+    "scipy.stats", "scipy.optimize", "scipy.spatial", "scipy.interpolate", "scipy.io", "matplotlib",
+    "pydantic", "typer", "rich",
     "zarr", "h5py", "h5netcdf", "netCDF4", "dask.array", "distributed", "pint", "sympy", "heyoka",
 }  # fmt: skip
 RIG = 'rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")\n'
@@ -16,20 +19,43 @@ RIG = 'rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")\n'
 def imported(code: str) -> set[str]:
     """Modules in a process that did this."""
     command = f"import sys\nimport saltus as sl\n{code}\nprint(*sorted(sys.modules))"
-    return set(subprocess.run([sys.executable, "-c", command], check=True, capture_output=True, text=True).stdout.split())
+    return set(
+        subprocess.run(
+            [sys.executable, "-c", command], check=True, capture_output=True, text=True
+        ).stdout.split()
+    )
 
 
 def test_the_package_alone_is_next_to_nothing():
-    assert not imported("") & (HEAVY | {"numpy", "numba", "llvmlite", "pandas", "xarray", "saltus.system", "saltus.analysis"})
+    assert not imported("") & (
+        HEAVY
+        | {"numpy", "numba", "llvmlite", "pandas", "xarray", "saltus.system", "saltus.analysis"}
+    )
 
 
 @pytest.mark.parametrize("start", ["(0.0, 0.0)", '{"x": [0.0, 1e-3], "v": 0.0}'])
 def test_a_run_imports_what_it_needs(start):
-    """Trajectories, their contacts, time errors and the Dataset with its provenance: NumPy, xarray and the kernels."""
-    modules = imported(f"{RIG}run = sl.simulate(rig, start={start}, periods=2, progress=False)\nassert run.sizes['contact'] > 0")
+    """Trajectories, their contacts, time errors and the Dataset with its provenance: NumPy, xarray
+    and the kernels.
+    """
+    modules = imported(
+        f"{RIG}run = sl.simulate(rig, start={start}, periods=2, "
+        f"progress=False)\nassert run.sizes['contact'] > 0"
+    )
     assert not modules & HEAVY
-    rooms = {"motion", "motion.simulate", "motion.time_errors", "axes", "dataset_parts", "outcome_messages", "starts", "verb"}
-    assert {name for name in modules if name.startswith("saltus.analysis.")} == {f"saltus.analysis.{name}" for name in rooms}
+    rooms = {
+        "motion",
+        "motion.simulate",
+        "motion.time_errors",
+        "axes",
+        "dataset_parts",
+        "outcome_messages",
+        "starts",
+        "verb",
+    }
+    assert {name for name in modules if name.startswith("saltus.analysis.")} == {
+        f"saltus.analysis.{name}" for name in rooms
+    }
 
 
 def test_other_verbs_leave_out_what_is_for_others():

@@ -9,7 +9,22 @@ from hypothesis import strategies as st
 from saltus.errors import ParameterError, UnitError
 from saltus.units import check_declared, coherent_unit, from_si, to_si
 
-UNITS = ["m", "N/m", "Hz", "rad/s", "kg", "N/m^3", "s", "m/s", "N*s/m", "rad", "kg*m^2", "N*m/rad", "1", "1/s"]
+UNITS = [
+    "m",
+    "N/m",
+    "Hz",
+    "rad/s",
+    "kg",
+    "N/m^3",
+    "s",
+    "m/s",
+    "N*s/m",
+    "rad",
+    "kg*m^2",
+    "N*m/rad",
+    "1",
+    "1/s",
+]
 finite = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e300, max_value=1e300)
 
 
@@ -76,7 +91,8 @@ finite = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e300, max_
     ],
 )
 def test_text_becomes_the_nearest_double(text, unit, expected):
-    tolerance = math.ulp(expected) if "rad" in text + unit or "deg" in text else 0.0  # a factor of pi is rounded before and after
+    # a factor of pi is rounded before and after
+    tolerance = math.ulp(expected) if "rad" in text + unit or "deg" in text else 0.0
     assert abs(to_si(text, unit, "p") - expected) <= tolerance
 
 
@@ -97,7 +113,9 @@ def test_numpy_numbers_and_quantities_pass():
     assert to_si(np.float32(0.5), "m", "p") == 0.5
     assert to_si(np.array(0.5), "m", "p") == 0.5
     assert to_si(pint.UnitRegistry().Quantity(0.4, "mm"), "m", "p") == 0.4e-3
-    assert to_si(pint.UnitRegistry().Quantity(15.0, "Hz"), "rad/s", "p") == pytest.approx(30 * math.pi, rel=1e-15)
+    assert to_si(pint.UnitRegistry().Quantity(15.0, "Hz"), "rad/s", "p") == pytest.approx(
+        30 * math.pi, rel=1e-15
+    )
     assert to_si(pint.UnitRegistry().Quantity(3.0, "kN/mm**2"), "Pa", "p") == 3e9
 
 
@@ -215,10 +233,14 @@ def test_numbers_are_written_as_people_write_them(value, unit, text):
 @pytest.mark.parametrize(
     ("text", "unit"),
     [
-        ("0.4 mm", "m"), ("14 kN/m", "N/m"), ("7e8 N/m^3", "N/m^3"), ("3 kg", "kg"), ("900 rpm", "rad/s"), ("15 kHz", "Hz"),
-        ("2 N*s/m", "N*s/m"), ("0.03", "1"), ("3 %", "1"), ("5 deg", "rad"), ("1 inch", "m"), ("2 ms", "s"),
-        ("1 lbf/inch", "N/m"), ("1 lbf", "N"), ("1 bar", "Pa"), ("2 Nm", "N*m"), ("2 kNm/deg", "N*m/rad"),
-        ("1e9 N/m^1.5", "N/m^1.5"), ("2 m^(1/3)", "m^(1/3)"), ("3 g0", "m/s^2"), ("2 l", "m^3"), ("1 N/N", "1"),
+        ("0.4 mm", "m"), ("14 kN/m", "N/m"), ("7e8 N/m^3", "N/m^3"), ("3 kg", "kg"),
+        ("900 rpm", "rad/s"), ("15 kHz", "Hz"),
+        ("2 N*s/m", "N*s/m"), ("0.03", "1"), ("3 %", "1"), ("5 deg", "rad"), ("1 inch", "m"),
+        ("2 ms", "s"),
+        ("1 lbf/inch", "N/m"), ("1 lbf", "N"), ("1 bar", "Pa"), ("2 Nm", "N*m"),
+        ("2 kNm/deg", "N*m/rad"),
+        ("1e9 N/m^1.5", "N/m^1.5"), ("2 m^(1/3)", "m^(1/3)"), ("3 g0", "m/s^2"), ("2 l", "m^3"),
+        ("1 N/N", "1"),
     ],
 )  # fmt: skip
 def test_the_unit_of_a_text_value_is_kept_coherent(text, unit):
@@ -242,14 +264,22 @@ def test_a_unit_with_several_meanings_needs_a_word_more(text, teaches):
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "written"), [("1 lbf", "N", "4.44822 N"), ("1 bar", "Pa", "100 kPa"), ("2 lbf/in", "N/m", "350.254 N/m")]
+    ("text", "unit", "written"),
+    [("1 lbf", "N", "4.44822 N"), ("1 bar", "Pa", "100 kPa"), ("2 lbf/in", "N/m", "350.254 N/m")],
 )
 def test_units_are_shown_reduced(text, unit, written):
     assert coherent_unit(text, "p") == unit
     assert from_si(to_si(text, unit, "p"), unit) == written
 
 
-@given(text=st.text(max_size=130) | st.from_regex(r"[0-9.e+-]{1,12} ?[a-zA-Z0-9µ°%*/^(). -]{0,12}", fullmatch=True))
+@given(
+    text=st.text(max_size=130)
+    | st.from_regex(
+        r"[0-9.e+-]{1,12} ?[a-zA-Z0-9µ°%*/^(). "
+        r"-]{0,12}",
+        fullmatch=True,
+    )
+)
 def test_any_text_is_a_number_or_a_refusal_in_words(text):
     for unit in ("", "1", "m", "N*m"):
         said = ""
@@ -268,7 +298,8 @@ def test_messages_show_80_characters_of_a_value():
 
 @pytest.mark.parametrize(
     ("unit", "kept"),
-    [("N/m", "N/m"), (" N / m ", "N/m"), ("dimensionless", "1"), ("", ""), ("kg m", "kg m"), ("N/m^1.5", "N/m^1.5"), ("m/s2", "m/s2"),
+    [("N/m", "N/m"), (" N / m ", "N/m"), ("dimensionless", "1"), ("", ""), ("kg m", "kg m"),
+        ("N/m^1.5", "N/m^1.5"), ("m/s2", "m/s2"),
      ("Nm/rad", "Nm/rad"), ("newton/meter", "N/m")],
 )  # fmt: skip
 def test_declared_units_pass(unit, kept):

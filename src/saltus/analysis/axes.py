@@ -1,4 +1,6 @@
-"""Values along an axis, from what users write: a tuple is a range, a list or array holds the values. One rule for all verbs."""
+"""Values along an axis, from what users write: a tuple is a range, a list or array holds the
+values. One rule for all verbs.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ SCALES = ("linear", "log")
 MOST_VALUES = 100_000_000
 
 
-def along(name: str, given: Any, number: Callable[[Any], float], what: str, example: str, least: int = 1) -> np.ndarray:
+def along(
+    name: str, given: Any, number: Callable[[Any], float], what: str, example: str, least: int = 1
+) -> np.ndarray:
     """Values along an axis [SI], in the order in which they are written.
 
     Parameters
@@ -24,7 +28,8 @@ def along(name: str, given: Any, number: Callable[[Any], float], what: str, exam
     name : str
         The parameter or state.
     given : tuple, list or array
-        ``(first, last, number)`` or ``(first, last, number, "log")``, ends included; or a list or array of the values.
+        ``(first, last, number)`` or ``(first, last, number, "log")``, ends included; or a list or
+        array of the values.
     number : callable
         One value [SI] from a number or a text with a unit.
     what : str
@@ -37,13 +42,15 @@ def along(name: str, given: Any, number: Callable[[Any], float], what: str, exam
     Raises
     ------
     ParameterError, UnitError
-        If it is neither, a value isn't finite, the number isn't whole, or a log scale doesn't begin above zero.
+        If it is neither, a value isn't finite, the number isn't whole, or a log scale doesn't begin
+        above zero.
     """
     if not isinstance(given, tuple):
         return _listed(name, given, number, what, example)
     if len(given) not in (3, 4):
         raise ParameterError(
-            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as {example}. A tuple is a range; "
+            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as "
+            f"{example}. A tuple is a range; "
             f"a list holds the {what} themselves: {shown(list(given))}."
         )
     first, last, count, *rest = given
@@ -52,40 +59,60 @@ def along(name: str, given: Any, number: Callable[[Any], float], what: str, exam
         raise ParameterError(f"the scale of {name} is {shown(scale)}. {nearest(scale, SCALES)}")
     count = whole(count, f"the number of {what} along {name}", least)
     if count > MOST_VALUES:
-        raise ParameterError(f"{count} {what} along {name} are more than {MOST_VALUES:.0e}. Take a coarser grid.")
+        raise ParameterError(
+            f"{count} {what} along {name} are more than {MOST_VALUES:.0e}. Take a coarser grid."
+        )
     low, high = number(first), number(last)
     if scale == "log" and min(low, high) <= 0:
-        raise ParameterError(f"{name} from {first} to {last} can't have a log scale: give ends above zero.")
+        raise ParameterError(
+            f"{name} from {first} to {last} can't have a log scale: give ends above zero."
+        )
     return np.geomspace(low, high, count) if scale == "log" else np.linspace(low, high, count)
 
 
 def axes_of(given: Any) -> int:
-    """Number of axes of lists or an array; -1 for lists of unequal length, and for what can't be made an array."""
+    """Number of axes of lists or an array; -1 for lists of unequal length, and for what can't be
+    made an array.
+    """
     try:
         return np.ndim(given)
     except (TypeError, ValueError):
         return -1
 
 
-def _listed(name: str, given: Any, number: Callable[[Any], float], what: str, example: str) -> np.ndarray:
+def _listed(
+    name: str, given: Any, number: Callable[[Any], float], what: str, example: str
+) -> np.ndarray:
     """The values of a list or array, each a number or a text with a unit."""
-    if isinstance(given, str | bytes | dict | set | frozenset) or not hasattr(given, "__len__") or axes_of(given) != 1:
+    if (
+        isinstance(given, str | bytes | dict | set | frozenset)
+        or not hasattr(given, "__len__")
+        or axes_of(given) != 1
+    ):
         raise ParameterError(
-            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as {example}, or a list or array of {what}."
+            f"{name} = {shown(given)} must be a range (first, last, number of {what}), such as "
+            f"{example}, or a list or array of {what}."
         )
     values = np.asarray(given)
     if values.dtype.kind in "fiu":
         values = values.astype(float)
         where = np.flatnonzero(~np.isfinite(values))
         if len(where):
-            raise ParameterError(f"{name} is {values[where[0]]} at index {where[0]}. Give finite {what}.")
+            raise ParameterError(
+                f"{name} is {values[where[0]]} at index {where[0]}. Give finite {what}."
+            )
         for value in (values.min(), values.max()) if len(values) else ():
             number(float(value))  # what the name allows is checked there
         return values
     items = list(given)
-    if len(items) in (3, 4) and all(isinstance(one, str) for one in items[:2]) and not isinstance(items[2], str):
+    if (
+        len(items) in (3, 4)
+        and all(isinstance(one, str) for one in items[:2])
+        and not isinstance(items[2], str)
+    ):
         raise ParameterError(
-            f"{name} = {shown(items)} is a list, which holds the {what} themselves, but {shown(items[2])} has no unit. A range is a tuple: "
+            f"{name} = {shown(items)} is a list, which holds the {what} themselves, but "
+            f"{shown(items[2])} has no unit. A range is a tuple: "
             f"{name}={shown(tuple(items))}."
         )
     return np.array([number(value) for value in items], float)

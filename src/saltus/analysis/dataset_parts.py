@@ -1,4 +1,6 @@
-"""From what a flow computed to the parts of a Dataset that all analyses share: guards, counters, provenance, contacts and their errors."""
+"""From what a flow computed to the parts of a Dataset that all analyses share: guards, counters,
+provenance, contacts and their errors.
+"""
 
 from __future__ import annotations
 
@@ -24,19 +26,28 @@ def shared_values(system: System, group: Ensemble) -> dict[str, float]:
 
 
 def guards(system: System, group: Ensemble) -> Guards:
-    """The guards with their boundaries, one for each trajectory where a varied parameter moves them."""
+    """The guards with their boundaries, one for each trajectory where a varied parameter moves
+    them.
+    """
     return guards_over(system, {**shared_values(system, group), **group.varied}, (group.size,))
 
 
 def guards_over(system: System, values: Mapping[str, Any], shape: tuple[int, ...]) -> Guards:
-    """The guards with their boundaries; of this shape where a parameter that is given as an array moves one of them."""
+    """The guards with their boundaries; of this shape where a parameter that is given as an array
+    moves one of them.
+    """
     places = []
     for guard in system.guards:
         place = np.nan if guard.boundary is None else evaluate([guard.boundary], values=values)[0]
         places.append(np.broadcast_to(place, shape if np.ndim(place) else ()))
     if any(np.ndim(place) for place in places):
         places = [np.broadcast_to(place, shape) for place in places]
-    return Guards([g.name for g in system.guards], [g.state for g in system.guards], np.array(places, float), gap_units(system))
+    return Guards(
+        [g.name for g in system.guards],
+        [g.state for g in system.guards],
+        np.array(places, float),
+        gap_units(system),
+    )
 
 
 def gap_units(system: System) -> list[str]:
@@ -46,20 +57,34 @@ def gap_units(system: System) -> list[str]:
 
 @lru_cache(maxsize=64)  # the same for all values, and as long to find as a short run
 def _gap_units(system: System) -> tuple[str, ...]:
-    found = units_of(system.states, system.units, system.field, [guard.gap for guard in system.guards])
-    return tuple(unit if guard.state is None else system.units[guard.state] for guard, unit in zip(system.guards, found, strict=True))
+    found = units_of(
+        system.states, system.units, system.field, [guard.gap for guard in system.guards]
+    )
+    return tuple(
+        unit if guard.state is None else system.units[guard.state]
+        for guard, unit in zip(system.guards, found, strict=True)
+    )
 
 
-def subject(system: System, attrs: Mapping[str, Any], guards: Guards | None = None, varied: Mapping[str, Any] | None = None) -> Subject:
+def subject(
+    system: System,
+    attrs: Mapping[str, Any],
+    guards: Guards | None = None,
+    varied: Mapping[str, Any] | None = None,
+) -> Subject:
     """What a Dataset of this system is about."""
     return Subject(system.states, system.units, attrs, guards, gap_unit(system), varied or {})
 
 
-def trajectories(system: System, method: Method, group: Ensemble, forcing_period: float | np.ndarray | None) -> Subject:
+def trajectories(
+    system: System, method: Method, group: Ensemble, forcing_period: float | np.ndarray | None
+) -> Subject:
     """What the Datasets of some trajectories are about."""
     return Subject(
-        states=system.states, units=system.units, guards=guards(system, group), varied=group.varied, batch=group.batch,
-        forcing_period=forcing_period, attrs=provenance(system, method, shared_values(system, group), group.varied),
+        states=system.states, units=system.units, guards=guards(system, group), varied=group.varied,
+        batch=group.batch,
+        forcing_period=forcing_period,
+        attrs=provenance(system, method, shared_values(system, group), group.varied),
     )  # fmt: skip
 
 
@@ -74,8 +99,12 @@ def minima(outcome: Outcome) -> dict[str, np.ndarray]:
     return {name: outcome.minima[:, i] for i, name in enumerate(st.MINIMA)}
 
 
-def provenance(system: System, method: Method, values: Mapping[str, float], varied: Iterable[str] = ()) -> dict[str, Any]:
-    """Attributes that say where a result comes from; ``values`` are those of its parameters, but for the ``varied`` ones."""
+def provenance(
+    system: System, method: Method, values: Mapping[str, float], varied: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Attributes that say where a result comes from; ``values`` are those of its parameters, but
+    for the ``varied`` ones.
+    """
     return attributes(
         system=system.name,
         equations=system.equations(),
@@ -104,6 +133,9 @@ def contacts(system: System, outcome: Outcome, time_error: np.ndarray) -> dict[s
         "contact_time": table.time,
         "contact_time_error": time_error,
         "contact_guard": names[table.guard],
-        **{f"contact_{name}": table.kind_name if name == "kind" else getattr(table, name) for name in columns},
+        **{
+            f"contact_{name}": table.kind_name if name == "kind" else getattr(table, name)
+            for name in columns
+        },
         "contact_<state>": table.state[:, : len(system.states)],
     }

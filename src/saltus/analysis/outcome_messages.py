@@ -1,4 +1,6 @@
-"""What to tell people about trajectories that didn't end well: what, how many, where first, and what to do next."""
+"""What to tell people about trajectories that didn't end well: what, how many, where first, and
+what to do next.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,15 @@ from saltus.units import from_si
 
 #: Statuses after which a trajectory's end is missing, each with advice.
 _ADVICE = {
-    st.SLIDING: "Sliding and sticking aren't followed yet. Make the force continuous there: friction as mu*N*sl.tanh(v/eps), eps small.",
-    st.BUDGET_STEPS: "Raise max_steps of the method, say Taylor(max_steps=10**10); if steps shrink towards one place, the equations are "
+    st.SLIDING: "Sliding and sticking aren't followed yet. Make the force continuous there: "
+    "friction as mu*N*sl.tanh(v/eps), eps small.",
+    st.BUDGET_STEPS: "Raise max_steps of the method, say Taylor(max_steps=10**10); if steps shrink "
+    "towards one place, the equations are "
     "singular there.",
-    st.BUDGET_EVENTS: "Contacts accumulate; give the contact a finite stiffness or damping, or raise max_events of the method.",
-    st.NONFINITE: "The motion left the range of numbers, or met a pole or a root of something negative: check the equations at that state.",
+    st.BUDGET_EVENTS: "Contacts accumulate; give the contact a finite stiffness or damping, or "
+    "raise max_events of the method.",
+    st.NONFINITE: "The motion left the range of numbers, or met a pole or a root of something "
+    "negative: check the equations at that state.",
     st.INVALID: "Check the starts and values of these trajectories.",
     st.INTERRUPTED: "The run was stopped; its end_* are where it stood. Start it again.",
     st.NOT_COMPUTED: "The run was stopped; start it again.",
@@ -31,13 +37,16 @@ _BELOW_A_ROOT = (
     " A trial step of ODE45 that goes below a root ends it too: end the law before it, as "
     "sl.piecewise((-c*sl.sqrt(h), h > 1e-9), otherwise=0.0) does."
 )
-#: A step of one trajectory alone, for systems of two states on one core of a server [s]. Good to a factor of three.
+#: A step of one trajectory alone, for systems of two states on one core of a server [s]. Good to a
+#: factor of three.
 SECONDS_PER_STEP = 1e-6
 
 
-#: Times the fastest rate of the equations that the rest of a run is long, from which on they count as singular where it stands.
+#: Times the fastest rate of the equations that the rest of a run is long, from which on they count
+#: as singular where it stands.
 SINGULAR = 1e9
-#: Times the usual step is long there: a stiff equation takes steps of about one from the start, beside a root they become ever shorter.
+#: Times the usual step is long there: a stiff equation takes steps of about one from the start,
+#: beside a root they become ever shorter.
 SHARPENING = 100.0
 
 
@@ -49,7 +58,8 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
     run : Dataset
         From :func:`saltus.simulate` or :func:`saltus.stroboscope`.
     asked : Span, optional
-        How long it should have run: tells how many steps one that ran out of them still has before it.
+        How long it should have run: tells how many steps one that ran out of them still has before
+        it.
     system : System, optional
         Its equations: tell whether they are singular where it stands.
     """
@@ -64,7 +74,10 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
                 advice = stuck or f"{_outlook(run, asked, int(here[0]))} {advice}"
             if code == st.NONFINITE and run.attrs.get("method") == "ODE45":
                 advice += _BELOW_A_ROOT
-            texts.append(f"{len(here)} of {len(status)} trajectories: {name} - {meaning} (first: {_where(run, int(here[0]))}). {advice}")
+            texts.append(
+                f"{len(here)} of {len(status)} trajectories: {name} - {meaning} (first: "
+                f"{_where(run, int(here[0]))}). {advice}"
+            )
     return texts
 
 
@@ -86,27 +99,45 @@ def _outlook(run: xr.Dataset, asked: Span, index: int) -> str:
     if not done > 0:
         return ""
     return (
-        f"It came {done:.3g} s of {whole:.3g} s far in {steps} steps: at this pace the whole takes {steps * whole / done:.1e} steps "
+        f"It came {done:.3g} s of {whole:.3g} s far in {steps} steps: at this pace the whole takes "
+        f"{steps * whole / done:.1e} steps "
         f"({_duration(steps * whole / done * SECONDS_PER_STEP)})."
     )
 
 
 def _singular(run: xr.Dataset, asked: Span, index: int, system: System) -> str:
-    """That no number of steps leads on, if the equations change far faster where a trajectory stands than the rest of its time is long."""
+    """That no number of steps leads on, if the equations change far faster where a trajectory
+    stands than the rest of its time is long.
+    """
     place = run.isel(trajectory=index) if "trajectory" in run.dims else run
-    values = {name: place[name].item() if name in place.variables else value for name, value in system.values.items()}
-    time, state = place["end_time"].item(), {name: place[f"end_{name}"].item() for name in system.states}
+    values = {
+        name: place[name].item() if name in place.variables else value
+        for name, value in system.values.items()
+    }
+    time, state = (
+        place["end_time"].item(),
+        {name: place[f"end_{name}"].item() for name in system.states},
+    )
     rest = asked.t_start + asked.count[index] * asked.period[index] + asked.phase[index] - time
     bits = sides(system, time, list(state.values()), values)
-    entries = evaluate([entry for row in system.jacobian for entry in row], t=time, states=state, values=values, bits=bits)
+    entries = evaluate(
+        [entry for row in system.jacobian for entry in row],
+        t=time,
+        states=state,
+        values=values,
+        bits=bits,
+    )
     matrix = np.array(entries, dtype=float).reshape(len(state), len(state))
     rate = float(np.abs(np.linalg.eigvals(matrix)).max()) if np.isfinite(matrix).all() else np.inf
-    usual = (time - asked.t_start) / max(place["steps"].item(), 1)  # a step of what lies behind: stiff equations take such, too
+    # a step of what lies behind: stiff equations take such, too
+    usual = (time - asked.t_start) / max(place["steps"].item(), 1)
     if not (rate * rest > SINGULAR and rate * usual > SHARPENING):
         return ""
     return (
-        f"The equations change at {rate:.1e} 1/s there: one of their laws has no derivative, as the root of a level h has none at h = 0, "
-        "or is extremely stiff. No number of steps gets over such a root: end the law a little before it, as "
+        f"The equations change at {rate:.1e} 1/s there: one of their laws has no derivative, as "
+        f"the root of a level h has none at h = 0, "
+        "or is extremely stiff. No number of steps gets over such a root: end the law a little "
+        "before it, as "
         "sl.piecewise((-c*sl.sqrt(h), h > 1e-9), otherwise=0.0) does."
     )
 
@@ -121,7 +152,11 @@ def _duration(seconds: float) -> str:
 
 def _value(place: xr.Dataset, name: str) -> str:
     end = place[f"end_{name}"]
-    return f"{name} = {from_si(end.item(), end.attrs['units'])}" if np.isfinite(end.item()) else f"{name} = {end.item()}"
+    return (
+        f"{name} = {from_si(end.item(), end.attrs['units'])}"
+        if np.isfinite(end.item())
+        else f"{name} = {end.item()}"
+    )
 
 
 def warn(run: xr.Dataset, asked: Span | None = None, system: System | None = None) -> None:

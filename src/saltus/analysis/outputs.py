@@ -1,4 +1,6 @@
-"""Outputs: what engineers read off a motion besides its states - a force, an acceleration, the motion of a base."""
+"""Outputs: what engineers read off a motion besides its states - a force, an acceleration, the
+motion of a base.
+"""
 
 from __future__ import annotations
 
@@ -49,16 +51,19 @@ def outputs_of(system: System, given: Mapping[str, Any] | None = None) -> Output
     system : System
         What moves.
     given : mapping of str to callable, or to (callable, unit)
-        Functions of (t, states, parameters), arguments found by name; see :func:`saltus.system.quantity.quantity`.
+        Functions of (t, states, parameters), arguments found by name; see
+        :func:`saltus.system.quantity.quantity`.
 
     Raises
     ------
     ParameterError, UnitError, TraceError
-        If a name is taken, a unit can't be read, or a function can't be traced or doesn't repeat with the forcing.
+        If a name is taken, a unit can't be read, or a function can't be traced or doesn't repeat
+        with the forcing.
     """
     if given is not None and not isinstance(given, Mapping):
         raise ParameterError(
-            f'outputs must be functions by name, such as outputs={{"spring force": lambda x, k: k*x}}, not {shown(given)}. '
+            f'outputs must be functions by name, such as outputs={{"spring force": lambda x, k: '
+            f"k*x}}, not {shown(given)}. "
             f"States are read off without being asked for."
         )
     extended, formulas, units = system, [], [system.units[name] for name in system.states]
@@ -79,6 +84,7 @@ def _unit(system: System, formula: Expr, name: str, declared: str) -> str:
     (found,) = units_of(system.states, system.units, system.field, [formula])
     if declared and found and dimension(found) != dimension(declared):
         raise UnitError(
-            f"the output {shown(name)} is said to be in {declared}, but its formula is in {found}. Correct one, or leave the unit out."
+            f"the output {shown(name)} is said to be in {declared}, but its formula is in {found}. "
+            f"Correct one, or leave the unit out."
         )
     return declared or found

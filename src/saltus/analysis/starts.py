@@ -62,7 +62,8 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
     system : System
         Names of states, parameters and their units.
     start : sequence, mapping or array
-        One number (or text with a unit) per state; a mapping of state names to numbers or arrays; or an array (n, states).
+        One number (or text with a unit) per state; a mapping of state names to numbers or arrays;
+        or an array (n, states).
     values : mapping, optional
         Parameter values that replace the system's own: one each, or an array of n.
 
@@ -82,19 +83,33 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         raise ParameterError(f"values of {empty[0]} are empty. Give at least one number.")
     deep = [name for name, value in given.items() if np.ndim(value) > 1]
     if deep:
-        raise ParameterError(f"values of {deep[0]} must be one number or a one-dimensional array, one for each trajectory.")
+        raise ParameterError(
+            f"values of {deep[0]} must be one number or a one-dimensional array, "
+            f"one for each trajectory."
+        )
     sizes = {name: np.size(array) for name, array in {**columns, **given}.items() if np.ndim(array)}
     count = max(sizes.values(), default=1)
     wrong = [f"{name} has {size}" for name, size in sizes.items() if size not in (1, count)]
     if wrong:
-        raise ParameterError(f"starts and values must have one length: {', '.join(wrong)}, the longest has {count}.")
+        raise ParameterError(
+            f"starts and values must have one length: {', '.join(wrong)}, the longest has {count}."
+        )
     if count > MOST_TRAJECTORIES:
         raise ParameterError(
-            f"{count} trajectories in one call are too many for memory. Split them into calls of {MOST_TRAJECTORIES} at most."
+            f"{count} trajectories in one call are too many for memory. Split them into calls of "
+            f"{MOST_TRAJECTORIES} at most."
         )
-    states = np.stack([np.broadcast_to(np.ravel(columns[name]), count) for name in system.states], axis=1).astype(float)
-    varied = {name: np.broadcast_to(np.ravel(value), count).astype(float) for name, value in given.items() if np.ndim(value)}
-    shared = system.with_values(**{name: value for name, value in given.items() if not np.ndim(value)}).values
+    states = np.stack(
+        [np.broadcast_to(np.ravel(columns[name]), count) for name in system.states], axis=1
+    ).astype(float)
+    varied = {
+        name: np.broadcast_to(np.ravel(value), count).astype(float)
+        for name, value in given.items()
+        if np.ndim(value)
+    }
+    shared = system.with_values(
+        **{name: value for name, value in given.items() if not np.ndim(value)}
+    ).values
     if varied:
         check_overlaps(system, {**shared, **varied})
         _check_period_of_each(system, shared, varied, count)
@@ -104,13 +119,18 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
 
 
 def _check_labels(given: Mapping[str, Any]) -> None:
-    """Columns of pandas or xarray are taken row by row, so their labels must be the same, in the same order. Raises ParameterError."""
-    labelled = {name: labels for name, value in given.items() if (labels := _labels(value)) is not None}
+    """Columns of pandas or xarray are taken row by row, so their labels must be the same, in the
+    same order. Raises ParameterError.
+    """
+    labelled = {
+        name: labels for name, value in given.items() if (labels := _labels(value)) is not None
+    }
     for name, labels in labelled.items():
         first = next(iter(labelled))
         if not labels.equals(labelled[first]):
             raise ParameterError(
-                f"{first} and {name} have different labels in their index. Align them first, or give plain numbers: .to_numpy()."
+                f"{first} and {name} have different labels in their index. Align them first, or "
+                f"give plain numbers: .to_numpy()."
             )
 
 
@@ -127,9 +147,13 @@ def check_system(system: Any) -> None:
         return
     name = getattr(system, "__name__", "")
     if callable(system) and str(getattr(system, "__module__", "")).startswith("saltus.models"):
-        raise ParameterError(f"sl.models.{name} is the function that makes a System. Call it: sl.models.{name}().")
+        raise ParameterError(
+            f"sl.models.{name} is the function that makes a System. Call it: sl.models.{name}()."
+        )
     advice = (
-        "Put @sl.system(states=...) above the function." if callable(system) else "Take one of sl.models, such as sl.models.delangre()."
+        "Put @sl.system(states=...) above the function."
+        if callable(system)
+        else "Take one of sl.models, such as sl.models.delangre()."
     )
     if isinstance(system, Mapping) and "format" in system:
         advice = "Write sl.System.from_dict(...) of what System.to_dict() gave."
@@ -146,7 +170,9 @@ def looks_every(system: System, every: Any) -> float | None:
     """
     if system.forced_at is not None:
         if every is not None:
-            raise ParameterError(f"{system.name} is forced: it is looked at once a forcing period. Leave every= out.")
+            raise ParameterError(
+                f"{system.name} is forced: it is looked at once a forcing period. Leave every= out."
+            )
         return None
     if every is None:
         raise ParameterError(f"{system.name} {NO_PERIOD}")
@@ -156,10 +182,17 @@ def looks_every(system: System, every: Any) -> float | None:
     return seconds
 
 
-def fill(system: System, columns: Mapping[str, np.ndarray], fixed: Mapping[str, float]) -> np.ndarray:
-    """States float64[k, D] from float64[k] for some of them; the others are fixed, at zero if nothing is said."""
+def fill(
+    system: System, columns: Mapping[str, np.ndarray], fixed: Mapping[str, float]
+) -> np.ndarray:
+    """States float64[k, D] from float64[k] for some of them; the others are fixed, at zero if
+    nothing is said.
+    """
     count = len(next(iter(columns.values())))
-    return np.stack([columns[n] if n in columns else np.full(count, fixed.get(n, 0.0)) for n in system.states], axis=1).astype(float)
+    return np.stack(
+        [columns[n] if n in columns else np.full(count, fixed.get(n, 0.0)) for n in system.states],
+        axis=1,
+    ).astype(float)
 
 
 def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, float]:
@@ -168,28 +201,43 @@ def fixed_states(system: System, at: Any, moving: Iterable[str]) -> dict[str, fl
     Raises
     ------
     ParameterError, UnitError
-        If ``at`` isn't a mapping, names an unknown state, or one of those that move; if a name of those isn't a state.
+        If ``at`` isn't a mapping, names an unknown state, or one of those that move; if a name of
+        those isn't a state.
     """
     if at is not None and not isinstance(at, Mapping):
         raise ParameterError(f"at must be a mapping of states to starts, not {shown(at)}.")
     given, moving = at or {}, list(moving)
     for name in (*moving, *given):
         if name not in system.states:
-            raise ParameterError(f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}")
+            raise ParameterError(
+                f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}"
+            )
     twice = [name for name in moving if name in given]
     if twice:
-        raise ParameterError(f"{twice[0]} has a range and stands in at= too. Leave it out of one of them.")
-    return {name: to_si(given.get(name, 0.0), system.units[name], name) for name in system.states if name not in moving}
+        raise ParameterError(
+            f"{twice[0]} has a range and stands in at= too. Leave it out of one of them."
+        )
+    return {
+        name: to_si(given.get(name, 0.0), system.units[name], name)
+        for name in system.states
+        if name not in moving
+    }
 
 
-def _check_period_of_each(system: System, shared: Mapping[str, float], varied: Mapping[str, np.ndarray], count: int) -> None:
-    """The time dependence must repeat with the forcing period for every trajectory, not only for the system's own values.
+def _check_period_of_each(
+    system: System, shared: Mapping[str, float], varied: Mapping[str, np.ndarray], count: int
+) -> None:
+    """The time dependence must repeat with the forcing period for every trajectory, not only for
+    the system's own values.
 
-    Only parameters that the explicit time dependence can see are asked; each different combination once.
+    Only parameters that the explicit time dependence can see are asked; each different combination
+    once.
     """
     if system.forced_at is None:
         return
-    timed = [node for rate in system.field for node in ex.walk(rate) if ex.depends_on(node, ("time",))]
+    timed = [
+        node for rate in system.field for node in ex.walk(rate) if ex.depends_on(node, ("time",))
+    ]
     seen = {leaf.payload for node in timed for leaf in ex.walk(node) if leaf.op == "param"}
     columns = {name: values for name, values in varied.items() if name in seen}
     done: set[tuple[float, ...]] = set()
@@ -213,11 +261,14 @@ def _values(system: System, name: str, value: Any) -> Any:
 
 
 def single(system: System, name: str, value: Any) -> float:
-    """The value of a parameter [SI] at an end of a range, or in a list of them. Raises ParameterError for many in place of one."""
+    """The value of a parameter [SI] at an end of a range, or in a list of them. Raises
+    ParameterError for many in place of one.
+    """
     number = system.resolve(name, value)
     if np.ndim(number):
         raise ParameterError(
-            f"{name} = {shown(value)} must be one number, or a text with a unit, where it is an end of a range or in a list."
+            f"{name} = {shown(value)} must be one number, or a text with a unit, where it is an "
+            f"end of a range or in a list."
         )
     return float(number)
 
@@ -227,16 +278,23 @@ def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
     if isinstance(start, Mapping):
         unknown = [name for name in start if name not in system.states]
         if unknown:
-            raise ParameterError(f"{system.name} has no state {shown(unknown[0])}. {nearest(unknown[0], system.states)}")
+            raise ParameterError(
+                f"{system.name} has no state {shown(unknown[0])}. "
+                f"{nearest(unknown[0], system.states)}"
+            )
         missing = [name for name in system.states if name not in start]
         if missing:
-            raise ParameterError(f"the start gives no {missing[0]!r}. Write start={{{', '.join(f'{s!r}: 0.0' for s in system.states)}}}.")
+            raise ParameterError(
+                f"the start gives no {missing[0]!r}. Write "
+                f"start={{{', '.join(f'{s!r}: 0.0' for s in system.states)}}}."
+            )
         return {name: _numbers(system, name, start[name]) for name in system.states}
     rows = start if isinstance(start, np.ndarray) else _as_array(start)
     if rows.shape == () or rows.shape[-1] != len(system.states) or rows.ndim > 2:
         this = f"has shape {rows.shape}" if rows.shape else f"is {shown(start)}"
         raise ParameterError(
-            f"a start of {system.name} is {len(system.states)} numbers ({', '.join(system.states)}), or an array of such rows; "
+            f"a start of {system.name} is {len(system.states)} numbers "
+            f"({', '.join(system.states)}), or an array of such rows; "
             f"this one {this}."
         )
     return {name: _numbers(system, name, rows[..., i]) for i, name in enumerate(system.states)}
@@ -254,25 +312,35 @@ def _as_array(start: Any) -> np.ndarray:
 def _numbers(system: System, name: str, value: Any) -> np.ndarray:
     if isinstance(value, tuple):
         example = f'start={{"{name}": (0.0, 1.0, 20), ...}}'
-        return along(name, value, lambda one: to_si(one, system.units[name], name), "starts", example)
+        return along(
+            name, value, lambda one: to_si(one, system.units[name], name), "starts", example
+        )
     array = np.asarray(value) if isinstance(value, np.ndarray) else _as_array(value)
     if array.size == 0:
         raise ParameterError(f"the start of {name} is empty. Give at least one number.")
     if array.dtype.kind in "OUS":
-        array = np.array([to_si(item, system.units[name], name) for item in np.ravel(array).tolist()]).reshape(array.shape)
+        array = np.array(
+            [to_si(item, system.units[name], name) for item in np.ravel(array).tolist()]
+        ).reshape(array.shape)
     if array.dtype.kind not in "fiu" or array.ndim > 1:
-        raise ParameterError(f"the start of {name} must be a number or a one-dimensional array of numbers.")
+        raise ParameterError(
+            f"the start of {name} must be a number or a one-dimensional array of numbers."
+        )
     if not np.isfinite(array).all():
         where = "" if array.ndim == 0 else f" (first at index {int(np.argmin(np.isfinite(array)))})"
-        raise ParameterError(f"the start of {name} isn't finite{where}. Every start must be a number.")
+        raise ParameterError(
+            f"the start of {name} isn't finite{where}. Every start must be a number."
+        )
     return array.astype(float)
 
 
 @dataclass(frozen=True)
 class Span:
-    """How long to run: a period for each trajectory, whole periods and the time after them, all since t_start.
+    """How long to run: a period for each trajectory, whole periods and the time after them, all
+    since t_start.
 
-    For an unforced system the whole span is one period. ``t_end`` is the time that was asked for [s], infinite if periods were.
+    For an unforced system the whole span is one period. ``t_end`` is the time that was asked for
+    [s], infinite if periods were.
     """
 
     t_start: float
@@ -281,10 +349,15 @@ class Span:
     phase: np.ndarray
     t_end: float = math.inf
 
-    def request(self, start: np.ndarray, parameters: np.ndarray, schedule: Schedule, record_from: int | None) -> Request:
-        """A run of this length, with samples at a schedule; contacts from period ``record_from`` on are kept, or none."""
+    def request(
+        self, start: np.ndarray, parameters: np.ndarray, schedule: Schedule, record_from: int | None
+    ) -> Request:
+        """A run of this length, with samples at a schedule; contacts from period ``record_from`` on
+        are kept, or none.
+        """
         return Request(
-            start=start, parameters=parameters, period=self.period, end_count=self.count, end_phase=self.phase, origin=self.t_start,
+            start=start, parameters=parameters, period=self.period, end_count=self.count,
+            end_phase=self.phase, origin=self.t_start,
             schedule=schedule, record_from=record_from,
         )  # fmt: skip
 
@@ -300,12 +373,18 @@ def span(system: System, group: Ensemble, periods: Any, t_end: Any, t_start: Any
     begin = _time(t_start, "t_start")
     n = group.size
     if periods is None and t_end is None and system.forced_at is None:
-        raise ParameterError(f'{system.name} has no forcing period: give t_end=, such as t_end="10 s".')
+        raise ParameterError(
+            f'{system.name} has no forcing period: give t_end=, such as t_end="10 s".'
+        )
     if (periods is None) == (t_end is None):
-        raise ParameterError("give periods= (whole forcing periods) or t_end= (seconds), and only one of them.")
+        raise ParameterError(
+            "give periods= (whole forcing periods) or t_end= (seconds), and only one of them."
+        )
     if periods is not None:
         if system.forced_at is None:
-            raise ParameterError(f"{system.name} has no forcing period. Give t_end= in place of periods=.")
+            raise ParameterError(
+                f"{system.name} has no forcing period. Give t_end= in place of periods=."
+            )
         periods = whole(periods, "periods")
         return Span(begin, _periods(system, group), np.full(n, int(periods), np.int64), np.zeros(n))
     end = _time(t_end, "t_end")

@@ -1,4 +1,6 @@
-"""What every public verb does beside its work: say in a sentence how it is called, and end well on Ctrl-C."""
+"""What every public verb does beside its work: say in a sentence how it is called, and end well on
+Ctrl-C.
+"""
 
 from __future__ import annotations
 
@@ -24,17 +26,27 @@ R = TypeVar("R")
 
 #: What people write who come from elsewhere, and what it is called here.
 _ELSEWHERE: Mapping[str, str] = {
-    **dict.fromkeys(("tend", "tfinal", "t_final", "tf", "t_max", "tmax", "duration", "t_span", "tspan"), "t_end="),
-    **dict.fromkeys(("t_eval", "teval", "n_samples", "nsamples", "dt", "step"), "samples= (per period)"),
+    **dict.fromkeys(
+        ("tend", "tfinal", "t_final", "tf", "t_max", "tmax", "duration", "t_span", "tspan"),
+        "t_end=",
+    ),
+    **dict.fromkeys(
+        ("t_eval", "teval", "n_samples", "nsamples", "dt", "step"), "samples= (per period)"
+    ),
     **dict.fromkeys(("y0", "x0", "u0", "initial", "initial_state", "ic"), "start="),
-    **dict.fromkeys(("rtol", "atol"), "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none"),
+    **dict.fromkeys(
+        ("rtol", "atol"), "method=sl.ODE45(rtol=..., atol=...), or sl.Taylor(), which needs none"
+    ),
     **dict.fromkeys(("params", "parameters", "args", "p"), "values="),
     **dict.fromkeys(("n_jobs", "workers", "cores"), "threads="),
     **dict.fromkeys(("n", "n_periods", "nperiods", "cycles"), "periods="),
     **dict.fromkeys(("solver", "integrator"), "method="),
 }
 #: What verbs take for states that the user names, as one would write it.
-_RANGES = {"axes": 'x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)', "box": 'x=("-5 mm", "5 mm"), v=("-1 m/s", "1 m/s")'}
+_RANGES = {
+    "axes": 'x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)',
+    "box": 'x=("-5 mm", "5 mm"), v=("-1 m/s", "1 m/s")',
+}
 #: Arguments for the length of a run; verbs of whole periods have no t_end.
 _LENGTHS = ("t_end", "periods", "every")
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
@@ -43,8 +55,9 @@ _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 def verb(function: Callable[P, R]) -> Callable[P, R]:
     """Make a function a public verb.
 
-    Arguments that it doesn't have are answered by those that it has, and those of another kind by what they must be; ``progress=False``
-    silences what is said about compiling; Ctrl-C that comes before anything is finished is an :class:`Interrupted` too.
+    Arguments that it doesn't have are answered by those that it has, and those of another kind by
+    what they must be; ``progress=False`` silences what is said about compiling; Ctrl-C that comes
+    before anything is finished is an :class:`Interrupted` too.
     """
     signature, kinds = inspect.signature(function), Kinds(function)
 
@@ -56,7 +69,9 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
         kinds.check(f"sl.{function.__name__}", given)
         if given.get("threads") is not None:
             whole(given["threads"], "threads", 1, MOST_THREADS)
-        quiet: AbstractContextManager[Any] = silent() if kwargs.get("progress") is False else nullcontext()
+        quiet: AbstractContextManager[Any] = (
+            silent() if kwargs.get("progress") is False else nullcontext()
+        )
         token = _INSIDE.set(True)
         try:
             with quiet, no_ctrl_c_is_lost():
@@ -71,33 +86,47 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
     return called
 
 
-def _check(name: str, signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> Mapping[str, Any]:
+def _check(
+    name: str, signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]
+) -> Mapping[str, Any]:
     """The arguments by name. Raises ParameterError unless there are such."""
     known = signature.parameters
     if not any(parameter.kind == parameter.VAR_KEYWORD for parameter in known.values()):
         for word in kwargs:
             if word not in known:
-                raise ParameterError(f"sl.{name} has no argument {shown(word)}. {_instead(word, known, args, kwargs)}")
+                raise ParameterError(
+                    f"sl.{name} has no argument {shown(word)}. "
+                    f"{_instead(word, known, args, kwargs)}"
+                )
     try:
         given = signature.bind(*args, **kwargs).arguments
     except TypeError as error:
         raise ParameterError(f"sl.{name}: {error}. Write sl.{name}({_call(known)}).") from None
     if "start" in known and isinstance(given.get("periods"), list | tuple | dict | np.ndarray):
         raise ParameterError(
-            f"sl.{name}: the start comes second, and the time is one number: sl.{name}(system, start, t_end=10). "
+            f"sl.{name}: the start comes second, and the time is one number: sl.{name}(system, "
+            f"start, t_end=10). "
             f"periods can't be {shown(given['periods'])}."
         )
     return given
 
 
-def _instead(word: str, known: Mapping[str, inspect.Parameter], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str:
+def _instead(
+    word: str,
+    known: Mapping[str, inspect.Parameter],
+    args: tuple[Any, ...],
+    kwargs: Mapping[str, Any],
+) -> str:
     """What to write in place of an argument that isn't there."""
     system = kwargs.get("system", args[0] if args else None)
     if isinstance(system, System) and word in system.values:
         by = f"values={{{word!r}: ...}} or " if "values" in known else ""
         return f"It is a parameter of {system.name}: give it by {by}system.with_values({word}=...)."
     if isinstance(system, System) and word in system.states and "start" in known:
-        return f"It is a state of {system.name}: give it by start={{{', '.join(f'{state!r}: ...' for state in system.states)}}}."
+        return (
+            f"It is a state of {system.name}: give it by "
+            f"start={{{', '.join(f'{state!r}: ...' for state in system.states)}}}."
+        )
     there = _ELSEWHERE.get(word.lower(), f"{word}=" if word in _LENGTHS else "")
     if there.partition("=")[0] in known:
         return f"Write {there}."
@@ -110,15 +139,25 @@ def _length(known: Mapping[str, inspect.Parameter]) -> str:
     """The arguments of a verb for the length of its run."""
     ways = {
         "t_end": "t_end= [s]",
-        "periods": "periods= (forcing periods)" if "every" not in known else "periods= (forcing periods, or samples every= seconds of "
+        "periods": "periods= (forcing periods)" if "every" not in known else "periods= (forcing "
+            "periods, or samples every= seconds of "
         "a system without forcing)",
     }  # fmt: skip
-    return f"The length of the run is {' or '.join(text for name, text in ways.items() if name in known)}."
+    return (
+        f"The length of the run is "
+        f"{' or '.join(text for name, text in ways.items() if name in known)}."
+    )
 
 
 def _call(known: Mapping[str, inspect.Parameter]) -> str:
     """How it is called, with the arguments that it can't do without."""
-    needed = [p.name for p in known.values() if p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
-    ranges = [_RANGES[p.name] for p in known.values() if p.kind == p.VAR_KEYWORD and p.name in _RANGES]
+    needed = [
+        p.name
+        for p in known.values()
+        if p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
+    ]
+    ranges = [
+        _RANGES[p.name] for p in known.values() if p.kind == p.VAR_KEYWORD and p.name in _RANGES
+    ]
     rest = [] if ranges else [p.name for p in known.values() if p.default is not p.empty][:2]
     return ", ".join([*needed, *ranges, *(f"{name}=..." for name in rest), "..."])

@@ -1,9 +1,11 @@
-"""The cache that processes share, keyed by the inputs of each entry: safe to lose, and private to this user.
+"""The cache that processes share, keyed by the inputs of each entry: safe to lose, and private to
+this user.
 
-Compiled kernels, one for each (equations, templates, versions, processor); and the hash of saltus's code, by that of its text. A kernel
-is code, so a folder or a file that others could have written to is never used: kernels are then compiled for this process only, in its
-memory. An entry is written under another name and renamed into place, so processes that start cold at once can't disturb each other; its
-checksum is verified before anything of it is used, and a damaged one is made again.
+Compiled kernels, one for each (equations, templates, versions, processor); and the hash of saltus's
+code, by that of its text. A kernel is code, so a folder or a file that others could have written to
+is never used: kernels are then compiled for this process only, in its memory. An entry is written
+under another name and renamed into place, so processes that start cold at once can't disturb each
+other; its checksum is verified before anything of it is used, and a damaged one is made again.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ from saltus.errors import SaltusWarning
 #: Suffixes of the names of entries, by content.
 KERNEL, HASH = ".kernel", ".hash"
 _CALLED = {KERNEL: "compiled kernel", HASH: "hash of the code"}
-#: Age from which an unfinished entry belongs to a process that was killed, and from which the hash of code is one of old code [s].
+#: Age from which an unfinished entry belongs to a process that was killed, and from which the hash
+#: of code is one of old code [s].
 _ABANDONED, _OLD = 86_400.0, 30 * 86_400.0
 
 
@@ -38,14 +41,22 @@ class Entry:
 
 
 def folder() -> Path:
-    """``$SALTUS_CACHE``, a ``~`` at its beginning being the home folder as in a shell; else saltus's folder in the user's cache."""
+    """``$SALTUS_CACHE``, a ``~`` at its beginning being the home folder as in a shell; else
+    saltus's folder in the user's cache.
+    """
     chosen = os.environ.get("SALTUS_CACHE")
-    return Path(os.path.expanduser(chosen)) if chosen else Path(platformdirs.user_cache_dir("saltus", appauthor=False))
+    return (
+        Path(os.path.expanduser(chosen))
+        if chosen
+        else Path(platformdirs.user_cache_dir("saltus", appauthor=False))
+    )
 
 
 def kernels() -> list[Entry]:
     """Every kernel, by name."""
-    paths = sorted(path for path in folder().glob(f"*{KERNEL}") if not path.name.startswith(entry.DRAFT))
+    paths = sorted(
+        path for path in folder().glob(f"*{KERNEL}") if not path.name.startswith(entry.DRAFT)
+    )
     return [Entry(path.stem, entry.title_of(path), path.lstat().st_size, path) for path in paths]
 
 
@@ -111,8 +122,10 @@ def _usable() -> bool:
         entry.check_folder(place)
     except entry.NotOurs as why:
         _warn(
-            f"saltus: the folder of compiled kernels {place} {why}, so whoever writes there could run code as you. It isn't used: kernels "
-            "are compiled for this process only. Close it (chmod go-w), or set SALTUS_CACHE to a folder of yours."
+            f"saltus: the folder of compiled kernels {place} {why}, so whoever writes there could "
+            f"run code as you. It isn't used: kernels "
+            "are compiled for this process only. Close it (chmod go-w), or set SALTUS_CACHE to a "
+            "folder of yours."
         )
         return False
     except OSError as error:
@@ -138,7 +151,8 @@ def _sweep_older(place: Path, pattern: str, age: float) -> None:
 
 def _cannot_write(place: Path, error: OSError) -> None:
     _warn(
-        f"saltus: {place} can't be written ({error.strerror or error}); kernels are compiled for this process only. "
+        f"saltus: {place} can't be written ({error.strerror or error}); kernels are compiled for "
+        f"this process only. "
         "Set SALTUS_CACHE to a folder of yours with free space."
     )
 

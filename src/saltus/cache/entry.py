@@ -1,7 +1,9 @@
-"""One entry of the cache: a file that is read whole, through one handle, and believed only if its owner and its checksum say so.
+"""One entry of the cache: a file that is read whole, through one handle, and believed only if its
+owner and its checksum say so.
 
-What stands in it is code. So it counts only if it is a regular file of this user (or of the administrator) that nobody else may write
-to; that is asked of the opened file, so nothing can be exchanged between the question and the reading.
+What stands in it is code. So it counts only if it is a regular file of this user (or of the
+administrator) that nobody else may write to; that is asked of the opened file, so nothing can be
+exchanged between the question and the reading.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ class Damaged(Exception):  # noqa: N818
 
 
 def check_ours(seen: os.stat_result) -> None:
-    """Raise NotOurs unless this user or the administrator owns it and nobody else may write to it."""
+    """Raise NotOurs unless this user or the administrator owns it and nobody else may
+    write to it.
+    """
     if not hasattr(os, "geteuid"):  # Windows: a user's folders are closed to others by default
         return
     me = os.geteuid()
@@ -44,7 +48,9 @@ def check_ours(seen: os.stat_result) -> None:
 
 
 def _private_group(group: int, user: int) -> bool:
-    """Whether a group is this user's own and holds nobody else: the common default, with which users' files are writable to it."""
+    """Whether a group is this user's own and holds nobody else: the common default, with which
+    users' files are writable to it.
+    """
     import grp
     import pwd
 
@@ -52,20 +58,35 @@ def _private_group(group: int, user: int) -> bool:
         entry, person = grp.getgrgid(group), pwd.getpwuid(user)
     except KeyError:
         return False
-    return person.pw_gid == group and entry.gr_name == person.pw_name and not set(entry.gr_mem) - {person.pw_name}
+    return (
+        person.pw_gid == group
+        and entry.gr_name == person.pw_name
+        and not set(entry.gr_mem) - {person.pw_name}
+    )
 
 
 def check_folder(folder: Path) -> None:
-    """Raise NotOurs unless a folder, and the link that stands for it if there is one, are this user's alone; OSError if it isn't there."""
+    """Raise NotOurs unless a folder, and the link that stands for it if there is one, are this
+    user's alone; OSError if it isn't there.
+    """
     link = os.lstat(folder)
-    if stat.S_ISLNK(link.st_mode) and hasattr(os, "geteuid") and link.st_uid not in (os.geteuid(), 0):
+    if (
+        stat.S_ISLNK(link.st_mode)
+        and hasattr(os, "geteuid")
+        and link.st_uid not in (os.geteuid(), 0)
+    ):
         raise NotOurs("is a link that belongs to another user")
     check_ours(os.stat(folder))
 
 
 def write(path: Path, title: str, data: bytes) -> None:
     """Write an entry in full, then give it its name, read-only."""
-    header = {"format": FORMAT, "key": path.stem, "title": title, "sha256": hashlib.sha256(data).hexdigest()}
+    header = {
+        "format": FORMAT,
+        "key": path.stem,
+        "title": title,
+        "sha256": hashlib.sha256(data).hexdigest(),
+    }
     handle, draft = tempfile.mkstemp(prefix=DRAFT, dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -90,7 +111,11 @@ def read(path: Path) -> bytes:
     header, data = _split(_content(path))
     try:
         fields = json.loads(header)
-        whole = fields["format"] == FORMAT and fields["key"] == path.stem and fields["sha256"] == hashlib.sha256(data).hexdigest()
+        whole = (
+            fields["format"] == FORMAT
+            and fields["key"] == path.stem
+            and fields["sha256"] == hashlib.sha256(data).hexdigest()
+        )
     except (ValueError, KeyError, TypeError, RecursionError):
         whole = False
     if not whole:
@@ -107,7 +132,12 @@ def title_of(path: Path) -> str:
 
 
 def _content(path: Path) -> bytes:
-    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    flags = (
+        os.O_RDONLY
+        | getattr(os, "O_NOFOLLOW", 0)
+        | getattr(os, "O_NONBLOCK", 0)
+        | getattr(os, "O_BINARY", 0)
+    )
     try:
         handle = os.open(path, flags)
     except FileNotFoundError:

@@ -31,19 +31,29 @@ class Commands(TyperGroup):
         except BrokenPipeError:  # `saltus models | head`
             raise
         except OSError as error:
-            if error.errno == errno.EBADF and not error.filename:  # standard output was closed meanwhile: nobody reads on, as with a pipe
+            # standard output was closed meanwhile: nobody reads on, as with a pipe
+            if error.errno == errno.EBADF and not error.filename:
                 raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)) from None
-            if error.errno is None:  # a library that can't be loaded, not a file that can't be written
+            # a library that can't be loaded, not a file that can't be written
+            if error.errno is None:
                 screen.fail(str(error))
             else:
-                screen.fail(f"{error.filename or 'a file'}: {error.strerror or error}. Choose another folder, or free some space.")
+                screen.fail(
+                    f"{error.filename or 'a file'}: {error.strerror or error}. Choose "
+                    f"another folder, or free some space."
+                )
             raise typer.Exit(REFUSED) from None
         except MemoryError as error:
             why = f" ({error})" if str(error) else ""
-            screen.fail(f"memory is used up{why}. Ask for fewer starts, samples or cells, or take --threads 1.")
+            screen.fail(
+                f"memory is used up{why}. Ask for fewer starts, samples or cells, or take "
+                f"--threads 1."
+            )
             raise typer.Exit(REFUSED) from None
         except KeyboardInterrupt:
-            screen.fail("stopped. Files are written in full or not at all: none is left half-written.")
+            screen.fail(
+                "stopped. Files are written in full or not at all: none is left half-written."
+            )
             raise typer.Exit(EXIT_CODE) from None
 
 
@@ -53,12 +63,15 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
-    help="Vibration with contacts, to machine precision: freeplay, backlash, stops.\n\nStart with `saltus demo`.",
+    help="Vibration with contacts, to machine precision: freeplay, backlash, stops.\n\nStart with "
+    "`saltus demo`.",
 )
 
 
 @app.callback(invoke_without_command=True)
-def version(version: bool = typer.Option(False, "--version", help="Print the version and stop.")) -> None:
+def version(
+    version: bool = typer.Option(False, "--version", help="Print the version and stop."),
+) -> None:
     """Print the version if it is asked for."""
     if version:
         from importlib import metadata

@@ -53,27 +53,47 @@ class Progress(StrEnum):
     none = "none"
 
 
-Only = Annotated[list[str] | None, typer.Option(help="Answer this question only, by its table or its name; may be given again.")]
-Threads = Annotated[int | None, typer.Option(min=1, help="Threads; by default one for each usable core.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Basins: processes of this machine, in place of threads.")]
-Scheduler = Annotated[str, typer.Option(help="Basins: a dask scheduler, tcp://HOST:PORT. Whoever can reach it can run code as you.")]
-Shard = Annotated[str, typer.Option(help="Basins: K/N, the K-th of N jobs that share the folder; K from 0.")]
-ProgressKind = Annotated[Progress, typer.Option(help="bar; json: a line of JSON on standard error each second; none.")]
+Only = Annotated[
+    list[str] | None,
+    typer.Option(help="Answer this question only, by its table or its name; may be given again."),
+]
+Threads = Annotated[
+    int | None, typer.Option(min=1, help="Threads; by default one for each usable core.")
+]
+Workers = Annotated[
+    int | None, typer.Option(min=1, help="Basins: processes of this machine, in place of threads.")
+]
+Scheduler = Annotated[
+    str,
+    typer.Option(
+        help="Basins: a dask scheduler, tcp://HOST:PORT. Whoever can reach it can run code as you."
+    ),
+]
+Shard = Annotated[
+    str, typer.Option(help="Basins: K/N, the K-th of N jobs that share the folder; K from 0.")
+]
+ProgressKind = Annotated[
+    Progress, typer.Option(help="bar; json: a line of JSON on standard error each second; none.")
+]
 
 
 @app.command()
 def demo(
     frequency: Annotated[str, typer.Option(help="Forcing frequency, with its unit.")] = "15 Hz",
     force: Annotated[str, typer.Option(help="Forcing amplitude, with its unit.")] = "4 N",
-    case: Annotated[Case, typer.Option(help="Gaps: a = 0.4, 0.4 mm; b = 0, 0.4 mm; c = 0, 0.8 mm.")] = Case.b,
+    case: Annotated[
+        Case, typer.Option(help="Gaps: a = 0.4, 0.4 mm; b = 0, 0.4 mm; c = 0, 0.8 mm.")
+    ] = Case.b,
     periods: Annotated[int, typer.Option(min=3, help="Forcing periods to run.")] = 2000,
-    out: Annotated[Path, typer.Option(help="Folder for the picture and the data.")] = Path("saltus-demo"),
+    out: Annotated[Path, typer.Option(help="Folder for the picture and the data.")] = Path(
+        "saltus-demo"
+    ),
     plot: Annotated[bool, typer.Option(help="Draw the picture.")] = True,
 ) -> None:
     """One rig, six starts: what does each settle to?
 
-    A block between two springs with gaps, shaken sideways. Where it starts decides how it vibrates for ever after. Prints a table, draws
-    each motion, keeps the data.
+    A block between two springs with gaps, shaken sideways. Where it starts decides how it vibrates
+    for ever after. Prints a table, draws each motion, keeps the data.
 
     Example: `saltus demo --case c --frequency "5 Hz"`
     """
@@ -97,12 +117,19 @@ def demo(
 @app.command()
 def run(
     study: Annotated[Path, typer.Argument(help="The study file (TOML).")],
-    system: Annotated[str, typer.Option(help="A system of your own: FILE.py:NAME. Runs that file.")] = "",
-    out: Annotated[Path | None, typer.Option(help="Folder for results; default saltus-runs/STUDY.")] = None,
+    system: Annotated[
+        str, typer.Option(help="A system of your own: FILE.py:NAME. Runs that file.")
+    ] = "",
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for results; default saltus-runs/STUDY.")
+    ] = None,
     only: Only = None,
     inputs: Annotated[
         list[Path] | None,
-        typer.Option(help="Another folder in which the study may read the files that it names; may be given again."),
+        typer.Option(
+            help="Another folder in which the study may read the files that it names; may "
+            "be given again."
+        ),
     ] = None,
     threads: Threads = None,
     workers: Workers = None,
@@ -112,13 +139,15 @@ def run(
 ) -> None:
     """Run a study file: answer its questions, print their tables, keep data and pictures.
 
-    A study names a model of saltus and its values; it never runs code, and reads no file outside its folder unless you allow it with
-    --inputs. A system of your own is given here, by you. Results are stored: a study stopped at any moment, by anything, goes
-    on where it was when it is run again. An answer isn't computed twice unless its inputs changed.
+    A study names a model of saltus and its values; it never runs code, and reads no file outside
+    its folder unless you allow it with --inputs. A system of your own is given here, by you.
+    Results are stored: a study stopped at any moment, by anything, goes on where it was when it is
+    run again. An answer isn't computed twice unless its inputs changed.
 
     Example: `saltus run replications/saunders2021/table2.toml`
 
-    Example: `saltus run examples/two_masses/study.toml --system examples/two_masses/two_masses.py:rig`
+    Example: `saltus run examples/two_masses/study.toml --system
+    examples/two_masses/two_masses.py:rig`
 
     Example: `saltus run my_study.toml --only frequency_response`
 
@@ -136,19 +165,35 @@ def run(
     own = own_system(system) if system else None
     folder = usable_folder(out or Path("saltus-runs") / study.stem)
     resources = _resources(spec, threads, workers, scheduler, shard)
-    _run(spec, text, folder, Inputs(study.parent, inputs or []), own, only or [], resources, progress, _again(folder, system))
+    _run(
+        spec,
+        text,
+        folder,
+        Inputs(study.parent, inputs or []),
+        own,
+        only or [],
+        resources,
+        progress,
+        _again(folder, system),
+    )
 
 
-def _resources(spec: Study, threads: int | None, workers: int | None, scheduler: str, shard: str) -> Resources:
+def _resources(
+    spec: Study, threads: int | None, workers: int | None, scheduler: str, shard: str
+) -> Resources:
     from saltus.study.run.running import Resources, shard_of
 
     if spec.basins is None and (workers or scheduler or shard):
-        raise StudyError("--workers, --scheduler and --shard are for studies of basins; this one has no [basins]. Leave them out.")
+        raise StudyError(
+            "--workers, --scheduler and --shard are for studies of basins; this one "
+            "has no [basins]. Leave them out."
+        )
     return Resources(threads, workers, scheduler or None, shard_of(shard) if shard else None)
 
 
 def _run(
-    spec: Study, text: str, folder: Path, inputs: Inputs, own: System | None, only: list[str], resources: Resources, progress: Progress,
+    spec: Study, text: str, folder: Path, inputs: Inputs, own: System | None, only: list[str],
+    resources: Resources, progress: Progress,
     again: str,
 ) -> None:  # fmt: skip
     from saltus.cli import screen
@@ -156,7 +201,9 @@ def _run(
 
     try:
         with screen.reporting(progress.value) as (report, say):
-            outcome = run_study(spec, text, folder, own, resources, report, say, inputs=inputs, only=only)
+            outcome = run_study(
+                spec, text, folder, own, resources, report, say, inputs=inputs, only=only
+            )
     except KeyboardInterrupt:
         screen.fail(f"stopped; results so far are stored. Go on with: {again}")
         raise
@@ -174,9 +221,12 @@ def _again(folder: Path, system: str) -> str:
 
 @app.command()
 def status(
-    store: Annotated[Path, typer.Argument(help="The output folder of a study, or one of its stores of basins.")],
+    store: Annotated[
+        Path, typer.Argument(help="The output folder of a study, or one of its stores of basins.")
+    ],
 ) -> None:
-    """Show which questions of a study are answered, and how far its maps are, on this machine and any other that works on the folder.
+    """Show which questions of a study are answered, and how far its maps are, on this machine and
+    any other that works on the folder.
 
     Example: `saltus status saltus-runs/fig6b`
     """
@@ -190,7 +240,9 @@ def status(
 @app.command()
 def resume(
     store: Annotated[Path, typer.Argument(help="The output folder of a study.")],
-    system: Annotated[str, typer.Option(help="The system of your own that it was run with: FILE.py:NAME.")] = "",
+    system: Annotated[
+        str, typer.Option(help="The system of your own that it was run with: FILE.py:NAME.")
+    ] = "",
     only: Only = None,
     threads: Threads = None,
     workers: Workers = None,
@@ -209,7 +261,17 @@ def resume(
     spec, text = read(copy_of(store))
     own = own_system(system) if system else None
     resources = _resources(spec, threads, workers, scheduler, shard)
-    _run(spec, text, store, inputs_of(store, text), own, only or [], resources, progress, _again(store, system))
+    _run(
+        spec,
+        text,
+        store,
+        inputs_of(store, text),
+        own,
+        only or [],
+        resources,
+        progress,
+        _again(store, system),
+    )
 
 
 @app.command()
@@ -217,12 +279,22 @@ def plot(
     result: Annotated[Path, typer.Argument(help="A result (.nc) that saltus wrote.")],
     kind: Annotated[
         Kind | None,
-        typer.Option(help="history: state against time. phase: velocity against displacement. Others: the one picture of their result."),
+        typer.Option(
+            help="history: state against time. phase: velocity against displacement. "
+            "Others: the one picture of their result."
+        ),
     ] = None,
-    trajectory: Annotated[int | None, typer.Option(min=0, help="Which trajectory of a batch; by default all, at most 8.")] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture (.png, .pdf, .svg); default RESULT-KIND.png.")] = None,
+    trajectory: Annotated[
+        int | None,
+        typer.Option(min=0, help="Which trajectory of a batch; by default all, at most 8."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Picture (.png, .pdf, .svg); default RESULT-KIND.png."),
+    ] = None,
 ) -> None:
-    """Draw a result: history and phase of a run; basins; responses; a section; a spectrum; impacts; energies. By default what fits.
+    """Draw a result: history and phase of a run; basins; responses; a section; a spectrum; impacts;
+    energies. By default what fits.
 
     Example: `saltus plot saltus-demo/demo.nc --trajectory 2 --kind phase -o phase.pdf`
     """
@@ -234,23 +306,38 @@ def plot(
 
 @app.command()
 def reproduce(
-    paper: Annotated[str, typer.Argument(help="The paper; leave it out to list those that can be reproduced.")] = "",
+    paper: Annotated[
+        str, typer.Argument(help="The paper; leave it out to list those that can be reproduced.")
+    ] = "",
     figure: Annotated[
-        list[str] | None, typer.Option(help="A figure of the paper, 8 or fig8; may be given several times. By default all.")
+        list[str] | None,
+        typer.Option(
+            help="A figure of the paper, 8 or fig8; may be given several times. By default all."
+        ),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Coarser and shorter: some three minutes on two cores, not ten to fifteen.")
+        bool,
+        typer.Option(
+            "--quick",
+            help="Coarser and shorter: some three minutes on two cores, not ten to fifteen.",
+        ),
     ] = False,
-    out: Annotated[Path | None, typer.Option(help="Folder for the report; default saltus-runs/PAPER or PAPER-quick.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the report; default saltus-runs/PAPER or PAPER-quick."),
+    ] = None,
     threads: Threads = None,
 ) -> None:
-    """Redraw a published paper's figures and hold each of its claims against exact arithmetic: one HTML report.
+    """Redraw a published paper's figures and hold each of its claims against exact arithmetic: one
+    HTML report.
 
-    Every claim gets a verdict (holds, holds in part, does not hold, not decidable), computed from the data by a rule printed with
-    it. Stopped at any moment, it goes on where it was when it is run again; nothing is computed twice.
+    Every claim gets a verdict (holds, holds in part, does not hold, not decidable), computed from
+    the data by a rule printed with it. Stopped at any moment, it goes on where it was when it is
+    run again; nothing is computed twice.
 
-    Writes report.html; claims.csv, each claim with the answers and the verdict in a row; the data and the pictures. Of some figures only:
-    report-fig8.html and claims-fig8.csv, next to those of all figures. Exit code 1 if something could not be computed; see the report.
+    Writes report.html; claims.csv, each claim with the answers and the verdict in a row; the data
+    and the pictures. Of some figures only: report-fig8.html and claims-fig8.csv, next to those of
+    all figures. Exit code 1 if something could not be computed; see the report.
 
     Example: `saltus reproduce saunders2021 --quick`
 
@@ -263,14 +350,22 @@ def reproduce(
     from saltus.study.table import TextTable
 
     if not paper:
-        screen.show(TextTable("Papers; `saltus reproduce NAME` does one", ("name", "title"), tuple(replication.names().items())))
+        screen.show(
+            TextTable(
+                "Papers; `saltus reproduce NAME` does one",
+                ("name", "title"),
+                tuple(replication.names().items()),
+            )
+        )
         return
     chosen = replication.find(paper)
     folder = out or Path("saltus-runs") / (f"{paper}-quick" if quick else paper)
     matplotlib.use("Agg")  # no window, and none needed
     try:
         with screen.reporting("bar") as (report, say):
-            result = replication.reproduce(chosen, folder, figure or (), quick, threads, report, say)
+            result = replication.reproduce(
+                chosen, folder, figure or (), quick, threads, report, say
+            )
     except KeyboardInterrupt:
         screen.fail(f"stopped; results so far are stored in {folder}. Go on with the same command.")
         raise
@@ -298,12 +393,19 @@ def models(
         screen.say(repr(published.find(name)()))
         screen.say(f'energy      sl.models.energy("{name}"), as sl.energy_balance takes it')
     else:
-        screen.show(TextTable("Models; `saltus models NAME` shows one", ("name", "description"), tuple(published.describe().items())))
+        screen.show(
+            TextTable(
+                "Models; `saltus models NAME` shows one",
+                ("name", "description"),
+                tuple(published.describe().items()),
+            )
+        )
 
 
 @app.command()
 def doctor() -> None:
-    """Show what saltus runs on here, and check its answers against closed forms. Exit code 1 if one is wrong.
+    """Show what saltus runs on here, and check its answers against closed forms. Exit code 1 if one
+    is wrong.
 
     Example: `saltus doctor`
     """
@@ -315,7 +417,10 @@ def doctor() -> None:
         found = study.checks()
     screen.show(study.check_table(found))
     if not all(check.passed for check in found):
-        screen.fail("a self-check failed: results on this machine can't be trusted. Try `saltus cache clear`, then report this output.")
+        screen.fail(
+            "a self-check failed: results on this machine can't be trusted. Try `saltus "
+            "cache clear`, then report this output."
+        )
         raise typer.Exit(1)
 
 
@@ -358,18 +463,24 @@ def cache_show() -> None:
     from saltus.cli import screen
     from saltus.study.table import TextTable
 
-    rows = tuple((entry.name[:12], entry.system, f"{entry.size_bytes / 1e6:.2f}") for entry in entries.kernels())
+    rows = tuple(
+        (entry.name[:12], entry.system, f"{entry.size_bytes / 1e6:.2f}")
+        for entry in entries.kernels()
+    )
     screen.show(TextTable(f"Kernels in {entries.folder()}", ("entry", "system", "MB"), rows))
 
 
 @cache.command("clear")
 def cache_clear(
-    everything: Annotated[bool, typer.Option("--all", help="Forget too which result files saltus wrote here.")] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Forget too which result files saltus wrote here.")
+    ] = False,
 ) -> None:
     """Delete the compiled kernels. They are built again when they are needed.
 
-    The folder also knows the checksums of the result files that saltus wrote here, so that they are loaded at once. They stay: a file
-    whose checksum is forgotten is read by another process first, which takes some tenths of a second. With --all they go too.
+    The folder also knows the checksums of the result files that saltus wrote here, so that they are
+    loaded at once. They stay: a file whose checksum is forgotten is read by another process first,
+    which takes some tenths of a second. With --all they go too.
 
     Example: `saltus cache clear`
     """
@@ -382,7 +493,10 @@ def cache_clear(
     if everything:
         screen.say(f"forgot {_result_files(known.forget())}")
     elif left := known.count():
-        screen.say(f"kept the checksums of {_result_files(left)}, which are loaded at once; --all forgets them")
+        screen.say(
+            f"kept the checksums of {_result_files(left)}, which are loaded at once; --all "
+            f"forgets them"
+        )
 
 
 def _result_files(count: int) -> str:

@@ -1,4 +1,6 @@
-"""The demo: one rig, six starts, what each settles to, and whether a start one nanometre away settles to the same."""
+"""The demo: one rig, six starts, what each settles to, and whether a start one nanometre away
+settles to the same.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +25,16 @@ if TYPE_CHECKING:
 
 #: Callable that takes the share done, or None.
 Progress = Callable[[float], None] | None
-#: Starts (x [m], v [m/s]): the four that Saunders et al. (2021), Fig. 5, name; then 1.9 mm, which reaches the 4T that they report from 2 mm
-#: (there the outcome changes from one nanometre to the next); and a high one, which reaches the T-periodic response.
+#: Starts (x [m], v [m/s]): the four that Saunders et al. (2021), Fig. 5, name; then 1.9 mm, which
+#: reaches the 4T that they report from 2 mm (there the outcome changes from one nanometre to the
+#: next); and a high one, which reaches the T-periodic response.
 STARTS = ((1.0e-3, 0.0), (0.2e-3, 0.0), (0.4e-3, 0.0), (2.0e-3, 0.0), (1.9e-3, 0.0), (4.0e-3, 0.3))
 #: Distance [m] of the neighbours that are started on either side: less than any experiment can set.
 NEIGHBOUR = 1e-9
 #: Long enough for the slowest of them, 24T from x = 0.4 mm, to repeat to ten digits.
 PERIODS = 2000
-#: Forcing periods drawn in a time history, and in the phase portrait of a response that doesn't repeat.
+#: Forcing periods drawn in a time history, and in the phase portrait of a response that doesn't
+#: repeat.
 SHOWN, SHOWN_IF_APERIODIC = 12, 24
 
 
@@ -56,7 +60,13 @@ class Demo:
     table: TextTable
 
 
-def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods: int = PERIODS, progress: Progress = None) -> Demo:
+def demo(
+    frequency: str = "15 Hz",
+    case: str = "b",
+    force: str = "4 N",
+    periods: int = PERIODS,
+    progress: Progress = None,
+) -> Demo:
     """Move the rig from six starts, and from their neighbours, until it settles.
 
     Parameters
@@ -82,7 +92,9 @@ def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods:
     rig = models.delangre(case, force=force, frequency=frequency)
     x, v = np.array(STARTS).T
     recorded = min(LAST, periods)
-    run = simulate(rig, start={"x": x, "v": v}, periods=periods, keep=recorded, progress=progress or False)
+    run = simulate(
+        rig, start={"x": x, "v": v}, periods=periods, keep=recorded, progress=progress or False
+    )
     twins = {"x": np.concatenate([x - NEIGHBOUR, x + NEIGHBOUR]), "v": np.tile(v, 2)}
     twin_run = stroboscope(rig, start=twins, periods=periods, keep=recorded + 1)
     neighbours = settled(twin_run)["response_period"].values.reshape(2, len(STARTS))
@@ -92,7 +104,9 @@ def demo(frequency: str = "15 Hz", case: str = "b", force: str = "4 N", periods:
 
 
 def prepare_drawing() -> None:
-    """Begin to import what :func:`draw` needs, in a thread: the first demo on a machine waits for another process to compile meanwhile."""
+    """Begin to import what :func:`draw` needs, in a thread: the first demo on a machine waits for
+    another process to compile meanwhile.
+    """
 
     def imported() -> None:
         with contextlib.suppress(Exception):  # `draw` meets it again, and says it
@@ -113,12 +127,20 @@ def _pyplot() -> Any:
 
 
 def draw(result: Demo, file: Path) -> Path:
-    """A row for each start, the time history and the phase portrait of its response; returns the file."""
+    """A row for each start, the time history and the phase portrait of its response; returns the
+    file.
+    """
     plt = _pyplot()
     from saltus import plot
 
     with plot.style():
-        figure, axes = plt.subplots(len(STARTS), 2, figsize=(9.0, 1.75 * len(STARTS)), width_ratios=(2.6, 1), layout="constrained")
+        figure, axes = plt.subplots(
+            len(STARTS),
+            2,
+            figsize=(9.0, 1.75 * len(STARTS)),
+            width_ratios=(2.6, 1),
+            layout="constrained",
+        )
         for i, (row, text) in enumerate(zip(axes, response_texts(result.run), strict=True)):
             n = int(result.settled["response_period"][i]) or SHOWN_IF_APERIODIC
             plot.history(result.run, trajectory=i, periods=SHOWN, ax=row[0], time="T", legend=False)
@@ -143,24 +165,46 @@ def _table(run: xr.Dataset, found: xr.Dataset, neighbours: np.ndarray, title: st
     texts, periods = response_texts(run), found["response_period"].values.tolist()
     statuses = run["status"].values.astype(str).tolist()
     shifted = [_shifted(n, neighbours[:, i].tolist()) for i, n in enumerate(periods)]
-    counts = [float(count) if n else None for n, count in zip(periods, found["contacts_per_response"].values, strict=True)]
+    counts = [
+        float(count) if n else None
+        for n, count in zip(periods, found["contacts_per_response"].values, strict=True)
+    ]
     x, v = zip(*STARTS, strict=True)
     columns = [
         Column("start x, v", _start, {"start x [m]": x, "start v [m/s]": v}),
-        words("settles to", [text if status == "ok" else f"{text} ({status})" for text, status in zip(texts, statuses, strict=True)]),
+        words(
+            "settles to",
+            [
+                text if status == "ok" else f"{text} ({status})"
+                for text, status in zip(texts, statuses, strict=True)
+            ],
+        ),
         words("1 nm off", shifted),
-        Column("contacts", lambda i: "-" if counts[i] is None else f"{counts[i]:g} in {texts[i]}", {"contacts in a response": counts}),
+        Column(
+            "contacts",
+            lambda i: "-" if counts[i] is None else f"{counts[i]:g} in {texts[i]}",
+            {"contacts in a response": counts},
+        ),
         quantity("peak |x|", found["x_peak"].values, "m"),
         quantity("rms x", found["x_rms"].values, "m"),
         words("steps", run["steps"].values),
     ]
     periodic = found["response_period"] > 0
     notes = [
-        f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. Stability isn't examined."
-        + (f" States repeat to {float(found['mismatch'].where(periodic).max()):.0e} of their range." if periodic.any() else "")
+        f"Periods are read off the last {2 * found.attrs['longest_period']} forcing periods. "
+        f"Stability isn't examined."
+        + (
+            f" States repeat to {float(found['mismatch'].where(periodic).max()):.0e} of their "
+            f"range."
+            if periodic.any()
+            else ""
+        )
     ]
     if set(shifted) - {"same", "-"}:
-        notes.append("Where a start 1 nm away settles to something else, no experiment and no other program need agree.")
+        notes.append(
+            "Where a start 1 nm away settles to something else, no experiment and no "
+            "other program need agree."
+        )
     return table(title, columns, notes)
 
 

@@ -11,8 +11,11 @@ if TYPE_CHECKING:
     pass
 
 _WORDS = {
-    "trajectory": "a run", "stroboscope": "points at whole periods", "basins": "basins", "agreement": "the agreement of two maps of basins",
-    "responses": "responses", "section": "a section", "spectrum": "a spectrum", "impacts": "impacts", "energy": "energies",
+    "trajectory": "a run", "stroboscope": "points at whole periods", "basins": "basins",
+    "agreement": "the agreement "
+        "of two maps of basins",
+    "responses": "responses", "section": "a section", "spectrum": "a spectrum",
+    "impacts": "impacts", "energy": "energies",
     "methods": "one question by several methods", "exponents": "exponents",
 }  # fmt: skip
 #: Pictures that show trajectories of a batch.
@@ -27,7 +30,8 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
     result : Path
         A ``.nc`` file that saltus wrote.
     kind : str, optional
-        Which picture, one of :data:`saltus.plot.choice.PICTURES`; by default the one that fits the result.
+        Which picture, one of :data:`saltus.plot.choice.PICTURES`; by default the one that fits the
+        result.
     trajectory : int, optional
         Which of a batch; all of them, at most 8, by default.
     file : Path, optional
@@ -64,14 +68,24 @@ def draw(result: Path, kind: str | None, trajectory: int | None, file: Path | No
         raise ParameterError(f"{result} holds {kind_of(ds)}, for which there is no picture yet.")
     kind = kind or default_kind(ds)
     if kind not in possible:
-        raise ParameterError(f"{result} holds {_WORDS[kind_of(ds)]}: it can't be drawn as {kind}. Known: {', '.join(possible)}.")
+        raise ParameterError(
+            f"{result} holds {_WORDS[kind_of(ds)]}: it can't be drawn as {kind}. "
+            f"Known: {', '.join(possible)}."
+        )
     if trajectory is not None and kind not in OF_TRAJECTORIES:
-        raise ParameterError(f"{result} holds {_WORDS[kind_of(ds)]}, no trajectories. Leave --trajectory out.")
+        raise ParameterError(
+            f"{result} holds {_WORDS[kind_of(ds)]}, no trajectories. Leave --trajectory out."
+        )
     file = file or result.with_name(f"{result.stem}-{kind}.png")
     formats = FigureCanvasBase.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in formats:
-        raise ParameterError(f"a picture can't be written as {file.name!r}. Known: {', '.join('.' + name for name in sorted(formats))}.")
-    axes = getattr(plot, kind)(ds, **({"trajectory": trajectory} if kind in OF_TRAJECTORIES else {}))
+        raise ParameterError(
+            f"a picture can't be written as {file.name!r}. Known: "
+            f"{', '.join('.' + name for name in sorted(formats))}."
+        )
+    axes = getattr(plot, kind)(
+        ds, **({"trajectory": trajectory} if kind in OF_TRAJECTORIES else {})
+    )
     first = axes.flat[0] if hasattr(axes, "flat") else axes
     first.figure.savefig(file)
     plt.close("all")

@@ -1,4 +1,6 @@
-"""A system of one's own, named on the command line: ``my_rig.py:rig``. The only place where saltus runs a file of the user's."""
+"""A system of one's own, named on the command line: ``my_rig.py:rig``. The only place where saltus
+runs a file of the user's.
+"""
 
 from __future__ import annotations
 
@@ -33,16 +35,27 @@ def own_system(reference: str) -> System:
     file, _, name = reference.rpartition(":") if ".py:" in reference else (reference, "", "")
     path = Path(file)
     if path.suffix != ".py" or not path.is_file():
-        raise ParameterError(f"--system {reference}: there is no Python file {str(path)!r}. Write --system my_rig.py:rig.")
+        raise ParameterError(
+            f"--system {reference}: there is no Python file {str(path)!r}. Write "
+            f"--system my_rig.py:rig."
+        )
     found = {key: value for key, value in vars(_module(path)).items() if isinstance(value, System)}
     if name in found:
         return found[name]
     if not found:
-        raise ParameterError(f"--system {reference}: {path} holds no system. Put @sl.system(states=...) above the equation.")
+        raise ParameterError(
+            f"--system {reference}: {path} holds no system. Put "
+            f"@sl.system(states=...) above the equation."
+        )
     if name:
-        raise ParameterError(f"--system {reference}: {path} holds no system {name!r}. {nearest(name, found)}")
+        raise ParameterError(
+            f"--system {reference}: {path} holds no system {name!r}. {nearest(name, found)}"
+        )
     if len(found) > 1:
-        raise ParameterError(f"--system {reference}: {path} holds {', '.join(found)}. Say which: --system {file}:{next(iter(found))}")
+        raise ParameterError(
+            f"--system {reference}: {path} holds {', '.join(found)}. Say which: "
+            f"--system {file}:{next(iter(found))}"
+        )
     return next(iter(found.values()))
 
 
@@ -58,7 +71,11 @@ def _module(path: Path) -> ModuleType:
     except SaltusError as error:
         raise ParameterError(f"{path}: {error}") from error
     except Exception as error:
-        frames = [frame for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename).resolve() == path.resolve()]
+        frames = [
+            frame
+            for frame in traceback.extract_tb(error.__traceback__)
+            if Path(frame.filename).resolve() == path.resolve()
+        ]
         line = getattr(error, "lineno", None) or (frames[-1].lineno if frames else None)
         place = f"{path}, line {line}" if line else str(path)
         raise ParameterError(f"{place}: {type(error).__name__}: {error}") from error

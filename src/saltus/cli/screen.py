@@ -28,24 +28,43 @@ LOG_WIDTH = 220
 def console(stderr: bool = False) -> Console:
     """A console on the current standard output (or error)."""
     stream = sys.stderr if stderr else sys.stdout
-    return Console(stderr=stderr, highlight=False, emoji=False, width=None if stream.isatty() else LOG_WIDTH, soft_wrap=False)
+    return Console(
+        stderr=stderr,
+        highlight=False,
+        emoji=False,
+        width=None if stream.isatty() else LOG_WIDTH,
+        soft_wrap=False,
+    )
 
 
 def show(table: TextTable) -> None:
     """Print a table and its notes; row by row where the terminal is too narrow for it."""
     screen = console()
     screen.print(_plain(table.title), style="bold")
-    grid = Table(show_header=any(table.columns), header_style="dim", box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    grid = Table(
+        show_header=any(table.columns),
+        header_style="dim",
+        box=None,
+        pad_edge=False,
+        padding=(0, 2, 0, 0),
+    )
     for number, column in enumerate(table.columns):
         numeric = all(_is_number(row[number]) for row in table.rows if row[number])
         grid.add_column(_plain(column), justify="right" if numeric else "left", no_wrap=True)
     for row in table.rows:
         grid.add_row(*map(_plain, row))
-    if Measurement.get(screen, screen.options.update(max_width=10 * LOG_WIDTH), grid).maximum <= screen.width:
+    if (
+        Measurement.get(screen, screen.options.update(max_width=10 * LOG_WIDTH), grid).maximum
+        <= screen.width
+    ):
         screen.print(grid)
     else:
         for row in table.rows:
-            lines = [f"{column:>{max(map(len, table.columns))}}  {text}" for column, text in zip(table.columns, row, strict=True) if text]
+            lines = [
+                f"{column:>{max(map(len, table.columns))}}  {text}"
+                for column, text in zip(table.columns, row, strict=True)
+                if text
+            ]
             screen.print(_plain("\n".join(lines)), end="\n\n")
     for note in table.notes:
         screen.print(_plain(note), style="dim")
@@ -69,7 +88,9 @@ def fail(text: str) -> None:
 
 @contextmanager
 def working() -> Iterator[Callable[[float], None]]:
-    """Show that something is being computed, and afterwards how long it took; yields what to call with the share done."""
+    """Show that something is being computed, and afterwards how long it took; yields what to call
+    with the share done.
+    """
     begin = time.perf_counter()
     with console(stderr=True).status("working ...") as status:
         yield lambda share: status.update(f"integrating, {share:.0%} ...")
@@ -80,12 +101,18 @@ def working() -> Iterator[Callable[[float], None]]:
 def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[str], None]]]:
     """Show how far questions are; yields what to call with a report, and with a sentence.
 
-    ``kind`` "bar" shows a line that changes, "json" prints a JSON object a line to standard error, "none" nothing.
+    ``kind`` "bar" shows a line that changes, "json" prints a JSON object a line to standard error,
+    "none" nothing.
     """
     begin, shown = time.perf_counter(), [0.0]
     if kind == "bar":
         with console(stderr=True).status("working ...") as status:
-            yield (lambda report: status.update(_progress_text(report))) if sys.stderr.isatty() else _log_lines(), say
+            yield (
+                (lambda report: status.update(_progress_text(report)))
+                if sys.stderr.isatty()
+                else _log_lines(),
+                say,
+            )
         say(f"computed in {time.perf_counter() - begin:.1f} s")
         return
 
@@ -94,7 +121,13 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
         if kind == "json" and (now - shown[0] > 1.0 or report.last):
             shown[0] = now
             left = report.seconds_left
-            fields = {"question": report.name, "done": report.done, "total": report.total, "seconds": report.seconds, "seconds_left": left}
+            fields = {
+                "question": report.name,
+                "done": report.done,
+                "total": report.total,
+                "seconds": report.seconds,
+                "seconds_left": left,
+            }
             print(json.dumps(fields), file=sys.stderr, flush=True)  # noqa: T201
 
     def note_json(text: str) -> None:
@@ -108,7 +141,9 @@ def reporting(kind: str) -> Iterator[tuple[Callable[[Report], None], Callable[[s
 
 
 def _log_lines() -> Callable[[Report], None]:
-    """What to call with reports where standard error is a log: a line now and then for each question."""
+    """What to call with reports where standard error is a log: a line now and then for each
+    question.
+    """
     from saltus.flow.progress import Lines
 
     lines: dict[str, Lines] = {}
@@ -116,7 +151,9 @@ def _log_lines() -> Callable[[Report], None]:
     def report(report: Report) -> None:
         name = report.name
         if name not in lines:
-            lines[name] = Lines(lambda text: console(stderr=True).print(escape(f"saltus: {name}: {text}")))
+            lines[name] = Lines(
+                lambda text: console(stderr=True).print(escape(f"saltus: {name}: {text}"))
+            )
         lines[name].show(report.done / max(report.total, 1))
 
     return report
@@ -125,8 +162,14 @@ def _log_lines() -> Callable[[Report], None]:
 def _progress_text(report: Report) -> str:
     left = report.seconds_left
     if report.what == "%":
-        return _plain(f"{report.name}: {report.done} %{f', {left:.0f} s left' if left is not None else ''}")
-    rate = f", {report.computed / report.seconds:.1f} chunks a second, {left:.0f} s left" if left is not None and report.seconds > 0 else ""
+        return _plain(
+            f"{report.name}: {report.done} %{f', {left:.0f} s left' if left is not None else ''}"
+        )
+    rate = (
+        f", {report.computed / report.seconds:.1f} chunks a second, {left:.0f} s left"
+        if left is not None and report.seconds > 0
+        else ""
+    )
     return _plain(f"{report.name}: {report.done} of {report.total} chunks{rate}")
 
 

@@ -1,1 +1,3 @@
-"""From a traced System to its compiled kernels: series, lane code, scalar code, the module on disk and its cache."""
+"""From a traced System to its compiled kernels: series, lane code, scalar code, the module on disk
+and its cache.
+"""

@@ -18,7 +18,9 @@ _WRITE: ContextVar[Callable[[str], None]] = ContextVar("write", default=_to_stde
 
 @contextmanager
 def announcing_to(write: Callable[[str], None]) -> Iterator[None]:
-    """A context in which sentences about compiling go to ``write``; by default they go to standard error."""
+    """A context in which sentences about compiling go to ``write``; by default they go to standard
+    error.
+    """
     token = _WRITE.set(write)
     try:
         yield

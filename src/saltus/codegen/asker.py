@@ -13,13 +13,16 @@ CHECK_INTERVAL = 0.5
 
 
 def end_with_asker() -> None:
-    """End this process as soon as its parent isn't the process in PARENT_ID any more; go on if none is given."""
+    """End this process as soon as its parent isn't the process in PARENT_ID any more; go on if none
+    is given.
+    """
     asker = os.environ.pop(PARENT_ID, "")
     if asker.isdigit():
         threading.Thread(target=_watch, args=(int(asker),), daemon=True).start()
 
 
 def _watch(asker: int) -> None:
-    while os.getppid() == asker:  # on Windows for ever; there the answer finds nobody, and the process ends after it
+    # on Windows for ever; there the answer finds nobody, and the process ends after it
+    while os.getppid() == asker:
         time.sleep(CHECK_INTERVAL)
     os._exit(1)

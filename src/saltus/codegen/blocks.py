@@ -1,6 +1,8 @@
-"""Long straight-line functions in blocks: the time that LLVM takes grows faster than the length of a function.
+"""Long straight-line functions in blocks: the time that LLVM takes grows faster than the length of
+a function.
 
-A value that a later block needs goes through memory; the operations and their order are the same, so not a digit changes.
+A value that a later block needs goes through memory; the operations and their order are the same,
+so not a digit changes.
 """
 
 from __future__ import annotations
@@ -12,7 +14,8 @@ from saltus.errors import TraceError
 
 #: Most lines of a function that isn't split, and lines of a block.
 WHOLE, LENGTH = 1000, 250
-#: Most bytes of the stack for the values that blocks share: threads have 8 MB on Linux, and less elsewhere.
+#: Most bytes of the stack for the values that blocks share: threads have 8 MB on Linux, and less
+#: elsewhere.
 MAX_STACK = 4_000_000
 
 _VALUE = re.compile(r"%r\d+\b")
@@ -26,13 +29,20 @@ class Line(NamedTuple):
     type: str
 
 
-def in_blocks(name: str, result: str, parameters: str, attributes: str, lines: list[Line], lanes: int) -> str:
-    """The text of a function ``result name(parameters)`` with these lines, the last of which returns.
+def in_blocks(
+    name: str, result: str, parameters: str, attributes: str, lines: list[Line], lanes: int
+) -> str:
+    """The text of a function ``result name(parameters)`` with these lines, the last of which
+    returns.
 
     One that branches stays whole: a block could leave itself only, not the function.
     """
     head = f"{result} @{name}({parameters}) {attributes} {{\n"
-    if len(lines) <= WHOLE or result != "void" or any(line.text.startswith("br ") for line in lines):
+    if (
+        len(lines) <= WHOLE
+        or result != "void"
+        or any(line.text.startswith("br ") for line in lines)
+    ):
         return f"define {head}" + "".join(f"  {line.text}\n" for line in lines) + "}\n"
     blocks = [lines[i : i + LENGTH] for i in range(0, len(lines), LENGTH)]
     slots = _slots(blocks)
@@ -40,14 +50,22 @@ def in_blocks(name: str, result: str, parameters: str, attributes: str, lines: l
     plain = re.sub(r"\S+ (%\w+)", r"\1", parameters)
     for i, block in enumerate(blocks):
         body = _one_block(block, i, slots, lanes, last=i == len(blocks) - 1)
-        texts.append(f"define internal void @{name}.{i}({parameters}, ptr %kept) noinline {attributes} {{\n{body}}}\n")
-        given = ", ".join(f"{kind} {value}" for kind, value in zip(_kinds(parameters), plain.split(", "), strict=True))
+        texts.append(
+            f"define internal void @{name}.{i}({parameters}, ptr %kept) noinline "
+            f"{attributes} {{\n{body}}}\n"
+        )
+        given = ", ".join(
+            f"{kind} {value}"
+            for kind, value in zip(_kinds(parameters), plain.split(", "), strict=True)
+        )
         calls.append(f"  call void @{name}.{i}({given}, ptr %kept)\n")
     places = sum(slot.width for slot in slots.values())
     if 8 * places * lanes > MAX_STACK:
         raise TraceError(
-            f"the equation is too long to be compiled: {len(lines)} operations, whose values take {8e-6 * places * lanes:.1f} MB of the "
-            f"stack; at most {MAX_STACK / 1e6:.0f} MB are used. Couple fewer states, or take a lower order or fewer lanes, such as "
+            f"the equation is too long to be compiled: {len(lines)} operations, whose values take "
+            f"{8e-6 * places * lanes:.1f} MB of the "
+            f"stack; at most {MAX_STACK / 1e6:.0f} MB are used. Couple fewer states, or take a "
+            f"lower order or fewer lanes, such as "
             "sl.Taylor(12, lanes=4)."
         )
     memory = f"  %kept = alloca [{max(places, 1) * lanes} x double], align 64\n"
@@ -73,7 +91,9 @@ class _Slot(NamedTuple):
 
 def _slots(blocks: list[list[Line]]) -> dict[str, _Slot]:
     """Places for the values that another block than their own uses."""
-    home = {line.name: (i, line.type) for i, block in enumerate(blocks) for line in block if line.name}
+    home = {
+        line.name: (i, line.type) for i, block in enumerate(blocks) for line in block if line.name
+    }
     slots: dict[str, _Slot] = {}
     place = 0
     for i, block in enumerate(blocks):
@@ -86,7 +106,9 @@ def _slots(blocks: list[list[Line]]) -> dict[str, _Slot]:
 
 
 def _one_block(block: list[Line], i: int, slots: dict[str, _Slot], lanes: int, last: bool) -> str:
-    """The lines of a block: values of others are loaded where they are first used, its own are stored if others use them."""
+    """The lines of a block: values of others are loaded where they are first used, its own are
+    stored if others use them.
+    """
     out, here = [], set()
     for line in block:
         for used in _VALUE.findall(line.text):

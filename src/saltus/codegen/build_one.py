@@ -1,7 +1,7 @@
 """Compile one object: what a process does that another one started for it (building.py).
 
-Reads ``[template, texts, called symbols, target, whether sizes are open]`` as JSON from standard input; writes the object to standard
-output.
+Reads ``[template, texts, called symbols, target, whether sizes are open]`` as JSON from standard
+input; writes the object to standard output.
 """
 
 from __future__ import annotations
@@ -20,4 +20,8 @@ if __name__ == "__main__":
     template, texts, called, target, open_sizes = json.load(sys.stdin)
     code = building.bitcode(template) if template else None
     with answer:
-        answer.write(machine.object_code(code, texts, frozenset(called), machine.Target(*target), open_sizes=open_sizes))
+        answer.write(
+            machine.object_code(
+                code, texts, frozenset(called), machine.Target(*target), open_sizes=open_sizes
+            )
+        )

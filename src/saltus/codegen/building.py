@@ -1,4 +1,6 @@
-"""Objects from the cache, or made: here if that takes a moment, by another process if it takes long, so that Ctrl-C ends the wait."""
+"""Objects from the cache, or made: here if that takes a moment, by another process if it takes
+long, so that Ctrl-C ends the wait.
+"""
 
 from __future__ import annotations
 
@@ -72,13 +74,22 @@ class Order:
     def key(self) -> str:
         """Name of the entry: a hash of everything that the machine code depends on."""
         made_of = templates.identity(self.template) if self.template else ""
-        parts = [made_of, *self.texts, *self.called, str(self.open_sizes), *machine.target(), *machine.versions()]
+        parts = [
+            made_of,
+            *self.texts,
+            *self.called,
+            str(self.open_sizes),
+            *machine.target(),
+            *machine.versions(),
+        ]
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
     @property
     def seconds(self) -> float:
         """About how long it takes to make on a quiet machine [s]."""
-        return sum(map(len, self.texts)) / 1e6 * SECONDS_PER_MEGABYTE + (SECONDS_OF_TEMPLATE if self.template in _SLOW else 0.0)
+        return sum(map(len, self.texts)) / 1e6 * SECONDS_PER_MEGABYTE + (
+            SECONDS_OF_TEMPLATE if self.template in _SLOW else 0.0
+        )
 
 
 _SLOW = frozenset(name for name in templates.BITCODE if name != "capture")
@@ -101,7 +112,9 @@ def built(order: Order) -> bytes:
         if found is None:
             if order.said and order.seconds > ANNOUNCEMENT:
                 announce(order.said, order.seconds)
-            found = (_made_elsewhere(order) if order.seconds > OTHER_PROCESS else None) or made(order)
+            found = (_made_elsewhere(order) if order.seconds > OTHER_PROCESS else None) or made(
+                order
+            )
             cache.keep(order.key, order.title, found)
         _OBJECTS[order.key] = found
         while len(_OBJECTS) > _MAX_OBJECTS:
@@ -112,11 +125,14 @@ def built(order: Order) -> bytes:
 def made(order: Order) -> bytes:
     """Compile in this process."""
     template = bitcode(order.template) if order.template else None
-    return machine.object_code(template, order.texts, frozenset(order.called), open_sizes=order.open_sizes)
+    return machine.object_code(
+        template, order.texts, frozenset(order.called), open_sizes=order.open_sizes
+    )
 
 
 def bitcode(name: str) -> bytes:
-    """The templates' bitcode: what the package brings, or, if the templates were edited since, made of them now.
+    """The templates' bitcode: what the package brings, or, if the templates were edited since, made
+    of them now.
 
     Raises
     ------
@@ -128,11 +144,17 @@ def bitcode(name: str) -> bytes:
     key = templates.source_hash(name)[:32]
     found = cache.read(key)
     if found is None:
-        announce(f"the templates, which were edited since {name}.bc.xz was made: once", SECONDS_OF_LOWERING)
-        found = _answer_of("saltus.codegen.lowering", ("--print", name), b"", f"{name} from the templates")
+        announce(
+            f"the templates, which were edited since {name}.bc.xz was made: once",
+            SECONDS_OF_LOWERING,
+        )
+        found = _answer_of(
+            "saltus.codegen.lowering", ("--print", name), b"", f"{name} from the templates"
+        )
         if found is None:
             raise CacheError(
-                f"saltus/kernels was edited since its bitcode {name}.bc.xz was made. Making it needs Numba: pip install 'saltus[build]', "
+                f"saltus/kernels was edited since its bitcode {name}.bc.xz was made. Making it "
+                f"needs Numba: pip install 'saltus[build]', "
                 "then python -m saltus.codegen.lowering."
             )
         cache.keep(key, f"{name}, bitcode", found)
@@ -153,7 +175,8 @@ def _held(lock: threading.Lock) -> Iterator[None]:
 def _made_elsewhere(order: Order) -> bytes | None:
     """Compile in a process of its own (build_one.py); None if there is none, or it doesn't succeed.
 
-    LLVM can't be stopped while it works. Here this process only waits: Ctrl-C ends the wait at once.
+    LLVM can't be stopped while it works. Here this process only waits: Ctrl-C ends the wait at
+    once.
 
     Raises
     ------
@@ -164,20 +187,28 @@ def _made_elsewhere(order: Order) -> bytes | None:
     """
     if order.template:
         bitcode(order.template)  # made first if it isn't current
-    given = json.dumps([order.template, order.texts, order.called, machine.target(), order.open_sizes]).encode()
+    given = json.dumps(
+        [order.template, order.texts, order.called, machine.target(), order.open_sizes]
+    ).encode()
     return _answer_of("saltus.codegen.build_one", (), given, order.title)
 
 
 def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) -> bytes | None:
-    """What a module writes when it is run by another process and given these bytes; None if there is none, or it doesn't succeed."""
-    path = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    """What a module writes when it is run by another process and given these bytes; None if there
+    is none, or it doesn't succeed.
+    """
+    path = os.pathsep.join(
+        [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    )
     environment = {**os.environ, "PYTHONPATH": path, PARENT_ID: str(os.getpid())}
     try:
-        with tempfile.TemporaryFile() as file:  # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
+        # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
+        with tempfile.TemporaryFile() as file:
             file.write(given)
             file.seek(0)
             process = subprocess.Popen(
-                [sys.executable, "-P", "-m", module, *options],  # -P: not what lies in the working folder
+                # -P: not what lies in the working folder
+                [sys.executable, "-P", "-m", module, *options],
                 stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
                 start_new_session=True,  # Ctrl-C is for this process
             )  # fmt: skip
@@ -190,7 +221,8 @@ def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) 
         _end(process)
     if process.returncode < 0:
         raise CacheError(
-            f"the process that compiled {title} was ended by signal {-process.returncode}, as when memory runs out. Try again."
+            f"the process that compiled {title} was ended by signal {-process.returncode}, as when "
+            f"memory runs out. Try again."
         )
     return data if process.returncode == 0 and data else None
 

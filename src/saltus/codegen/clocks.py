@@ -1,4 +1,6 @@
-"""The clocks of a system in generated code: the tables of kernels/clocks.py, and the code that reads its state."""
+"""The clocks of a system in generated code: the tables of kernels/clocks.py, and the code that
+reads its state.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,18 @@ import numpy as np
 
 from saltus.codegen.head import Constant
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
-from saltus.kernels.clocks_layout import C0, CYCLE, HELD, LEVEL, NUMBERS, ON, PULSE, REF, TABLE, WAVE
+from saltus.kernels.clocks_layout import (
+    C0,
+    CYCLE,
+    HELD,
+    LEVEL,
+    NUMBERS,
+    ON,
+    PULSE,
+    REF,
+    TABLE,
+    WAVE,
+)
 from saltus.system import expression as ex
 from saltus.system.clocks import Level, Pulse, Wave, affine, switch_of
 from saltus.system.derivatives import differentiate
@@ -21,7 +34,9 @@ _TURN = ex.constant(2 * math.pi)
 
 
 class Clocks:
-    """Numbers the switches, remainders and tables of a system, in the order in which its equations name them."""
+    """Numbers the switches, remainders and tables of a system, in the order in which its equations
+    name them.
+    """
 
     def __init__(self, system: System) -> None:
         gaps = [guard.gap for guard in system.guards]
@@ -43,7 +58,9 @@ class Clocks:
     def __len__(self) -> int:
         return len(self._kinds)
 
-    def _add(self, key: Expr, kind: int, numbers: tuple[Expr, ...], table: Table | None = None) -> None:
+    def _add(
+        self, key: Expr, kind: int, numbers: tuple[Expr, ...], table: Table | None = None
+    ) -> None:
         if key in self._index:
             return
         self._index[key] = len(self._kinds)
@@ -53,7 +70,7 @@ class Clocks:
             self.tables.append(table)
         self._table_of.append(-1 if table is None else self.tables.index(table))
 
-    # -- what a clock holds ---------------------------------------------------------------------------------------------------------
+    # -- what a clock holds ------------------------------------------------------------------------
     def row_of_side(self, relation: Relation) -> int:
         """Row of the side of a switch, +1 or -1."""
         return HELD * self._index[relation.gap] + ON
@@ -67,7 +84,7 @@ class Clocks:
         first = HELD * self._index[node] + C0
         return [first + i for i in range(1 + (node.payload.degree if node.op == "table" else 1))]
 
-    # -- scalar code ----------------------------------------------------------------------------------------------------------------
+    # -- scalar code -------------------------------------------------------------------------------
     def side(self, relation: Relation) -> str:
         """Code that is true where a switch is on."""
         return f"(h[{self.row_of_side(relation)}] > 0.0)"
@@ -82,10 +99,14 @@ class Clocks:
             code = f"({coefficient} + (t - h[{self.row_of_reference(node)}]) * {code})"
         return code
 
-    # -- for the head -----------------------------------------------------------------------------------------------------------------
+    # -- for the head ------------------------------------------------------------------------------
     def constants(self) -> dict[str, Constant]:
         """Number and kinds of clocks."""
-        return {"NCLOCKS": len(self), "CLOCK_KIND": tuple(self._kinds) or (0,), "CLOCK_TABLE": tuple(self._table_of) or (0,)}
+        return {
+            "NCLOCKS": len(self),
+            "CLOCK_KIND": tuple(self._kinds) or (0,),
+            "CLOCK_TABLE": tuple(self._table_of) or (0,),
+        }
 
     def function(self) -> str:
         """``numbers_of_clocks(p, n)``: their numbers, of parameters only."""
@@ -125,12 +146,20 @@ def _cycle_numbers(node: Expr) -> tuple[Expr, ...]:
 
 
 def table_data(system: System) -> np.ndarray:
-    """The tables of a system as one array, as kernels/clocks.py reads it. float64[n], at least one."""
+    """The tables of a system as one array, as kernels/clocks.py reads it. float64[n],
+    at least one.
+    """
     tables = Clocks(system).tables if _has_tables(system) else []
-    parts = [np.array([float(len(t.points)), float(t.periodic), *t.points, *t.pieces.ravel()]) for t in tables]
+    parts = [
+        np.array([float(len(t.points)), float(t.periodic), *t.points, *t.pieces.ravel()])
+        for t in tables
+    ]
     begins = len(tables) + np.cumsum([0, *map(len, parts)])[: len(tables)]
     return np.concatenate([begins.astype(float), *parts, np.zeros(1)])
 
 
 def _has_tables(system: System) -> bool:
-    return any(node.op == "table" for node in ex.walk(*system.field, *(guard.gap for guard in system.guards)))
+    return any(
+        node.op == "table"
+        for node in ex.walk(*system.field, *(guard.gap for guard in system.guards))
+    )

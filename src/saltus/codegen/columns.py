@@ -1,7 +1,9 @@
-"""Lane code in two parts: what all columns of a tangent share, and one column, which serves for each of them.
+"""Lane code in two parts: what all columns of a tangent share, and one column, which serves for
+each of them.
 
-The columns of a tangent obey the same equations. Their coefficients - the series of the Jacobian along the motion - are worked out once;
-the lines of one column are a function of their own, called with the place where the next column begins.
+The columns of a tangent obey the same equations. Their coefficients - the series of the Jacobian
+along the motion - are worked out once; the lines of one column are a function of their own, called
+with the place where the next column begins.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ _CONSTANT = re.compile(r"(?!load\(y,)\w+\([^()]*\)")
 class Lines:
     """Assignments and stores of straight-line lane code, in the order in which they come.
 
-    What is made of a value of the column belongs to the column. Its code reads shared values from rows of ``shared``; constants stand in it
-    themselves.
+    What is made of a value of the column belongs to the column. Its code reads shared values from
+    rows of ``shared``; constants stand in it themselves.
 
     Attributes
     ----------
@@ -36,7 +38,9 @@ class Lines:
         self._of_column: set[str] = set()
 
     def assign(self, names: str, code: str, of_column: bool = False) -> None:
-        """``names = code``, one name or two; belongs to the column if it is said so, or reads what does."""
+        """``names = code``, one name or two; belongs to the column if it is said so, or reads what
+        does.
+        """
         if of_column or not self._of_column.isdisjoint(_VALUE.findall(code)):
             self._of_column.update(names.split(", "))
             self.column.append(f"{names} = {code if of_column else self._in_column(code)}")
@@ -53,7 +57,9 @@ class Lines:
             self._shared.append(("", code))
 
     def shared(self, first: int = 0) -> Iterator[str]:
-        """The shared lines; values for the columns are stored to the rows of ``work`` from ``first`` on."""
+        """The shared lines; values for the columns are stored to the rows of ``work`` from
+        ``first`` on.
+        """
         for names, code in self._shared:
             yield f"{names} = {code}" if names else code
             for name in names.split(", "):
@@ -61,7 +67,9 @@ class Lines:
                     yield f"store(work, {first + self.handed[name]}, {name})"
 
     def _in_column(self, code: str) -> str:
-        return _VALUE.sub(lambda name: name[0] if name[0] in self._of_column else self._read(name[0]), code)
+        return _VALUE.sub(
+            lambda name: name[0] if name[0] in self._of_column else self._read(name[0]), code
+        )
 
     def _read(self, name: str) -> str:
         if name in self._constants:

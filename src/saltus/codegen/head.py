@@ -1,4 +1,6 @@
-"""The generated head of a method for one equation: numbers and functions that the templates leave open."""
+"""The generated head of a method for one equation: numbers and functions that the templates leave
+open.
+"""
 
 from __future__ import annotations
 
@@ -25,4 +27,8 @@ class Head:
     @property
     def text(self) -> str:
         """All of it as Python, to stand above the templates."""
-        return "\n".join(f"{name} = {value!r}" for name, value in self.constants.items()) + "\n\n" + self.functions
+        return (
+            "\n".join(f"{name} = {value!r}" for name, value in self.constants.items())
+            + "\n\n"
+            + self.functions
+        )

@@ -1,7 +1,9 @@
-"""What the generated head of an equation supplies to the templates: sizes, tables, and functions with their arguments.
+"""What the generated head of an equation supplies to the templates: sizes, tables, and functions
+with their arguments.
 
-The templates are compiled once, for every equation to come: they read sizes and tables from symbols ``saltus_NAME``, and call functions of
-these names. A new equation brings them (codegen/lane_ir.py). With the JIT off, the head stands above the templates as plain Python.
+The templates are compiled once, for every equation to come: they read sizes and tables from symbols
+``saltus_NAME``, and call functions of these names. A new equation brings them (codegen/lane_ir.py).
+With the JIT off, the head stands above the templates as plain Python.
 """
 
 from __future__ import annotations
@@ -50,7 +52,8 @@ class Interface:
 
 _F1, _F2, _F3 = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
 _I1, _I2 = "int64[::1]", "int64[:, ::1]"
-#: Types of a batch, the first arguments of every `propagate`, in order (kernels/batch.py), and the budget.
+#: Types of a batch, the first arguments of every `propagate`, in order (kernels/batch.py), and the
+#: budget.
 BATCH = (
     _F1, _F1, _F2, "int64", _F2, _I1, _F1, _I1, _I1, _F2, _I1, _I1, _F1, _I2, _F2,
     _I1, _F1, _I1, _F3, _I2, _I1, _I2, _F2, _I1, _F2, _F1, "int64",
@@ -66,16 +69,19 @@ TAYLOR = Interface(
     entry="propagate",
     arguments=BATCH + _TAYLOR_WORK,
     layout="taylor_layout",
-    templates=("clocks", "taylor_singular", "taylor_crossings", "taylor_step", "taylor_contacts", "taylor_lanes"),
+    templates=("clocks", "taylor_singular", "taylor_crossings", "taylor_step", "taylor_contacts",
+        "taylor_lanes"),
     sizes=(
-        "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW", "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
+        "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW",
+        "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
         "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "NSTEPPED", "NSERIES", "NCLOCKS",
     ),
     flags=("PROBED", "TANGENT"),
     tables=MappingProxyType(
         dict.fromkeys(
             (
-                "STEP_ROW", "SERIES_ROW", "GUARD_ROW", "GUARD_SERIES", "SNAP_STATE", "SNAP_CONST", "SINGULAR_GUARD", "CLOCK_KIND",
+                "STEP_ROW", "SERIES_ROW", "GUARD_ROW", "GUARD_SERIES", "SNAP_STATE", "SNAP_CONST",
+                "SINGULAR_GUARD", "CLOCK_KIND",
                 "CLOCK_TABLE",
             ),
             WHOLE,

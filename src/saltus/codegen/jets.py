@@ -1,12 +1,13 @@
 """Taylor recurrences as straight-line lane code.
 
-For a system in linear form (:mod:`saltus.codegen.series`) this writes the assignments that compute the normalised Taylor coefficients
-``y_k = y^(k)(t)/k!`` of every state up to a given order, of every gap, and the few values that the crossing of contacts needs.
-Coefficients are produced on demand, so nothing is computed that nothing uses. Sums put the newest coefficient last: a convolution then
-adds one fused multiply-add to the critical path, not its whole length.
+For a system in linear form (:mod:`saltus.codegen.series`) this writes the assignments that compute
+the normalised Taylor coefficients ``y_k = y^(k)(t)/k!`` of every state up to a given order, of
+every gap, and the few values that the crossing of contacts needs. Coefficients are produced on
+demand, so nothing is computed that nothing uses. Sums put the newest coefficient last: a
+convolution then adds one fused multiply-add to the critical path, not its whole length.
 
-Recurrences: Moore, Interval Analysis (1966); Jorba & Zou, Experimental Mathematics 14 (2005), section 2; Griewank & Walther,
-Evaluating Derivatives (2008), table 13.2.
+Recurrences: Moore, Interval Analysis (1966); Jorba & Zou, Experimental Mathematics 14 (2005),
+section 2; Griewank & Walther, Evaluating Derivatives (2008), table 13.2.
 """
 
 from __future__ import annotations
@@ -68,15 +69,26 @@ class JetCode:
     constants : Constants
         Receives the parameter-only coefficients.
     shared : int, optional
-        Number of states that all columns of a tangent share; the others are one column. Default: all.
+        Number of states that all columns of a tangent share; the others are one column. Default:
+        all.
     """
 
     def __init__(
-        self, rows: dict[str, int], fields: tuple[Linear, ...], builder: SeriesBuilder, constants: Constants, shared: int | None = None
+        self,
+        rows: dict[str, int],
+        fields: tuple[Linear, ...],
+        builder: SeriesBuilder,
+        constants: Constants,
+        shared: int | None = None,
     ) -> None:
         self.lines = Lines()
-        self.harmonics: dict[tuple[Expr, Expr], int] = {}  # (angular frequency, phase offset) of sines and cosines of time: row
-        self._fields, self._builder, self._shared = fields, builder, len(rows) if shared is None else shared
+        # (angular frequency, phase offset) of sines and cosines of time: row
+        self.harmonics: dict[tuple[Expr, Expr], int] = {}
+        self._fields, self._builder, self._shared = (
+            fields,
+            builder,
+            len(rows) if shared is None else shared,
+        )
         self._rows, self._index = list(rows.values()), {name: i for i, name in enumerate(rows)}
         self._constants = constants
         self._memo: dict[tuple, str | None] = {}
@@ -85,7 +97,7 @@ class JetCode:
         self._depth: dict[str, int] = {}
         self._count = 0
 
-    # -- names ------------------------------------------------------------------------------------------------------------------
+    # -- names -------------------------------------------------------------------------------------
     def _assign(self, code: str, of_column: bool = False) -> str:
         name = f"s{self._count}"
         self._count += 1
@@ -98,7 +110,9 @@ class JetCode:
         return max((self._depth.get(name, 0) for name in re.findall(r"\bs\d+\b", code)), default=0)
 
     def coefficient(self, node: Expr) -> str:
-        """Code for a coefficient: a literal, a row of ``c``, or an expression of those and mode masks."""
+        """Code for a coefficient: a literal, a row of ``c``, or an expression of those and mode
+        masks.
+        """
         if node.op == "const":
             return f"({node.payload!r})" if node.payload < 0 else repr(node.payload)
         if node not in self._coefficients:
@@ -138,12 +152,16 @@ class JetCode:
             elif isinstance(condition, ex.Relation):
                 code = f"{held(self._builder.row_of_side(condition))} > 0.0"
             else:
-                code = condition_code(condition, lambda i: self._mask(ex.Bit(i)), self._mask, MASK_WORDS)
+                code = condition_code(
+                    condition, lambda i: self._mask(ex.Bit(i)), self._mask, MASK_WORDS
+                )
             self._masks[condition] = self._assign(code)
         return self._masks[condition]
 
-    # -- sums -------------------------------------------------------------------------------------------------------------------
-    def _sum(self, products: list[tuple[str, str] | tuple[str]], start: str | None = None) -> str | None:
+    # -- sums --------------------------------------------------------------------------------------
+    def _sum(
+        self, products: list[tuple[str, str] | tuple[str]], start: str | None = None
+    ) -> str | None:
         """``start + a*b + ...`` as a chain of fused multiply-adds, the latest value at its end."""
         total = start
         for factors in sorted(products, key=lambda factors: self._wait(" ".join(factors))):
@@ -161,7 +179,9 @@ class JetCode:
         return self._assign(f"{value} * {number!r}")
 
     def _over(self, value: str | None, k: int) -> str | None:
-        """A value over k, rounded once: the rounding of 1/k alone would bend every step the same way, and energy would drift with time."""
+        """A value over k, rounded once: the rounding of 1/k alone would bend every step the same
+        way, and energy would drift with time.
+        """
         rest = float(Fraction(1, k) - Fraction(1.0 / k))
         if value is None or rest == 0.0 or k > LAST_EXACT_DIVISOR:
             return self._times(value, 1.0 / k)
@@ -169,10 +189,16 @@ class JetCode:
 
     def linear(self, form: Linear, k: int) -> str | None:
         """Coefficient k of a linear form; None if it is structurally zero."""
-        total = self.coefficient(form.offset) if k == 0 and not is_constant(form.offset, 0.0) else None
+        total = (
+            self.coefficient(form.offset) if k == 0 and not is_constant(form.offset, 0.0) else None
+        )
         if total is not None and form.offset.op == "const":
             total = self._assign(f"splat({total}, LANES)")
-        terms = [term for series, coefficient in form.terms.items() if (term := self._term(series, coefficient, k))]
+        terms = [
+            term
+            for series, coefficient in form.terms.items()
+            if (term := self._term(series, coefficient, k))
+        ]
         for value, coefficient in sorted(terms, key=lambda term: self._wait(term[0])):
             if is_constant(coefficient, 1.0):
                 total = value if total is None else self._assign(f"{total} + {value}")
@@ -183,28 +209,42 @@ class JetCode:
         return total
 
     def _term(self, series: Series, coefficient: Expr, k: int) -> tuple[str, Expr] | None:
-        """Coefficient k of a series and its factor: a forcing's amplitude goes into its recurrence, once for all k."""
-        frequency = self._time_frequency(series.operands[0]) if series.kind in ("sin", "cos") else None
+        """Coefficient k of a series and its factor: a forcing's amplitude goes into its recurrence,
+        once for all k.
+        """
+        frequency = (
+            self._time_frequency(series.operands[0]) if series.kind in ("sin", "cos") else None
+        )
         if frequency is not None and abs(_number(coefficient)) != 1.0:
             part = "sine" if series.kind == "sin" else "cosine"
-            value = self._forcing(series.operands[0], frequency, k, part, self._as_lane(self.coefficient(coefficient), coefficient))
+            value = self._forcing(
+                series.operands[0],
+                frequency,
+                k,
+                part,
+                self._as_lane(self.coefficient(coefficient), coefficient),
+            )
             return value, ex.constant(1.0)
         plain = self.value(series, k)
         return None if plain is None else (plain, coefficient)
 
-    # -- coefficients of series -------------------------------------------------------------------------------------------------
+    # -- coefficients of series --------------------------------------------------------------------
     def state(self, i: int, k: int) -> str | None:
         """Coefficient k of state i."""
         key = ("state", i, k)
         if key not in self._memo:
             if k == 0:
-                self._memo[key] = self._assign(f"load(y, {self._rows[i]}, LANES)", of_column=i >= self._shared)
+                self._memo[key] = self._assign(
+                    f"load(y, {self._rows[i]}, LANES)", of_column=i >= self._shared
+                )
             else:
                 self._memo[key] = self._over(self.linear(self._fields[i], k - 1), k)
         return self._memo[key]
 
     def value(self, series: Series, k: int, part: str = "") -> str | None:
-        """Coefficient k of a series (``part`` names a companion series that a recurrence carries along)."""
+        """Coefficient k of a series (``part`` names a companion series that a recurrence carries
+        along).
+        """
         key = (series, k, part)
         if key not in self._memo:
             rule: Callable = getattr(self, f"_{series.kind}")
@@ -218,7 +258,9 @@ class JetCode:
             self._memo[key] = self._times(self.value(series, i), float(i))
         return self._memo[key]
 
-    def _convolution(self, k: int, left: Callable, right: Callable, first: int, last: int) -> str | None:
+    def _convolution(
+        self, k: int, left: Callable, right: Callable, first: int, last: int
+    ) -> str | None:
         """``sum(left(i) * right(k - i) for i in first..last)``."""
         products = [(left(i), right(k - i)) for i in range(first, last + 1)]
         return self._sum([(a, b) for a, b in products if a is not None and b is not None])
@@ -281,7 +323,9 @@ class JetCode:
         a, b = series.operands
         if k == 0:
             return self._assign(f"{self._zero(self.value(a, 0))} / {self._zero(self.value(b, 0))}")
-        known = self._convolution(k, lambda i: self.value(b, i), lambda i: self.value(series, i), 1, k)
+        known = self._convolution(
+            k, lambda i: self.value(b, i), lambda i: self.value(series, i), 1, k
+        )
         rest = self._difference(self.value(a, k), known)
         return None if rest is None else self._assign(f"{rest} * {self._inverse(b)}")
 
@@ -298,7 +342,11 @@ class JetCode:
         for j in range(k):
             x, p = self.value(a, k - j), self.value(series, j)
             if x is not None and p is not None:
-                weight = repr(exponent.payload * (k - j) - j) if exponent.op == "const" else f"({r} * {float(k - j)!r} - {float(j)!r})"
+                weight = (
+                    repr(exponent.payload * (k - j) - j)
+                    if exponent.op == "const"
+                    else (f"({r} * {float(k - j)!r} - {float(j)!r})")
+                )
                 products.append((self._assign(f"{x} * {weight}"), p))
         total = self._times(self._sum(list(products)), 1.0 / k)
         return None if total is None else self._assign(f"{total} * {self._inverse(a)}")
@@ -307,7 +355,13 @@ class JetCode:
         (a,) = series.operands
         if k == 0:
             return self._assign(f"root({self._zero(self.value(a, 0))})")
-        known = self._convolution(k, lambda i: self.value(series, i), lambda i: self.value(series, i), 1, k - 1) if k > 1 else None
+        known = (
+            self._convolution(
+                k, lambda i: self.value(series, i), lambda i: self.value(series, i), 1, k - 1
+            )
+            if k > 1
+            else None
+        )
         rest = self._difference(self.value(a, k), known)
         return None if rest is None else self._assign(f"{rest} * {self._inverse(series, 2.0)}")
 
@@ -315,18 +369,26 @@ class JetCode:
         (a,) = series.operands
         if k == 0:
             return self._assign(f"libm_exp({self._zero(self.value(a, 0))})")
-        total = self._convolution(k, lambda i: self._derivative(a, i), lambda i: self.value(series, i), 1, k)
+        total = self._convolution(
+            k, lambda i: self._derivative(a, i), lambda i: self.value(series, i), 1, k
+        )
         return self._times(total, 1.0 / k)
 
     def _log(self, series: Series, k: int) -> str | None:
         (a,) = series.operands
         if k == 0:
             return self._assign(f"libm_log({self._zero(self.value(a, 0))})")
-        known = None if k == 1 else self._convolution(k, lambda i: self._derivative(series, i), lambda i: self.value(a, i), 1, k - 1)
+        known = (
+            None
+            if k == 1
+            else self._convolution(
+                k, lambda i: self._derivative(series, i), lambda i: self.value(a, i), 1, k - 1
+            )
+        )
         rest = self._difference(self.value(a, k), self._times(known, 1.0 / k))
         return None if rest is None else self._assign(f"{rest} * {self._inverse(a)}")
 
-    # -- sine and cosine --------------------------------------------------------------------------------------------------------
+    # -- sine and cosine ---------------------------------------------------------------------------
     def _sin(self, series: Series, k: int) -> str | None:
         return self._harmonic(series.operands[0], k, "sine")
 
@@ -348,7 +410,9 @@ class JetCode:
                 return self._forcing(a, frequency, k, part)
             else:
                 other, sign = ("cosine", 1.0) if part == "sine" else ("sine", -1.0)
-                total = self._convolution(k, lambda i: self._derivative(a, i), lambda i: self._harmonic(a, i, other), 1, k)
+                total = self._convolution(
+                    k, lambda i: self._derivative(a, i), lambda i: self._harmonic(a, i, other), 1, k
+                )
                 self._memo[key] = self._times(total, sign / k)
         return self._memo[key]
 
@@ -357,7 +421,11 @@ class JetCode:
         """(angular frequency, offset) if the argument is affine in time and nothing else."""
         if a.kind == "time":
             return ex.constant(1.0), ex.constant(0.0)
-        if a.kind == "linear" and isinstance(a.payload, Linear) and [s.kind for s in a.payload.terms] == ["time"]:
+        if (
+            a.kind == "linear"
+            and isinstance(a.payload, Linear)
+            and [s.kind for s in a.payload.terms] == ["time"]
+        ):
             (rate,) = a.payload.terms.values()
             if not ex.depends_on(rate, MOVING) and not ex.depends_on(a.payload.offset, MOVING):
                 return rate, a.payload.offset
@@ -367,7 +435,9 @@ class JetCode:
         if frequency is None:
             return self._zero(self.value(a, 0))
         row = 2 + self.harmonics.setdefault(frequency, len(self.harmonics))
-        return self._assign(f"fma({self._rate(frequency)}, load(clock, 0, LANES), load(clock, {row}, LANES))")
+        return self._assign(
+            f"fma({self._rate(frequency)}, load(clock, 0, LANES), load(clock, {row}, LANES))"
+        )
 
     def _rate(self, frequency: tuple[Expr, Expr]) -> str:
         key = (frequency[0], 0, "rate")
@@ -376,20 +446,30 @@ class JetCode:
             self._memo[key] = self._assign(self._as_lane(self.coefficient(rate), rate))
         return str(self._memo[key])
 
-    def _forcing(self, a: Series, frequency: tuple[Expr, Expr], k: int, part: str, amplitude: str = "") -> str:
-        """Coefficient of sin or cos(rate*t + offset), times an amplitude: two orders back times -rate^2/(k(k-1))."""
+    def _forcing(
+        self, a: Series, frequency: tuple[Expr, Expr], k: int, part: str, amplitude: str = ""
+    ) -> str:
+        """Coefficient of sin or cos(rate*t + offset), times an amplitude: two orders back times
+        -rate^2/(k(k-1)).
+        """
         key = (a, k, part, amplitude)
         if key not in self._memo:
             self._memo[key] = self._assign(self._forcing_code(a, frequency, k, part, amplitude))
         return str(self._memo[key])
 
-    def _forcing_code(self, a: Series, frequency: tuple[Expr, Expr], k: int, part: str, amplitude: str) -> str:
+    def _forcing_code(
+        self, a: Series, frequency: tuple[Expr, Expr], k: int, part: str, amplitude: str
+    ) -> str:
         if k == 0:
             return f"{amplitude} * {self._harmonic(a, 0, part)}"
         rate = self._rate(frequency)
         if k == 1:
             other = "cosine" if part == "sine" else "sine"
-            first = self._forcing(a, frequency, 0, other, amplitude) if amplitude else self._harmonic(a, 0, other)
+            first = (
+                self._forcing(a, frequency, 0, other, amplitude)
+                if amplitude
+                else self._harmonic(a, 0, other)
+            )
             return f"{rate} * {first}" if part == "sine" else f"-({rate} * {first})"
         squared = (frequency[0], 0, "squared")
         if squared not in self._memo:
@@ -397,10 +477,14 @@ class JetCode:
         share = (frequency[0], k, "share")
         if share not in self._memo:
             self._memo[share] = self._assign(f"{self._memo[squared]} * {1.0 / (k * (k - 1))!r}")
-        before = self._forcing(a, frequency, k - 2, part, amplitude) if amplitude or k > 2 else self._harmonic(a, 0, part)
+        before = (
+            self._forcing(a, frequency, k - 2, part, amplitude)
+            if amplitude or k > 2
+            else self._harmonic(a, 0, part)
+        )
         return f"{self._memo[share]} * {before}"
 
-    # -- functions through their differential equations -------------------------------------------------------------------------
+    # -- functions through their differential equations --------------------------------------------
     def _tan(self, series: Series, k: int, part: str = "") -> str | None:
         return self._tangent(series, k, part, "libm_tan", 1.0)
 
@@ -417,11 +501,15 @@ class JetCode:
             return self._times(square, sign)
         if k == 0:
             return self._assign(f"{function}({self._zero(self.value(a, 0))})")
-        total = self._convolution(k, lambda i: self._derivative(a, i), lambda i: self.value(series, i, "w"), 1, k)
+        total = self._convolution(
+            k, lambda i: self._derivative(a, i), lambda i: self.value(series, i, "w"), 1, k
+        )
         return self._times(total, 1.0 / k)
 
     def _square_of(self, series: Series, k: int) -> str | None:
-        return self._convolution(k, lambda i: self.value(series, i), lambda i: self.value(series, i), 0, k)
+        return self._convolution(
+            k, lambda i: self.value(series, i), lambda i: self.value(series, i), 0, k
+        )
 
     def _atan(self, series: Series, k: int, part: str = "") -> str | None:
         """y = atan a: w y' = a' with w = 1 + a^2."""
@@ -433,7 +521,13 @@ class JetCode:
             return self._assign(f"libm_atan({self._zero(self.value(a, 0))})")
         known = None
         if k > 1:
-            known = self._convolution(k, lambda i: self._derivative(series, i), lambda i: self.value(series, i, "w"), 1, k - 1)
+            known = self._convolution(
+                k,
+                lambda i: self._derivative(series, i),
+                lambda i: self.value(series, i, "w"),
+                1,
+                k - 1,
+            )
         rest = self._difference(self.value(a, k), self._times(known, 1.0 / k))
         key = (series, 0, "inverse w")
         if key not in self._memo:
@@ -445,10 +539,14 @@ class JetCode:
         assert isinstance(series.payload, ex.Condition)
         return self._assign(f"select({self._mask(series.payload)}, {a}, {b})")
 
-    # -- what the crossing of contacts needs ------------------------------------------------------------------------------------
+    # -- what the crossing of contacts needs -------------------------------------------------------
     def size(self, form: Linear) -> str:
-        """``|offset| + sum |coefficient * value|``: the scale of the rounding error of a linear form."""
-        total = self._assign(f"magnitude({self._as_lane(self.coefficient(form.offset), form.offset)})")
+        """``|offset| + sum |coefficient * value|``: the scale of the rounding error of a linear
+        form.
+        """
+        total = self._assign(
+            f"magnitude({self._as_lane(self.coefficient(form.offset), form.offset)})"
+        )
         for series, coefficient in form.terms.items():
             product = self._zero(self.value(series, 0))
             if not is_constant(coefficient, 1.0) and not is_constant(coefficient, -1.0):

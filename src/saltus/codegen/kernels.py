@@ -1,12 +1,14 @@
-"""The compiled flow of one equation, as the engine calls it: at once with sizes that are read as it runs, and made again once it has work.
+"""The compiled flow of one equation, as the engine calls it: at once with sizes that are read as it
+runs, and made again once it has work.
 
 Two tiers give the same bits, for they are the same operations in the same order:
 
-generic   the templates' machine code serves all equations and is on disk; only the equation is compiled, in a fraction of a second
-full      sizes, tables and the equation are known to the compiler: one piece of code
+generic   the templates' machine code serves all equations and is on disk; only the equation is
+compiled, in a fraction of a second full      sizes, tables and the equation are known to the
+compiler: one piece of code
 
-A flow begins generic. After `STEADY_AFTER` seconds of work another process compiles the full tier, stores it on disk, and the flow changes
-to it between two calls. The next process begins with it.
+A flow begins generic. After `STEADY_AFTER` seconds of work another process compiles the full tier,
+stores it on disk, and the flow changes to it between two calls. The next process begins with it.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ from saltus.codegen.lane_ir import constants_ir, equation_ir
 GENERIC, FULL = TIERS = ("generic", "full")
 #: Final tier of a flow.
 STEADY = FULL
-#: Seconds of work before the full tier is compiled: that takes some three seconds of another processor, and gains a tenth.
+#: Seconds of work before the full tier is compiled: that takes some three seconds of another
+#: processor, and gains a tenth.
 STEADY_AFTER = 2.0
 #: Constants that the generic code knows too: loops over them are unrolled.
 _BAKED = ("ORDER", "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "HORNER", "FINER", "SHORTEST")
@@ -39,10 +42,15 @@ _DTYPES = {"float64": np.dtype(np.float64), "int64": np.dtype(np.int64)}
 
 
 class Call:
-    """The arguments of a compiled function as one block of numbers: of each array where it lies, its shape and its strides."""
+    """The arguments of a compiled function as one block of numbers: of each array where it lies,
+    its shape and its strides.
+    """
 
     def __init__(self, arguments: tuple[str, ...]) -> None:
-        self._kinds = [(None if kind == "int64" else _DTYPES[kind.partition("[")[0]], kind.count(",") + 1) for kind in arguments]
+        self._kinds = [
+            (None if kind == "int64" else _DTYPES[kind.partition("[")[0]], kind.count(",") + 1)
+            for kind in arguments
+        ]
 
     def block(self, values: tuple) -> np.ndarray:
         """The arguments as the function reads them. int64[m].
@@ -57,14 +65,19 @@ class Call:
             if dtype is None:
                 numbers.append(int(value))
             elif value.dtype != dtype or value.ndim != dimensions or not value.flags.c_contiguous:
-                raise TypeError(f"a kernel takes a contiguous array of {dtype} with {dimensions} axes, not of {value.dtype} {value.shape}.")
+                raise TypeError(
+                    f"a kernel takes a contiguous array of {dtype} with {dimensions} "
+                    f"axes, not of {value.dtype} {value.shape}."
+                )
             else:
                 numbers += (0, 0, value.size, 8, _address(value), *value.shape, *value.strides)
         return np.array(numbers, np.int64)
 
 
 def _address(array: np.ndarray) -> int:
-    """Where a contiguous array lies, in a third of the time of ``array.ctypes``: a call asks for fifty."""
+    """Where a contiguous array lies, in a third of the time of ``array.ctypes``: a call asks for
+    fifty.
+    """
     try:
         return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]  # a buffer, which stubs for 3.11 don't know
     except (TypeError, ValueError):  # read-only, or empty
@@ -93,7 +106,9 @@ class Kernels:
         If it can't be compiled here.
     """
 
-    def __init__(self, interface: Interface, template: str, head: Head, title: str, what: str) -> None:
+    def __init__(
+        self, interface: Interface, template: str, head: Head, title: str, what: str
+    ) -> None:
         self.interface, self.template, self.title, self.what = interface, template, title, what
         self._layout = layout_of(interface, head.constants)
         self._constants = _open_constants(interface, head.constants, self._layout)
@@ -116,7 +131,9 @@ class Kernels:
             raise AttributeError(f"{type(self).__name__} has no {name!r}") from None
 
     def workspace(self) -> tuple:
-        """The memory that one call works in; one set for each thread, made once: many a call takes no longer than making it."""
+        """The memory that one call works in; one set for each thread, made once: many a call takes
+        no longer than making it.
+        """
         if not hasattr(self._memory, "arrays"):
             self._memory.arrays = self._layout["workspace"]()
         return self._memory.arrays
@@ -127,23 +144,35 @@ class Kernels:
         begun = time.perf_counter()
         answer = int(self._entry(block.ctypes.data))
         self._worked += time.perf_counter() - begun
-        if self._worked > STEADY_AFTER and self.tier != STEADY and self._asked.acquire(blocking=False):
-            threading.Thread(target=self._settle, name=f"kernels: {self.title}", daemon=True).start()
+        if (
+            self._worked > STEADY_AFTER
+            and self.tier != STEADY
+            and self._asked.acquire(blocking=False)
+        ):
+            threading.Thread(
+                target=self._settle, name=f"kernels: {self.title}", daemon=True
+            ).start()
         return answer
 
     def exchange(self, tier: str) -> None:
-        """Go on with another tier, made here if it isn't on disk. The next call uses it; a call under way ends as it began."""
+        """Go on with another tier, made here if it isn't on disk. The next call uses it; a call
+        under way ends as it began.
+        """
         self._begin(tier, [built(order) for order in self._orders(tier)])
 
     def _settle(self) -> None:
-        """In a thread that no Ctrl-C of the caller's work ends. What goes wrong here costs speed, no result."""
+        """In a thread that no Ctrl-C of the caller's work ends. What goes wrong here costs speed,
+        no result.
+        """
         with contextlib.suppress(Exception):
             self.exchange(STEADY)
 
     def _begin(self, tier: str, objects: list[bytes]) -> None:
         loaded = machine.loaded(objects, f"saltus_{self.interface.entry}")
         self._kept.append(loaded)
-        self._entry: Callable[[int], int] = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(loaded.address)
+        self._entry: Callable[[int], int] = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(
+            loaded.address
+        )
         self.tier = tier
 
     def _orders(self, tier: str) -> list[Order]:
@@ -157,7 +186,9 @@ class Kernels:
         if tier == FULL:
             texts.append(self._equation_text)
         title = f"{self.title if tier == FULL else self.template}, {tier}"
-        return Order(self.template, tuple(texts), (entry,), title, self._said(tier), tier == GENERIC)
+        return Order(
+            self.template, tuple(texts), (entry,), title, self._said(tier), tier == GENERIC
+        )
 
     def _said(self, tier: str) -> str:
         return "what all equations share, for this processor: once" if tier == GENERIC else ""
@@ -182,7 +213,13 @@ def layout_of(interface: Interface, constants: dict[str, Constant]) -> dict[str,
     return space
 
 
-def _open_constants(interface: Interface, constants: dict[str, Constant], layout: dict[str, Any]) -> dict[str, Constant]:
-    """Everything that the templates read: sizes, flags, tables, and what the layout works out from them."""
+def _open_constants(
+    interface: Interface, constants: dict[str, Constant], layout: dict[str, Any]
+) -> dict[str, Constant]:
+    """Everything that the templates read: sizes, flags, tables, and what the layout works out from
+    them.
+    """
     names = [*interface.sizes, *interface.flags, *interface.tables]
-    return {name: constants[name] for name in names} | {name: layout[name] for name in templates.open_names_of(interface)}
+    return {name: constants[name] for name in names} | {
+        name: layout[name] for name in templates.open_names_of(interface)
+    }

@@ -1,7 +1,9 @@
-"""The generated head of an equation as LLVM IR: a translator of the few forms of Python that heads are written in.
+"""The generated head of an equation as LLVM IR: a translator of the few forms of Python that heads
+are written in.
 
-A head is straight-line code on doubles and lanes; the text that runs as plain Python with the JIT off is the text that is translated here,
-so there is one source. Each operation becomes the instruction that codegen/lowering/lane_types.py makes of it in the templates.
+A head is straight-line code on doubles and lanes; the text that runs as plain Python with the JIT
+off is the text that is translated here, so there is one source. Each operation becomes the
+instruction that codegen/lowering/lane_types.py makes of it in the templates.
 """
 
 from __future__ import annotations
@@ -27,11 +29,26 @@ OF_LANES = ("jets", "rates")
 
 _ARITHMETIC = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
 _BITWISE = {ast.RShift: "ashr", ast.LShift: "shl", ast.BitAnd: "and", ast.BitOr: "or"}
-_COMPARE = {ast.Gt: "ogt", ast.Lt: "olt", ast.GtE: "oge", ast.LtE: "ole", ast.Eq: "oeq", ast.NotEq: "une"}
-_COMPARE_WHOLE = {ast.Gt: "sgt", ast.Lt: "slt", ast.GtE: "sge", ast.LtE: "sle", ast.Eq: "eq", ast.NotEq: "ne"}
+_COMPARE = {
+    ast.Gt: "ogt",
+    ast.Lt: "olt",
+    ast.GtE: "oge",
+    ast.LtE: "ole",
+    ast.Eq: "oeq",
+    ast.NotEq: "une",
+}
+_COMPARE_WHOLE = {
+    ast.Gt: "sgt",
+    ast.Lt: "slt",
+    ast.GtE: "sge",
+    ast.LtE: "sle",
+    ast.Eq: "eq",
+    ast.NotEq: "ne",
+}
 #: Functions that are instructions of LLVM; the others are those of the C library.
 _INTRINSIC = {
-    "sin": "sin", "cos": "cos", "exp": "exp", "log": "log", "sqrt": "sqrt", "fabs": "fabs", "pow": "pow",
+    "sin": "sin", "cos": "cos", "exp": "exp", "log": "log", "sqrt": "sqrt", "fabs": "fabs",
+    "pow": "pow",
     "fma": "fma", "magnitude": "fabs", "root": "sqrt", "nearest_integer": "rint", "abs": "fabs",
 }  # fmt: skip
 
@@ -56,22 +73,31 @@ class _Body:
     """The lines of one function while it is translated."""
 
     def __init__(
-        self, lanes: int, row: int, pointers: Iterable[str], names: Mapping[str, Value], declared: set[str], helpers: Helpers
+        self,
+        lanes: int,
+        row: int,
+        pointers: Iterable[str],
+        names: Mapping[str, Value],
+        declared: set[str],
+        helpers: Helpers,
     ) -> None:
         self.lanes, self.row, self.declared, self.helpers = lanes, row, declared, helpers
         self.lines: list[Line] = []
         self.names = dict(names)
         self.types = {
-            LANE: f"<{lanes} x double>", MASK: f"<{lanes} x i1>", NUMBER: "double", TRUTH: "i1", INTEGER: "i64",
+            LANE: f"<{lanes} x double>", MASK: f"<{lanes} x i1>", NUMBER: "double", TRUTH: "i1",
+            INTEGER: "i64",
         }  # fmt: skip
         self._pointers = set(pointers)
         self._labels = 0
 
-    # -- lines ------------------------------------------------------------------------------------------------------------------
+    # -- lines -------------------------------------------------------------------------------------
     def new(self, kind: str, code: str, kind_of_line: str | None = None) -> Value:
         """A line that gives a value."""
         name = f"%r{len(self.lines)}"
-        self.lines.append(Line(f"{name} = {code}", name, kind_of_line or self.types.get(kind, kind)))
+        self.lines.append(
+            Line(f"{name} = {code}", name, kind_of_line or self.types.get(kind, kind))
+        )
         return Value(kind, name)
 
     def do(self, code: str) -> None:
@@ -82,10 +108,14 @@ class _Body:
         self._labels += 1
         return self._labels
 
-    # -- conversions ------------------------------------------------------------------------------------------------------------
+    # -- conversions -------------------------------------------------------------------------------
     def number(self, value: Value) -> Value:
         """A whole number as a double; anything else as it is."""
-        return self.new(NUMBER, f"sitofp i64 {value.text} to double") if value.kind == INTEGER else value
+        return (
+            self.new(NUMBER, f"sitofp i64 {value.text} to double")
+            if value.kind == INTEGER
+            else value
+        )
 
     def lane(self, value: Value) -> Value:
         """A number in every lane; a lane as it is."""
@@ -96,14 +126,18 @@ class _Body:
             return Value(LANE, f"splat (double {value.text})")
         vector = self.types[LANE]
         one = self.new(LANE, f"insertelement {vector} poison, double {value.text}, i32 0")
-        return self.new(LANE, f"shufflevector {vector} {one.text}, {vector} poison, <{self.lanes} x i32> zeroinitializer")
+        return self.new(
+            LANE,
+            f"shufflevector {vector} {one.text}, {vector} poison, <{self.lanes} "
+            f"x i32> zeroinitializer",
+        )
 
     def _alike(self, a: Value, b: Value) -> tuple[str, Value, Value]:
         if LANE in (a.kind, b.kind):
             return LANE, self.lane(a), self.lane(b)
         return NUMBER, self.number(a), self.number(b)
 
-    # -- expressions ------------------------------------------------------------------------------------------------------------
+    # -- expressions -------------------------------------------------------------------------------
     def value(self, node: ast.expr) -> Value:
         """Translate an expression."""
         rule = getattr(self, f"_{type(node).__name__.lower()}", None)
@@ -138,7 +172,9 @@ class _Body:
             value = self.value(node.operand)
             return self.new(value.kind, f"fneg {self.types[value.kind]} {value.text}")
         value = self.value(node.operand)
-        return self.new(value.kind, f"xor {self.types[value.kind]} {value.text}, {self._all_true(value.kind)}")
+        return self.new(
+            value.kind, f"xor {self.types[value.kind]} {value.text}, {self._all_true(value.kind)}"
+        )
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         word = "and" if isinstance(node.op, ast.And) else "or"
@@ -148,12 +184,18 @@ class _Body:
         return total
 
     def _ifexp(self, node: ast.IfExp) -> Value:
-        condition, a, b = self.value(node.test), self.number(self.value(node.body)), self.number(self.value(node.orelse))
+        condition, a, b = (
+            self.value(node.test),
+            self.number(self.value(node.body)),
+            self.number(self.value(node.orelse)),
+        )
         return self.new(NUMBER, f"select i1 {condition.text}, double {a.text}, double {b.text}")
 
     def _subscript(self, node: ast.Subscript) -> Value:
         assert isinstance(node.value, ast.Name)
-        return self.new(NUMBER, f"load double, ptr {self._place(node.value.id, node.slice, 1)}, align 8")
+        return self.new(
+            NUMBER, f"load double, ptr {self._place(node.value.id, node.slice, 1)}, align 8"
+        )
 
     def _call(self, node: ast.Call) -> Value:
         match node.func:
@@ -174,7 +216,9 @@ class _Body:
         if a.kind == b.kind and a.kind in (MASK, TRUTH, INTEGER) and op in _BITWISE:
             return self.new(a.kind, f"{_BITWISE[op]} {self.types[a.kind]} {a.text}, {b.text}")
         if a.kind == b.kind == INTEGER:
-            return self.new(INTEGER, f"{ {ast.Add: 'add', ast.Mult: 'mul'}[op] } i64 {a.text}, {b.text}")
+            return self.new(
+                INTEGER, f"{ {ast.Add: 'add', ast.Mult: 'mul'}[op] } i64 {a.text}, {b.text}"
+            )
         kind, a, b = self._alike(a, b)
         return self.new(kind, f"{_ARITHMETIC[op]} {self.types[kind]} {a.text}, {b.text}")
 
@@ -183,26 +227,38 @@ class _Body:
         if a.kind == b.kind == INTEGER:
             return self.new(TRUTH, f"icmp {_COMPARE_WHOLE[op]} i64 {a.text}, {b.text}")
         kind, a, b = self._alike(a, b)
-        return self.new(MASK if kind == LANE else TRUTH, f"fcmp {_COMPARE[op]} {self.types[kind]} {a.text}, {b.text}")
+        return self.new(
+            MASK if kind == LANE else TRUTH,
+            f"fcmp {_COMPARE[op]} {self.types[kind]} {a.text}, {b.text}",
+        )
 
     def _function(self, name: str, arguments: list[ast.expr]) -> Value:
         """A function of kernels/lanes.py, of trigonometry.py, or of Python."""
         if name == "load":
-            return self.new(LANE, f"load {self.types[LANE]}, ptr {self._place(arguments[0].id, arguments[1], self.lanes)}, align 8")  # type: ignore[attr-defined]
-        values = [self.value(a) for a in arguments if not (isinstance(a, ast.Name) and a.id == "LANES")]
+            table, row, *_ = arguments
+            place = self._place(table.id, row, self.lanes)  # type: ignore[attr-defined]
+            return self.new(LANE, f"load {self.types[LANE]}, ptr {place}, align 8")
+        values = [
+            self.value(a) for a in arguments if not (isinstance(a, ast.Name) and a.id == "LANES")
+        ]
         match name:
             case "splat":
                 return self.lane(values[0])
             case "float":
                 return self.number(values[0])
             case "round":  # to a whole number, as Python's
-                return self.new(INTEGER, f"fptosi double {self._library('rint', NUMBER, values).text} to i64")
+                return self.new(
+                    INTEGER, f"fptosi double {self._library('rint', NUMBER, values).text} to i64"
+                )
             case "abs":
                 return self._library("fabs", NUMBER, [self.number(values[0])])
             case "select":
                 mask, a, b = values[0], self.lane(values[1]), self.lane(values[2])
                 vector = self.types[LANE]
-                return self.new(LANE, f"select {self.types[MASK]} {mask.text}, {vector} {a.text}, {vector} {b.text}")
+                return self.new(
+                    LANE,
+                    f"select {self.types[MASK]} {mask.text}, {vector} {a.text}, {vector} {b.text}",
+                )
             case "turned":
                 given = ", ".join(f"{self.types[v.kind]} {v.text}" for v in values)
                 return self.new(NUMBER, f"call double @saltus_turned({given})")
@@ -215,31 +271,46 @@ class _Body:
     def _library(self, name: str, kind: str, values: list[Value]) -> Value:
         type_ = self.types[kind]
         intrinsic = _INTRINSIC.get(name, name if name == "rint" else "")
-        full = f"llvm.{intrinsic}.{f'v{self.lanes}f64' if kind == LANE else 'f64'}" if intrinsic else name
+        full = (
+            f"llvm.{intrinsic}.{f'v{self.lanes}f64' if kind == LANE else 'f64'}"
+            if intrinsic
+            else name
+        )
         self.declared.add(f"declare {type_} @{full}({', '.join([type_] * len(values))})")
-        return self.new(kind, f"call {type_} @{full}({', '.join(f'{type_} {v.text}' for v in values)})")
+        return self.new(
+            kind, f"call {type_} @{full}({', '.join(f'{type_} {v.text}' for v in values)})"
+        )
 
     def _lane_by_lane(self, name: str, values: list[Value]) -> Value:
         result, vector = Value(LANE, "poison"), self.types[LANE]
         for i in range(self.lanes):
             ones = [self.new(NUMBER, f"extractelement {vector} {v.text}, i32 {i}") for v in values]
             one = self._library(name, NUMBER, ones)
-            result = self.new(LANE, f"insertelement {vector} {result.text}, double {one.text}, i32 {i}")
+            result = self.new(
+                LANE, f"insertelement {vector} {result.text}, double {one.text}, i32 {i}"
+            )
         return result
 
-    # -- memory -----------------------------------------------------------------------------------------------------------------
+    # -- memory ------------------------------------------------------------------------------------
     def _place(self, array: str, index: ast.expr, width: int) -> str:
         """Address of an entry, or of a row of lanes."""
         if array not in self._pointers:
             raise UntranslatableError(array)
         match index:
             case ast.Tuple(elts=[row, ast.Name(id="lane")]):
-                start = self.new(ARRAY, f"getelementptr i8, ptr %{array}, i64 {8 * self.lanes * _whole(row, self.names)}")
+                start = self.new(
+                    ARRAY,
+                    f"getelementptr i8, ptr %{array}, i64 "
+                    f"{8 * self.lanes * _whole(row, self.names)}",
+                )
                 return self.new(ARRAY, f"getelementptr double, ptr {start.text}, i64 %lane").text
             case _:
-                return self.new(ARRAY, f"getelementptr i8, ptr %{array}, i64 {8 * width * _whole(index, self.names)}").text
+                return self.new(
+                    ARRAY,
+                    f"getelementptr i8, ptr %{array}, i64 {8 * width * _whole(index, self.names)}",
+                ).text
 
-    # -- statements -------------------------------------------------------------------------------------------------------------
+    # -- statements --------------------------------------------------------------------------------
     def run(self, statements: list[ast.stmt]) -> None:
         """Translate statements."""
         for statement in statements:
@@ -248,12 +319,23 @@ class _Body:
                     pass
                 case ast.Assign(targets=[target], value=value):
                     self._assign(target, value)
-                case ast.AugAssign(target=ast.Subscript(value=ast.Name(id=array), slice=index), op=ast.Add(), value=value):
+                case ast.AugAssign(
+                    target=ast.Subscript(value=ast.Name(id=array), slice=index),
+                    op=ast.Add(),
+                    value=value,
+                ):
                     self._add_to(self._place(array, index, 1), value)
-                case ast.Expr(value=ast.Call(func=ast.Name(id="store"), args=[ast.Name(id=array), row, value])):
+                case ast.Expr(
+                    value=ast.Call(func=ast.Name(id="store"), args=[ast.Name(id=array), row, value])
+                ):
                     found = self.lane(self.value(value))
-                    self.do(f"store {self.types[LANE]} {found.text}, ptr {self._place(array, row, self.lanes)}, align 8")
-                case ast.Expr(value=ast.Call(func=ast.Name(id=function), args=arguments)) if function in self.helpers:
+                    self.do(
+                        f"store {self.types[LANE]} {found.text}, ptr "
+                        f"{self._place(array, row, self.lanes)}, align 8"
+                    )
+                case ast.Expr(value=ast.Call(func=ast.Name(id=function), args=arguments)) if (
+                    function in self.helpers
+                ):
                     self._helper(function, arguments)
                 case ast.If(test=test, body=body, orelse=[]):
                     self._if(test, body)
@@ -268,7 +350,11 @@ class _Body:
                 for one, found in zip(targets, [self.value(one) for one in values], strict=True):
                     self._give(one, found)
             case ast.Tuple(elts=names), ast.Call(func=ast.Name(id=function), args=arguments):
-                self._call_for_two([ast.unparse(name) for name in names], function, [self.value(a) for a in arguments])
+                self._call_for_two(
+                    [ast.unparse(name) for name in names],
+                    function,
+                    [self.value(a) for a in arguments],
+                )
             case _:
                 self._give(target, self.value(value))
 
@@ -284,7 +370,10 @@ class _Body:
                 raise UntranslatableError(ast.unparse(target))
 
     def _add_to(self, place: str, value: ast.expr) -> None:
-        before, more = self.new(NUMBER, f"load double, ptr {place}, align 8"), self.number(self.value(value))
+        before, more = (
+            self.new(NUMBER, f"load double, ptr {place}, align 8"),
+            self.number(self.value(value)),
+        )
         total = self.new(NUMBER, f"fadd double {before.text}, {more.text}")
         self.do(f"store double {total.text}, ptr {place}, align 8")
 
@@ -304,7 +393,9 @@ class _Body:
                 for name, old in before.items():
                     if (new := self.names[name]) != old:
                         a, b = self.number(new), self.number(old)
-                        self.names[name] = self.new(NUMBER, f"select i1 {condition.text}, double {a.text}, double {b.text}")
+                        self.names[name] = self.new(
+                            NUMBER, f"select i1 {condition.text}, double {a.text}, double {b.text}"
+                        )
 
     def _leave(self, value: ast.expr | None) -> None:
         match value:
@@ -315,7 +406,9 @@ class _Body:
                 pair = "{ " + ", ".join(self.types[v.kind] for v in given) + " }"
                 whole = "poison"
                 for i, v in enumerate(given):
-                    whole = self.new(pair, f"insertvalue {pair} {whole}, {self.types[v.kind]} {v.text}, {i}").text
+                    whole = self.new(
+                        pair, f"insertvalue {pair} {whole}, {self.types[v.kind]} {v.text}, {i}"
+                    ).text
                 self.do(f"ret {pair} {whole}")
             case _:
                 found = self.value(value)
@@ -324,13 +417,17 @@ class _Body:
                 self.do(f"ret {self.types[found.kind]} {found.text}")
 
     def _helper(self, name: str, arguments: list[ast.expr]) -> None:
-        """Call another function of the head with values and with arrays, whole or from some row on."""
+        """Call another function of the head with values and with arrays, whole or
+        from some row on.
+        """
         given = []
         for argument in arguments:
             match argument:
                 case ast.Name(id=array) if array in self._pointers:
                     given.append((ARRAY, f"%{array}"))
-                case ast.Subscript(value=ast.Name(id=array), slice=ast.Slice(lower=first, upper=None, step=None)) if first:
+                case ast.Subscript(
+                    value=ast.Name(id=array), slice=ast.Slice(lower=first, upper=None, step=None)
+                ) if first:
                     given.append((ARRAY, self._place(array, first, self.row)))
                 case _:
                     value = self.value(argument)
@@ -349,7 +446,9 @@ class _Body:
     def _where_any(self, mask: Value, body: list[ast.stmt]) -> None:
         """Work that is done only if the mask holds in any lane."""
         label, before = self._label(), dict(self.names)
-        bits = self.new(f"i{self.lanes}", f"bitcast {self.types[MASK]} {mask.text} to i{self.lanes}")
+        bits = self.new(
+            f"i{self.lanes}", f"bitcast {self.types[MASK]} {mask.text} to i{self.lanes}"
+        )
         some = self.new(TRUTH, f"icmp ne i{self.lanes} {bits.text}, 0")
         self.do(f"br label %here{label}")
         self.do(f"here{label}:")
@@ -361,7 +460,10 @@ class _Body:
         for name, old in before.items():
             if (new := self.names[name]) != old:
                 type_ = self.types[old.kind]
-                self.names[name] = self.new(old.kind, f"phi {type_} [ {old.text}, %here{label} ], [ {new.text}, %some{label} ]")
+                self.names[name] = self.new(
+                    old.kind,
+                    f"phi {type_} [ {old.text}, %here{label} ], [ {new.text}, %some{label} ]",
+                )
 
 
 def _whole(node: ast.expr, names: Mapping[str, Value]) -> int:
@@ -377,7 +479,9 @@ def _whole(node: ast.expr, names: Mapping[str, Value]) -> int:
 
 
 class _Signature(NamedTuple):
-    """Arguments of a function, its result and attributes, and the numbers in a row of its arrays."""
+    """Arguments of a function, its result and attributes, and the numbers in a row of
+    its arrays.
+    """
 
     arguments: tuple[str, ...]
     result: str
@@ -386,19 +490,32 @@ class _Signature(NamedTuple):
 
 
 def _function(
-    tree: ast.FunctionDef, signature: _Signature, lanes: int, constants: Mapping[str, Value], declared: set[str], helpers: Helpers
+    tree: ast.FunctionDef,
+    signature: _Signature,
+    lanes: int,
+    constants: Mapping[str, Value],
+    declared: set[str],
+    helpers: Helpers,
 ) -> str:
     """One function as IR text, in blocks if it is long."""
     kinds = {WHOLE: INTEGER, REAL: NUMBER}
-    arguments = list(zip((argument.arg for argument in tree.args.args), signature.arguments, strict=True))
-    given = {name: Value(kinds.get(type_, LANE), f"%{name}") for name, type_ in arguments if type_ != ARRAY}
+    arguments = list(
+        zip((argument.arg for argument in tree.args.args), signature.arguments, strict=True)
+    )
+    given = {
+        name: Value(kinds.get(type_, LANE), f"%{name}")
+        for name, type_ in arguments
+        if type_ != ARRAY
+    }
     arrays = [name for name, type_ in arguments if type_ == ARRAY]
     body = _Body(lanes, signature.row, arrays, {**constants, **given}, declared, helpers)
     body.run(tree.body)
     if signature.result == "void":
         body.do("ret void")
     parameters = ", ".join(f"{type_} %{name}" for name, type_ in arguments)
-    return in_blocks(f"saltus_{tree.name}", signature.result, parameters, signature.attributes, body.lines, lanes)
+    return in_blocks(
+        f"saltus_{tree.name}", signature.result, parameters, signature.attributes, body.lines, lanes
+    )
 
 
 @cache
@@ -408,9 +525,20 @@ def _trigonometry(lanes: int) -> tuple[str, frozenset[str]]:
     numbers = _numbers_of(tree)
     vector, declared = f"<{lanes} x double>", set[str]()
     pair, doubles = f"{{ {vector}, {vector} }}", "{ double, double }"
-    kinds = {"sincos": ((vector,), pair), "two_product": ((REAL, REAL), doubles), "turned": ((REAL, REAL, WHOLE), REAL)}
+    kinds = {
+        "sincos": ((vector,), pair),
+        "two_product": ((REAL, REAL), doubles),
+        "turned": ((REAL, REAL, WHOLE), REAL),
+    }
     texts = [
-        _function(node, _Signature(*kinds[node.name], "alwaysinline nounwind"), lanes, numbers, declared, {})
+        _function(
+            node,
+            _Signature(*kinds[node.name], "alwaysinline nounwind"),
+            lanes,
+            numbers,
+            declared,
+            {},
+        )
         for node in tree.body
         if isinstance(node, ast.FunctionDef) and node.name in kinds
     ]
@@ -428,12 +556,24 @@ def _numbers_of(tree: ast.Module) -> dict[str, Value]:
             case ast.Assign(targets=[ast.Name(id=name)], value=value):
                 found[name] = Value(NUMBER, literal(ast.literal_eval(value)))
             case ast.Assign(targets=[ast.Tuple(elts=names)], value=value):
-                values = tuples[value.id] if isinstance(value, ast.Name) else [ast.literal_eval(e) for e in value.elts]  # type: ignore[attr-defined]
-                found |= {name.id: Value(NUMBER, literal(v)) for name, v in zip(names, values, strict=True)}  # type: ignore[attr-defined]
+                values = (
+                    tuples[value.id]
+                    if isinstance(value, ast.Name)
+                    else [ast.literal_eval(e) for e in value.elts]  # type: ignore[attr-defined]
+                )
+                found |= {
+                    name.id: Value(NUMBER, literal(v))  # type: ignore[attr-defined]
+                    for name, v in zip(names, values, strict=True)
+                }
     return found
 
 
-def equation_ir(functions: str, constants: Mapping[str, int | float | bool | tuple], interface: Interface, lanes: int) -> str:
+def equation_ir(
+    functions: str,
+    constants: Mapping[str, int | float | bool | tuple],
+    interface: Interface,
+    lanes: int,
+) -> str:
     """The functions of a head as LLVM IR, named ``saltus_NAME``.
 
     Parameters
@@ -448,13 +588,26 @@ def equation_ir(functions: str, constants: Mapping[str, int | float | bool | tup
         Width of a lane.
     """
     shared, declared = _trigonometry(lanes)
-    known = {name: Value(INTEGER, str(int(v))) for name, v in constants.items() if isinstance(v, int)}
+    known = {
+        name: Value(INTEGER, str(int(v))) for name, v in constants.items() if isinstance(v, int)
+    }
     needed = set(declared)
-    trees = {node.name: node for node in templates.tree_of(functions).body if isinstance(node, ast.FunctionDef)}
+    trees = {
+        node.name: node
+        for node in templates.tree_of(functions).body
+        if isinstance(node, ast.FunctionDef)
+    }
     texts = []
     for name in interface.functions:
-        attributes, row = ("nounwind alignstack(64)", lanes) if name in OF_LANES else ("nounwind", 1)
-        signature = _Signature(interface.functions[name], "i64" if name in interface.truths else "void", attributes, row)
+        attributes, row = (
+            ("nounwind alignstack(64)", lanes) if name in OF_LANES else ("nounwind", 1)
+        )
+        signature = _Signature(
+            interface.functions[name],
+            "i64" if name in interface.truths else "void",
+            attributes,
+            row,
+        )
         helpers: Helpers = {other: None for other in trees if other not in interface.functions}
         texts.append(_function(trees[name], signature, lanes, known, needed, helpers))
         for helper, arguments in helpers.items():

@@ -1,4 +1,6 @@
-"""Machine code: LLVM modules made into objects for this processor, and objects loaded and called. The only place that drives LLVM."""
+"""Machine code: LLVM modules made into objects for this processor, and objects loaded and called.
+The only place that drives LLVM.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,11 @@ import llvmlite.binding as llvm
 
 from saltus.errors import CacheError, ParameterError, nearest, shown
 
-#: Rises when the same templates and equations would be made into other code: entries of the cache carry it in their names.
+#: Rises when the same templates and equations would be made into other code: entries of the cache
+#: carry it in their names.
 PIPELINE = 3
-#: LLVM's level for a template, and for an equation alone: that is straight lines of lanes, of which level 3 makes nothing faster (0026).
+#: LLVM's level for a template, and for an equation alone: that is straight lines of lanes, of which
+#: level 3 makes nothing faster (0026).
 LEVEL, LEVEL_ALONE = 3, 1
 #: Only one thread at a time: LLVM keeps modules in one context.
 _LLVM = threading.Lock()
@@ -30,7 +34,8 @@ class Target(NamedTuple):
     features: str
 
 
-#: Levels of x86-64 that ``$SALTUS_PROCESSOR`` may name, and features of this machine without which their code would crash.
+#: Levels of x86-64 that ``$SALTUS_PROCESSOR`` may name, and features of this machine without which
+#: their code would crash.
 LEVELS = {
     "x86-64": (), "x86-64-v2": ("sse4.2", "popcnt"), "x86-64-v3": ("avx2", "fma", "bmi2"),
     "x86-64-v4": ("avx512f", "avx512dq", "avx512bw", "avx512vl"),
@@ -39,7 +44,8 @@ LEVELS = {
 
 @cache
 def target() -> Target:
-    """The machine at hand; ``$SALTUS_PROCESSOR``, such as ``x86-64-v3``, names an older processor of its family instead.
+    """The machine at hand; ``$SALTUS_PROCESSOR``, such as ``x86-64-v3``, names an older processor
+    of its family instead.
 
     Raises
     ------
@@ -52,9 +58,15 @@ def target() -> Target:
         return Target(triple, llvm.get_host_cpu_name(), features.flatten())
     if chosen not in LEVELS or not triple.startswith("x86_64"):
         known = LEVELS if triple.startswith("x86_64") else ()
-        raise ParameterError(f"SALTUS_PROCESSOR={shown(chosen)} names no processor for {triple}. {nearest(chosen, known) if known else ''}")
+        raise ParameterError(
+            f"SALTUS_PROCESSOR={shown(chosen)} names no processor for {triple}. "
+            f"{nearest(chosen, known) if known else ''}"
+        )
     if lacking := [name for name in LEVELS[chosen] if not features.get(name)]:
-        raise ParameterError(f"SALTUS_PROCESSOR={chosen}: this processor lacks {', '.join(lacking)}. Name an older one, or none.")
+        raise ParameterError(
+            f"SALTUS_PROCESSOR={chosen}: this processor lacks "
+            f"{', '.join(lacking)}. Name an older one, or none."
+        )
     return Target(triple, chosen, "")
 
 
@@ -66,7 +78,12 @@ def versions() -> tuple[str, ...]:
 
 
 def object_code(
-    template: bytes | None, texts: Sequence[str], called: Collection[str], chosen: Target | None = None, *, open_sizes: bool = False
+    template: bytes | None,
+    texts: Sequence[str],
+    called: Collection[str],
+    chosen: Target | None = None,
+    *,
+    open_sizes: bool = False,
 ) -> bytes:
     """One object file, optimised as a whole.
 
@@ -81,8 +98,8 @@ def object_code(
     chosen : Target, optional
         Default: this machine.
     open_sizes : bool
-        The template reads its sizes as it runs: LLVM neither unrolls its loops nor inlines what doesn't ask for it. That takes a third of
-        the time, and gains nothing there (0028).
+        The template reads its sizes as it runs: LLVM neither unrolls its loops nor inlines what
+        doesn't ask for it. That takes a third of the time, and gains nothing there (0028).
     """
     made_for = chosen or target()
     alone = template is None
@@ -112,13 +129,23 @@ def _target_machine(made_for: Target, level: int = LEVEL) -> llvm.TargetMachine:
         llvm.initialize_all_targets()
         llvm.initialize_all_asmprinters()
     found = llvm.Target.from_triple(made_for.triple)
-    return found.create_target_machine(cpu=made_for.processor, features=made_for.features, opt=level, codemodel="jitdefault")
+    return found.create_target_machine(
+        cpu=made_for.processor, features=made_for.features, opt=level, codemodel="jitdefault"
+    )
 
 
-def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine, level: int, open_sizes: bool) -> None:
-    """LLVM's passes. Lanes are vectors already: nothing is to be made into vectors, least of all sums of doubles."""
+def _optimise(
+    module: llvm.ModuleRef, machine: llvm.TargetMachine, level: int, open_sizes: bool
+) -> None:
+    """LLVM's passes. Lanes are vectors already: nothing is to be made into vectors, least of all
+    sums of doubles.
+    """
     options = llvm.create_pipeline_tuning_options(speed_level=level)
-    options.loop_vectorization, options.slp_vectorization, options.loop_unrolling = False, False, not open_sizes
+    options.loop_vectorization, options.slp_vectorization, options.loop_unrolling = (
+        False,
+        False,
+        not open_sizes,
+    )
     if open_sizes:
         options.inlining_threshold = 0
     builder = llvm.create_pass_builder(machine, options)
@@ -138,7 +165,8 @@ class Loaded(NamedTuple):
 
 
 def loaded(objects: Sequence[bytes], symbol: str) -> Loaded:
-    """Objects that refer to one another and to the C library, in memory, and the address of one function.
+    """Objects that refer to one another and to the C library, in memory, and the address of one
+    function.
 
     Raises
     ------
@@ -150,8 +178,15 @@ def loaded(objects: Sequence[bytes], symbol: str) -> Loaded:
         for one in objects:
             library = library.add_object_img(one)
         try:
-            keeper = library.add_current_process().export_symbol(symbol).link(_jit(), f"saltus{next(_NUMBER)}")
+            keeper = (
+                library.add_current_process()
+                .export_symbol(symbol)
+                .link(_jit(), f"saltus{next(_NUMBER)}")
+            )
         except RuntimeError as error:
             why = " ".join(str(error).split())
-            raise CacheError(f"a compiled kernel can't be loaded: {shown(why, 200)}. Delete the cache: saltus cache clear.") from error
+            raise CacheError(
+                f"a compiled kernel can't be loaded: {shown(why, 200)}. Delete the "
+                f"cache: saltus cache clear."
+            ) from error
     return Loaded(keeper[symbol], keeper)

@@ -44,15 +44,19 @@ class Flow(Protocol):
 
 
 def jit_disabled() -> bool:
-    """Whether ``SALTUS_DISABLE_JIT=1`` asks for plain Python: slow, for debuggers and for the coverage of the kernels."""
+    """Whether ``SALTUS_DISABLE_JIT=1`` asks for plain Python: slow, for debuggers and for the
+    coverage of the kernels.
+    """
     return os.environ.get("SALTUS_DISABLE_JIT", "0") not in ("", "0")
 
 
 def lane_width() -> int:
-    """Trajectories in the lanes of a step: two instructions' worth, since one works while the other waits.
+    """Trajectories in the lanes of a step: two instructions' worth, since one works while the other
+    waits.
 
-    Measured on the rig [µs a period]: AVX-512 with 8 and 16 lanes 1.27, 1.16; AVX2 with 4, 8, 16 lanes 2.06, 1.87, 2.05; without fused
-    multiply-add 2 and 4 lanes 17.7, 23.8. NEON has registers of 2, so 4 lanes; nobody has measured it.
+    Measured on the rig [µs a period]: AVX-512 with 8 and 16 lanes 1.27, 1.16; AVX2 with 4, 8, 16
+    lanes 2.06, 1.87, 2.05; without fused multiply-add 2 and 4 lanes 17.7, 23.8. NEON has registers
+    of 2, so 4 lanes; nobody has measured it.
     """
     triple, processor, listed = machine.target()
     features = set(listed.split(","))
@@ -65,7 +69,9 @@ def lane_width() -> int:
 
 @lru_cache(maxsize=64)
 def taylor_module(system: System, order: int, lanes: int) -> Flow:
-    """The compiled Taylor flow of a system. Parameters are arguments: new values never recompile."""
+    """The compiled Taylor flow of a system. Parameters are arguments: new values
+    never recompile.
+    """
     title = f"{system.name}, Taylor order {order}, {lanes} lanes"
     head = _printed(system, lambda: taylor_head(system, order, lanes))
     return _flow(TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor")
@@ -79,12 +85,15 @@ def ode45_module(system: System) -> Flow:
 
 
 def _printed(system: System, head: Callable[[], Head]) -> Head:
-    """The functions of an equation. Raises TraceError for one whose operations are nested deeper than Python follows."""
+    """The functions of an equation. Raises TraceError for one whose operations are nested deeper
+    than Python follows.
+    """
     try:
         return head()
     except RecursionError:
         raise TraceError(
-            f"{system.name}: hundreds of operations stand within one another in an expression of its equation, more than can be compiled. "
+            f"{system.name}: hundreds of operations stand within one another in an expression of "
+            f"its equation, more than can be compiled. "
             "Multiply in pairs, ((a*b)*(c*d))*..., or give a curve by sl.table."
         ) from None
 
@@ -99,15 +108,25 @@ def _described(system: System) -> str:
     """What is compiled, for people who wait: a verb of its own compiles an equation of its own."""
     if system.tangent_of is not None:
         return f"the tangent flow of {system.name}"
-    return f"{system.name} with a surface" if len(acting_guards(system)) < len(system.guards) else system.name
+    return (
+        f"{system.name} with a surface"
+        if len(acting_guards(system)) < len(system.guards)
+        else system.name
+    )
 
 
 def _flow(interface: Interface, template: str, head: Head, title: str, what: str) -> Any:
-    return _interpreted(interface, head) if jit_disabled() else Kernels(interface, template, head, title, what)
+    return (
+        _interpreted(interface, head)
+        if jit_disabled()
+        else Kernels(interface, template, head, title, what)
+    )
 
 
 def _interpreted(interface: Interface, head: Head) -> ModuleType:
-    """Head and templates as plain Python, each template under its own file name so that coverage and debuggers see it."""
+    """Head and templates as plain Python, each template under its own file name so that coverage
+    and debuggers see it.
+    """
     module = ModuleType(f"saltus_{interface.entry}")
     exec(compile(_PREAMBLE + head.text, "<generated head>", "exec"), module.__dict__)
     for name in filter(None, (interface.layout, *interface.templates)):

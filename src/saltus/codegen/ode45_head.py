@@ -1,7 +1,9 @@
-"""The generated head of an ode45 module: the right-hand side in the user's own order of operations, split by what changes when.
+"""The generated head of an ode45 module: the right-hand side in the user's own order of operations,
+split by what changes when.
 
-Parameter-only parts are worked out once a trajectory (``prepare``), time-only parts once a stage time (``drive``): the same operations on
-the same numbers, so not a digit changes, but the cosine of two stages at one time is computed once.
+Parameter-only parts are worked out once a trajectory (``prepare``), time-only parts once a stage
+time (``drive``): the same operations on the same numbers, so not a digit changes, but the cosine of
+two stages at one time is computed once.
 """
 
 from __future__ import annotations
@@ -38,7 +40,9 @@ def _level(node: Expr) -> int:
 
 
 class _Stages:
-    """Leaves for the state-dependent code: whatever doesn't depend on the state is read from ``c`` or ``q``."""
+    """Leaves for the state-dependent code: whatever doesn't depend on the state is read from ``c``
+    or ``q``.
+    """
 
     def __init__(self, system: System) -> None:
         self.constants, self.drives, self.clocks = _Slots("c"), _Slots("q"), Clocks(system)
@@ -50,7 +54,9 @@ class _Stages:
         level = _level(node)
         if level == 2 or node.op == "const":
             return None
-        return "t" if node.op == "time" else (self.constants if level == 0 else self.drives).code(node)
+        return (
+            "t" if node.op == "time" else (self.constants if level == 0 else self.drives).code(node)
+        )
 
     def drive_leaf(self, node: Expr) -> str | None:
         if node.op == "time":
@@ -91,7 +97,10 @@ def _outputs(code: ScalarCode, roots: Iterable[Expr]) -> str:
 def _gap_rates(system: System, stages: _Stages) -> str:
     """d gap/dt = gradient . dy/dt + partial derivative by time."""
     gaps = [guard.gap for guard in system.guards]
-    rows = [[differentiate(gap, ex.state(s)) for s in system.states] + [differentiate(gap, ex.TIME)] for gap in gaps]
+    rows = [
+        [differentiate(gap, ex.state(s)) for s in system.states] + [differentiate(gap, ex.TIME)]
+        for gap in gaps
+    ]
     code = _with_sides(system, stages, [entry for row in rows for entry in row])
     for i, row in enumerate(rows):
         terms = []
@@ -120,8 +129,10 @@ def ode45_head(system: System) -> Head:
         value = prepare.value(node)
         prepare.lines.append(f"c[{i}] = {value}")
     sizes: dict[str, Constant] = dict(
-        NSTATES=len(system.states), NGUARDS=len(gaps), NCONST=len(stages.constants.nodes), NDRIVE=len(stages.drives.nodes),
-        TANGENT=system.tangent_of is not None, GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
+        NSTATES=len(system.states), NGUARDS=len(gaps), NCONST=len(stages.constants.nodes),
+        NDRIVE=len(stages.drives.nodes),
+        TANGENT=system.tangent_of is not None,
+        GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
         **stages.clocks.constants(),
     )  # fmt: skip
     functions = [

@@ -1,4 +1,6 @@
-"""The Taylor series of a system in plain NumPy: the generated text that a flow compiles, run on arrays of any width."""
+"""The Taylor series of a system in plain NumPy: the generated text that a flow compiles, run on
+arrays of any width.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ from saltus.system.system import System
 def series_module(system: System, order: int) -> ModuleType:
     """Jets and step length of a system, as its Taylor flow compiles them.
 
-    It evaluates a motion that a flow has computed. Nothing is compiled, so a new function costs no time.
+    It evaluates a motion that a flow has computed. Nothing is compiled, so a new function costs no
+    time.
     """
     return _plain(taylor_head(system, order, 1).text)
 
@@ -28,12 +31,17 @@ def _plain(head: str) -> ModuleType:
     """A head and the templates of a step as a Python module, its lanes whole arrays."""
     module = ModuleType(f"saltus_series_{hashlib.sha256(head.encode()).hexdigest()[:32]}")
     names = module.__dict__
-    names |= {name: value for name, value in vars(lanes).items() if callable(value) and not name.startswith("_")}
+    names |= {
+        name: value
+        for name, value in vars(lanes).items()
+        if callable(value) and not name.startswith("_")
+    }
     names |= {"kernel": marks.kernel, "inner": marks.inner, "math": math, "np": np}
     names |= {"sincos": trigonometry.sincos, "turned": trigonometry.turned}
     exec(compile(head, "<generated head>", "exec"), names)
     for name in ("taylor_layout", "clocks", "taylor_step"):
         exec(templates.layout_code(name), names)
-    names["SINGULAR"], names["NSINGULAR"] = names["NSINGULAR"], 0  # rows of `side`; no term is left out of these series
+    # rows of `side`; no term is left out of these series
+    names["SINGULAR"], names["NSINGULAR"] = names["NSINGULAR"], 0
     names["splat"] = lambda value, width: value  # noqa: ARG005  (NumPy spreads a number over any width)
     return module

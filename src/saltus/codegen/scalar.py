@@ -1,4 +1,6 @@
-"""Scalar code from expressions: one assignment per shared node, operations in the order in which the user wrote them."""
+"""Scalar code from expressions: one assignment per shared node, operations in the order in which
+the user wrote them.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ def indented(lines: list[str]) -> str:
 def parameter_leaf(
     system: System, states: str | None = None, clocked: Callable[[Expr], str | None] | None = None
 ) -> Callable[[Expr], str | None]:
-    """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions, and for what ``clocked`` knows."""
+    """Code for parameters ``p[i]``, states ``y[i]`` and time ``t`` in scalar functions, and for
+    what ``clocked`` knows.
+    """
     names, state_names = tuple(system.values), system.states
 
     def leaf(node: Expr) -> str | None:
@@ -40,8 +44,8 @@ def condition_code(
     switch: Callable[[ex.Relation], str],
     words: tuple[str, str, str] = ("and", "or", "not"),
 ) -> str:
-    """A condition as code: ``bit(i)`` is the code for side i, ``switch(relation)`` that for what time decides, ``words`` are the operators
-    (``& | ~`` for lane masks).
+    """A condition as code: ``bit(i)`` is the code for side i, ``switch(relation)`` that for what
+    time decides, ``words`` are the operators (``& | ~`` for lane masks).
     """
     match condition:
         case ex.Bit(guard):
@@ -49,9 +53,15 @@ def condition_code(
         case ex.Relation():
             return switch(condition)
         case ex.And(left, right):
-            return f"({condition_code(left, bit, switch, words)} {words[0]} {condition_code(right, bit, switch, words)})"
+            return (
+                f"({condition_code(left, bit, switch, words)} {words[0]} "
+                f"{condition_code(right, bit, switch, words)})"
+            )
         case ex.Or(left, right):
-            return f"({condition_code(left, bit, switch, words)} {words[1]} {condition_code(right, bit, switch, words)})"
+            return (
+                f"({condition_code(left, bit, switch, words)} {words[1]} "
+                f"{condition_code(right, bit, switch, words)})"
+            )
         case ex.Not(inner):
             return f"({words[2]} {condition_code(inner, bit, switch, words)})"
     raise TypeError(condition)
@@ -63,7 +73,8 @@ class ScalarCode:
     Parameters
     ----------
     leaf : callable
-        ``leaf(node) -> str | None``: code for a node that is available already (a parameter, a state, a constant slot), None otherwise.
+        ``leaf(node) -> str | None``: code for a node that is available already (a parameter, a
+        state, a constant slot), None otherwise.
     side : callable
         ``side(guard) -> str``: code that is true where the guard is positive.
     prefix : str
@@ -98,7 +109,12 @@ class ScalarCode:
             node, ready = stack.pop()
             if ready:
                 order.append(node)
-            elif node not in seen and node not in self._names and node.op != "const" and self._leaf(node) is None:
+            elif (
+                node not in seen
+                and node not in self._names
+                and node.op != "const"
+                and self._leaf(node) is None
+            ):
                 seen.add(node)
                 stack.append((node, True))
                 stack.extend((child, False) for child in reversed(node.args))
@@ -132,5 +148,6 @@ class ScalarCode:
     @staticmethod
     def _power(base: str, exponent: Expr, code: str) -> str:
         if exponent.op == "const" and exponent.payload in (2.0, 3.0, 4.0):
-            return "*".join([base] * int(exponent.payload))  # multiplied out: MATLAB's digits for whole powers
+            # multiplied out: MATLAB's digits for whole powers
+            return "*".join([base] * int(exponent.payload))
         return f"{base} ** {code}"

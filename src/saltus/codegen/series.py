@@ -1,9 +1,11 @@
 """Equations as linear combinations of series: the form in which Taylor recurrences are cheapest.
 
 A field such as ``(drive - contact)/mass - 2*zeta*wn*v - wn**2*x - cubic/mass*x**3`` is flattened to
-``sum(coefficient * series)``: the coefficients depend on parameters and mode only and are worked out once per step at most, the series
-(states, products, elementary functions) carry the Taylor coefficients. Piecewise laws whose pieces are finite everywhere dissolve into
-mode-dependent coefficients; pieces that may be undefined on the other side (roots, logarithms, quotients) stay a selection of series.
+``sum(coefficient * series)``: the coefficients depend on parameters and mode only and are worked
+out once per step at most, the series (states, products, elementary functions) carry the Taylor
+coefficients. Piecewise laws whose pieces are finite everywhere dissolve into mode-dependent
+coefficients; pieces that may be undefined on the other side (roots, logarithms, quotients) stay a
+selection of series.
 """
 
 from __future__ import annotations
@@ -26,12 +28,13 @@ class Series:
     Attributes
     ----------
     kind : str
-        ``state``, ``time``, ``since`` (time since the reference of a clock's polynomial), ``linear``, ``product``, ``quotient``,
-        ``power``, ``select``, or an elementary function.
+        ``state``, ``time``, ``since`` (time since the reference of a clock's polynomial),
+        ``linear``, ``product``, ``quotient``, ``power``, ``select``, or an elementary function.
     operands : tuple of Series
         Its arguments.
     payload : object
-        Name of a state, row of a reference, exponent (Expr) of a power, condition of a select, :class:`Linear` of a linear series.
+        Name of a state, row of a reference, exponent (Expr) of a power, condition of a select,
+        :class:`Linear` of a linear series.
     """
 
     kind: str
@@ -46,7 +49,9 @@ class Series:
 
 @dataclass
 class Linear:
-    """``offset + sum(terms[s] * s)``; coefficients are expressions of parameters and mode bits only."""
+    """``offset + sum(terms[s] * s)``; coefficients are expressions of parameters and mode bits
+    only.
+    """
 
     offset: Expr
     terms: dict[Series, Expr] = field(default_factory=dict)
@@ -58,9 +63,15 @@ def is_constant(coefficient: Expr, value: float) -> bool:
 
 
 def _scale(factor: Expr, c: Expr, by_division: bool = False) -> Expr:
-    """``c * factor`` (or ``c / factor``), pushed into the branches of a mode selection so that nothing is divided at run time."""
+    """``c * factor`` (or ``c / factor``), pushed into the branches of a mode selection so that
+    nothing is divided at run time.
+    """
     if c.op == "select":
-        return ex.select(c.payload, _scale(factor, c.args[0], by_division), _scale(factor, c.args[1], by_division))
+        return ex.select(
+            c.payload,
+            _scale(factor, c.args[0], by_division),
+            _scale(factor, c.args[1], by_division),
+        )
     if c.op == "neg":
         return ex.neg(_scale(factor, c.args[0], by_division))
     if factor.op == "select" and not by_division:
@@ -85,11 +96,15 @@ def _degree_in_time(series: Series) -> int:
 
 def _of_time(series: Series) -> bool:
     """Whether a series is time, or a linear form of time only."""
-    return series.kind in ("time", "since") or (series.kind == "linear" and all(s.kind in ("time", "since") for s in series.operands))
+    return series.kind in ("time", "since") or (
+        series.kind == "linear" and all(s.kind in ("time", "since") for s in series.operands)
+    )
 
 
 class SeriesBuilder:
-    """Turns expressions into :class:`Linear` forms over shared series; ``clocks`` numbers what time alone decides in them."""
+    """Turns expressions into :class:`Linear` forms over shared series; ``clocks`` numbers what time
+    alone decides in them.
+    """
 
     def __init__(self, clocks: Clocks | None = None) -> None:
         self._clocks = clocks
@@ -113,13 +128,15 @@ class SeriesBuilder:
         return self._clocks.row_of_side(relation)
 
     def may_hide(self) -> bool:
-        """Whether some series can be negligible where it is expanded and large within the step, so that its coefficients don't show it.
+        """Whether some series can be negligible where it is expanded and large within the step, so
+        that its coefficients don't show it.
 
-        ``tanh`` and ``exp`` far from their bend, a high power of time: all but sums and products of states and harmonics of time.
+        ``tanh`` and ``exp`` far from their bend, a high power of time: all but sums and products of
+        states and harmonics of time.
         """
         return any(_may_hide(series) for series in self._known.values())
 
-    # -- one node ---------------------------------------------------------------------------------------------------------------
+    # -- one node ----------------------------------------------------------------------------------
     def _flatten(self, node: Expr) -> Linear:
         if not ex.depends_on(node, ("state", "time")):
             return Linear(node)
@@ -146,11 +163,19 @@ class SeriesBuilder:
         return self._unit(self._make(node.op, (self._as_series(forms[0]),)))
 
     def _polynomial(self, node: Expr) -> Linear:
-        """The present piece of a remainder or a table: the coefficients in its clock, times powers of the time since its reference."""
+        """The present piece of a remainder or a table: the coefficients in its clock, times powers
+        of the time since its reference.
+        """
         assert self._clocks is not None
         offset, *rest = (Expr("held", (), row) for row in self._clocks.rows_of_coefficients(node))
         since = self._make("since", (), self._clocks.row_of_reference(node))
-        return Linear(offset, {self._multiply_out(since, k): coefficient for k, coefficient in enumerate(rest, start=1)})
+        return Linear(
+            offset,
+            {
+                self._multiply_out(since, k): coefficient
+                for k, coefficient in enumerate(rest, start=1)
+            },
+        )
 
     def _make(self, kind: str, operands: tuple[Series, ...], payload: object = None) -> Series:
         key = (kind, payload, tuple(map(id, operands)))
@@ -174,16 +199,23 @@ class SeriesBuilder:
         terms = dict(a.terms)
         for series, coefficient in b.terms.items():
             terms[series] = op(terms.get(series, zero), coefficient)
-        return Linear(op(a.offset, b.offset), {s: c for s, c in terms.items() if not is_constant(c, 0.0)})
+        return Linear(
+            op(a.offset, b.offset), {s: c for s, c in terms.items() if not is_constant(c, 0.0)}
+        )
 
     @staticmethod
     def _scaled(factor: Expr, form: Linear, by_division: bool = False) -> Linear:
         if is_constant(factor, -1.0):
             return Linear(ex.neg(form.offset), {s: ex.neg(c) for s, c in form.terms.items()})
-        return Linear(_scale(factor, form.offset, by_division), {s: _scale(factor, c, by_division) for s, c in form.terms.items()})
+        return Linear(
+            _scale(factor, form.offset, by_division),
+            {s: _scale(factor, c, by_division) for s, c in form.terms.items()},
+        )
 
     def _split_factor(self, form: Linear) -> tuple[Expr, Series]:
-        """A form as coefficient times series, the coefficient pulled out where there is only one term."""
+        """A form as coefficient times series, the coefficient pulled out where there is only one
+        term.
+        """
         if len(form.terms) == 1 and is_constant(form.offset, 0.0):
             ((series, coefficient),) = form.terms.items()
             return coefficient, series
@@ -210,9 +242,14 @@ class SeriesBuilder:
 
     def _power(self, base: Linear, exponent: Expr) -> Linear:
         coefficient, series = self._split_factor(base)
-        if exponent.op == "const" and exponent.payload == int(exponent.payload) and 0 < exponent.payload <= 64:
+        if (
+            exponent.op == "const"
+            and exponent.payload == int(exponent.payload)
+            and 0 < exponent.payload <= 64
+        ):
             return self._scaled(
-                self._whole_power(coefficient, exponent.payload), self._unit(self._multiply_out(series, int(exponent.payload)))
+                self._whole_power(coefficient, exponent.payload),
+                self._unit(self._multiply_out(series, int(exponent.payload))),
             )
         if not is_constant(coefficient, 1.0):
             series = self._as_series(base)
@@ -234,6 +271,9 @@ class SeriesBuilder:
     def _selection(self, condition: ex.Condition, a: Linear, b: Linear) -> Linear:
         if all(s.total for s in (*a.terms, *b.terms)):
             zero = ex.constant(0.0)
-            terms = {s: ex.select(condition, a.terms.get(s, zero), b.terms.get(s, zero)) for s in {**a.terms, **b.terms}}
+            terms = {
+                s: ex.select(condition, a.terms.get(s, zero), b.terms.get(s, zero))
+                for s in {**a.terms, **b.terms}
+            }
             return Linear(ex.select(condition, a.offset, b.offset), terms)
         return self._unit(self._make("select", (self._as_series(a), self._as_series(b)), condition))

@@ -21,8 +21,14 @@ FIRST_TURN = 2
 
 
 def gaps_function(system: System, clocks: Clocks) -> str:
-    """``gaps(t, y, p, h, out)``: value of every guard, sides taken from the state; h is what the clocks hold."""
-    code = ScalarCode(parameter_leaf(system, "y", clocks.value), side=lambda i: f"(out[{i}] > 0.0)", switch=clocks.side)
+    """``gaps(t, y, p, h, out)``: value of every guard, sides taken from the state; h is what the
+    clocks hold.
+    """
+    code = ScalarCode(
+        parameter_leaf(system, "y", clocks.value),
+        side=lambda i: f"(out[{i}] > 0.0)",
+        switch=clocks.side,
+    )
     for i in evaluation_order(system):
         value = code.value(system.guards[i].gap)
         code.lines.append(f"out[{i}] = {value}")
@@ -72,11 +78,15 @@ class _Guards:
 
 
 def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
-    """(state, sign, boundary) if the gap is ``sign * (state - boundary)`` with a boundary of parameters only."""
+    """(state, sign, boundary) if the gap is ``sign * (state - boundary)`` with a boundary of
+    parameters only.
+    """
     if len(form.terms) != 1 or ex.depends_on(form.offset, MOVING):
         return None
     ((series, coefficient),) = form.terms.items()
-    if series.kind != "state" or not (is_constant(coefficient, 1.0) or is_constant(coefficient, -1.0)):
+    if series.kind != "state" or not (
+        is_constant(coefficient, 1.0) or is_constant(coefficient, -1.0)
+    ):
         return None
     sign = coefficient.payload
     return str(series.payload), sign, ex.neg(form.offset) if sign > 0 else form.offset
@@ -94,25 +104,36 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
     for i, row in enumerate(written):
         for k in range(order + 1):
             code.write(row * (order + 1) + k, code.state(i, k), of_column=row in column)
-    guards, rows = _write_guards(system, code, [builder.form(gap) for gap in aside.gaps], constants, order)
+    guards, rows = _write_guards(
+        system, code, [builder.form(gap) for gap in aside.gaps], constants, order
+    )
     gap_row, scale_row, calm_row = rows, rows + len(system.guards), rows + 2 * len(system.guards)
     for j in range(len(aside.guards)):
         for i, entry in enumerate(aside.without(j, moved)):
             code.write(calm_row + j * moved + i, code.linear(builder.form(entry), 0))
     handed_row = calm_row + moved * len(aside.guards)
     probed = builder.may_hide()
-    rates = _rates(system, aside.field, builder, constants, code.harmonics) if probed or aside.guards else []
+    rates = (
+        _rates(system, aside.field, builder, constants, code.harmonics)
+        if probed or aside.guards
+        else []
+    )
     series = sorted(set(guards.row))
     stepped = sorted({*series, *(i * (order + 1) for i in range(len(system.states)))})
     constants_of_head: dict[str, Constant] = dict(
-        LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order, NCONST=len(constants.rows),
-        NTURNS=len(code.harmonics), CLOCK_ROW=FIRST_TURN + len(code.harmonics), GAP_ROW=gap_row, SCALE_ROW=scale_row, CALM_ROW=calm_row,
+        LANES=lanes, NSTATES=len(system.states), NGUARDS=len(system.guards), ORDER=order,
+        NCONST=len(constants.rows),
+        NTURNS=len(code.harmonics), CLOCK_ROW=FIRST_TURN + len(code.harmonics), GAP_ROW=gap_row,
+        SCALE_ROW=scale_row, CALM_ROW=calm_row,
         ROWS=handed_row + len(code.lines.handed), NMOVED=moved, NSINGULAR=len(aside.guards),
-        NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped), NSERIES=len(series),
+        NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped),
+        NSERIES=len(series),
         PROBED=probed, TANGENT=system.tangent_of is not None,
         **_tables(
-            STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row, GUARD_SERIES=[series.index(row) for row in guards.row],
-            GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const, SINGULAR_GUARD=list(aside.guards),
+            STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row,
+            GUARD_SERIES=[series.index(row) for row in guards.row],
+            GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const,
+            SINGULAR_GUARD=list(aside.guards),
         ),
         **clocks.constants(),
     )  # fmt: skip
@@ -129,7 +150,11 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
 
 
 def _rates(
-    system: System, field: Sequence[Expr], builder: SeriesBuilder, constants: Constants, harmonics: dict[tuple[Expr, Expr], int]
+    system: System,
+    field: Sequence[Expr],
+    builder: SeriesBuilder,
+    constants: Constants,
+    harmonics: dict[tuple[Expr, Expr], int],
 ) -> list[str]:
     """Code for the right-hand side alone, and for the size of its terms."""
     forms = tuple(builder.form(entry) for entry in field)
@@ -151,11 +176,19 @@ def _constants_function(system: System, constants: Constants) -> str:
 
 
 def _jets_functions(code: JetCode, columns: int, handed_row: int, terms: int) -> str:
-    """``jets(y, side, c, clock, work)``; for a tangent it calls a function of one column for each of them."""
+    """``jets(y, side, c, clock, work)``; for a tangent it calls a function of one column for each
+    of them.
+    """
     lines, texts = list(code.lines.shared(handed_row)), []
     if columns:
-        texts.append(f"@inner\ndef jets_of_column(y, c, clock, shared, work):\n{indented(code.lines.column)}\n\n")
-        lines += [f"jets_of_column(y[{j}:], c, clock, work[{handed_row}:], work[{j * terms}:])" for j in range(columns)]
+        texts.append(
+            f"@inner\ndef jets_of_column(y, c, clock, shared, "
+            f"work):\n{indented(code.lines.column)}\n\n"
+        )
+        lines += [
+            f"jets_of_column(y[{j}:], c, clock, work[{handed_row}:], work[{j * terms}:])"
+            for j in range(columns)
+        ]
     return "".join(texts) + f"@inner\ndef jets(y, side, c, clock, work):\n{indented(lines)}\n"
 
 
@@ -164,7 +197,9 @@ def _tables(**tables: list) -> dict[str, Constant]:
     return {name: tuple(rows) or (0,) for name, rows in tables.items()}
 
 
-def _write_guards(system: System, code: JetCode, forms: list[Linear], constants: Constants, order: int) -> tuple[_Guards, int]:
+def _write_guards(
+    system: System, code: JetCode, forms: list[Linear], constants: Constants, order: int
+) -> tuple[_Guards, int]:
     """Write every gap to the work rows; guards of one state share that state's rows."""
     guards, rows = _Guards(), len(system.states) * (order + 1)
     boundaries = [_state_boundary(form) for form in forms]
@@ -197,12 +232,17 @@ def _write_guards(system: System, code: JetCode, forms: list[Linear], constants:
 
 
 def _turns_function(system: System, code: JetCode) -> str:
-    """``turns(p, origin, period, count, lane, clock)``: phase of every harmonic at the start of a period; whether one of them drifts."""
+    """``turns(p, origin, period, count, lane, clock)``: phase of every harmonic at the start of a
+    period; whether one of them drifts.
+    """
     scalar = ScalarCode(parameter_leaf(system))
     drifting = []
     for (rate, offset), i in code.harmonics.items():
         w, b = scalar.value(rate), scalar.value(offset)
-        scalar.lines.append(f"clock[{FIRST_TURN + i}, lane] = {b} + turned({w}, period, count) + turned({w}, origin, 1)")
+        scalar.lines.append(
+            f"clock[{FIRST_TURN + i}, lane] = {b} + turned({w}, period, count) + "
+            f"turned({w}, origin, 1)"
+        )
         drifting.append(f"turned({w}, period, 1) != 0.0")
     scalar.lines.append(f"return {' or '.join(drifting) or 'False'}")
     return f"@kernel\ndef turns(p, origin, period, count, lane, clock):\n{indented(scalar.lines)}\n"

@@ -1,4 +1,6 @@
-"""The templates' bitcode that the package brings: codegen/lowering makes it, once for every equation and every processor."""
+"""The templates' bitcode that the package brings: codegen/lowering makes it, once for every
+equation and every processor.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ from saltus.errors import CacheError
 WIDTHS = (2, 4, 8, 16)
 #: Interface and lanes of every bitcode.
 BITCODE: dict[str, tuple[Interface, int]] = {
-    **{f"taylor_{lanes}": (TAYLOR, lanes) for lanes in WIDTHS}, "ode45": (ODE45, 1), "capture": (CAPTURE, 1),
+    **{f"taylor_{lanes}": (TAYLOR, lanes) for lanes in WIDTHS}, "ode45": (ODE45, 1),
+    "capture": (CAPTURE, 1),
 }  # fmt: skip
 #: Kernels that the templates import.
 _SHARED = ("lanes", "trigonometry", "isolation", "status", "batch", "parts", "clocks_layout")
@@ -36,17 +39,23 @@ def text(name: str) -> str:
 def _texts(name: str) -> list[str]:
     """The texts that a bitcode is made of."""
     interface, _ = BITCODE[name]
-    return [text(one) for one in (*filter(None, [interface.layout]), *interface.templates, *_SHARED)]
+    return [
+        text(one) for one in (*filter(None, [interface.layout]), *interface.templates, *_SHARED)
+    ]
 
 
 def _hash(name: str, texts: list[str]) -> str:
     interface, lanes = BITCODE[name]
-    return hashlib.sha256("\0".join([*texts, repr(interface), str(lanes), str(BITCODE_VERSION)]).encode()).hexdigest()
+    return hashlib.sha256(
+        "\0".join([*texts, repr(interface), str(lanes), str(BITCODE_VERSION)]).encode()
+    ).hexdigest()
 
 
 @cache
 def source_hash(name: str) -> str:
-    """Hash of all that a bitcode is made of, comments and docstrings left out: what says whether it is still what the templates give."""
+    """Hash of all that a bitcode is made of, comments and docstrings left out: what says whether it
+    is still what the templates give.
+    """
     return _hash(name, [_code_of(one) for one in _texts(name)])
 
 
@@ -61,7 +70,8 @@ class _WithoutDocstrings(ast.NodeTransformer):
         return None if isinstance(node.value, ast.Constant) else node
 
 
-#: CPython 3.11 can't parse to a tree in two threads at once ("AST constructor recursion depth mismatch").
+#: CPython 3.11 can't parse to a tree in two threads at once ("AST constructor recursion depth
+#: mismatch").
 _PARSER = threading.Lock()
 
 
@@ -87,7 +97,11 @@ def manifest() -> dict[str, Any]:
     """
     try:
         known = json.loads(_brought("manifest.json"))
-        if all(isinstance(known["bitcode"][name][one], str) for name in BITCODE for one in ("texts", "sources", "sha256")):
+        if all(
+            isinstance(known["bitcode"][name][one], str)
+            for name in BITCODE
+            for one in ("texts", "sources", "sha256")
+        ):
             return known
     except (ValueError, KeyError, TypeError, RecursionError):
         pass
@@ -99,7 +113,10 @@ def _brought(file: str) -> bytes:
     try:
         return resources.files("saltus.kernels").joinpath(f"bitcode/{file}").read_bytes()
     except OSError as error:
-        raise CacheError(f"saltus/kernels/bitcode/{file} can't be read: {error.strerror or error}. Install saltus again.") from None
+        raise CacheError(
+            f"saltus/kernels/bitcode/{file} can't be read: {error.strerror or error}. "
+            f"Install saltus again."
+        ) from None
 
 
 @cache
@@ -131,13 +148,22 @@ def identity(name: str) -> str:
 
 @cache
 def open_names_of(interface: Interface) -> tuple[str, ...]:
-    """The names of a layout whose values depend on open sizes, in the order in which they are computed."""
+    """The names of a layout whose values depend on open sizes, in the order in which they are
+    computed.
+    """
     if not interface.layout:
         return ()
     unknown, found = {*interface.sizes, *interface.flags, *interface.tables}, list[str]()
     for node in tree_of(text(interface.layout)).body:
-        if isinstance(node, ast.Assign) and unknown & {name.id for name in ast.walk(node.value) if isinstance(name, ast.Name)}:
-            names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+        if isinstance(node, ast.Assign) and unknown & {
+            name.id for name in ast.walk(node.value) if isinstance(name, ast.Name)
+        }:
+            names = [
+                name.id
+                for target in node.targets
+                for name in ast.walk(target)
+                if isinstance(name, ast.Name)
+            ]
             found += names
             unknown |= set(names)
     return tuple(found)

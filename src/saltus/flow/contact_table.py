@@ -43,22 +43,42 @@ class ContactTable:
     integers: np.ndarray
     floats: np.ndarray
 
-    trajectory, period, guard = _integers(st.REC_TRAJECTORY), _integers(st.REC_PERIOD), _integers(st.REC_GUARD)
-    direction, kind, steps = _integers(st.REC_DIRECTION), _integers(st.REC_KIND), _integers(st.REC_STEPS)
+    trajectory, period, guard = (
+        _integers(st.REC_TRAJECTORY),
+        _integers(st.REC_PERIOD),
+        _integers(st.REC_GUARD),
+    )
+    direction, kind, steps = (
+        _integers(st.REC_DIRECTION),
+        _integers(st.REC_KIND),
+        _integers(st.REC_STEPS),
+    )
     mode_before, mode_after = _integers(st.REC_MODE_BEFORE), _integers(st.REC_MODE_AFTER)
-    phase, velocity, time_error = _floats(st.REC_PHASE), _floats(st.REC_VELOCITY), _floats(st.REC_TIME_ERROR)
+    phase, velocity, time_error = (
+        _floats(st.REC_PHASE),
+        _floats(st.REC_VELOCITY),
+        _floats(st.REC_TIME_ERROR),
+    )
     state, time = _floats(slice(st.RECORD_FLOATS, -1)), _floats(-1)
 
     @classmethod
     def joined(cls, parts: list[ContactTable]) -> ContactTable:
-        """Tables one below the other, sorted by trajectory; those of one trajectory in the order given."""
-        integers, floats = (np.concatenate(half) if len(half) > 1 else half[0] for half in zip(*(p.arrays for p in parts), strict=True))
+        """Tables one below the other, sorted by trajectory; those of one trajectory in the order
+        given.
+        """
+        integers, floats = (
+            np.concatenate(half) if len(half) > 1 else half[0]
+            for half in zip(*(p.arrays for p in parts), strict=True)
+        )
         return cls(integers, floats).rows(np.argsort(integers[:, st.REC_TRAJECTORY], kind="stable"))
 
     @classmethod
     def empty(cls, size: int, states: int) -> ContactTable:
         """Uninitialised room for ``size`` contacts of systems with ``states`` states."""
-        return cls(np.empty((size, st.RECORD_INTEGERS), np.int64), np.empty((size, st.RECORD_FLOATS + states + 1)))
+        return cls(
+            np.empty((size, st.RECORD_INTEGERS), np.int64),
+            np.empty((size, st.RECORD_FLOATS + states + 1)),
+        )
 
     def __len__(self) -> int:
         return len(self.integers)
@@ -89,5 +109,7 @@ class ContactTable:
         return ContactTable(self.integers[which], self.floats[which])
 
     def begins(self, count: int, first: int = 0) -> np.ndarray:
-        """Where the contacts of ``count`` trajectories from ``first`` on begin, and where the last ends: int64[count + 1]."""
+        """Where the contacts of ``count`` trajectories from ``first`` on begin, and where the last
+        ends: int64[count + 1].
+        """
         return np.searchsorted(self.trajectory, first + np.arange(count + 1))

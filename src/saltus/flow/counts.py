@@ -14,10 +14,22 @@ MOST = 10**12
 
 
 def whole(value: Any, name: str, least: int = 1, most: int = MOST) -> int:
-    """A whole number. Raises ParameterError for anything else, or one below ``least`` or above ``most``."""
-    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool | np.timedelta64)
-    if not number or (not isinstance(value, int) and not math.isfinite(value)) or value != int(value) or value < least:
-        raise ParameterError(f"{name} must be a whole number of at least {least}{_and_most(most)}, not {shown(value)}.")
+    """A whole number. Raises ParameterError for anything else, or one below ``least`` or above
+    ``most``.
+    """
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
+        value, bool | np.timedelta64
+    )
+    if (
+        not number
+        or (not isinstance(value, int) and not math.isfinite(value))
+        or value != int(value)
+        or value < least
+    ):
+        raise ParameterError(
+            f"{name} must be a whole number of at least {least}{_and_most(most)}, "
+            f"not {shown(value)}."
+        )
     if value > most:
         raise ParameterError(f"{name} must be at most {_power(most)}, not {shown(value)}.")
     return int(value)

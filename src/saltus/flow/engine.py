@@ -1,6 +1,8 @@
-"""The engine: trajectories in chunks, chunks on threads, kernels in slices short enough for Ctrl-C; records and samples come back.
+"""The engine: trajectories in chunks, chunks on threads, kernels in slices short enough for Ctrl-C;
+records and samples come back.
 
-Every trajectory is independent of all others, so chunks may be cut and threads may run as they like: the result is the same to the bit.
+Every trajectory is independent of all others, so chunks may be cut and threads may run as they
+like: the result is the same to the bit.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
 from saltus.system.system import System
 
-#: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show progress.
+#: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show
+#: progress.
 CHUNK = 1024
 #: Threads of one call.
 MOST_THREADS = 4096
@@ -57,7 +60,9 @@ class Schedule:
 
     @classmethod
     def even(cls, periods: int, per_period: int, first: int = 0, beyond: int = 0) -> Schedule:
-        """``per_period`` equidistant samples in each of ``periods`` from ``first`` on, and ``beyond`` more after them."""
+        """``per_period`` equidistant samples in each of ``periods`` from ``first`` on, and
+        ``beyond`` more after them.
+        """
         index = first * per_period + np.arange(periods * per_period + beyond)
         return cls(index // per_period, (index % per_period) / per_period)
 
@@ -87,8 +92,8 @@ class Request:
     t_end : float
         End that the user gave [s]: sums of periods that exceed it by rounding are cut off.
     checks : int
-        Number of trajectories at the end that check the others. The method's companion moves them, with the same kernels, and takes no
-        samples of them.
+        Number of trajectories at the end that check the others. The method's companion moves them,
+        with the same kernels, and takes no samples of them.
     """
 
     start: np.ndarray
@@ -104,17 +109,36 @@ class Request:
 
     @classmethod
     def periods(
-        cls, start: np.ndarray, parameters: np.ndarray, period: float | np.ndarray, count: int | np.ndarray, **more: Any
+        cls,
+        start: np.ndarray,
+        parameters: np.ndarray,
+        period: float | np.ndarray,
+        count: int | np.ndarray,
+        **more: Any,
     ) -> Request:
-        """Whole periods from time zero, one period and count for all or one each; ``more`` as above."""
+        """Whole periods from time zero, one period and count for all or one each; ``more`` as
+        above.
+        """
         n = len(start)
-        length, ends = np.broadcast_to(np.asarray(period, float), n).copy(), np.broadcast_to(np.asarray(count, np.int64), n).copy()
-        return cls(start=start, parameters=parameters, period=length, end_count=ends, end_phase=np.zeros(n), **more)
+        length, ends = (
+            np.broadcast_to(np.asarray(period, float), n).copy(),
+            np.broadcast_to(np.asarray(count, np.int64), n).copy(),
+        )
+        return cls(
+            start=start,
+            parameters=parameters,
+            period=length,
+            end_count=ends,
+            end_phase=np.zeros(n),
+            **more,
+        )
 
 
 @dataclass
 class Outcome:
-    """What came out; arrays have the trajectory first. Contacts are sorted by trajectory, then time."""
+    """What came out; arrays have the trajectory first. Contacts are sorted by trajectory, then
+    time.
+    """
 
     state: np.ndarray
     time: np.ndarray
@@ -128,7 +152,9 @@ class Outcome:
     complete: bool = True
 
     def reached(self) -> int:
-        """How many samples there are: of a run that was interrupted those that some trajectory has reached."""
+        """How many samples there are: of a run that was interrupted those that some trajectory has
+        reached.
+        """
         if self.complete:
             return self.samples.shape[1]
         return int(np.flatnonzero((self.sample_mode >= 0).any(axis=0)).max(initial=0)) + 1
@@ -137,7 +163,9 @@ class Outcome:
         """That of some of the trajectories, as if they had been moved alone."""
         begins = self.contacts.begins(last - first, first)
         each = {name: getattr(self, name)[first:last] for name in _EACH}
-        return replace(self, **each, contacts=self.contacts.rows(slice(begins[0], begins[-1])).moved(-first))
+        return replace(
+            self, **each, contacts=self.contacts.rows(slice(begins[0], begins[-1])).moved(-first)
+        )
 
 
 #: Arrays of an outcome that have a row for each trajectory.
@@ -150,7 +178,9 @@ class RunInterrupted(Interrupted):
 
 @dataclass
 class _Chunk:
-    """A run of trajectories and the arrays of its kernel call (views of the outcome's arrays where possible)."""
+    """A run of trajectories and the arrays of its kernel call (views of the outcome's arrays where
+    possible).
+    """
 
     first: int
     arrays: dict[str, np.ndarray]
@@ -160,7 +190,11 @@ class _Chunk:
 
 
 def run(
-    system: System, method: Method, request: Request, threads: int | None = None, progress: Callable[[float], None] | None = None
+    system: System,
+    method: Method,
+    request: Request,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Outcome:
     """Compute a request.
 
@@ -173,7 +207,8 @@ def run(
     request : Request
         What to compute.
     threads : int, optional
-        Threads to use; default all processors this process may run on. The result doesn't depend on it.
+        Threads to use; default all processors this process may run on. The result doesn't depend on
+        it.
     progress : callable, optional
         Called with the share done, from this thread.
 
@@ -188,7 +223,9 @@ def run(
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     data, due = tables_of(system.origin), method.due(periods)
     whole["options"] = options_of(method, periods, len(request.start), request.checks)
-    chunks = [_cut(request, whole, first, data, due) for first in range(0, len(request.start), CHUNK)]
+    chunks = [
+        _cut(request, whole, first, data, due) for first in range(0, len(request.start), CHUNK)
+    ]
     workers = threads or usable_processors()
     stop, room = Stop(), Contacts(len(system.states))
     try:
@@ -198,8 +235,10 @@ def run(
         raise RunInterrupted(lambda: _finish(outcome, whole, chunks, request.t_end)) from None
     if room.stopped:
         warnings.warn(
-            f"the contacts of this call, {room.count} by now, filled half of the free memory: trajectories still running stopped with "
-            "status budget_events. Keep those of the last periods only (keep=), or run fewer starts or periods in one call.",
+            f"the contacts of this call, {room.count} by now, filled half of the free memory: "
+            f"trajectories still running stopped with "
+            "status budget_events. Keep those of the last periods only (keep=), or run fewer "
+            "starts or periods in one call.",
             SaltusWarning,
             stacklevel=4,
         )
@@ -207,7 +246,9 @@ def run(
 
 
 def options_of(method: Method, periods: float, count: int, checks: int = 0) -> np.ndarray:
-    """The numbers of a method as its kernels read them, for ``count`` trajectories, the last ``checks`` of them checks."""
+    """The numbers of a method as its kernels read them, for ``count`` trajectories, the last
+    ``checks`` of them checks.
+    """
     options = np.tile(method.numbers(periods), (count, 1))
     if checks:
         options[-checks:] = method.companion().numbers(periods)
@@ -220,9 +261,11 @@ def tables_of(system: System) -> np.ndarray:
     return table_data(system)
 
 
-# -- arrays --------------------------------------------------------------------------------------------------------------------
+# -- arrays ----------------------------------------------------------------------------------------
 def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict[str, np.ndarray]]:
-    """The arrays that all chunks write to, at the start of a run, and the outcome that shows them."""
+    """The arrays that all chunks write to, at the start of a run, and the outcome
+    that shows them.
+    """
     n, m = len(request.start), len(request.schedule.count)
     sampled = n - request.checks
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
@@ -246,7 +289,8 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
         **marks(n),
     }
     outcome = Outcome(
-        whole["state"], whole["phase"], whole["status"], whole["mode"], whole["counters"], whole["minima"], whole["samples"],
+        whole["state"], whole["phase"], whole["status"], whole["mode"], whole["counters"],
+        whole["minima"], whole["samples"],
         whole["sample_mode"], ContactTable.empty(0, states),
     )  # fmt: skip
     return outcome, whole
@@ -256,38 +300,59 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
 ARGUMENTS = Batch._fields
 
 
-def _cut(request: Request, whole: dict[str, np.ndarray], first: int, data: np.ndarray, due: float | None) -> _Chunk:
+def _cut(
+    request: Request, whole: dict[str, np.ndarray], first: int, data: np.ndarray, due: float | None
+) -> _Chunk:
     """The arrays of one chunk: views of the whole, and tables of its own."""
     last = min(first + CHUNK, len(request.start))
     arrays = {name: array[first:last] for name, array in whole.items()}
     shared = len(request.parameters) == 1
-    arrays["param"] = np.ascontiguousarray(request.parameters if shared else request.parameters[first:last], float)
+    arrays["param"] = np.ascontiguousarray(
+        request.parameters if shared else request.parameters[first:last], float
+    )
     arrays["stride"] = np.int64(0 if shared else 1)  # type: ignore[assignment]
-    arrays["sample_count"], arrays["sample_fraction"] = request.schedule.count, request.schedule.fraction
-    arrays["rec_first"] = np.full(last - first, 0 if request.record_from is None else request.record_from, np.int64)
+    arrays["sample_count"], arrays["sample_fraction"] = (
+        request.schedule.count,
+        request.schedule.fraction,
+    )
+    arrays["rec_first"] = np.full(
+        last - first, 0 if request.record_from is None else request.record_from, np.int64
+    )
     arrays["rec_used"] = np.zeros(1, np.int64)
     arrays["data"] = data
     return _Chunk(first, arrays, request.record_from is not None, due)
 
 
 def _open_tables(chunk: _Chunk, module: Flow) -> None:
-    """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no memory."""
+    """The chunk's table of contacts, made when its turn comes so that waiting chunks hold no
+    memory.
+    """
     size = RECORDS + module.STEP_RECORDS if chunk.keeps_contacts else 0
-    chunk.arrays["rec_i"], chunk.arrays["rec_f"] = ContactTable.empty(size, chunk.arrays["state"].shape[1]).arrays
+    chunk.arrays["rec_i"], chunk.arrays["rec_f"] = ContactTable.empty(
+        size, chunk.arrays["state"].shape[1]
+    ).arrays
 
 
 def _empty_table(chunk: _Chunk, room: Contacts) -> None:
     """Move a chunk's contacts from its table to its list."""
     arrays, used = chunk.arrays, int(chunk.arrays["rec_used"][0])
     if used:
-        chunk.contacts.append(ContactTable(arrays["rec_i"][:used], arrays["rec_f"][:used].copy()).moved(chunk.first))
+        chunk.contacts.append(
+            ContactTable(arrays["rec_i"][:used], arrays["rec_f"][:used].copy()).moved(chunk.first)
+        )
         room.take(used)
         arrays["rec_used"][0] = 0
 
 
-def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], t_end: float) -> Outcome:
-    """Times at the end, and the contacts of all chunks in one sorted table; none is later than the end, not by rounding either."""
-    outcome.time = np.minimum(whole["origin"] + whole["count"] * whole["period"] + whole["phase"], t_end)
+def _finish(
+    outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk], t_end: float
+) -> Outcome:
+    """Times at the end, and the contacts of all chunks in one sorted table; none is later than the
+    end, not by rounding either.
+    """
+    outcome.time = np.minimum(
+        whole["origin"] + whole["count"] * whole["period"] + whole["phase"], t_end
+    )
     running, begun = whole["status"] == st.RUNNING, whole["counters"][:, st.STEPS] > 0
     whole["status"][running] = np.where(begun[running], st.INTERRUPTED, st.NOT_COMPUTED)
     if parts := [part for chunk in chunks for part in chunk.contacts]:
@@ -300,23 +365,42 @@ def _finish(outcome: Outcome, whole: dict[str, np.ndarray], chunks: list[_Chunk]
 
 
 def _returns_where_sliding_begins(contacts: ContactTable, status: np.ndarray) -> np.ndarray:
-    """The last contact of a trajectory that slides, where it is the return from the one before it at the same instant: bool[contacts]."""
-    who, guard, direction, time = contacts.trajectory, contacts.guard, contacts.direction, contacts.time
+    """The last contact of a trajectory that slides, where it is the return from the one before it
+    at the same instant: bool[contacts].
+    """
+    who, guard, direction, time = (
+        contacts.trajectory,
+        contacts.guard,
+        contacts.direction,
+        contacts.time,
+    )
     last = (status[who] == st.SLIDING) & (np.append(who[1:], -1) != who)
-    back = (who[1:] == who[:-1]) & (guard[1:] == guard[:-1]) & (direction[1:] == -direction[:-1]) & (time[1:] == time[:-1])
+    back = (
+        (who[1:] == who[:-1])
+        & (guard[1:] == guard[:-1])
+        & (direction[1:] == -direction[:-1])
+        & (time[1:] == time[:-1])
+    )
     return last & np.append(False, back)
 
 
-# -- work ----------------------------------------------------------------------------------------------------------------------
+# -- work ------------------------------------------------------------------------------------------
 def slice_of(states: int) -> int:
     """Steps of the lanes between two checks for Ctrl-C: steps of many states take longer."""
     return max(SLICE * 4 // max(states, 2) ** 2, 1)
 
 
 def _advance(
-    chunk: _Chunk, module: Flow, workspace: tuple, stop: Stop, room: Contacts, show: Callable[[float], None] | None = None
+    chunk: _Chunk,
+    module: Flow,
+    workspace: tuple,
+    stop: Stop,
+    room: Contacts,
+    show: Callable[[float], None] | None = None,
 ) -> None:
-    """Move a chunk to its end in slices; empties its table of contacts after each. It ends early if the memory for contacts is full."""
+    """Move a chunk to its end in slices; empties its table of contacts after each. It ends early if
+    the memory for contacts is full.
+    """
     arrays = chunk.arrays
     steps = slice_of(arrays["state"].shape[1])
     while not stop.is_set():
@@ -346,11 +430,18 @@ def _behind(arrays: dict[str, np.ndarray]) -> float:
 
 
 def _run_chunks(
-    chunks: list[_Chunk], module: Flow, stop: Stop, room: Contacts, progress: Callable[[float], None] | None, workers: int
+    chunks: list[_Chunk],
+    module: Flow,
+    stop: Stop,
+    room: Contacts,
+    progress: Callable[[float], None] | None,
+    workers: int,
 ) -> None:
-    """All chunks; Ctrl-C never comes in the midst of one, which would cut a table of contacts in two.
+    """All chunks; Ctrl-C never comes in the midst of one, which would cut a table of contacts in
+    two.
 
-    A single chunk that is moved by this very thread reports its own progress: a thread only for that would take as long as a short run.
+    A single chunk that is moved by this very thread reports its own progress: a thread only for
+    that would take as long as a short run.
     """
     here = len(chunks) == 1 and may_wait(stop)
 

@@ -1,4 +1,6 @@
-"""A flight: many trajectories on their way, moved some periods at a time and thinned out as they arrive."""
+"""A flight: many trajectories on their way, moved some periods at a time and thinned out as they
+arrive.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,15 @@ class Flight:
         Periods that will be asked for at most; sets the default step budget.
     """
 
-    def __init__(self, system: System, method: Method, start: np.ndarray, parameters: np.ndarray, period: np.ndarray, longest: float):
+    def __init__(
+        self,
+        system: System,
+        method: Method,
+        start: np.ndarray,
+        parameters: np.ndarray,
+        period: np.ndarray,
+        longest: float,
+    ):
         count = len(start)
         self._module = method.kernels(system.origin)
         request = Request.periods(start, parameters, period, 0)
@@ -99,8 +109,10 @@ class Flight:
         arrays["end_count"] = np.full(k, self.age + periods, np.int64)
         samples = np.full((k, periods, states), np.nan)
         call = dict(
-            arrays, stride=np.int64(0 if len(arrays["param"]) == 1 else 1), cursor=np.zeros(k, np.int64), samples=samples,
-            sample_count=np.arange(self.age + 1, self.age + periods + 1, dtype=np.int64), sample_fraction=np.zeros(periods),
+            arrays, stride=np.int64(0 if len(arrays["param"]) == 1 else 1),
+            cursor=np.zeros(k, np.int64), samples=samples,
+            sample_count=np.arange(self.age + 1, self.age + periods + 1, dtype=np.int64),
+            sample_fraction=np.zeros(periods),
             sample_mode=np.zeros((k, periods), np.int64), rec_first=np.zeros(k, np.int64),
             rec_used=np.zeros(1, np.int64), data=self._data,
         )  # fmt: skip

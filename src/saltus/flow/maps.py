@@ -1,4 +1,6 @@
-"""Maps: what orbits, attractors, responses and exponents are asked of. The stroboscope of a flow, or any function of states."""
+"""Maps: what orbits, attractors, responses and exponents are asked of. The stroboscope of a flow,
+or any function of states.
+"""
 
 from __future__ import annotations
 
@@ -23,11 +25,13 @@ from saltus.system.tangent import tangent_system
 MODE_SAMPLES = 32
 #: End of the message for a system without forcing.
 NO_PERIOD = (
-    'has no forcing period: give every=, the time between two samples of the motion, such as every="0.1 s", about a turn of it. '
+    "has no forcing period: give every=, the time between two samples of the motion, such as "
+    'every="0.1 s", about a turn of it. '
     "Answers don't depend on it."
 )
-#: The noise of a method is relative to a box of starts; a motion is some ten times smaller. Measured for ode45 at (1e-4, 1e-7) on the rig's
-#: responses: its returns scatter by 0.05 to 2 % of their range with location, by 0.3 to 4 % without.
+#: The noise of a method is relative to a box of starts; a motion is some ten times smaller.
+#: Measured for ode45 at (1e-4, 1e-7) on the rig's responses: its returns scatter by 0.05 to 2 % of
+#: their range with location, by 0.3 to 4 % without.
 BOX_PER_MOTION = 10.0
 #: Share of the range of a motion beyond which a mismatch is no noise.
 MAX_NOISE = 0.03
@@ -66,7 +70,8 @@ class Travel(Protocol):
 class Map(Protocol):
     """A map of states to states. k points, D states.
 
-    A map has one row of parameter values for all points, or a row for each of them: row i of all arrays then belongs to row i.
+    A map has one row of parameter values for all points, or a row for each of them: row i of all
+    arrays then belongs to row i.
 
     Attributes
     ----------
@@ -81,7 +86,9 @@ class Map(Protocol):
 
     @property
     def noise(self) -> float:
-        """Mismatch of a closed orbit that the map's own errors explain, relative to the range of a box of starts."""
+        """Mismatch of a closed orbit that the map's own errors explain, relative to the range of a
+        box of starts.
+        """
 
     @property
     def exact(self) -> bool:
@@ -95,16 +102,24 @@ class Map(Protocol):
         """The noise relative to the ranges float64[m, D] of motions, float64[m]."""
 
     def rows(self, which: np.ndarray) -> Map:
-        """The map of some of the rows: int64[m], with repeats if wanted, or bool[k]. A single row is repeated for each."""
+        """The map of some of the rows: int64[m], with repeats if wanted, or bool[k]. A single row
+        is repeated for each.
+        """
 
     def launch(self, start: np.ndarray, longest: float) -> Travel:
         """Trajectories from float64[k, D]; they will be asked for ``longest`` iterates at most."""
 
-    def tangent(self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Ends float64[k, D] of ``count`` iterates, and the derivative times ``directions`` (default: identity) float64[k, D, D]."""
+    def tangent(
+        self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Ends float64[k, D] of ``count`` iterates, and the derivative times ``directions``
+        (default: identity) float64[k, D, D].
+        """
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
-        """End states after ``count`` iterates, and for each start the contacts on the way: guard and direction in one number."""
+        """End states after ``count`` iterates, and for each start the contacts on the way: guard
+        and direction in one number.
+        """
 
 
 class Stroboscope:
@@ -117,7 +132,8 @@ class Stroboscope:
     method : Method
         How to integrate.
     parameters : float64[k, P], optional
-        Values in the order of ``system.values``: one row for all points, or a row for each. Default: those of the system.
+        Values in the order of ``system.values``: one row for all points, or a row for each.
+        Default: those of the system.
     every : float or float64[k], optional
         Time between two samples [s]: for systems without forcing.
     threads : int, optional
@@ -133,11 +149,15 @@ class Stroboscope:
         threads: int | None = None,
     ):
         if (every is None) == (system.forced_at is None):
-            raise ParameterError(f"{system.name} {NO_PERIOD if every is None else 'is forced: leave every= out.'}")
+            raise ParameterError(
+                f"{system.name} {NO_PERIOD if every is None else 'is forced: leave every= out.'}"
+            )
         if every is not None and not (np.isfinite(every) & (np.asarray(every) > 0)).all():
             raise ParameterError(f"every must be a positive time, not {shown(every)}.")
         self.system, self.method, self.states, self.threads = system, method, system.states, threads
-        self.parameters = np.atleast_2d(np.array(list(system.values.values()) if parameters is None else parameters, float))
+        self.parameters = np.atleast_2d(
+            np.array(list(system.values.values()) if parameters is None else parameters, float)
+        )
         check_overlaps(system, self.values)
         period = system.period(self.values) if every is None else every
         self.period = np.broadcast_to(np.asarray(period, float), len(self)).copy()
@@ -177,10 +197,16 @@ class Stroboscope:
         """See :class:`Map`; with other threads if they are given."""
         index = np.flatnonzero(which) if which.dtype == bool else which
         index = np.zeros_like(index) if len(self) == 1 else index
-        return self._with(parameters=self.parameters[index], period=self.period[index], threads=threads or self.threads)
+        return self._with(
+            parameters=self.parameters[index],
+            period=self.period[index],
+            threads=threads or self.threads,
+        )
 
     def with_period(self, time: np.ndarray) -> Stroboscope:
-        """The same rows with other times between two samples [s], float64[k]: for systems without forcing."""
+        """The same rows with other times between two samples [s], float64[k]: for systems without
+        forcing.
+        """
         return self._with(period=np.array(time, float))
 
     def of_system(self, system: System) -> Stroboscope:
@@ -195,16 +221,38 @@ class Stroboscope:
 
     def launch(self, start: np.ndarray, longest: float) -> Flight:
         """See :class:`Map`. On one thread."""
-        return Flight(self.system, self.method, start, self.parameters, np.broadcast_to(self.period, len(start)).copy(), longest)
+        return Flight(
+            self.system,
+            self.method,
+            start,
+            self.parameters,
+            np.broadcast_to(self.period, len(start)).copy(),
+            longest,
+        )
 
     def run(
-        self, start: np.ndarray, periods: np.ndarray | int, schedule: Schedule | None = None, record: int | None = None
+        self,
+        start: np.ndarray,
+        periods: np.ndarray | int,
+        schedule: Schedule | None = None,
+        record: int | None = None,
     ) -> engine.Outcome:
-        """Trajectories over ``periods`` each, with samples at a schedule and the contacts from period ``record`` on."""
-        request = Request.periods(start, self.parameters, self.period, periods, schedule=schedule or Schedule.none(), record_from=record)
+        """Trajectories over ``periods`` each, with samples at a schedule and the contacts from
+        period ``record`` on.
+        """
+        request = Request.periods(
+            start,
+            self.parameters,
+            self.period,
+            periods,
+            schedule=schedule or Schedule.none(),
+            record_from=record,
+        )
         return engine.run(self.system, self.method, request, self.threads)
 
-    def tangent(self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def tangent(
+        self, start: np.ndarray, count: np.ndarray | int, directions: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`Map`."""
         k, size = start.shape
         first = np.broadcast_to(np.eye(size), (k, size, size)) if directions is None else directions
@@ -215,10 +263,15 @@ class Stroboscope:
 
     def sequences(self, start: np.ndarray, count: int) -> tuple[np.ndarray, list[np.ndarray]]:
         """See :class:`Map`."""
-        if not self.method.records_contacts:  # the modes in which the motion is seen, one after the other, stand for contacts
+        # the modes in which the motion is seen, one after the other, stand for contacts
+        if not self.method.records_contacts:
             outcome = self.run(start, count, Schedule.even(count, MODE_SAMPLES))
-            return outcome.state, [row[np.flatnonzero(np.diff(row, prepend=-1))] for row in outcome.sample_mode]
+            return outcome.state, [
+                row[np.flatnonzero(np.diff(row, prepend=-1))] for row in outcome.sample_mode
+            ]
         outcome = self.run(start, count, record=0)
         contacts = outcome.contacts
-        codes = np.ravel_multi_index((contacts.kind, contacts.direction + 1, contacts.guard), (3, 3, 2**31))
+        codes = np.ravel_multi_index(
+            (contacts.kind, contacts.direction + 1, contacts.guard), (3, 3, 2**31)
+        )
         return outcome.state, np.split(codes, contacts.begins(len(start))[1:-1])

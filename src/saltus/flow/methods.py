@@ -22,14 +22,20 @@ from saltus.system.system import System
 STEPS_PER_PERIOD = 10_000
 #: Steps that any trajectory may take.
 STEPS_AT_LEAST = 1_000_000
-#: Trajectories of a small batch, and its lanes: one and the three copies that measure its errors. 16 lanes take twice as long (0028).
+#: Trajectories of a small batch, and its lanes: one and the three copies that measure its errors.
+#: 16 lanes take twice as long (0028).
 SMALL_BATCH = 4
-#: Share of its span that LONG_CHECK_STEPS steps must bring: a trajectory of 1e9 steps, minutes, runs to its end.
+#: Share of its span that LONG_CHECK_STEPS steps must bring: a trajectory of 1e9 steps, minutes,
+#: runs to its end.
 SLOWEST_SHARE = 1e-3
 
 
 def _step_budget(given: int | None, periods: float) -> float:
-    return float(given) if given is not None else STEPS_AT_LEAST + STEPS_PER_PERIOD * math.ceil(periods)
+    return (
+        float(given)
+        if given is not None
+        else STEPS_AT_LEAST + STEPS_PER_PERIOD * math.ceil(periods)
+    )
 
 
 def _check_positive(name: str, value: Any) -> None:
@@ -57,10 +63,15 @@ def _explain_unknown_options(cls: type[_M]) -> type[_M]:
             if word not in known:
                 own = _MATLAB.get(word.lower())
                 raise ParameterError(
-                    f"sl.{cls.__name__} has no option {shown(word)}. {f'Write {own}=.' if own in known else nearest(word, known)}"
+                    f"sl.{cls.__name__} has no option {shown(word)}. "
+                    f"{f'Write {own}=.' if own in known else nearest(word, known)}"
                 )
         if len(args) > len(known):
-            raise ParameterError(f"sl.{cls.__name__} takes {', '.join(f'{name}=' for name in known)}, not {len(args)} values in a row.")
+            raise ParameterError(
+                f"sl.{cls.__name__} takes "
+                f"{', '.join(f'{name}=' for name in known)}, not {len(args)} "
+                f"values in a row."
+            )
         made(self, *args, **kwargs)
 
     cls.__init__ = init  # type: ignore[assignment, method-assign]
@@ -88,11 +99,15 @@ class Method:
         raise NotImplementedError
 
     def due(self, periods: float) -> float | None:  # noqa: ARG002
-        """Least progress in :data:`saltus.flow.pace.LONG_CHECK_STEPS` steps, in periods; None if there is a budget of steps."""
+        """Least progress in :data:`saltus.flow.pace.LONG_CHECK_STEPS` steps, in periods; None if
+        there is a budget of steps.
+        """
         return None
 
     def suited_to(self, count: int) -> Method:  # noqa: ARG002  (unused by most methods)
-        """The fastest variant of the method for ``count`` trajectories; its results are the same to the bit."""
+        """The fastest variant of the method for ``count`` trajectories; its results are the same to
+        the bit.
+        """
         return self
 
     @property
@@ -102,7 +117,9 @@ class Method:
 
     @property
     def noise(self) -> float:
-        """Mismatch of a periodic orbit, relative to the range of the states, that this method's own errors explain."""
+        """Mismatch of a periodic orbit, relative to the range of the states, that this method's own
+        errors explain.
+        """
         raise NotImplementedError
 
     @property
@@ -115,28 +132,35 @@ class Method:
         return np.full(len(scale), self.noise)
 
     def companion(self) -> Method:
-        """A more exact method: the distance of its contact times from this one's measures their errors."""
+        """A more exact method: the distance of its contact times from this one's measures their
+        errors.
+        """
         raise NotImplementedError
 
 
 @_explain_unknown_options
 @dataclass(frozen=True)
 class Taylor(Method):
-    """Taylor series, contacts located on the gap's own polynomial: machine precision, no contact missed. The default.
+    """Taylor series, contacts located on the gap's own polynomial: machine precision, no contact
+    missed. The default.
 
     Parameters
     ----------
     order : int
-        Order of the series, 6 to 40. 20 is where the rig's cost is flattest (benchmarks/flow.py): higher orders take fewer steps, but
-        every contact ends a step anyway.
+        Order of the series, 6 to 40. 20 is where the rig's cost is flattest (benchmarks/flow.py):
+        higher orders take fewer steps, but every contact ends a step anyway.
     tolerance : float
-        Size of the last two terms of a step relative to the leading ones [-]. The default, 2**-56, leaves rounding only, over any number
-        of periods; 2**-46 leaves 3e-15 m of error on the rig after five periods and takes a quarter less time.
+        Size of the last two terms of a step relative to the leading ones [-]. The default, 2**-56,
+        leaves rounding only, over any number of periods; 2**-46 leaves 3e-15 m of error on the rig
+        after five periods and takes a quarter less time.
     lanes : int, optional
-        Trajectories moved at once: 2, 4, 8 or 16. Default: what suits the processor, and a short run of few. Results don't depend on it.
+        Trajectories moved at once: 2, 4, 8 or 16. Default: what suits the processor, and a short
+        run of few. Results don't depend on it.
     max_steps, max_events : int, optional
-        Budgets of one trajectory; beyond them it stops with status ``budget_steps`` or ``budget_events``. Default: any number of steps as
-        long as each million brings it a thousandth of the run further, or 100 periods, and it doesn't stand still; 10 million contacts.
+        Budgets of one trajectory; beyond them it stops with status ``budget_steps`` or
+        ``budget_events``. Default: any number of steps as long as each million brings it a
+        thousandth of the run further, or 100 periods, and it doesn't stand still; 10 million
+        contacts.
 
     References
     ----------
@@ -152,7 +176,9 @@ class Taylor(Method):
     def __post_init__(self) -> None:
         whole(self.order, "order", 6, 40)
         _check_positive("tolerance", self.tolerance)
-        if self.lanes is not None and (not isinstance(self.lanes, int) or self.lanes not in (2, 4, 8, 16)):
+        if self.lanes is not None and (
+            not isinstance(self.lanes, int) or self.lanes not in (2, 4, 8, 16)
+        ):
             raise ParameterError(f"lanes must be 2, 4, 8 or 16, not {shown(self.lanes)}.")
         if self.max_steps is not None:
             whole(self.max_steps, "max_steps")
@@ -164,17 +190,31 @@ class Taylor(Method):
 
     def suited_to(self, count: int) -> Taylor:
         """With few lanes for few trajectories, unless the user has chosen."""
-        return replace(self, lanes=min(SMALL_BATCH, lane_width())) if self.lanes is None and count <= SMALL_BATCH else self
+        return (
+            replace(self, lanes=min(SMALL_BATCH, lane_width()))
+            if self.lanes is None and count <= SMALL_BATCH
+            else self
+        )
 
     def numbers(self, periods: float) -> np.ndarray:
-        """log2 of the tolerance, steps between two checks of the pace, event budget, least progress between two checks [periods]."""
+        """log2 of the tolerance, steps between two checks of the pace, event budget, least progress
+        between two checks [periods].
+        """
         due = self.due(periods)
-        steps, least = (CHECK_STEPS, due * CHECK_STEPS / LONG_CHECK_STEPS) if due is not None else (self.max_steps or 0, math.inf)
+        steps, least = (
+            (CHECK_STEPS, due * CHECK_STEPS / LONG_CHECK_STEPS)
+            if due is not None
+            else (self.max_steps or 0, math.inf)
+        )
         return np.array([math.log2(self.tolerance), float(steps), float(self.max_events), least])
 
     def due(self, periods: float) -> float | None:
         """See :class:`Method`."""
-        return min(SLOWEST_SHARE * periods, LONG_CHECK_STEPS / STEPS_PER_PERIOD) if self.max_steps is None else None
+        return (
+            min(SLOWEST_SHARE * periods, LONG_CHECK_STEPS / STEPS_PER_PERIOD)
+            if self.max_steps is None
+            else None
+        )
 
     @property
     def noise(self) -> float:
@@ -187,8 +227,12 @@ class Taylor(Method):
         return True
 
     def companion(self) -> Taylor:
-        """The same series with steps an eighth shorter, which leaves a twentieth of the truncation; the same compiled kernel."""
-        return Taylor(self.order, self.tolerance * 2.0**-4, self.lanes, self.max_steps, self.max_events)
+        """The same series with steps an eighth shorter, which leaves a twentieth of the truncation;
+        the same compiled kernel.
+        """
+        return Taylor(
+            self.order, self.tolerance * 2.0**-4, self.lanes, self.max_steps, self.max_events
+        )
 
 
 @_explain_unknown_options
@@ -201,14 +245,17 @@ class ODE45(Method):
     rtol, atol : float
         RelTol [-] and AbsTol [unit of each state]; the defaults are MATLAB's.
     events : {"locate", "ignore"}
-        ``"locate"``: integration stops at each contact and starts afresh, as with MATLAB's Events option. ``"ignore"``: contacts are
-        stepped over and the right-hand side picks its side from the state, as without it.
+        ``"locate"``: integration stops at each contact and starts afresh, as with MATLAB's Events
+        option. ``"ignore"``: contacts are stepped over and the right-hand side picks its side from
+        the state, as without it.
     max_steps, max_events : int, optional
-        Budgets of one trajectory. Default: 10 000 steps per period and a million more; 10 million contacts.
+        Budgets of one trajectory. Default: 10 000 steps per period and a million more; 10 million
+        contacts.
 
     References
     ----------
-    Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19-26; Shampine & Reichelt, SIAM J. Sci. Comput. 18 (1997) 1-22.
+    Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19-26; Shampine & Reichelt, SIAM J. Sci.
+    Comput. 18 (1997) 1-22.
     """
 
     rtol: float = 1e-3
@@ -221,7 +268,10 @@ class ODE45(Method):
         _check_positive("rtol", self.rtol)
         _check_positive("atol", self.atol)
         if self.rtol < 100 * np.finfo(float).eps:
-            raise ParameterError(f"rtol must be at least {100 * np.finfo(float).eps:.3g}, as in MATLAB, not {self.rtol}.")
+            raise ParameterError(
+                f"rtol must be at least {100 * np.finfo(float).eps:.3g}, as in "
+                f"MATLAB, not {self.rtol}."
+            )
         if not isinstance(self.events, str) or self.events not in ("locate", "ignore"):
             raise ParameterError(f'events must be "locate" or "ignore", not {shown(self.events)}.')
         if self.max_steps is not None:
@@ -235,7 +285,15 @@ class ODE45(Method):
     def numbers(self, periods: float) -> np.ndarray:
         """RelTol, AbsTol, whether contacts are located, step budget, event budget."""
         locate = 1.0 if self.events == "locate" else 0.0
-        return np.array([self.rtol, self.atol, locate, _step_budget(self.max_steps, periods), float(self.max_events)])
+        return np.array(
+            [
+                self.rtol,
+                self.atol,
+                locate,
+                _step_budget(self.max_steps, periods),
+                float(self.max_events),
+            ]
+        )
 
     @property
     def records_contacts(self) -> bool:
@@ -244,7 +302,9 @@ class ODE45(Method):
 
     @property
     def noise(self) -> float:
-        """ode45's errors over some periods: its map isn't even continuous where step counts change, and contacts stepped over cost more."""
+        """ode45's errors over some periods: its map isn't even continuous where step counts change,
+        and contacts stepped over cost more.
+        """
         return min((5.0 if self.events == "locate" else 20.0) * self.rtol, 0.01)
 
     def noise_of(self, scale: np.ndarray) -> np.ndarray:
@@ -257,10 +317,14 @@ class ODE45(Method):
 
 
 def check_method(method: Any) -> Method:
-    """The method itself, the default for None. Raises ParameterError for anything that isn't one."""
+    """The method itself, the default for None. Raises ParameterError for anything
+    that isn't one.
+    """
     if method is None:
         return Taylor()
     if not isinstance(method, Method):
         what = method.__name__ + " itself" if isinstance(method, type) else shown(method)
-        raise ParameterError(f"method must be such as sl.Taylor() or sl.ODE45(rtol=1e-4, atol=1e-7), not {what}.")
+        raise ParameterError(
+            f"method must be such as sl.Taylor() or sl.ODE45(rtol=1e-4, atol=1e-7), not {what}."
+        )
     return method

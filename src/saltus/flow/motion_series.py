@@ -1,7 +1,8 @@
-"""The Taylor series of motions: from the places where a flow knows them, with those of any function of them.
+"""The Taylor series of motions: from the places where a flow knows them, with those of any function
+of them.
 
-The series are those that the flow itself steps by: :mod:`saltus.codegen` writes them, NumPy evaluates them for thousands of places at once,
-and nothing is compiled.
+The series are those that the flow itself steps by: :mod:`saltus.codegen` writes them, NumPy
+evaluates them for thousands of places at once, and nothing is compiled.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from saltus.system.system import System
 ORDER, LOG2_TOLERANCE = 20, -50.0
 #: Pieces between two nodes; more mean a pole.
 MOST_PIECES = 1000
-#: A boundary nearer than this to the start of a piece is the one at which the piece starts [lengths of the piece].
+#: A boundary nearer than this to the start of a piece is the one at which the piece starts [lengths
+#: of the piece].
 START_TOLERANCE = 1e-9
 
 
@@ -61,7 +63,9 @@ class Pieces:
 
 @dataclass(frozen=True)
 class Nodes:
-    """Where motions are known: row by row in the order of motion and time; each lasts until the next."""
+    """Where motions are known: row by row in the order of motion and time; each lasts until the
+    next.
+    """
 
     motion: np.ndarray
     period: np.ndarray
@@ -76,7 +80,9 @@ class Nodes:
 
 
 class MotionSeries:
-    """The Taylor series of a map_'s states, of some quantities (the last guards of ``watched``) and of its gaps."""
+    """The Taylor series of a map_'s states, of some quantities (the last guards of ``watched``) and
+    of its gaps.
+    """
 
     def __init__(self, map_: Stroboscope, watched: System, guards: int):
         self._map, self._guards, self._own = map_, guards, len(map_.system.guards)
@@ -84,7 +90,10 @@ class MotionSeries:
         self._module: ModuleType = series_module(watched, ORDER)
         k, module = len(map_), self._module
         self._tables = table_data(watched)
-        self._constants, self._turns = np.zeros((max(module.NCONST, 1), k)), np.zeros((module.CLOCK_ROWS, k))
+        self._constants, self._turns = (
+            np.zeros((max(module.NCONST, 1), k)),
+            np.zeros((module.CLOCK_ROWS, k)),
+        )
         self._drifts = np.zeros(k, bool)
         for i, row in enumerate(map_.parameters):
             module.constants(row, self._constants, i)
@@ -94,20 +103,36 @@ class MotionSeries:
         """No pieces at all."""
         numbers, reals = np.zeros(0, np.int64), np.zeros(0)
         size = self._module.NSTATES + len(self._asked)
-        return Pieces(numbers, numbers, reals, reals, np.zeros((ORDER + 1, size, 0)), np.zeros((size, 0)))
+        return Pieces(
+            numbers, numbers, reals, reals, np.zeros((ORDER + 1, size, 0)), np.zeros((size, 0))
+        )
 
     def of(self, nodes: Nodes, cubic: bool) -> list[Pieces]:
-        """The pieces that begin at nodes and fill them; for cubics the first terms of each will do."""
+        """The pieces that begin at nodes and fill them; for cubics the first terms of
+        each will do.
+        """
         result, state, left = [], nodes.state.T.copy(), nodes.length.copy()
-        side = np.full((self._module.NGUARDS + self._module.SINGULAR, len(left)), -1.0)  # -1: no term is left out
-        side[: self._guards] = np.where((nodes.mode[None] >> np.arange(self._guards)[:, None]) & 1 == 1, 1.0, -1.0)
+        # -1: no term is left out
+        side = np.full((self._module.NGUARDS + self._module.SINGULAR, len(left)), -1.0)
+        side[: self._guards] = np.where(
+            (nodes.mode[None] >> np.arange(self._guards)[:, None]) & 1 == 1, 1.0, -1.0
+        )
         new = np.ones(len(left), bool)
         for _ in range(MOST_PIECES):
             work, h = self._step(nodes, state, side, new)
-            h, flips = (left, np.zeros_like(side, bool)) if cubic else self._until_own_boundary(work, np.minimum(h, left))
+            h, flips = (
+                (left, np.zeros_like(side, bool))
+                if cubic
+                else self._until_own_boundary(work, np.minimum(h, left))
+            )
             result.append(self._piece(nodes, work, h))
             powers = h ** np.arange(ORDER + 1)[:, None]
-            state = np.stack([(self._rows(work, i * (ORDER + 1)) * powers).sum(axis=0) for i in range(len(state))])
+            state = np.stack(
+                [
+                    (self._rows(work, i * (ORDER + 1)) * powers).sum(axis=0)
+                    for i in range(len(state))
+                ]
+            )
             left = np.where(h < left, left - h, 0.0)
             going = (left > 0.0) & np.isfinite(state).all(axis=0) & (not cubic)
             if not going.any():
@@ -118,8 +143,12 @@ class MotionSeries:
             new = np.zeros(len(left), bool)
         return result
 
-    def _step(self, nodes: Nodes, state: np.ndarray, side: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """All terms at some places, and how far they reach. At new nodes the sides of guards of the quantities' own are found first."""
+    def _step(
+        self, nodes: Nodes, state: np.ndarray, side: np.ndarray, new: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """All terms at some places, and how far they reach. At new nodes the sides of guards of the
+        quantities' own are found first.
+        """
         module, motion = self._module, nodes.motion
         constants, (clock, room) = self._constants[:, motion], self._clock(nodes)
         work = np.zeros((module.ROWS, len(motion)))
@@ -129,7 +158,9 @@ class MotionSeries:
             for guard in range(self._own, self._guards):
                 terms = self._gap(work, guard)
                 terms[0] = np.where(np.abs(terms[0]) <= self._noise(work, guard), 0.0, terms[0])
-                side[guard] = np.where(new, np.where(polynomials.leading_signs(terms)[0] < 0.0, -1.0, 1.0), side[guard])
+                side[guard] = np.where(
+                    new, np.where(polynomials.leading_signs(terms)[0] < 0.0, -1.0, 1.0), side[guard]
+                )
             if self._own < self._guards:
                 aside |= boundaries.jets(work)
             h = module.step_length(work, LOG2_TOLERANCE)
@@ -139,41 +170,75 @@ class MotionSeries:
         return work, h
 
     def _clock(self, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
-        """Phase, time at phase zero, the phases of all harmonics there, what the clocks hold; and the time to the next break of one."""
+        """Phase, time at phase zero, the phases of all harmonics there, what the clocks hold; and
+        the time to the next break of one.
+        """
         module, motion = self._module, nodes.motion
         clock = self._turns[:, motion]
         clock[module.TAU], clock[module.BASE] = nodes.phase, nodes.period * self._map.period[motion]
         for i in np.flatnonzero(self._drifts[motion]):
             row = motion[i]
-            module.turns(self._map.parameters[row], 0.0, self._map.period[row], int(nodes.period[i]), i, clock)
+            module.turns(
+                self._map.parameters[row],
+                0.0,
+                self._map.period[row],
+                int(nodes.period[i]),
+                i,
+                clock,
+            )
         room = np.full(len(motion), np.inf)
         if module.NCLOCKS:
-            numbers, held = np.zeros((module.NUMBERS + 1) * module.NCLOCKS), np.zeros(module.HELD * module.NCLOCKS)
+            numbers, held = (
+                np.zeros((module.NUMBERS + 1) * module.NCLOCKS),
+                np.zeros(module.HELD * module.NCLOCKS),
+            )
             for at, who in enumerate(motion.tolist()):
                 period, count = self._map.period[who], int(nodes.period[at])
-                module.place_clocks(self._map.parameters[who], 0.0, period, count, numbers, self._tables)
-                room[at] = module.set_clocks(nodes.phase[at], count * period, numbers, self._tables, False, held) - nodes.phase[at]
+                module.place_clocks(
+                    self._map.parameters[who], 0.0, period, count, numbers, self._tables
+                )
+                room[at] = (
+                    module.set_clocks(
+                        nodes.phase[at], count * period, numbers, self._tables, False, held
+                    )
+                    - nodes.phase[at]
+                )
                 clock[module.CLOCK_ROW :, at] = held
         return clock, room
 
     def _probed(
-        self, nodes: Nodes, side: np.ndarray, constants: np.ndarray, clock: np.ndarray, work: np.ndarray, h: np.ndarray
+        self,
+        nodes: Nodes,
+        side: np.ndarray,
+        constants: np.ndarray,
+        clock: np.ndarray,
+        work: np.ndarray,
+        h: np.ndarray,
     ) -> np.ndarray:
-        """Steps cut down to where the right-hand side agrees with the series: a term may sleep at the node."""
+        """Steps cut down to where the right-hand side agrees with the series: a term may sleep at
+        the node.
+        """
         module, width = self._module, len(h)
         period = self._map.period[nodes.motion]
         lanes = SimpleNamespace(
-            work=work, side=side, c=constants, clock=clock, probe_y=np.zeros((module.NSTATES, width)), probe_clock=np.zeros_like(clock),
+            work=work, side=side, c=constants, clock=clock,
+            probe_y=np.zeros((module.NSTATES, width)), probe_clock=np.zeros_like(clock),
             probe_rate=np.zeros((3 * module.NSTATES, width)),
         )  # fmt: skip
-        result: np.ndarray = module.probed(lanes, np.minimum(h, module.LONGEST_SHARE * period), LOG2_TOLERANCE)
+        result: np.ndarray = module.probed(
+            lanes, np.minimum(h, module.LONGEST_SHARE * period), LOG2_TOLERANCE
+        )
         return result
 
     def _until_own_boundary(self, work: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Lengths up to the first boundary of the quantities' own, and the guards float64[guards, n] that flip there."""
+        """Lengths up to the first boundary of the quantities' own, and the guards float64[guards,
+        n] that flip there.
+        """
         flips = np.zeros((self._module.NGUARDS + self._module.SINGULAR, len(h)), bool)
         for guard in range(self._own, self._guards):
-            which, place = polynomials.sign_changes(self._gap(work, guard) * h ** np.arange(ORDER + 1)[:, None])
+            which, place = polynomials.sign_changes(
+                self._gap(work, guard) * h ** np.arange(ORDER + 1)[:, None]
+            )
             which, place = which[place > START_TOLERANCE], place[place > START_TOLERANCE]
             which, first = np.unique(which, return_index=True)
             sooner = np.ones(len(h))
@@ -204,5 +269,10 @@ class MotionSeries:
         states = [self._rows(work, i * (ORDER + 1)) for i in range(self._module.NSTATES)]
         terms = np.stack([*states, *(self._gap(work, guard) for guard in self._asked)], axis=1)
         terms *= (h ** np.arange(ORDER + 1)[:, None])[:, None]
-        noise = np.stack([*(ROUNDING * np.abs(one[0]) for one in states), *(self._noise(work, guard) for guard in self._asked)])
+        noise = np.stack(
+            [
+                *(ROUNDING * np.abs(one[0]) for one in states),
+                *(self._noise(work, guard) for guard in self._asked),
+            ]
+        )
         return Pieces(nodes.motion, nodes.period, nodes.phase, h, terms, noise)

@@ -1,9 +1,10 @@
 """Pace: trajectories whose steps bring almost no progress are stopped.
 
-The Taylor kernel checks a trajectory every CHECK_STEPS steps and stops it if its progress is below the average that is due. Most of these
-are slow for a while only: they go on, and are stopped if LONG_CHECK_STEPS steps stay below the average. The second check finds trajectories
-at rest: at a singular point, such as the root of an empty tank, steps shrink until time no longer passes. The outcome depends on the
-trajectory alone, so results are the same in every chunk and on every thread.
+The Taylor kernel checks a trajectory every CHECK_STEPS steps and stops it if its progress is below
+the average that is due. Most of these are slow for a while only: they go on, and are stopped if
+LONG_CHECK_STEPS steps stay below the average. The second check finds trajectories at rest: at a
+singular point, such as the root of an empty tank, steps shrink until time no longer passes. The
+outcome depends on the trajectory alone, so results are the same in every chunk and on every thread.
 """
 
 from __future__ import annotations
@@ -14,18 +15,29 @@ from saltus.kernels import status as st
 
 #: Steps between two checks of a trajectory; steps over which its average pace is measured.
 CHECK_STEPS, LONG_CHECK_STEPS = 20_000, 1_000_000
-#: Share of the rest of a run that CHECK_STEPS steps must bring. Less would need 2e11 steps to the end: days.
+#: Share of the rest of a run that CHECK_STEPS steps must bring. Less would need 2e11 steps to the
+#: end: days.
 MIN_PROGRESS = 1e-7
 
 
 def marks(count: int) -> dict[str, np.ndarray]:
-    """State of ``count`` trajectories at the last check and at the last long check: steps, whole periods, phase [s]."""
-    never = {"check_steps": np.full(count, -LONG_CHECK_STEPS), "long_steps": np.zeros(count, np.int64)}
-    return never | {f"{which}_{what}": np.zeros(count) for which in ("check", "long") for what in ("count", "phase")}
+    """State of ``count`` trajectories at the last check and at the last long check: steps, whole
+    periods, phase [s].
+    """
+    never = {
+        "check_steps": np.full(count, -LONG_CHECK_STEPS),
+        "long_steps": np.zeros(count, np.int64),
+    }
+    return never | {
+        f"{which}_{what}": np.zeros(count)
+        for which in ("check", "long")
+        for what in ("count", "phase")
+    }
 
 
 def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
-    """Resume the trajectories that were stopped for a check and are fast enough; returns whether there are any.
+    """Resume the trajectories that were stopped for a check and are fast enough; returns whether
+    there are any.
 
     Parameters
     ----------
@@ -39,18 +51,30 @@ def resume(arrays: dict[str, np.ndarray], due: float) -> bool:
         return False
     steps = arrays["counters"][here, st.STEPS]
     rest = -_since(arrays, here, "end")
-    still = (steps - arrays["check_steps"][here] < 2 * CHECK_STEPS) & (_since(arrays, here, "check") < MIN_PROGRESS * rest)
+    still = (steps - arrays["check_steps"][here] < 2 * CHECK_STEPS) & (
+        _since(arrays, here, "check") < MIN_PROGRESS * rest
+    )
     long = steps - arrays["long_steps"][here]
-    slow = (long >= LONG_CHECK_STEPS) & ~(_since(arrays, here, "long") >= due * long / LONG_CHECK_STEPS)
+    slow = (long >= LONG_CHECK_STEPS) & ~(
+        _since(arrays, here, "long") >= due * long / LONG_CHECK_STEPS
+    )
     on = here[~(still | slow)]
     for which, who in (("check", on), ("long", on[(long >= LONG_CHECK_STEPS)[~(still | slow)]])):
         arrays[f"{which}_steps"][who] = arrays["counters"][who, st.STEPS]
-        arrays[f"{which}_count"][who], arrays[f"{which}_phase"][who] = arrays["count"][who], arrays["phase"][who]
+        arrays[f"{which}_count"][who], arrays[f"{which}_phase"][who] = (
+            arrays["count"][who],
+            arrays["phase"][who],
+        )
     arrays["status"][on] = st.RUNNING
     return len(on) > 0
 
 
 def _since(arrays: dict[str, np.ndarray], who: np.ndarray, which: str) -> np.ndarray:
-    """Periods since a mark: whole ones and the rest apart, so that no digit is lost in a long run."""
-    whole, phase = arrays["count"][who] - arrays[f"{which}_count"][who], arrays["phase"][who] - arrays[f"{which}_phase"][who]
+    """Periods since a mark: whole ones and the rest apart, so that no digit is lost
+    in a long run.
+    """
+    whole, phase = (
+        arrays["count"][who] - arrays[f"{which}_count"][who],
+        arrays["phase"][who] - arrays[f"{which}_phase"][who],
+    )
     return whole + phase / arrays["period"][who]

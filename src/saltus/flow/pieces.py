@@ -1,9 +1,12 @@
-"""Motions as polynomials: what a compiled flow has computed, with everything between its samples and contacts.
+"""Motions as polynomials: what a compiled flow has computed, with everything between its samples
+and contacts.
 
-The flow hands over its states some times a period and at every contact, and the mode in between. From each of these nodes the motion is
-the Taylor series of the equations in that mode: :mod:`saltus.codegen` writes it, NumPy evaluates it for thousands of nodes at once. Any
-function of the motion has its series too, so turning points are roots of polynomials and means are exact sums; nothing is compiled. A
-method that locates no contacts has cubics between its samples instead, through their values and rates.
+The flow hands over its states some times a period and at every contact, and the mode in between.
+From each of these nodes the motion is the Taylor series of the equations in that mode:
+:mod:`saltus.codegen` writes it, NumPy evaluates it for thousands of nodes at once. Any function of
+the motion has its series too, so turning points are roots of polynomials and means are exact sums;
+nothing is compiled. A method that locates no contacts has cubics between its samples instead,
+through their values and rates.
 """
 
 from __future__ import annotations
@@ -21,7 +24,8 @@ from saltus.system.expression import Expr
 from saltus.system.guards import Guard
 from saltus.system.system import System
 
-#: Samples of a period besides the contacts: for an exact method, for another method, and for cubics.
+#: Samples of a period besides the contacts: for an exact method, for another method, and for
+#: cubics.
 NODES, NODES_INEXACT, SAMPLES = 8, 64, 1000
 #: Nodes whose series are worked out at a time: some thousand rows of them fill a few ten megabytes.
 WIDTH = 2048
@@ -30,7 +34,11 @@ SAME = 1e-9
 
 
 def pieces(
-    map_: Stroboscope, start: np.ndarray, periods: int, quantities: Sequence[Expr], guards: Sequence[Guard]
+    map_: Stroboscope,
+    start: np.ndarray,
+    periods: int,
+    quantities: Sequence[Expr],
+    guards: Sequence[Guard],
 ) -> tuple[Pieces, Outcome]:
     """The motions from float64[k, D] over ``periods``, row i by row i of the map.
 
@@ -50,13 +58,18 @@ def pieces(
     Returns
     -------
     Pieces, Outcome
-        The quantities are the states, then those asked for, then the gaps of the system. A motion that didn't reach the end has no pieces.
+        The quantities are the states, then those asked for, then the gaps of the system. A motion
+        that didn't reach the end has no pieces.
     """
     asked = tuple(Guard(f"quantity {i}", quantity) for i, quantity in enumerate(quantities))
     watched = replace(map_.system, guards=(*guards, *asked))
-    whole, outcome = _pieces(map_, start, periods, watched, len(guards), not map_.method.records_contacts)
+    whole, outcome = _pieces(
+        map_, start, periods, watched, len(guards), not map_.method.records_contacts
+    )
     if map_.method.records_contacts:
-        without = np.setdiff1d(np.arange(len(start)), whole.motion[np.isfinite(whole.terms).all(axis=(0, 1))])
+        without = np.setdiff1d(
+            np.arange(len(start)), whole.motion[np.isfinite(whole.terms).all(axis=(0, 1))]
+        )
         bad = np.union1d(without, whole.motion[~np.isfinite(whole.terms).all(axis=(0, 1))])
         bad = bad[np.isfinite(outcome.state[bad]).all(axis=1)]
         if len(bad):  # a pole, or a law whose series isn't known where it begins
@@ -73,19 +86,29 @@ def nodes_of(map_: Stroboscope, cubic: bool = False) -> int:
     return NODES if map_.exact else NODES_INEXACT
 
 
-def _pieces(map_: Stroboscope, start: np.ndarray, periods: int, watched: System, guards: int, cubic: bool) -> tuple[Pieces, Outcome]:
+def _pieces(
+    map_: Stroboscope, start: np.ndarray, periods: int, watched: System, guards: int, cubic: bool
+) -> tuple[Pieces, Outcome]:
     """The pieces by Taylor series, or by cubics, and what the flow computed."""
     count = nodes_of(map_, cubic)
     schedule = Schedule.even(periods, count, beyond=int(cubic))
     outcome = map_.run(start, periods, schedule, record=0)
-    nodes, series = _nodes(map_, outcome, periods, schedule, cubic), MotionSeries(map_, watched, guards)
-    parts = [series.of(nodes.rows(slice(first, first + WIDTH)), cubic) for first in range(0, len(nodes.motion), WIDTH)]
+    nodes, series = (
+        _nodes(map_, outcome, periods, schedule, cubic),
+        MotionSeries(map_, watched, guards),
+    )
+    parts = [
+        series.of(nodes.rows(slice(first, first + WIDTH)), cubic)
+        for first in range(0, len(nodes.motion), WIDTH)
+    ]
     whole = _joined(parts or [[series.none()]])
     return (_between(whole) if cubic else whole), outcome
 
 
-# -- nodes ---------------------------------------------------------------------------------------------------------------------
-def _nodes(map_: Stroboscope, outcome: Outcome, periods: int, schedule: Schedule, cubic: bool) -> Nodes:
+# -- nodes -----------------------------------------------------------------------------------------
+def _nodes(
+    map_: Stroboscope, outcome: Outcome, periods: int, schedule: Schedule, cubic: bool
+) -> Nodes:
     """Samples and contacts in one list, without what lies at one instant with the next."""
     k, m, size = outcome.samples.shape
     contacts = outcome.contacts
@@ -99,36 +122,62 @@ def _nodes(map_: Stroboscope, outcome: Outcome, periods: int, schedule: Schedule
         np.concatenate([outcome.sample_mode.ravel(), contacts.mode_after]),
     )
     period = map_.period[nodes.motion]
-    order = np.lexsort((nodes.length, nodes.period * period + nodes.phase, nodes.motion))  # a sample before a contact at one instant
+    # a sample before a contact at one instant
+    order = np.lexsort((nodes.length, nodes.period * period + nodes.phase, nodes.motion))
     nodes, period = nodes.rows(order), period[order]
     behind = np.zeros(len(order), bool)
-    follows = (np.diff(nodes.motion) == 0) & (np.diff(nodes.period * period + nodes.phase) < SAME * period[1:])
+    follows = (np.diff(nodes.motion) == 0) & (
+        np.diff(nodes.period * period + nodes.phase) < SAME * period[1:]
+    )
     behind[1:] = follows & (nodes.length[1:] == 0.0) & (nodes.length[:-1] == 1.0)
     keep = whole[nodes.motion] & ~behind
     nodes, period = nodes.rows(keep), period[keep]
     last = np.append(np.diff(nodes.motion) != 0, True)[: len(period)]
     until_period = np.where(last, periods, np.roll(nodes.period, -1))
     until_phase = np.where(last, 0.0, np.roll(nodes.phase, -1))
-    nodes = replace(nodes, length=(until_period - nodes.period) * period + (until_phase - nodes.phase))
+    nodes = replace(
+        nodes, length=(until_period - nodes.period) * period + (until_phase - nodes.phase)
+    )
     if cubic:  # the last node ends the last piece
-        return replace(nodes, length=np.where(last, period / SAMPLES, nodes.length)).rows((nodes.length > 0.0) | last)
+        return replace(nodes, length=np.where(last, period / SAMPLES, nodes.length)).rows(
+            (nodes.length > 0.0) | last
+        )
     return nodes.rows(nodes.length > 0.0)
 
 
 def _joined(parts: list[list[Pieces]]) -> Pieces:
-    """All pieces in the order of motion and time; cubics have as many terms as the others, the last ones zero."""
+    """All pieces in the order of motion and time; cubics have as many terms as the others, the last
+    ones zero.
+    """
     flat = [piece for part in parts for piece in part]
     longest = max(len(piece.terms) for piece in flat)
-    flat = [replace(piece, terms=np.pad(piece.terms, ((0, longest - len(piece.terms)), (0, 0), (0, 0)))) for piece in flat]
-    whole = Pieces(*(np.concatenate([getattr(piece, name) for piece in flat], axis=-1) for name in Pieces.__dataclass_fields__))
+    flat = [
+        replace(piece, terms=np.pad(piece.terms, ((0, longest - len(piece.terms)), (0, 0), (0, 0))))
+        for piece in flat
+    ]
+    whole = Pieces(
+        *(
+            np.concatenate([getattr(piece, name) for piece in flat], axis=-1)
+            for name in Pieces.__dataclass_fields__
+        )
+    )
     return whole.rows(np.lexsort((whole.phase, whole.period, whole.motion)))
 
 
 def _between(whole: Pieces) -> Pieces:
-    """Cubics from each node to the next, through values and rates at both: the node at the end of a motion closes its last piece."""
+    """Cubics from each node to the next, through values and rates at both: the node at the end of a
+    motion closes its last piece.
+    """
     first = np.flatnonzero(np.diff(whole.motion) == 0)
     length = whole.length[first]
     rate = whole.terms[1] / whole.length
     (a, b), (da, db) = ((of[:, first], of[:, first + 1]) for of in (whole.terms[0], rate))
     terms = polynomials.hermite(a, b, da * length, db * length)
-    return Pieces(whole.motion[first], whole.period[first], whole.phase[first], length, terms, whole.noise[:, first])
+    return Pieces(
+        whole.motion[first],
+        whole.period[first],
+        whole.phase[first],
+        length,
+        terms,
+        whole.noise[:, first],
+    )

@@ -1,8 +1,10 @@
-"""Many polynomials on [0, 1] at once: values, integrals, and every place where one changes its sign.
+"""Many polynomials on [0, 1] at once: values, integrals, and every place where one changes its
+sign.
 
-A polynomial is a column of ``terms`` float64[n + 1, p]: ``sum(terms[k] * x**k)``. Roots are isolated by the sign variations of Bernstein
-coefficients, halving the interval while there are more than one: only pairs closer than rounding are missed. (Lane &
-Riesenfeld, BIT 21 (1981); kernels/isolation.py does the same for one polynomial inside the flow.)
+A polynomial is a column of ``terms`` float64[n + 1, p]: ``sum(terms[k] * x**k)``. Roots are
+isolated by the sign variations of Bernstein coefficients, halving the interval while there are more
+than one: only pairs closer than rounding are missed. (Lane & Riesenfeld, BIT 21 (1981);
+kernels/isolation.py does the same for one polynomial inside the flow.)
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ MOST_STEPS, CONVERGED = 80, 4e-16
 
 
 def value(terms: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Each polynomial at a place of its own: terms float64[n + 1, ..., p], x float64[p]; float64[..., p]."""
+    """Each polynomial at a place of its own: terms float64[n + 1, ..., p], x float64[p];
+    float64[..., p].
+    """
     total = terms[-1]
     for term in terms[-2::-1]:
         total = total * x + term
@@ -32,7 +36,9 @@ def derivative(terms: np.ndarray) -> np.ndarray:
 
 
 def leading_signs(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sign of each polynomial just after 0 and just before 1, float64[p] each; 0 for one that is zero everywhere."""
+    """Sign of each polynomial just after 0 and just before 1, float64[p] each; 0 for one that is
+    zero everywhere.
+    """
     after, before = np.zeros(terms.shape[1]), np.zeros(terms.shape[1])
     way = 1.0
     for _ in range(len(terms)):
@@ -78,7 +84,12 @@ def sign_changes(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @functools.cache
 def bernstein(degree: int) -> np.ndarray:
     """The matrix float64[n + 1, n + 1] from terms to Bernstein coefficients on [0, 1]."""
-    return np.array([[math.comb(i, k) / math.comb(degree, k) for k in range(degree + 1)] for i in range(degree + 1)])
+    return np.array(
+        [
+            [math.comb(i, k) / math.comb(degree, k) for k in range(degree + 1)]
+            for i in range(degree + 1)
+        ]
+    )
 
 
 def _halves(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -86,13 +97,17 @@ def _halves(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     left, right = np.empty_like(coefficients), coefficients.copy()
     left[0] = right[0]
     for level in range(1, len(right)):
-        right[: len(right) - level] = 0.5 * (right[: len(right) - level] + right[1 : len(right) - level + 1])
+        right[: len(right) - level] = 0.5 * (
+            right[: len(right) - level] + right[1 : len(right) - level + 1]
+        )
         left[level] = right[0]
     return left, right
 
 
 def _refined(terms: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """The one root of each polynomial between low and high, by Newton's method inside a shrinking bracket."""
+    """The one root of each polynomial between low and high, by Newton's method inside a shrinking
+    bracket.
+    """
     rates = derivative(terms)
     rises = value(terms, high) > value(terms, low)
     x = 0.5 * (low + high)
@@ -111,12 +126,16 @@ def _refined(terms: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
 
 
 def hermite(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> np.ndarray:
-    """Terms of the cubics with the values a, b and the slopes da, db at 0 and 1, float64[4, ...]."""
+    """Terms of the cubics with the values a, b and the slopes da, db at 0 and 1,
+    float64[4, ...].
+    """
     return np.stack([a, da, 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db])
 
 
 @functools.cache
 def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places in (0, 1) and weights of Gauss's rule, float64[count] each: exact up to the degree 2 count - 1."""
+    """Places in (0, 1) and weights of Gauss's rule, float64[count] each: exact up to the degree 2
+    count - 1.
+    """
     places, weights = np.polynomial.legendre.leggauss(count)
     return 0.5 * (places + 1.0), 0.5 * weights

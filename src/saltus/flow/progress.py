@@ -1,4 +1,6 @@
-"""Progress of long work: a callable of the user's, a bar on a terminal, lines elsewhere; both only if the work lasts."""
+"""Progress of long work: a callable of the user's, a bar on a terminal, lines elsewhere; both only
+if the work lasts.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,18 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def reporting(progress: bool | Callable[[float], None] | None) -> Iterator[Callable[[float], None] | None]:
-    """A context with the progress callable: the user's own, a bar after two seconds on a terminal, lines elsewhere.
+def reporting(
+    progress: bool | Callable[[float], None] | None,
+) -> Iterator[Callable[[float], None] | None]:
+    """A context with the progress callable: the user's own, a bar after two seconds on a terminal,
+    lines elsewhere.
 
     Raises ParameterError if it is neither a callable, nor True, False or None.
     """
     if not (callable(progress) or progress is None or isinstance(progress, bool | np.bool_)):
-        raise ParameterError(f"progress must be True, False or a function of the share done, not {progress!r:.80}.")
+        raise ParameterError(
+            f"progress must be True, False or a function of the share done, not {progress!r:.80}."
+        )
     if callable(progress):
         yield progress
     elif progress is not None and not progress:
@@ -39,7 +46,9 @@ def reporting(progress: bool | Callable[[float], None] | None) -> Iterator[Calla
             bar.close()
 
 
-def stage(show: Callable[[float], None] | None, begin: float, end: float) -> Callable[[float], None] | None:
+def stage(
+    show: Callable[[float], None] | None, begin: float, end: float
+) -> Callable[[float], None] | None:
     """Progress of one stage as a part of the whole."""
     return None if show is None else lambda share: show(begin + (end - begin) * share)
 
@@ -50,7 +59,8 @@ def _to_stderr(text: str) -> None:
 
 
 class Lines:
-    """Lines for a log, which is read afterwards: at 25, 50 and 75 %, and at least one in five minutes, once the work lasts.
+    """Lines for a log, which is read afterwards: at 25, 50 and 75 %, and at least one in five
+    minutes, once the work lasts.
 
     Parameters
     ----------
@@ -62,7 +72,9 @@ class Lines:
 
     PATIENCE, EVERY = 10.0, 300.0
 
-    def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._write, self._clock = write, clock
         self._begun = self._written = clock()
         self._passed = 0
@@ -73,12 +85,19 @@ class Lines:
         now, quarter = self._clock(), int(4 * share)
         if self._first is None:
             self._first = now, share
-        if share >= 1.0 or now - self._begun < self.PATIENCE or (quarter <= self._passed and now - self._written < self.EVERY):
+        if (
+            share >= 1.0
+            or now - self._begun < self.PATIENCE
+            or (quarter <= self._passed and now - self._written < self.EVERY)
+        ):
             return
         since, before = self._first  # the time before, such as compiling, doesn't count
         left = (now - since) * (1 - share) / (share - before) if share > before else None
         self._passed, self._written = max(quarter, self._passed), now
-        self._write(f"{share:.0%} done in {now - self._begun:.0f} s" + (f", about {left:.0f} s left" if left is not None else ""))
+        self._write(
+            f"{share:.0%} done in {now - self._begun:.0f} s"
+            + (f", about {left:.0f} s left" if left is not None else "")
+        )
 
 
 class _Bar:
@@ -96,7 +115,13 @@ class _Bar:
             if time.monotonic() - self._begun < self.PATIENCE:
                 return
             from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+            from rich.progress import (
+                BarColumn,
+                Progress,
+                TextColumn,
+                TimeElapsedColumn,
+                TimeRemainingColumn,
+            )
 
             columns = (
                 TextColumn("integrating"),

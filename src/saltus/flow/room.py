@@ -14,22 +14,33 @@ SHARE = 0.5
 ALWAYS_ALLOWED = 2**24
 #: Free memory if the system doesn't report it [bytes].
 DEFAULT_FREE = 4 * 2**30
-#: Memory of a contact of D states, from the kernel's table to the Dataset with both runs of measured time errors [bytes]. Measured: 401 for
-#: two states in one run; the second keeps its own.
+#: Memory of a contact of D states, from the kernel's table to the Dataset with both runs of
+#: measured time errors [bytes]. Measured: 401 for two states in one run; the second keeps its own.
 CONTACT, CONTACT_OF_A_STATE = 640, 80
 
 
 def free() -> int:
-    """Memory that this process can have without taking it from others [bytes]; the limit of a container counts."""
+    """Memory that this process can have without taking it from others [bytes]; the limit of a
+    container counts.
+    """
     amounts = []
     try:
         fields = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text().splitlines())
         amounts.append(int(fields["MemAvailable"].split()[0]) * 1024)
     except (OSError, KeyError, ValueError, IndexError):
         amounts.append(DEFAULT_FREE)
-    for limit, used in (("memory.max", "memory.current"), ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes")):
+    for limit, used in (
+        ("memory.max", "memory.current"),
+        ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes"),
+    ):
         try:
-            amounts.append(max(int(Path("/sys/fs/cgroup", limit).read_text()) - int(Path("/sys/fs/cgroup", used).read_text()), 0))
+            amounts.append(
+                max(
+                    int(Path("/sys/fs/cgroup", limit).read_text())
+                    - int(Path("/sys/fs/cgroup", used).read_text()),
+                    0,
+                )
+            )
         except (OSError, ValueError):  # no such limit
             continue
     return min(amounts)
@@ -52,7 +63,8 @@ def check_room(size: float, what: str, instead: str) -> None:
     room = SHARE * free()
     if size > room:
         raise ParameterError(
-            f"{what} are more than fits here: they need about {size / 1e9:.3g} GB of memory, and half of the free memory is "
+            f"{what} are more than fits here: they need about {size / 1e9:.3g} GB of memory, and "
+            f"half of the free memory is "
             f"{room / 1e9:.3g} GB. {instead}"
         )
 

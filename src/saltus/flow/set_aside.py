@@ -1,8 +1,10 @@
-"""Series of motions near a boundary on which a law has none, such as ``d**1.5`` where a contact begins: the steps of the compiled flow.
+"""Series of motions near a boundary on which a law has none, such as ``d**1.5`` where a contact
+begins: the steps of the compiled flow.
 
-As in kernels/taylor_singular.py, in NumPy and without the flow's care for its last digits: the flow knows the states at contacts already.
-Behind the boundary a series reaches at most as far as the boundary is away. On it the terms without a series are set aside, for a time in
-which they change nothing.
+As in kernels/taylor_singular.py, in NumPy and without the flow's care for its last digits: the flow
+knows the states at contacts already. Behind the boundary a series reaches at most as far as the
+boundary is away. On it the terms without a series are set aside, for a time in which they change
+nothing.
 """
 
 from __future__ import annotations
@@ -35,11 +37,26 @@ class Boundaries:
         Arguments of its ``jets``: one column for each motion.
     """
 
-    def __init__(self, module: ModuleType, state: np.ndarray, side: np.ndarray, constants: np.ndarray, clock: np.ndarray):
-        self._module, self._state, self._side, self._constants, self._clock = module, state, side, constants, clock
+    def __init__(
+        self,
+        module: ModuleType,
+        state: np.ndarray,
+        side: np.ndarray,
+        constants: np.ndarray,
+        clock: np.ndarray,
+    ):
+        self._module, self._state, self._side, self._constants, self._clock = (
+            module,
+            state,
+            side,
+            constants,
+            clock,
+        )
 
     def jets(self, work: np.ndarray) -> np.ndarray:
-        """Fill in all terms; returns where some were set aside, bool[n]: those that act near their own boundary."""
+        """Fill in all terms; returns where some were set aside, bool[n]: those that act near their
+        own boundary.
+        """
         module, aside = self._module, np.zeros(work.shape[1], bool)
         for _ in range(module.SINGULAR + 1):
             module.jets(self._state, self._side, self._constants, self._clock, work)
@@ -72,43 +89,70 @@ class Boundaries:
         """Time in which the quadratic part of a gap changes by the gap itself."""
         first, gap = self._module.GUARD_ROW[self._module.SINGULAR_GUARD[j]], self._gap(work, j)
         rate, bend = np.abs(work[first + 1]), np.abs(work[first + 2])
-        return np.where(gap > 0.0, 2.0 * gap / (rate + np.sqrt(rate * rate + 4.0 * bend * gap)), 0.0)
+        return np.where(
+            gap > 0.0, 2.0 * gap / (rate + np.sqrt(rate * rate + 4.0 * bend * gap)), 0.0
+        )
 
     def _forces(self, work: np.ndarray, j: int) -> np.ndarray:
         """Contribution of the terms of a boundary to the rates of the states."""
         module = self._module
         first = module.CALM_ROW + j * module.NMOVED
-        return np.abs(work[1 : module.NMOVED * _terms(module) : _terms(module)] - work[first : first + module.NMOVED])
+        return np.abs(
+            work[1 : module.NMOVED * _terms(module) : _terms(module)]
+            - work[first : first + module.NMOVED]
+        )
 
     def _acts(self, work: np.ndarray, j: int) -> np.ndarray:
         return np.any(~(self._forces(work, j) <= 0.0), axis=0)
 
     def _near(self, work: np.ndarray, j: int) -> np.ndarray:
-        """Motions on the boundary of an acting term up to rounding, or so near that the term changes nothing before it is reached."""
+        """Motions on the boundary of an acting term up to rounding, or so near that the term
+        changes nothing before it is reached.
+        """
         module, count = self._module, _terms(self._module)
-        nonzero = self._gap(work, j) > NONZERO_ROUNDINGS * ROUNDING * work[module.SCALE_ROW + module.SINGULAR_GUARD[j]]
+        nonzero = (
+            self._gap(work, j)
+            > NONZERO_ROUNDINGS * ROUNDING * work[module.SCALE_ROW + module.SINGULAR_GUARD[j]]
+        )
         size = np.abs(self._state[: module.NMOVED])
-        weak = np.all(self._way(work, j) * self._forces(work, j) <= 0.25 * NEGLIGIBLE * size, axis=0)
+        weak = np.all(
+            self._way(work, j) * self._forces(work, j) <= 0.25 * NEGLIGIBLE * size, axis=0
+        )
         finite = np.all(np.isfinite(work[: module.NSTATES * count]), axis=0)
         return (self._acts(work, j) & weak) | ~(nonzero & finite)
 
     def _negligible(self, work: np.ndarray, h: np.ndarray, which: np.ndarray) -> np.ndarray:
-        """Lengths over which the terms set aside change no state by more than NEGLIGIBLE, estimated in the middle of the step."""
+        """Lengths over which the terms set aside change no state by more than NEGLIGIBLE, estimated
+        in the middle of the step.
+        """
         module, count = self._module, _terms(self._module)
-        series = np.stack([work[i * count : (i + 1) * count] for i in range(module.NSTATES)], axis=1)  # [terms, states, n]
+        # [terms, states, n]
+        series = np.stack(
+            [work[i * count : (i + 1) * count] for i in range(module.NSTATES)], axis=1
+        )
         rates = polynomials.derivative(series)
-        side, constants, clock = self._side[:, which].copy(), self._constants[:, which], self._clock[:, which].copy()
+        side, constants, clock = (
+            self._side[:, which].copy(),
+            self._constants[:, which],
+            self._clock[:, which].copy(),
+        )
         side[module.NGUARDS :] = -1.0
         phase, there = clock[module.TAU].copy(), np.zeros_like(work)
         for _ in range(TRIALS):
             clock[module.TAU] = phase + 0.5 * h
             module.jets(polynomials.value(series, 0.5 * h), side, constants, clock, there)
-            defect = np.abs(there[1 : module.NSTATES * count : count] - polynomials.value(rates, 0.5 * h))
-            change = (defect * h / (np.abs(series[0]) + h * np.abs(series[1]))).max(axis=0) / NEGLIGIBLE
+            defect = np.abs(
+                there[1 : module.NSTATES * count : count] - polynomials.value(rates, 0.5 * h)
+            )
+            change = (defect * h / (np.abs(series[0]) + h * np.abs(series[1]))).max(
+                axis=0
+            ) / NEGLIGIBLE
             fits = change <= 1.0
             if fits.all():
                 break
-            h = np.where(fits, h, h * np.clip(np.nan_to_num(0.5 * change**-0.4, nan=0.1), 1e-3, 0.5))
+            h = np.where(
+                fits, h, h * np.clip(np.nan_to_num(0.5 * change**-0.4, nan=0.1), 1e-3, 0.5)
+            )
         return h
 
 

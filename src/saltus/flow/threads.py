@@ -31,12 +31,15 @@ def on_threads(
     progress: Callable[[float], None] | None = None,
     stop: Stop | None = None,
 ) -> None:
-    """Call ``work(item)`` for every item, and ``done(item, result)`` from this thread as each is ready, in any order.
+    """Call ``work(item)`` for every item, and ``done(item, result)`` from this thread as each is
+    ready, in any order.
 
-    Raises whatever a piece raises. On that, and on Ctrl-C, ``stop`` is set, pieces under way are waited for and the rest is left. What a
-    piece calls asks ``stop`` too, threads of its own included, so that pieces end at once; they raise Interrupted then. The caller's
-    context holds in the threads too, such as its settings of NumPy. A single piece without progress is done by this very thread: Newton's
-    method asks for thousands of them, each shorter than it takes to make a thread.
+    Raises whatever a piece raises. On that, and on Ctrl-C, ``stop`` is set, pieces under way are
+    waited for and the rest is left. What a piece calls asks ``stop`` too, threads of its own
+    included, so that pieces end at once; they raise Interrupted then. The caller's context holds in
+    the threads too, such as its settings of NumPy. A single piece without progress is done by this
+    very thread: Newton's method asks for thousands of them, each shorter than it takes to make a
+    thread.
     """
     stop = stop or Stop()
 
@@ -51,7 +54,11 @@ def on_threads(
             done(*result)
         check_stop()
         return
-    with _OneThread() if len(items) == 1 else ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool:
+    with (
+        _OneThread()
+        if len(items) == 1
+        else ThreadPoolExecutor(min(threads or usable_processors(), max(len(items), 1))) as pool
+    ):
         waiting: set[Future] = set()
         try:
             waiting |= {pool.submit(copy_context().run, one, item) for item in items}
@@ -70,7 +77,9 @@ def on_threads(
 
 
 def may_wait(stop: Stop) -> bool:
-    """Whether Ctrl-C can wait until a piece of work in this thread has ended: wherever nobody has a handler of his own for it."""
+    """Whether Ctrl-C can wait until a piece of work in this thread has ended: wherever nobody has a
+    handler of his own for it.
+    """
     if stop.inside or threading.current_thread() is not threading.main_thread():
         return True
     handler = signal.getsignal(signal.SIGINT)
@@ -79,7 +88,9 @@ def may_wait(stop: Stop) -> bool:
 
 @contextmanager
 def _ctrl_c_asks(stop: Stop) -> Iterator[None]:
-    """Ctrl-C asks to stop, and is raised where the block ends: in the midst of it, it would cut a table of contacts in two."""
+    """Ctrl-C asks to stop, and is raised where the block ends: in the midst of it, it would cut a
+    table of contacts in two.
+    """
     main = threading.current_thread() is threading.main_thread()
     if stop.inside or not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
@@ -101,7 +112,9 @@ def _ctrl_c_asks(stop: Stop) -> Iterator[None]:
 
 
 class _OneThread(Executor):
-    """A thread for a single piece of work: a pool takes three times as long to make and to end, which a single trajectory would feel."""
+    """A thread for a single piece of work: a pool takes three times as long to make and to end,
+    which a single trajectory would feel.
+    """
 
     _thread: threading.Thread | None = None
 

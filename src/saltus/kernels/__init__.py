@@ -1,1 +1,3 @@
-"""Numba templates and their pure helpers: numbers in, numbers out, nothing allocated in a loop, nothing raised."""
+"""Numba templates and their pure helpers: numbers in, numbers out, nothing allocated in a loop,
+nothing raised.
+"""

@@ -1,13 +1,17 @@
-"""Template: has a trajectory entered a neighbourhood of an attractor in which the return map was verified to contract?"""
+"""Template: has a trajectory entered a neighbourhood of an attractor in which the return map was
+verified to contract?
+"""
 
 
 @entry
 def capture(points, centres, weights, owners, extents, label, when):
-    """Look at every point of every trajectory, in order, until one lies in an ellipsoid |W (p - c)| <= 1.
+    """Look at every point of every trajectory, in order, until one lies in an ellipsoid |W (p - c)|
+    <= 1.
 
-    points f8[k, n, D]; centres f8[m, D], ascending in their first coordinate; weights f8[m, D, D]; owners i8[m], the attractor of each;
-    extents f8[m]: half the extent of each ellipsoid along the first coordinate; out: label i8[k], the owner, or untouched; when i8[k], the
-    index of the point. Returns how many were captured.
+    points f8[k, n, D]; centres f8[m, D], ascending in their first coordinate; weights f8[m, D, D];
+    owners i8[m], the attractor of each; extents f8[m]: half the extent of each ellipsoid along the
+    first coordinate; out: label i8[k], the owner, or untouched; when i8[k], the index of the point.
+    Returns how many were captured.
     """
     count, size, found, reach = centres.shape[0], points.shape[2], 0, 0.0
     for i in range(count):
@@ -30,7 +34,9 @@ def capture(points, centres, weights, owners, extents, label, when):
                         break
                     part = 0.0
                     for column in range(size):
-                        part += weights[low, row, column] * (points[i, j, column] - centres[low, column])
+                        part += weights[low, row, column] * (
+                            points[i, j, column] - centres[low, column]
+                        )
                     total += part * part
                 if total <= 1.0:
                     owner = owners[low]

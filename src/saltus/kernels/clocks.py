@@ -1,22 +1,40 @@
-"""Template: the clocks of a system - switches, remainders and tables that time alone decides. codegen puts it behind the generated head.
+"""Template: the clocks of a system - switches, remainders and tables that time alone decides.
+codegen puts it behind the generated head.
 
-A clock divides time into pieces, numbered k in the order of time; `begin_of` is when piece k of clock j begins, by a formula, so that no
-rounding adds up from piece to piece. The present piece of each clock is a function of time alone: the last one that has begun, or will
-within a few ulp (breaks of several clocks at one instant are one break). Steps end at breaks, so a step sees one piece of each.
+A clock divides time into pieces, numbered k in the order of time; `begin_of` is when piece k of
+clock j begins, by a formula, so that no rounding adds up from piece to piece. The present piece of
+each clock is a function of time alone: the last one that has begun, or will within a few ulp
+(breaks of several clocks at one instant are one break). Steps end at breaks, so a step sees one
+piece of each.
 
 Symbols
 -------
-A time is a phase tau after a base (Taylor: the start of the period; ode45: zero). h holds HELD numbers of each clock: its piece k, its side
-(+1/-1; switches), and for values the phase of the piece's reference point and four coefficients: value = sum(c_i (tau - ref)^i). n holds
-NUMBERS numbers of each clock, of parameters only. data: where each table begins; there its number of knots and whether it repeats, the
-knots, then a reference point and four coefficients for each piece.
+A time is a phase tau after a base (Taylor: the start of the period; ode45: zero). h holds HELD
+numbers of each clock: its piece k, its side (+1/-1; switches), and for values the phase of the
+piece's reference point and four coefficients: value = sum(c_i (tau - ref)^i). n holds NUMBERS
+numbers of each clock, of parameters only. data: where each table begins; there its number of knots
+and whether it repeats, the knots, then a reference point and four coefficients for each piece.
 
 The head supplies NCLOCKS, the tuples CLOCK_KIND and CLOCK_TABLE, and numbers_of_clocks(p, n).
 """
 
 import math
 
-from saltus.kernels.clocks_layout import C0, C1, C2, C3, CYCLE, HELD, LEVEL, NUMBERS, ON, PIECE, REF, TABLE, WAVE
+from saltus.kernels.clocks_layout import (
+    C0,
+    C1,
+    C2,
+    C3,
+    CYCLE,
+    HELD,
+    LEVEL,
+    NUMBERS,
+    ON,
+    PIECE,
+    REF,
+    TABLE,
+    WAVE,
+)
 from saltus.kernels.trigonometry import turned
 
 #: Times within this many ulp are one break (as coincident contacts are one).
@@ -53,7 +71,9 @@ def rate_of(j, n, data):
 def place_of(j, n, data):
     """Cycles at time zero, of a clock that repeats."""
     if CLOCK_KIND[j] == TABLE:
-        return (n[NUMBERS * j + 1] - knot(data, j, 0)) / (knot(data, j, knots(data, j) - 1) - knot(data, j, 0))
+        return (n[NUMBERS * j + 1] - knot(data, j, 0)) / (
+            knot(data, j, knots(data, j) - 1) - knot(data, j, 0)
+        )
     return n[NUMBERS * j + 1]
 
 
@@ -71,7 +91,9 @@ def is_cyclic(j, data):
 
 @kernel
 def on_from_to(j, n):
-    """The part of a cycle in which a switch is on, (begin, end); begin >= end: never on; end - begin >= 1: always."""
+    """The part of a cycle in which a switch is on, (begin, end); begin >= end: never on; end -
+    begin >= 1: always.
+    """
     factor, shift = n[NUMBERS * j + 2], n[NUMBERS * j + 3]
     if factor == 0.0:
         return 0.0, (2.0 if shift > 0.0 else 0.0)
@@ -113,7 +135,11 @@ def begin_of(j, k, n, base, data):
         cycle = k // count
         first, last = knot(data, j, 0), knot(data, j, count)
         i = k - cycle * count
-        share = (knot(data, j, i) - first) / (last - first) if rate > 0.0 else (last - knot(data, j, count - i)) / (last - first)
+        share = (
+            (knot(data, j, i) - first) / (last - first)
+            if rate > 0.0
+            else (last - knot(data, j, count - i)) / (last - first)
+        )
         return (cycle + share - place) / speed
     begin, end = on_from_to(j, n)
     if not (begin < end < begin + 1.0):
@@ -141,7 +167,9 @@ def first_guess(j, tau, n, base, data):
                 high = middle - 1
         return low
     rate = rate_of(j, n, data)
-    turns = math.floor(abs(rate) * tau + (place_at_base(j, n) if rate > 0.0 else -place_at_base(j, n)))
+    turns = math.floor(
+        abs(rate) * tau + (place_at_base(j, n) if rate > 0.0 else -place_at_base(j, n))
+    )
     if CLOCK_KIND[j] == CYCLE:
         return int(turns)
     if CLOCK_KIND[j] != TABLE:
@@ -210,11 +238,16 @@ def hold_polynomial(j, k, n, base, data, h):
     if rate == 0.0:
         s = offset - data[first]
         h[at + REF], h[at + C1], h[at + C2], h[at + C3] = 0.0, 0.0, 0.0, 0.0
-        h[at + C0] = data[first + 1] + s * (data[first + 2] + s * (data[first + 3] + s * data[first + 4]))
+        h[at + C0] = data[first + 1] + s * (
+            data[first + 2] + s * (data[first + 3] + s * data[first + 4])
+        )
         return
     if repeats(data, j):
         length = knot(data, j, count) - knot(data, j, 0)
-        speed, place = abs(rate) / length, place_at_base(j, n) if rate > 0.0 else -place_at_base(j, n)
+        speed, place = (
+            abs(rate) / length,
+            place_at_base(j, n) if rate > 0.0 else -place_at_base(j, n),
+        )
         share = (data[first] - knot(data, j, 0)) / length
         h[at + REF] = (cycle + (share if rate > 0.0 else 1.0 - share) - place) / speed
     else:
@@ -240,7 +273,9 @@ def place_clocks(p, origin, period, count, n, data):
 
 @kernel
 def set_clocks(tau, base, n, data, known, h):
-    """Bring every clock to its piece at tau (from a guess, unless the pieces in h are known); returns when the next break comes."""
+    """Bring every clock to its piece at tau (from a guess, unless the pieces in h are known);
+    returns when the next break comes.
+    """
     until = tau + SAME_BREAK * (abs(tau) + abs(base))
     following = math.inf
     for j in range(NCLOCKS):

@@ -1,16 +1,20 @@
-"""Template: the Dormand-Prince pair of orders 5 and 4, its error estimate and its dense output, as ode45 uses it.
+"""Template: the Dormand-Prince pair of orders 5 and 4, its error estimate and its dense output, as
+ode45 uses it.
 
-codegen puts a generated head before this text and odezero.py and ode45.py behind it. Sources: Dormand & Prince, J. Comput. Appl. Math. 6
-(1980); dense output, Shampine, Math. Comp. 46 (1986). Sums are taken from left to right and a stage is y + h*(sum), as MATLAB does it since
-it keeps each stage in a variable of its own: the last digits depend on that.
+codegen puts a generated head before this text and odezero.py and ode45.py behind it. Sources:
+Dormand & Prince, J. Comput. Appl. Math. 6 (1980); dense output, Shampine, Math. Comp. 46 (1986).
+Sums are taken from left to right and a stage is y + h*(sum), as MATLAB does it since it keeps each
+stage in a variable of its own: the last digits depend on that.
 
-The head supplies NSTATES, NGUARDS, NCONST, NDRIVE, GAPS_IN_TIME (whether a gap depends on time otherwise than through the state), and
-prepare(p, c), drive(t, c, h, q), field(t, y, c, q, h, out), gaps(t, y, c, q, h, out), gap_rates(t, y, dy, c, q, h, out): c holds what
-depends on parameters only, q what depends on time too, h what the clocks hold (clocks.py).
+The head supplies NSTATES, NGUARDS, NCONST, NDRIVE, GAPS_IN_TIME (whether a gap depends on time
+otherwise than through the state), and prepare(p, c), drive(t, c, h, q), field(t, y, c, q, h, out),
+gaps(t, y, c, q, h, out), gap_rates(t, y, dy, c, q, h, out): c holds what depends on parameters
+only, q what depends on time too, h what the clocks hold (clocks.py).
 
 Symbols
 -------
-t, t_new ends of a step; h its length; k_i stages, k_1 = k_7 of the step before; s place in the step, 0 to 1; theta = AbsTol/RelTol.
+t, t_new ends of a step; h its length; k_i stages, k_1 = k_7 of the step before; s place in the
+step, 0 to 1; theta = AbsTol/RelTol.
 """
 
 from saltus.kernels.parts import part
@@ -33,7 +37,7 @@ D62, D63, D64 = -11 / 7, 11 / 3, -55 / 28
 D72, D73, D74 = 3 / 2, -4.0, 5 / 2
 
 
-# -- the head's functions on parts of `work` -----------------------------------------------------------------------------------
+# -- the head's functions on parts of `work` -------------------------------------------------------
 @inner
 def drive_at(time, q, work):
     """Time-only values at a time, to `q`."""
@@ -62,10 +66,12 @@ def gap_rates_at(time, state, rate, q, out, work):
     gap_rates(time, y, dy, c, part(work, q, NDRIVE), h, part(work, out, NGUARDS))
 
 
-# -- one step ------------------------------------------------------------------------------------------------------------------
+# -- one step --------------------------------------------------------------------------------------
 @inner
 def try_step(t, length, t_new, work):
-    """The stages of a step of the length asked for, and its end at t_new; returns h = t_new - t, which rounding sets apart from length."""
+    """The stages of a step of the length asked for, and its end at t_new; returns h = t_new - t,
+    which rounding sets apart from length.
+    """
     h = length
     drive_at(t + h * A2, Q2, work)
     drive_at(t + h * A3, Q3, work)
@@ -79,21 +85,35 @@ def try_step(t, length, t_new, work):
         work[POINT + i] = work[NODE + i] + h * (B31 * work[K1 + i] + B32 * work[K2 + i])
     rate_at(t + h * A3, POINT, Q3, K3, work)
     for i in range(NSTATES):
-        work[POINT + i] = work[NODE + i] + h * (B41 * work[K1 + i] + B42 * work[K2 + i] + B43 * work[K3 + i])
+        work[POINT + i] = work[NODE + i] + h * (
+            B41 * work[K1 + i] + B42 * work[K2 + i] + B43 * work[K3 + i]
+        )
     rate_at(t + h * A4, POINT, Q4, K4, work)
     for i in range(NSTATES):
         slope = B51 * work[K1 + i] + B52 * work[K2 + i] + B53 * work[K3 + i] + B54 * work[K4 + i]
         work[POINT + i] = work[NODE + i] + h * slope
     rate_at(t + h * A5, POINT, Q5, K5, work)
     for i in range(NSTATES):
-        slope = B61 * work[K1 + i] + B62 * work[K2 + i] + B63 * work[K3 + i] + B64 * work[K4 + i] + B65 * work[K5 + i]
+        slope = (
+            B61 * work[K1 + i]
+            + B62 * work[K2 + i]
+            + B63 * work[K3 + i]
+            + B64 * work[K4 + i]
+            + B65 * work[K5 + i]
+        )
         work[POINT + i] = work[NODE + i] + h * slope
     rate_at(t + h, POINT, Q6, K6, work)
     if t_new != t + h:
         drive_at(t_new, Q6, work)
     h = t_new - t
     for i in range(NSTATES):
-        slope = B71 * work[K1 + i] + B73 * work[K3 + i] + B74 * work[K4 + i] + B75 * work[K5 + i] + B76 * work[K6 + i]
+        slope = (
+            B71 * work[K1 + i]
+            + B73 * work[K3 + i]
+            + B74 * work[K4 + i]
+            + B75 * work[K5 + i]
+            + B76 * work[K6 + i]
+        )
         work[NEXT + i] = work[NODE + i] + h * slope
     rate_at(t_new, NEXT, Q6, K7, work)
     return h
@@ -101,10 +121,19 @@ def try_step(t, length, t_new, work):
 
 @inner
 def error_norm(theta, work):
-    """Max norm of the error estimate, divided by h, on the scale of the states; NaN if any of it is NaN."""
+    """Max norm of the error estimate, divided by h, on the scale of the states; NaN if any of it is
+    NaN.
+    """
     norm = 0.0
     for i in range(NSTATES):
-        error = E1 * work[K1 + i] + E3 * work[K3 + i] + E4 * work[K4 + i] + E5 * work[K5 + i] + E6 * work[K6 + i] + E7 * work[K7 + i]
+        error = (
+            E1 * work[K1 + i]
+            + E3 * work[K3 + i]
+            + E4 * work[K4 + i]
+            + E5 * work[K5 + i]
+            + E6 * work[K6 + i]
+            + E7 * work[K7 + i]
+        )
         work[ERROR + i] = error
         ratio = abs(error / max(max(abs(work[NODE + i]), abs(work[NEXT + i])), theta))
         if ratio > norm or ratio != ratio:
@@ -124,5 +153,12 @@ def dense(time, t, h, work):
     w6 = s2 * (D62 + s * (D63 + D64 * s))
     w7 = s2 * (D72 + s * (D73 + D74 * s))
     for i in range(NSTATES):
-        slope = work[K1 + i] * w1 + work[K3 + i] * w3 + work[K4 + i] * w4 + work[K5 + i] * w5 + work[K6 + i] * w6 + work[K7 + i] * w7
+        slope = (
+            work[K1 + i] * w1
+            + work[K3 + i] * w3
+            + work[K4 + i] * w4
+            + work[K5 + i] * w5
+            + work[K6 + i] * w6
+            + work[K7 + i] * w7
+        )
         work[POINT + i] = work[NODE + i] + h * slope

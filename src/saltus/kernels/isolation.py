@@ -1,11 +1,14 @@
-"""The first crossing of a gap inside a step, with certainty: every root isolated by Bernstein coefficients, tangencies told apart.
+"""The first crossing of a gap inside a step, with certainty: every root isolated by Bernstein
+coefficients, tangencies told apart.
 
-The fast path of the flow settles nine steps in ten with a quadratic bound, in all lanes at once. What it can't settle comes here, one
-lane at a time. The gap is a polynomial ``q(x) = sum(q[k] * x**k)`` on [0, 1], positive where the mode says it should be.
+The fast path of the flow settles nine steps in ten with a quadratic bound, in all lanes at once.
+What it can't settle comes here, one lane at a time. The gap is a polynomial ``q(x) = sum(q[k] *
+x**k)`` on [0, 1], positive where the mode says it should be.
 
-Descartes' rule for Bernstein coefficients: the number of roots in (0, 1) is the number V of sign variations, or less by an even number;
-V = 0 and V = 1 are proofs. Else the extremum decides: above the noise no crossing, below it two, within it a graze.
-(Lane & Riesenfeld, BIT 21 (1981); Farouki, Computer Aided Geometric Design 29 (2012), section 4.)
+Descartes' rule for Bernstein coefficients: the number of roots in (0, 1) is the number V of sign
+variations, or less by an even number; V = 0 and V = 1 are proofs. Else the extremum decides: above
+the noise no crossing, below it two, within it a graze. (Lane & Riesenfeld, BIT 21 (1981); Farouki,
+Computer Aided Geometric Design 29 (2012), section 4.)
 """
 
 from __future__ import annotations
@@ -15,13 +18,15 @@ import numpy as np
 from saltus.kernels.marks import kernel
 from saltus.kernels.trigonometry import two_product
 
-# Columns of the output of `first_crossing`: place of the crossing, the smallest minimum that was no crossing.
+# Columns of the output of `first_crossing`: place of the crossing, the smallest minimum that was no
+# crossing.
 AT, MARGIN = range(2)
 # Columns of a touch: place, guard.
 TOUCH_AT, TOUCH_GUARD = range(2)
 #: Rounding error of a sum of terms, in units of their sizes.
 ROUNDING = 4.0 * 2.220446049250313e-16
-#: Places of a touch that differ by less are one: a minimum within rounding is flat over some 1e-8 of the step.
+#: Places of a touch that differ by less are one: a minimum within rounding is flat over some 1e-8
+#: of the step.
 SAME_TOUCH = 1.0e-6
 #: Touches that one step can hold on record.
 MOST_TOUCHES = 16
@@ -49,7 +54,9 @@ def slope(q, degree, x):
 
 @kernel
 def is_exact_zero(q, degree, x):
-    """Whether q(x) = 0 and no operation of Horner's rule rounded: the only zero that a sum of doubles can prove (Dekker 1971)."""
+    """Whether q(x) = 0 and no operation of Horner's rule rounded: the only zero that a sum of
+    doubles can prove (Dekker 1971).
+    """
     value, exact = q[degree], True
     for k in range(degree - 1, -1, -1):
         product, rounded = two_product(value, x)
@@ -74,7 +81,9 @@ def variations(b, degree):
 
 @kernel
 def to_bernstein(q, degree, b):
-    """Bernstein coefficients on [0, 1]: ``b_i = sum_k C(i,k)/C(n,k) q_k``, by repeated sums of scaled coefficients."""
+    """Bernstein coefficients on [0, 1]: ``b_i = sum_k C(i,k)/C(n,k) q_k``, by repeated sums of
+    scaled coefficients.
+    """
     binomial = 1.0
     for k in range(degree + 1):
         b[k] = q[k] / binomial
@@ -82,12 +91,15 @@ def to_bernstein(q, degree, b):
     for level in range(1, degree + 1):
         for i in range(degree, level - 1, -1):
             b[i] += b[i - 1]
-    b[degree] = polynomial(q, degree, 1.0)  # the value at the end of the step, without the rounding of the sums
+    # the value at the end of the step, without the rounding of the sums
+    b[degree] = polynomial(q, degree, 1.0)
 
 
 @kernel
 def halve(b, bounds, row, degree):
-    """Split the interval of a row of Bernstein coefficients (de Casteljau): its right half stays, its left half goes to the next row."""
+    """Split the interval of a row of Bernstein coefficients (de Casteljau): its right half stays,
+    its left half goes to the next row.
+    """
     b[row + 1, 0] = b[row, 0]
     for level in range(1, degree + 1):
         for i in range(degree - level + 1):
@@ -100,7 +112,9 @@ def halve(b, bounds, row, degree):
 
 @kernel
 def refine(q, degree, low, high, falling):
-    """The one root in [low, high] by Newton's method inside a shrinking bracket; ``falling``: q goes from + to -."""
+    """The one root in [low, high] by Newton's method inside a shrinking bracket; ``falling``: q
+    goes from + to -.
+    """
     x = 0.5 * (low + high)
     for _ in range(100):
         value = polynomial(q, degree, x)
@@ -122,7 +136,9 @@ def refine(q, degree, low, high, falling):
 
 @kernel
 def leading_sign(q, degree):
-    """Sign of the first non-zero coefficient: the side to which a gap leaves its boundary (0: it stays)."""
+    """Sign of the first non-zero coefficient: the side to which a gap leaves its boundary (0: it
+    stays).
+    """
     for k in range(degree + 1):
         if q[k] != 0.0:
             return 1 if q[k] > 0.0 else -1
@@ -131,7 +147,9 @@ def leading_sign(q, degree):
 
 @kernel
 def turning_place(q, degree, low, high, rates):
-    """The one place in (low, high) where q' goes from - to +; leaves the coefficients of q' in `rates`."""
+    """The one place in (low, high) where q' goes from - to +; leaves the coefficients of q' in
+    `rates`.
+    """
     for k in range(degree):
         rates[k] = (k + 1) * q[k + 1]
     return refine(rates, degree - 1, low, high, False)
@@ -157,8 +175,14 @@ def sign_beyond(b, degree, noise):
 
 @kernel
 def _note_touch(place, guard, touches, count):
-    """Add a touch to the list, unless it is the one noted last seen from the neighbouring interval; returns the new count."""
-    again = count > 0 and touches[count - 1, TOUCH_GUARD] == guard and abs(touches[count - 1, TOUCH_AT] - place) < SAME_TOUCH
+    """Add a touch to the list, unless it is the one noted last seen from the neighbouring interval;
+    returns the new count.
+    """
+    again = (
+        count > 0
+        and touches[count - 1, TOUCH_GUARD] == guard
+        and abs(touches[count - 1, TOUCH_AT] - place) < SAME_TOUCH
+    )
     if count < MOST_TOUCHES and not again:
         touches[count, TOUCH_AT], touches[count, TOUCH_GUARD] = place, guard
         count += 1
@@ -185,9 +209,11 @@ def first_crossing(q, degree, shifted, noise, guard, b, bounds, rates, out, touc
     degree : int
         Degree of q.
     shifted : bool
-        Whether a root at 0 was divided out: the gap is then ``x * q(x)``, which matters for its depth.
+        Whether a root at 0 was divided out: the gap is then ``x * q(x)``, which matters for its
+        depth.
     noise : float
-        Rounding error of the gap's terms at 0. That of its Taylor terms is added; minima within both are undecided.
+        Rounding error of the gap's terms at 0. That of its Taylor terms is added; minima within
+        both are undecided.
     guard : int
         Number that touches are noted under.
     b : float64[DEEPEST + 2, degree + 1]
@@ -237,7 +263,8 @@ def first_crossing(q, degree, shifted, noise, guard, b, bounds, rates, out, touc
             out[MARGIN] = min(out[MARGIN], abs(depth))
             if depth <= undecided:
                 count = _note_touch(place, guard, touches, count)
-        if high < 1.0 and abs(b[top, degree]) <= rounding(q, degree, shifted, noise, high):  # zero exactly where an interval was halved
+        # zero exactly where an interval was halved
+        if high < 1.0 and abs(b[top, degree]) <= rounding(q, degree, shifted, noise, high):
             following = sign_beyond(b[top - 1], degree, rounding(q, degree, shifted, noise, high))
             if b[top, degree] == 0.0 and following < 0:
                 out[AT] = high
@@ -250,6 +277,8 @@ def first_crossing(q, degree, shifted, noise, guard, b, bounds, rates, out, touc
 
 
 def work_arrays(degree):
-    """The work of :func:`first_crossing` for polynomials up to ``degree``: b, bounds, rates (plain Python; kernels bring their own)."""
+    """The work of :func:`first_crossing` for polynomials up to ``degree``: b, bounds, rates (plain
+    Python; kernels bring their own).
+    """
     n = degree + 1
     return np.empty((DEEPEST + 2, n)), np.empty((DEEPEST + 2, 2)), np.empty(n)

@@ -1,11 +1,13 @@
 """Lanes: a short vector of doubles, one trajectory in each, as one explicit LLVM value.
 
-LLVM doesn't vectorise plain inner loops over lanes (measured: three times slower than this), so a lane is one value of the type
-``<width x double>``. Kernels are written against the few operations below. Compiled they are single machine instructions (AVX-512: 8
-lanes, AVX2: 4, else 2; a wider lane takes several): codegen/lowering/lane_types.py says which. Here they are NumPy on arrays of shape
-``(width,)``, which is what runs with ``SALTUS_DISABLE_JIT=1``.
+LLVM doesn't vectorise plain inner loops over lanes (measured: three times slower than this), so a
+lane is one value of the type ``<width x double>``. Kernels are written against the few operations
+below. Compiled they are single machine instructions (AVX-512: 8 lanes, AVX2: 4, else 2; a wider
+lane takes several): codegen/lowering/lane_types.py says which. Here they are NumPy on arrays of
+shape ``(width,)``, which is what runs with ``SALTUS_DISABLE_JIT=1``.
 
-No operation mixes lanes except :func:`any_lane` and :func:`bits`, which only steer: a lane's digits never depend on its neighbours.
+No operation mixes lanes except :func:`any_lane` and :func:`bits`, which only steer: a lane's digits
+never depend on its neighbours.
 """
 
 from __future__ import annotations
@@ -84,7 +86,9 @@ def spacing(number):
 
 
 def coarse_log2(a):
-    """log2|a| to 0.09 from the bits of the number; about -1023 for zero. Enough for a step-size rule, which needs two digits."""
+    """log2|a| to 0.09 from the bits of the number; about -1023 for zero. Enough for a step-size
+    rule, which needs two digits.
+    """
     return np.abs(np.asarray(a)).view(np.int64) * 2.0**-52 - 1023.0
 
 

@@ -1,4 +1,5 @@
-"""Marks of the functions that are compiled: ``kernel``, ``inner`` for those that are to be inlined, ``entry`` for the one that is called.
+"""Marks of the functions that are compiled: ``kernel``, ``inner`` for those that are to be inlined,
+``entry`` for the one that is called.
 
 In plain Python they change nothing; codegen/lowering reads them.
 """

@@ -1,14 +1,17 @@
-"""Template: ode45 as MATLAB runs it, digit for digit. codegen puts a generated head, dormand_prince.py and odezero.py before this text.
+"""Template: ode45 as MATLAB runs it, digit for digit. codegen puts a generated head,
+dormand_prince.py and odezero.py before this text.
 
-One trajectory after the other; one step reads: step -> find the contact -> write samples -> land or go on. The right-hand side picks its
-sides from the state at every stage; with location on, a step that ends beyond a boundary is cut there and the method starts afresh from
-the contact with its default first step. Rules of error control and step length: Shampine & Reichelt, The MATLAB ODE Suite, SIAM J. Sci.
-Comput. 18 (1997).
+One trajectory after the other; one step reads: step -> find the contact -> write samples -> land or
+go on. The right-hand side picks its sides from the state at every stage; with location on, a step
+that ends beyond a boundary is cut there and the method starts afresh from the contact with its
+default first step. Rules of error control and step length: Shampine & Reichelt, The MATLAB ODE
+Suite, SIAM J. Sci. Comput. 18 (1997).
 
 Symbols
 -------
-t, t_new ends of a step; t_leg start of the leg (the first time, or the last contact); t_end end of the trajectory; h = t_new - t; length
-what is asked for h; theta = AbsTol/RelTol; err the error estimate on RelTol's scale. Times in s.
+t, t_new ends of a step; t_leg start of the leg (the first time, or the last contact); t_end end of
+the trajectory; h = t_new - t; length what is asked for h; theta = AbsTol/RelTol; err the error
+estimate on RelTol's scale. Times in s.
 """
 
 import math
@@ -47,14 +50,17 @@ RTOL, ATOL, LOCATE, MAX_STEPS, MAX_EVENTS = range(5)
 
 #: Exponent of the step length rules, 1 / (order of the error estimate + 1).
 POWER = 1 / 5
-#: Below this err/RelTol the rule 1.25 (err/RelTol)^(1/5) <= 0.2 lets a step grow five times; 0.16^5 = 1.048576e-4, less a little.
+#: Below this err/RelTol the rule 1.25 (err/RelTol)^(1/5) <= 0.2 lets a step grow five times; 0.16^5
+#: = 1.048576e-4, less a little.
 TINY = 1.04e-4
 
 
-# -- step length ---------------------------------------------------------------------------------------------------------------
+# -- step length -----------------------------------------------------------------------------------
 @inner
 def step(t, t_end, longest, length, rtol, theta, work):
-    """One accepted step: (t_new, h, its length, err, rejections). Failed if not err <= rtol: NaN, or no step is short enough."""
+    """One accepted step: (t_new, h, its length, err, rejections). Failed if not err <= rtol: NaN,
+    or no step is short enough.
+    """
     shortest = 16.0 * ulp(t)
     length = min(longest, max(shortest, length))
     last = 1.1 * length >= t_end - t
@@ -67,7 +73,10 @@ def step(t, t_end, longest, length, rtol, theta, work):
         err = length * error_norm(theta, work)
         if not err > rtol or length <= shortest:
             return t_new, h, length, err, rejections
-        length = max(shortest, length * max(0.1, 0.8 * (rtol / err) ** POWER) if rejections == 0 else 0.5 * length)
+        length = max(
+            shortest,
+            length * max(0.1, 0.8 * (rtol / err) ** POWER) if rejections == 0 else 0.5 * length,
+        )
         last = False
         rejections += 1
 
@@ -103,7 +112,7 @@ def longest_step(t_leg, t_end):
     return 0.1 * (t_end - t_leg)
 
 
-# -- sides ---------------------------------------------------------------------------------------------------------------------
+# -- sides -----------------------------------------------------------------------------------------
 @inner
 def sides(at, work):
     """Mode bits: bit g is set where gap g is positive."""
@@ -116,7 +125,9 @@ def sides(at, work):
 
 @inner
 def check_sides(i, batch, work):
-    """After a step without contact: the sides are those of the gaps. A gap that has changed sides unseen is counted."""
+    """After a step without contact: the sides are those of the gaps. A gap that has changed sides
+    unseen is counted.
+    """
     now = sides(AT_NEXT, work)
     if now != batch.mode[i]:
         for g in range(NGUARDS):
@@ -125,14 +136,18 @@ def check_sides(i, batch, work):
         batch.mode[i] = now
 
 
-# -- samples -------------------------------------------------------------------------------------------------------------------
+# -- samples ---------------------------------------------------------------------------------------
 @inner
 def due(i, batch):
     """Time of the next sample, infinite if there is none."""
     m = batch.cursor[i]
     if m < 0 or m >= batch.sample_count.shape[0]:
         return math.inf
-    return batch.origin[i] + batch.sample_count[m] * batch.period[i] + batch.sample_fraction[m] * batch.period[i]
+    return (
+        batch.origin[i]
+        + batch.sample_count[m] * batch.period[i]
+        + batch.sample_fraction[m] * batch.period[i]
+    )
 
 
 @kernel
@@ -149,7 +164,9 @@ def write_sample(i, time, state, batch, work):
 
 @kernel
 def write_samples(i, t, h, t_node, batch, work):
-    """Write the samples that the step has passed on its way from t to t_node, whose state stands in NEXT."""
+    """Write the samples that the step has passed on its way from t to t_node, whose state stands in
+    NEXT.
+    """
     time = due(i, batch)
     while time <= t_node:
         if time == t_node:
@@ -162,15 +179,19 @@ def write_samples(i, t, h, t_node, batch, work):
 
 @kernel
 def write_samples_here(i, until, batch, work):
-    """Write the samples due until a time from the state at NODE: at the start, and those that rounding has put past the end."""
+    """Write the samples due until a time from the state at NODE: at the start, and those that
+    rounding has put past the end.
+    """
     while due(i, batch) <= until:
         write_sample(i, due(i, batch), NODE, batch, work)
 
 
-# -- contacts ------------------------------------------------------------------------------------------------------------------
+# -- contacts --------------------------------------------------------------------------------------
 @kernel
 def land(i, t, t_hit, t_new, h, batch, work):
-    """Cut the step at a contact: NEXT becomes the state there, K1 its rate, AT_NEXT its gaps; the contact is recorded."""
+    """Cut the step at a contact: NEXT becomes the state there, K1 its rate, AT_NEXT its gaps; the
+    contact is recorded.
+    """
     if t_hit < t_new:
         dense(t_hit, t, h, work)
         for j in range(NSTATES):
@@ -188,7 +209,9 @@ def land(i, t, t_hit, t_new, h, batch, work):
 
 @kernel
 def gap_errors(i, t_hit, batch, work):
-    """How far the errors of all steps so far have moved each gap at most, to TRY; how errors grow from step to step is left out."""
+    """How far the errors of all steps so far have moved each gap at most, to TRY; how errors grow
+    from step to step is left out.
+    """
     gap_rates_at(t_hit, NEXT, REST, Q, RATE_AT_REST, work)
     for g in range(NGUARDS):
         work[TRY + g] = 0.0
@@ -212,7 +235,9 @@ def record_contacts(i, t_hit, batch, work):
     for g in range(NGUARDS):
         if changes_sign(work, LEFT, RIGHT, g):
             batch.counters[i, EVENTS] += 1
-            batch.minima[i, CONTACT_SPEED] = min(batch.minima[i, CONTACT_SPEED], abs(work[RATE + g]))
+            batch.minima[i, CONTACT_SPEED] = min(
+                batch.minima[i, CONTACT_SPEED], abs(work[RATE + g])
+            )
             record(i, g, t_hit, before, after, batch, work)
     batch.mode[i] = after
     if TANGENT:
@@ -221,13 +246,17 @@ def record_contacts(i, t_hit, batch, work):
 
 @inner
 def saltate(i, t_hit, before, after, batch, work):
-    """The jumps of the tangent that the states carry, guard by guard where several cross together."""
+    """The jumps of the tangent that the states carry, guard by guard where several
+    cross together.
+    """
     mode = before
     for g in range(NGUARDS):
         if changes_sign(work, LEFT, RIGHT, g):
             flipped = (mode & ~(1 << g)) | (after & (1 << g))
             h = part(work, H, HELD * NCLOCKS)
-            jump(t_hit, part(work, NEXT, NSTATES), batch.param[i * batch.stride], h, mode, flipped, g)
+            jump(
+                t_hit, part(work, NEXT, NSTATES), batch.param[i * batch.stride], h, mode, flipped, g
+            )
             mode = flipped
 
 
@@ -243,15 +272,21 @@ def record(i, g, t_hit, before, after, batch, work):
     row, values = batch.rec_i[r], batch.rec_f[r]
     row[REC_TRAJECTORY], row[REC_PERIOD], row[REC_GUARD], row[REC_KIND] = i, count, g, CROSSING
     row[REC_DIRECTION] = 1 if work[RIGHT + g] > work[LEFT + g] else -1
-    row[REC_MODE_BEFORE], row[REC_MODE_AFTER], row[REC_STEPS] = before, after, batch.counters[i, STEPS]
+    row[REC_MODE_BEFORE], row[REC_MODE_AFTER], row[REC_STEPS] = (
+        before,
+        after,
+        batch.counters[i, STEPS],
+    )
     values[REC_PHASE], values[REC_VELOCITY] = elapsed - count * period, work[RATE + g]
-    values[REC_TIME_ERROR] = work[TRY + g] / abs(work[RATE + g]) if work[RATE + g] != 0.0 else math.inf
+    values[REC_TIME_ERROR] = (
+        work[TRY + g] / abs(work[RATE + g]) if work[RATE + g] != 0.0 else math.inf
+    )
     for j in range(NSTATES):
         values[RECORD_FLOATS + j] = work[NEXT + j]
     values[RECORD_FLOATS + NSTATES] = t_hit
 
 
-# -- one trajectory ------------------------------------------------------------------------------------------------------------
+# -- one trajectory --------------------------------------------------------------------------------
 @inner
 def end_time(i, batch):
     """Time at which a trajectory ends."""
@@ -260,7 +295,9 @@ def end_time(i, batch):
 
 @inner
 def go_on(rate, work):
-    """The end of a step becomes the start of the next: NEXT, a rate and AT_NEXT to NODE, K1 and AT_NODE."""
+    """The end of a step becomes the start of the next: NEXT, a rate and AT_NEXT to NODE, K1 and
+    AT_NODE.
+    """
     for i in range(NSTATES):
         work[NODE + i] = work[NEXT + i]
         work[K1 + i] = work[rate + i]
@@ -270,7 +307,9 @@ def go_on(rate, work):
 
 @kernel
 def take_up(i, theta, batch, work):
-    """Load a trajectory, from its start (mode < 0) or from where it was paused: (t, start of the leg, next step length, next break)."""
+    """Load a trajectory, from its start (mode < 0) or from where it was paused: (t, start of the
+    leg, next step length, next break).
+    """
     prepare(batch.param[i * batch.stride], part(work, C, NCONST))
     t, t_leg, length = batch.carry[i, TIME], batch.carry[i, LEG], batch.carry[i, LENGTH]
     if batch.mode[i] < 0:
@@ -290,7 +329,9 @@ def take_up(i, theta, batch, work):
 
 @kernel
 def follow_clocks(i, t, known, batch, work):
-    """Bring the clocks to their pieces at a time, from those that they hold if these are known; returns the next break."""
+    """Bring the clocks to their pieces at a time, from those that they hold if these are known;
+    returns the next break.
+    """
     if NCLOCKS == 0:
         return math.inf
     n = part(work, N, (NUMBERS + 1) * NCLOCKS)
@@ -300,7 +341,9 @@ def follow_clocks(i, t, known, batch, work):
 
 @kernel
 def start_leg(i, t, t_end, rtol, theta, batch, work):
-    """Start afresh at a break, where the equations change: rates, gaps and sides at NODE; returns the length of the next step."""
+    """Start afresh at a break, where the equations change: rates, gaps and sides at NODE; returns
+    the length of the next step.
+    """
     drive_at(t, Q, work)
     gaps_at(t, NODE, Q, AT_NODE, work)
     rate_at(t, NODE, Q, K1, work)
@@ -353,14 +396,18 @@ def find_contact(t, t_new, t_leg, h, work):
 
 @kernel
 def advance(i, budget, batch, work):
-    """Move a trajectory to its end, or until the budget of tries is used up or the table of contacts is full; returns the budget left."""
+    """Move a trajectory to its end, or until the budget of tries is used up or the table of
+    contacts is full; returns the budget left.
+    """
     rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]
     locate = batch.options[i, LOCATE] != 0.0
     t_end = end_time(i, batch)
     t, t_leg, length, t_break = take_up(i, theta, batch, work)
     status = status_at(i, t, t_end, batch)
     while status == RUNNING and budget > 0 and has_room(batch):
-        t_new, h, length, err, rejections = step(t, min(t_end, t_break), longest_step(t_leg, t_end), length, rtol, theta, work)
+        t_new, h, length, err, rejections = step(
+            t, min(t_end, t_break), longest_step(t_leg, t_end), length, rtol, theta, work
+        )
         budget -= 1 + rejections
         batch.counters[i, REJECTED] += rejections
         if not err <= rtol:
@@ -392,13 +439,67 @@ def advance(i, budget, batch, work):
 
 
 @entry
-def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
-              sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, data, budget,
-              work):  # fmt: skip
-    """Move every trajectory whose status is RUNNING to its end, `budget` tries of a step at most. See kernels/batch.py for the arrays."""
-    batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
-                  sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options,
-                  data)  # fmt: skip
+def propagate(
+    period,
+    origin,
+    param,
+    stride,
+    state,
+    count,
+    phase,
+    mode,
+    fresh,
+    carry,
+    status,
+    end_count,
+    end_phase,
+    counters,
+    minima,
+    sample_count,
+    sample_fraction,
+    cursor,
+    samples,
+    sample_mode,
+    rec_first,
+    rec_i,
+    rec_f,
+    rec_used,
+    options,
+    data,
+    budget,
+    work,
+):
+    """Move every trajectory whose status is RUNNING to its end, `budget` tries of a step at most.
+    See kernels/batch.py for the arrays.
+    """
+    batch = Batch(
+        period,
+        origin,
+        param,
+        stride,
+        state,
+        count,
+        phase,
+        mode,
+        fresh,
+        carry,
+        status,
+        end_count,
+        end_phase,
+        counters,
+        minima,
+        sample_count,
+        sample_fraction,
+        cursor,
+        samples,
+        sample_mode,
+        rec_first,
+        rec_i,
+        rec_f,
+        rec_used,
+        options,
+        data,
+    )
     for i in range(status.shape[0]):
         if status[i] == RUNNING:
             budget = advance(i, budget, batch, work)

@@ -1,14 +1,18 @@
-"""Template: MATLAB's odezero, the root finder behind ode45's events. codegen puts it, with ode45.py, behind a generated head.
+"""Template: MATLAB's odezero, the root finder behind ode45's events. codegen puts it, with
+ode45.py, behind a generated head.
 
-A step from t to t_new has the values of all gaps at both ends. While a gap differs in sign between the ends of the bracket [t_left,
-t_right], regula falsi proposes a place for each such gap, the leftmost proposal is tried, and the half in which the first change of sign
-lies is kept; an end that has stayed twice in a row has its values halved (the Illinois rule, Dowell & Jarratt 1971). The rules are those
-of Shampine & Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997), as ode45 applies them to terminal events in either direction.
+A step from t to t_new has the values of all gaps at both ends. While a gap differs in sign between
+the ends of the bracket [t_left, t_right], regula falsi proposes a place for each such gap, the
+leftmost proposal is tried, and the half in which the first change of sign lies is kept; an end that
+has stayed twice in a row has its values halved (the Illinois rule, Dowell & Jarratt 1971). The
+rules are those of Shampine & Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997), as
+ode45 applies them to terminal events in either direction.
 
 Symbols
 -------
-t_left, t_right the bracket; t_try the last place tried, after a move: the end that was given up; LEFT, RIGHT, TRY in `work` (laid out in
-ode45.py): the gaps at these three. Only the signs and ratios of gaps matter, so halved values do no harm.
+t_left, t_right the bracket; t_try the last place tried, after a move: the end that was given up;
+LEFT, RIGHT, TRY in `work` (laid out in ode45.py): the gaps at these three. Only the signs and
+ratios of gaps matter, so halved values do no harm.
 """
 
 from saltus.kernels.lanes import spacing
@@ -47,15 +51,21 @@ def any_sign_change(work, one, other):
 
 @kernel
 def odezero(t, t_new, t_leg, h, work):
-    """The end of the step up to which no contact happens: (time of the first contact, whether it ends the leg), times in s.
+    """The end of the step up to which no contact happens: (time of the first contact, whether it
+    ends the leg), times in s.
 
-    Needs the gaps at t and t_new at AT_NODE and AT_NEXT. Afterwards LEFT and RIGHT bracket the contact: the gaps that differ
-    in sign there are those that close. A contact at the very start of a leg (t_leg) doesn't end it: it is the one that began it.
+    Needs the gaps at t and t_new at AT_NODE and AT_NEXT. Afterwards LEFT and RIGHT bracket the
+    contact: the gaps that differ in sign there are those that close. A contact at the very start of
+    a leg (t_leg) doesn't end it: it is the one that began it.
     """
     tol = min(128.0 * max(ulp(t), ulp(t_new)), abs(t_new - t))
     t_left, t_right, t_try = t, t_new, t_new
     for g in range(NGUARDS):
-        work[LEFT + g], work[RIGHT + g], work[TRY + g] = work[AT_NODE + g], work[AT_NEXT + g], work[AT_NEXT + g]
+        work[LEFT + g], work[RIGHT + g], work[TRY + g] = (
+            work[AT_NODE + g],
+            work[AT_NEXT + g],
+            work[AT_NEXT + g],
+        )
     moved = NEITHER
     while t_right - t_left > tol:
         place = propose(t, t_left, t_right, t_try, tol, work)
@@ -84,14 +94,21 @@ def propose(t, t_left, t_right, t_try, tol, work):
         if changes_sign(work, LEFT, RIGHT, g):
             if work[LEFT + g] == 0.0 and t_left == t:
                 return t_left + 0.5 * tol
-            change = min(change, proposal(t_left, t_right, t_try, width, work[LEFT + g], work[RIGHT + g], work[TRY + g]))
+            change = min(
+                change,
+                proposal(
+                    t_left, t_right, t_try, width, work[LEFT + g], work[RIGHT + g], work[TRY + g]
+                ),
+            )
     change = max(0.5 * tol, min(change * width, width - 0.5 * tol))
     return t_left + change
 
 
 @inner
 def proposal(t_left, t_right, t_try, width, left, right, tried):
-    """Where one gap wants to be tried, as a fraction of the bracket; a gap that is zero at an end is extrapolated from the end given up."""
+    """Where one gap wants to be tried, as a fraction of the bracket; a gap that is zero at an end
+    is extrapolated from the end given up.
+    """
     if left == 0.0:
         if not (t_try > t_right and tried != right):
             return 0.5

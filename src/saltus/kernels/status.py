@@ -1,4 +1,6 @@
-"""Status codes of a trajectory and kinds of contact: numbers in kernels, words in results, a sentence each for people."""
+"""Status codes of a trajectory and kinds of contact: numbers in kernels, words in results, a
+sentence each for people.
+"""
 
 from __future__ import annotations
 
@@ -22,16 +24,28 @@ STATUS = {
     OK: ("ok", "reached the end"),
     GRAZE_UNRESOLVED: (
         "graze_unresolved",
-        "reached the end, but a graze on the way was shallower than the local error: either outcome is possible",
+        "reached the end, but a graze on the way was shallower than the local error: either "
+        "outcome is possible",
     ),
-    RESTING: ("resting", "the gap and its first three derivatives are zero: resting on a boundary, which this version doesn't follow"),
-    SLIDING: ("sliding", "both sides push onto a boundary: the solution slides along it, which this version doesn't follow"),
+    RESTING: (
+        "resting",
+        "the gap and its first three derivatives are zero: resting on a boundary, "
+        "which this version doesn't follow",
+    ),
+    SLIDING: (
+        "sliding",
+        "both sides push onto a boundary: the solution slides along it, which "
+        "this version doesn't follow",
+    ),
     BUDGET_STEPS: ("budget_steps", "the step budget was used up"),
     BUDGET_EVENTS: ("budget_events", "the event budget was used up: contacts accumulate"),
     NONFINITE: ("nonfinite", "the state or its derivatives overflowed or became NaN"),
     INVALID: ("invalid", "the start or a parameter isn't a finite number"),
     NOT_COMPUTED: ("not_computed", "stopped before this trajectory was begun"),
-    LONG_TRANSIENT: ("long_transient", "still on its way to an attractor after all periods that were allowed"),
+    LONG_TRANSIENT: (
+        "long_transient",
+        "still on its way to an attractor after all periods that were allowed",
+    ),
     INTERRUPTED: ("interrupted", "stopped on its way"),
 }
 
@@ -53,9 +67,18 @@ CONTACT_SPEED, GAP_MARGIN = range(2)
 #: Names of the running minima, by column.
 MINIMA = ("smallest_contact_speed", "smallest_gap_margin")
 
-# Columns of a contact record: integers, then floats (the state, then the absolute time, follow the floats). REC_STEPS counts the accepted
-# steps from the start of the trajectory to the contact.
-REC_TRAJECTORY, REC_PERIOD, REC_GUARD, REC_DIRECTION, REC_KIND, REC_MODE_BEFORE, REC_MODE_AFTER, REC_STEPS = range(8)
+# Columns of a contact record: integers, then floats (the state, then the absolute time, follow the
+# floats). REC_STEPS counts the accepted steps from the start of the trajectory to the contact.
+(
+    REC_TRAJECTORY,
+    REC_PERIOD,
+    REC_GUARD,
+    REC_DIRECTION,
+    REC_KIND,
+    REC_MODE_BEFORE,
+    REC_MODE_AFTER,
+    REC_STEPS,
+) = range(8)
 REC_PHASE, REC_VELOCITY, REC_TIME_ERROR = range(3)
 RECORD_INTEGERS, RECORD_FLOATS = 8, 3
 

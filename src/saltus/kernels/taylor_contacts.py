@@ -1,4 +1,6 @@
-"""Template, 5 of 6 of the Taylor flow: contacts of one lane - settling what the quadratic bound could not, landing, recording."""
+"""Template, 5 of 6 of the Taylor flow: contacts of one lane - settling what the quadratic bound
+could not, landing, recording.
+"""
 
 import math
 
@@ -39,10 +41,12 @@ from saltus.kernels.status import (
 )
 
 
-# -- the slow path: one lane that the quadratic bound could not settle ---------------------------------------------------------
+# -- the slow path: one lane that the quadratic bound could not settle -----------------------------
 @kernel
 def scaled_gap(lanes, lane, g, h, slow):
-    """P on [0, 1] of one lane into slow.q, the known root divided out; returns the rounding error of the gap's terms at the start."""
+    """P on [0, 1] of one lane into slow.q, the known root divided out; returns the rounding error
+    of the gap's terms at the start.
+    """
     s = lanes.side[g, lane]
     slow.q[0] = s * lanes.work[GAP_ROW + g, lane]
     scale = s * GUARD_SIGN[g]
@@ -67,7 +71,9 @@ def gap_rate(lanes, lane, g, d):
 
 @kernel
 def first_place(lanes, lane, g, h, slow, count):
-    """Time into the step at which gap g crosses first, beyond h if it doesn't; and the touches now on the list."""
+    """Time into the step at which gap g crosses first, beyond h if it doesn't; and the touches now
+    on the list.
+    """
     noise = scaled_gap(lanes, lane, g, h, slow)
     fresh = lanes.fresh[g, lane] > 0.5
     sign = leading_sign(slow.q, ORDER)
@@ -77,12 +83,23 @@ def first_place(lanes, lane, g, h, slow, count):
         lanes.memo[lane, RESTS] |= 1 << g
         return 2.0 * h, count
     slow.out[MARGIN] = lanes.run[LEAST, lane]
-    if not fresh and slow.q[0] == 0.0:  # a node on the boundary that turns back: a tangency at the node
+    # a node on the boundary that turns back: a tangency at the node
+    if not fresh and slow.q[0] == 0.0:
         slow.touches[count, TOUCH_AT], slow.touches[count, TOUCH_GUARD] = 0.0, g
         slow.out[MARGIN] = 0.0
         count += 1
     crosses, count = first_crossing(
-        slow.q, ORDER, fresh, noise, g, slow.b, slow.bounds, slow.rates, slow.out, slow.touches, min(count, MOST_TOUCHES - 1)
+        slow.q,
+        ORDER,
+        fresh,
+        noise,
+        g,
+        slow.b,
+        slow.bounds,
+        slow.rates,
+        slow.out,
+        slow.touches,
+        min(count, MOST_TOUCHES - 1),
     )
     lanes.run[LEAST, lane] = slow.out[MARGIN]
     return (slow.out[AT] * h if crosses else 2.0 * h), min(count, MOST_TOUCHES - 1)
@@ -90,7 +107,9 @@ def first_place(lanes, lane, g, h, slow, count):
 
 @kernel
 def decide(lanes, lane, batch, slow):
-    """Settle one lane's step by isolating the roots of all its gaps; writes DELTA, and the guards that cross to memo[HITS]."""
+    """Settle one lane's step by isolating the roots of all its gaps; writes DELTA, and the guards
+    that cross to memo[HITS].
+    """
     h = lanes.run[STEP, lane]
     now = abs(lanes.clock[TAU, lane] + lanes.clock[BASE, lane])
     first, hits, count, least = h, 0, 0, lanes.run[LEAST, lane]
@@ -108,7 +127,8 @@ def decide(lanes, lane, batch, slow):
     lanes.found[DELTA, lane] = first
     lanes.memo[lane, HITS] = hits
     note_touches(lanes, lane, batch, slow, first, count)
-    if first < h and lanes.run[LEAST, lane] < least:  # a gap may have turned behind the crossing, where it won't come to
+    # a gap may have turned behind the crossing, where it won't come to
+    if first < h and lanes.run[LEAST, lane] < least:
         lanes.run[LEAST, lane] = least
         for g in range(NGUARDS if first > 0.0 else 0):
             first_place(lanes, lane, g, first, slow, 0)
@@ -135,17 +155,29 @@ def note_touches(lanes, lane, batch, slow, first, count):
     for _ in range(count):
         soonest = -1
         for j in range(count):
-            if slow.touches[j, TOUCH_AT] >= 0.0 and (soonest < 0 or slow.touches[j, TOUCH_AT] < slow.touches[soonest, TOUCH_AT]):
+            if slow.touches[j, TOUCH_AT] >= 0.0 and (
+                soonest < 0 or slow.touches[j, TOUCH_AT] < slow.touches[soonest, TOUCH_AT]
+            ):
                 soonest = j
         d = slow.touches[soonest, TOUCH_AT] * h
         if d <= first:
-            note_touch(lanes, lane, batch, slow, int(slow.touches[soonest, TOUCH_GUARD]), d, lanes.clock[TAU, lane])
+            note_touch(
+                lanes,
+                lane,
+                batch,
+                slow,
+                int(slow.touches[soonest, TOUCH_GUARD]),
+                d,
+                lanes.clock[TAU, lane],
+            )
         slow.touches[soonest, TOUCH_AT] = -1.0
 
 
 @kernel
 def touches_exactly(lanes, lane, g, d, slow):
-    """Whether a gap is zero at d with not one operation rounded: else a zero is luck, and the touch unresolved."""
+    """Whether a gap is zero at d with not one operation rounded: else a zero is luck, and the touch
+    unresolved.
+    """
     if SNAP_STATE[g] >= 0:
         x, place = lanes.work[GUARD_ROW[g], lane], lanes.c[SNAP_CONST[g], lane]
         total = x - place
@@ -160,7 +192,9 @@ def touches_exactly(lanes, lane, g, d, slow):
 
 @kernel
 def touch_error(lanes, lane, g, d, slow):
-    """Error of the time of a touch: how far around it the gap stays within its rounding error, up to the ends of the step."""
+    """Error of the time of a touch: how far around it the gap stays within its rounding error, up
+    to the ends of the step.
+    """
     h = lanes.run[STEP, lane]
     noise = 2.0 * scaled_gap(lanes, lane, g, h, slow)
     fresh, place = lanes.fresh[g, lane] > 0.5, d / h
@@ -179,8 +213,13 @@ def touch_error(lanes, lane, g, d, slow):
 
 @kernel
 def note_touch(lanes, lane, batch, slow, g, d, start):
-    """Count and record one tangency at time d into the step that began at phase `start`: exact, or within the gap's rounding error."""
-    who, kind = lanes.memo[lane, WHO], GRAZE if touches_exactly(lanes, lane, g, d, slow) else GRAZE_SHALLOW
+    """Count and record one tangency at time d into the step that began at phase `start`: exact, or
+    within the gap's rounding error.
+    """
+    who, kind = (
+        lanes.memo[lane, WHO],
+        GRAZE if touches_exactly(lanes, lane, g, d, slow) else GRAZE_SHALLOW,
+    )
     state_at(lanes, lane, d, slow.state)
     mode, side = mode_of(lanes, lane), int(lanes.side[g, lane])
     if kind == GRAZE:
@@ -194,20 +233,35 @@ def note_touch(lanes, lane, batch, slow, g, d, start):
     record(lanes, lane, batch, start + d, g, side, velocity, kind, mode, mode, error, slow.state)
 
 
-# -- gaps at a node, clocks -----------------------------------------------------------------------------------------------------
+# -- gaps at a node, clocks ------------------------------------------------------------------------
 @kernel
 def follow_clocks(lanes, lane, batch, slow, known):
-    """Bring the clocks of a lane to their pieces at its phase, from those that it holds if they are known; sets its next break."""
+    """Bring the clocks of a lane to their pieces at its phase, from those that it holds if they are
+    known; sets its next break.
+    """
     if NCLOCKS > 0:
         who, count, base = lanes.memo[lane, WHO], lanes.memo[lane, COUNT], lanes.clock[BASE, lane]
-        place_clocks(batch.param[who * batch.stride], batch.origin[who], batch.period[who], count, slow.numbers, batch.data)
+        place_clocks(
+            batch.param[who * batch.stride],
+            batch.origin[who],
+            batch.period[who],
+            count,
+            slow.numbers,
+            batch.data,
+        )
         for row in range(HELD * NCLOCKS):
             slow.held[row] = lanes.clock[CLOCK_ROW + row, lane]
-        following = set_clocks(lanes.clock[TAU, lane], base, slow.numbers, batch.data, known, slow.held)
+        following = set_clocks(
+            lanes.clock[TAU, lane], base, slow.numbers, batch.data, known, slow.held
+        )
         for row in range(HELD * NCLOCKS):
             lanes.clock[CLOCK_ROW + row, lane] = slow.held[row]
         lanes.run[BREAK, lane] = following
-        lanes.run[WATCH, lane] = following - SAME_BREAK * (abs(following) + abs(base)) if following < math.inf else math.inf
+        lanes.run[WATCH, lane] = (
+            following - SAME_BREAK * (abs(following) + abs(base))
+            if following < math.inf
+            else math.inf
+        )
 
 
 @inner
@@ -227,12 +281,20 @@ def gaps_here(lanes, lane, batch, slow):
         slow.state[i] = lanes.y[i, lane]
     show_clocks(lanes, lane, slow)
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
-    gaps(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.held, slow.gaps)
+    gaps(
+        lanes.clock[TAU, lane] + lanes.clock[BASE, lane],
+        slow.state,
+        parameters,
+        slow.held,
+        slow.gaps,
+    )
 
 
 @inner
 def is_past(lanes, lane, g, slow):
-    """Whether a gap in slow.gaps is on the wrong side of its boundary, by more than the rounding of the terms of the step before."""
+    """Whether a gap in slow.gaps is on the wrong side of its boundary, by more than the rounding of
+    the terms of the step before.
+    """
     return slow.gaps[g] * lanes.side[g, lane] < -ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
 
 
@@ -240,8 +302,9 @@ def is_past(lanes, lane, g, slow):
 def pass_break(lanes, lane, batch, slow):
     """Bring the clocks of a lane over a break at the end of its step.
 
-    A boundary may jump there, over the state or away from under it. The next step finds the state past it at once, with no step to blame:
-    so this counts as a landing in which nothing has changed sides yet.
+    A boundary may jump there, over the state or away from under it. The next step finds the state
+    past it at once, with no step to blame: so this counts as a landing in which nothing has changed
+    sides yet.
     """
     was_past, jumped = 0, False
     gaps_here(lanes, lane, batch, slow)
@@ -251,7 +314,10 @@ def pass_break(lanes, lane, batch, slow):
     follow_clocks(lanes, lane, batch, slow, True)
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
-        if lanes.fresh[g, lane] > 0.5 and abs(slow.gaps[g]) > TOLD * ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]:
+        if (
+            lanes.fresh[g, lane] > 0.5
+            and abs(slow.gaps[g]) > TOLD * ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
+        ):
             lanes.fresh[g, lane] = 0.0
         jumped = jumped or (is_past(lanes, lane, g, slow) and (was_past >> g) & 1 == 0)
     if jumped and lanes.run[LANDED, lane] != lanes.clock[TAU, lane] + lanes.clock[BASE, lane]:
@@ -259,7 +325,7 @@ def pass_break(lanes, lane, batch, slow):
         lanes.run[BOUNCES, lane] = -1.0
 
 
-# -- landing -------------------------------------------------------------------------------------------------------------------
+# -- landing ---------------------------------------------------------------------------------------
 @inner
 def mode_of(lanes, lane):
     """Mode bits of a lane."""
@@ -283,7 +349,10 @@ def state_at(lanes, lane, d, out):
 @inner
 def recorded(lanes, lane, batch):
     """Whether the contacts of this period are kept."""
-    return batch.rec_i.shape[0] > 0 and lanes.memo[lane, COUNT] >= batch.rec_first[lanes.memo[lane, WHO]]
+    return (
+        batch.rec_i.shape[0] > 0
+        and lanes.memo[lane, COUNT] >= batch.rec_first[lanes.memo[lane, WHO]]
+    )
 
 
 @inner
@@ -310,16 +379,22 @@ def record(lanes, lane, batch, tau, g, direction, velocity, kind, before, after,
 
 @inner
 def time_error(lanes, lane, g, rate, tau):
-    """Local error of a contact's time: truncation and rounding of the gap's terms over its rate, and the rounding of the clock."""
+    """Local error of a contact's time: truncation and rounding of the gap's terms over its rate,
+    and the rounding of the clock.
+    """
     if rate == 0.0:
         return math.inf
     size = lanes.prior[PRIOR_ROWS * g + NEW, lane]
-    return (ROUNDING + 2.0 ** lanes.run[TOLERANCE, lane]) * size / abs(rate) + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
+    return (ROUNDING + 2.0 ** lanes.run[TOLERANCE, lane]) * size / abs(rate) + 2.0e-16 * (
+        tau + abs(lanes.clock[BASE, lane])
+    )
 
 
 @inner
 def land(lanes, lane, batch, g, rate, slow):
-    """One contact: snap the state to the boundary, change the side, make the guard fresh, count and record."""
+    """One contact: snap the state to the boundary, change the side, make the guard fresh, count and
+    record.
+    """
     before = mode_of(lanes, lane)
     if SNAP_STATE[g] >= 0:
         lanes.y[SNAP_STATE[g], lane] = lanes.c[SNAP_CONST[g], lane]
@@ -329,27 +404,45 @@ def land(lanes, lane, batch, g, rate, slow):
 
 @inner
 def is_shallow(lanes, lane, g, rate):
-    """Whether a crossing at this rate goes no deeper than the rounding error of the gap: depth = rate^2 / (2 curvature)."""
+    """Whether a crossing at this rate goes no deeper than the rounding error of the gap: depth =
+    rate^2 / (2 curvature).
+    """
     j, h = BOUNDS * GUARD_SERIES[g], lanes.run[STEP, lane]
-    curvature = 2.0 * (abs(lanes.bounds[j + QUADRATIC, lane]) + 3.0 * abs(lanes.bounds[j + CUBIC, lane]))
+    curvature = 2.0 * (
+        abs(lanes.bounds[j + QUADRATIC, lane]) + 3.0 * abs(lanes.bounds[j + CUBIC, lane])
+    )
     size = lanes.prior[PRIOR_ROWS * g + NEW, lane] + lanes.prior[PRIOR_ROWS * g + OLD, lane]
     return rate * rate * h * h <= 2.0 * ROUNDING * size * curvature
 
 
 @inner
 def jump_over(lanes, lane, batch, g, rate, slow):
-    """One contact that the boundary made: it jumped over the state, when that crossed another boundary or at a break (-1)."""
+    """One contact that the boundary made: it jumped over the state, when that crossed another
+    boundary or at a break (-1).
+    """
     flipped = int(lanes.run[FLIPPED, lane])
-    change_side(lanes, lane, batch, g, rate, mode_of(lanes, lane), lowest_bit(flipped) if flipped != 0 else -1, slow)
+    change_side(
+        lanes,
+        lane,
+        batch,
+        g,
+        rate,
+        mode_of(lanes, lane),
+        lowest_bit(flipped) if flipped != 0 else -1,
+        slow,
+    )
 
 
 @inner
 def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
-    """The state is on the other side of a guard, for it crossed that boundary or another: change its bit, count and record."""
+    """The state is on the other side of a guard, for it crossed that boundary or another: change
+    its bit, count and record.
+    """
     who = lanes.memo[lane, WHO]
     velocity = rate * lanes.side[g, lane]
     lanes.side[g, lane] = -lanes.side[g, lane]
-    if lanes.run[STARTING, lane] > 0.5:  # the side at the start is an initial condition, no event; a sample taken there had to guess it
+    # the side at the start is an initial condition, no event; a sample taken there had to guess it
+    if lanes.run[STARTING, lane] > 0.5:
         for m in range(batch.cursor[who]):
             batch.sample_mode[who, m] = mode_of(lanes, lane)
         return
@@ -371,24 +464,49 @@ def change_side(lanes, lane, batch, g, rate, before, crossed, slow):
     tau, direction = lanes.clock[TAU, lane], int(lanes.side[g, lane])
     kind = GRAZE_SHALLOW if shallow else CROSSING
     error = time_error(lanes, lane, g, rate, tau)
-    record(lanes, lane, batch, tau, g, direction, velocity, kind, before, mode_of(lanes, lane), error, slow.state)
+    record(
+        lanes,
+        lane,
+        batch,
+        tau,
+        g,
+        direction,
+        velocity,
+        kind,
+        before,
+        mode_of(lanes, lane),
+        error,
+        slow.state,
+    )
 
 
 @kernel
 def saltate(lanes, lane, batch, g, before, slow):
-    """The jump of the tangent that the states carry, at a crossing of the boundary of guard g out of mode `before`."""
+    """The jump of the tangent that the states carry, at a crossing of the boundary of guard g out
+    of mode `before`.
+    """
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
     show_clocks(lanes, lane, slow)
-    jump(lanes.clock[TAU, lane] + lanes.clock[BASE, lane], slow.state, parameters, slow.held, before, mode_of(lanes, lane), g)
+    jump(
+        lanes.clock[TAU, lane] + lanes.clock[BASE, lane],
+        slow.state,
+        parameters,
+        slow.held,
+        before,
+        mode_of(lanes, lane),
+        g,
+    )
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
 
 
 @inner
 def note_arrival(lanes, lane):
-    """Whether time has passed since the last landing (or the start); counts the landings at one instant."""
+    """Whether time has passed since the last landing (or the start); counts the landings at one
+    instant.
+    """
     now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
     arrived = lanes.found[DELTA, lane] > 0.0 or now != lanes.run[LANDED, lane]
     if arrived:
@@ -403,21 +521,28 @@ def note_arrival(lanes, lane):
 def land_all(lanes, lane, batch, hits, slow):
     """Every contact at the end of this step, together. Returns the status.
 
-    A gap may hold sides of other guards, or clocks, and jump when they change: the state is then past that boundary without having met it.
+    A gap may hold sides of other guards, or clocks, and jump when they change: the state is then
+    past that boundary without having met it.
     """
     who, d = lanes.memo[lane, WHO], lanes.found[DELTA, lane]
     arrived = note_arrival(lanes, lane)
     for g in range(NGUARDS):
         if (hits >> g) & 1:
-            exactly = lanes.memo[lane, DECIDED] == 1 or batch.rec_i.shape[0] > 0  # Newton's slope is right to some 1e-9
+            # Newton's slope is right to some 1e-9
+            exactly = lanes.memo[lane, DECIDED] == 1 or batch.rec_i.shape[0] > 0
             rate = gap_rate(lanes, lane, g, d) if exactly else lanes.found[RATE, lane]
             past = -lanes.side[g, lane] * lanes.work[GAP_ROW + g, lane]
-            if d == 0.0 and lanes.fresh[g, lane] < 0.5 and past > ROUNDING * lanes.work[SCALE_ROW + g, lane]:
+            if (
+                d == 0.0
+                and lanes.fresh[g, lane] < 0.5
+                and past > ROUNDING * lanes.work[SCALE_ROW + g, lane]
+            ):
                 batch.counters[who, VIOLATIONS] += arrived
                 jump_over(lanes, lane, batch, g, rate, slow)
             else:
                 land(lanes, lane, batch, g, rate, slow)
     if lanes.run[BOUNCES, lane] >= MOST_BOUNCES:
-        lanes.run[MET, lane] -= (int(lanes.run[FLIPPED, lane]) >> NGUARDS) & 1  # there and back where sliding begins is one contact
+        # there and back where sliding begins is one contact
+        lanes.run[MET, lane] -= (int(lanes.run[FLIPPED, lane]) >> NGUARDS) & 1
         return SLIDING
     return BUDGET_EVENTS if lanes.run[MET, lane] >= lanes.run[MOST_MET, lane] else RUNNING

@@ -1,4 +1,6 @@
-"""Template, 6 of 6 of the Taylor flow: the life of a lane - filled, attended to at contacts, samples and ends of periods, emptied."""
+"""Template, 6 of 6 of the Taylor flow: the life of a lane - filled, attended to at contacts,
+samples and ends of periods, emptied.
+"""
 
 import math
 
@@ -21,10 +23,12 @@ from saltus.kernels.status import (
 )
 
 
-# -- samples and periods -------------------------------------------------------------------------------------------------------
+# -- samples and periods ---------------------------------------------------------------------------
 @kernel
 def write_samples(lanes, lane, batch, start, slow):
-    """Write every sample that this step has passed, from its polynomial; at a node, the node's own state."""
+    """Write every sample that this step has passed, from its polynomial; at a node, the node's own
+    state.
+    """
     who, count = lanes.memo[lane, WHO], lanes.memo[lane, COUNT]
     tau, period = lanes.clock[TAU, lane], batch.period[who]
     m = batch.cursor[who]
@@ -49,26 +53,39 @@ def set_due(lanes, lane, batch):
     who, m = lanes.memo[lane, WHO], batch.cursor[lanes.memo[lane, WHO]]
     lanes.run[DUE, lane] = math.inf
     if 0 <= m < batch.sample_count.shape[0] and batch.sample_count[m] <= lanes.memo[lane, COUNT]:
-        lanes.run[DUE, lane] = (batch.sample_count[m] - lanes.memo[lane, COUNT]) * batch.period[who] + batch.sample_fraction[
-            m
-        ] * batch.period[who]
+        lanes.run[DUE, lane] = (batch.sample_count[m] - lanes.memo[lane, COUNT]) * batch.period[
+            who
+        ] + batch.sample_fraction[m] * batch.period[who]
 
 
 @inner
 def set_period(lanes, lane, batch, slow):
-    """Everything of a lane that depends on its period count: time base, phases of harmonics, clocks, end of the stretch, next sample."""
+    """Everything of a lane that depends on its period count: time base, phases of harmonics,
+    clocks, end of the stretch, next sample.
+    """
     who, count = lanes.memo[lane, WHO], lanes.memo[lane, COUNT]
     lanes.clock[BASE, lane] = batch.origin[who] + count * batch.period[who]
     if lanes.memo[lane, DRIFTS] == 1:
-        turns(batch.param[who * batch.stride], batch.origin[who], batch.period[who], count, lane, lanes.clock)
-    lanes.run[END, lane] = batch.period[who] if count < batch.end_count[who] else batch.end_phase[who]
+        turns(
+            batch.param[who * batch.stride],
+            batch.origin[who],
+            batch.period[who],
+            count,
+            lane,
+            lanes.clock,
+        )
+    lanes.run[END, lane] = (
+        batch.period[who] if count < batch.end_count[who] else batch.end_phase[who]
+    )
     follow_clocks(lanes, lane, batch, slow, False)
     set_due(lanes, lane, batch)
 
 
 @kernel
 def final_contacts(lanes, lane, batch, slow):
-    """A gap that is exactly zero, or past zero by rounding, at the very end is an event there, reported once; or a graze if it turns."""
+    """A gap that is exactly zero, or past zero by rounding, at the very end is an event there,
+    reported once; or a graze if it turns.
+    """
     gaps_here(lanes, lane, batch, slow)
     d, met, past = lanes.found[DELTA, lane], 0, 0
     for g in range(NGUARDS):
@@ -101,7 +118,10 @@ def end_stretch(lanes, lane, batch, slow):
             lanes.run[LANDED, lane] = lanes.clock[BASE, lane]
         if lanes.run[DUE, lane] <= 0.0:
             write_samples(lanes, lane, batch, 0.0, slow)
-    if lanes.memo[lane, COUNT] < batch.end_count[who] or lanes.clock[TAU, lane] < batch.end_phase[who]:
+    if (
+        lanes.memo[lane, COUNT] < batch.end_count[who]
+        or lanes.clock[TAU, lane] < batch.end_phase[who]
+    ):
         return RUNNING
     final_contacts(lanes, lane, batch, slow)
     if lanes.memo[lane, RESTS] != 0:
@@ -111,7 +131,9 @@ def end_stretch(lanes, lane, batch, slow):
 
 @inner
 def overflowed(lanes, lane):
-    """Whether the step left the range of numbers; the lane then keeps the state and the time at the start of the step."""
+    """Whether the step left the range of numbers; the lane then keeps the state and the time at the
+    start of the step.
+    """
     bad = lanes.memo[lane, BROKEN] == 1
     for i in range(NSTATES):
         bad = bad or not abs(lanes.y[i, lane]) < HUGE
@@ -131,7 +153,10 @@ def is_slow(lanes, lane, batch):
     behind = periods_behind(lanes, lane, batch)
     who = lanes.memo[lane, WHO]
     slow = not behind - lanes.run[MARK, lane] >= batch.options[who, PACE]
-    lanes.run[LIMIT, lane], lanes.run[MARK, lane] = lanes.run[TAKEN, lane] + batch.options[who, MOST_STEPS], behind
+    lanes.run[LIMIT, lane], lanes.run[MARK, lane] = (
+        lanes.run[TAKEN, lane] + batch.options[who, MOST_STEPS],
+        behind,
+    )
     return slow
 
 
@@ -175,10 +200,12 @@ def attend(lanes, lane, batch, slow):
     return status
 
 
-# -- filling and emptying lanes ------------------------------------------------------------------------------------------------
+# -- filling and emptying lanes --------------------------------------------------------------------
 @kernel
 def start_sides(lanes, lane, batch, slow):
-    """Sides of all guards from the state; on a boundary the guard is fresh and its side is settled by the first step."""
+    """Sides of all guards from the state; on a boundary the guard is fresh and its side is settled
+    by the first step.
+    """
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
         lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
@@ -193,13 +220,26 @@ def fill(lanes, lane, who, batch, slow):
     lanes.memo[lane, :] = 0
     lanes.memo[lane, WHO], lanes.memo[lane, COUNT] = who, batch.count[who]
     constants(batch.param[who * batch.stride], lanes.c, lane)
-    drifts = turns(batch.param[who * batch.stride], batch.origin[who], batch.period[who], batch.count[who], lane, lanes.clock)
+    drifts = turns(
+        batch.param[who * batch.stride],
+        batch.origin[who],
+        batch.period[who],
+        batch.count[who],
+        lane,
+        lanes.clock,
+    )
     lanes.memo[lane, DRIFTS] = 1 if drifts else 0
     lanes.clock[TAU, lane] = batch.phase[who]
     set_period(lanes, lane, batch, slow)
     lanes.run[TAKEN, lane] = batch.counters[who, STEPS]
-    lanes.run[MET, lane], lanes.run[SHALLOW, lane] = batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED]
-    lanes.run[LEAST, lane], lanes.run[SLOWEST, lane] = batch.minima[who, GAP_MARGIN], batch.minima[who, CONTACT_SPEED]
+    lanes.run[MET, lane], lanes.run[SHALLOW, lane] = (
+        batch.counters[who, EVENTS],
+        batch.counters[who, UNRESOLVED],
+    )
+    lanes.run[LEAST, lane], lanes.run[SLOWEST, lane] = (
+        batch.minima[who, GAP_MARGIN],
+        batch.minima[who, CONTACT_SPEED],
+    )
     lanes.run[BOUNCES, lane], lanes.run[STARTING, lane], lanes.run[FLIPPED, lane] = 0.0, 0.0, 0.0
     lanes.run[ACTIVE, lane] = 1.0
     lanes.run[TOLERANCE, lane] = batch.options[who, LOG2_TOLERANCE]
@@ -209,7 +249,10 @@ def fill(lanes, lane, who, batch, slow):
     for g in range(NGUARDS):
         lanes.prior[PRIOR_ROWS * g + NEW, lane] = batch.carry[who, CARRIED + g]
     if batch.mode[who] < 0:
-        lanes.run[LIMIT, lane], lanes.run[MARK, lane] = batch.options[who, MOST_STEPS], periods_behind(lanes, lane, batch)
+        lanes.run[LIMIT, lane], lanes.run[MARK, lane] = (
+            batch.options[who, MOST_STEPS],
+            periods_behind(lanes, lane, batch),
+        )
         start_sides(lanes, lane, batch, slow)
         if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
             write_samples(lanes, lane, batch, lanes.clock[TAU, lane], slow)
@@ -219,7 +262,11 @@ def fill(lanes, lane, who, batch, slow):
         lanes.fresh[g, lane] = 1.0 if (batch.fresh[who] >> g) & 1 else 0.0
     lanes.run[LANDED, lane] = batch.carry[who, 0]
     lanes.run[BOUNCES, lane], lanes.run[STARTING, lane] = batch.carry[who, 1], batch.carry[who, 2]
-    lanes.run[FLIPPED, lane], lanes.run[LIMIT, lane], lanes.run[MARK, lane] = batch.carry[who, 3], batch.carry[who, 4], batch.carry[who, 5]
+    lanes.run[FLIPPED, lane], lanes.run[LIMIT, lane], lanes.run[MARK, lane] = (
+        batch.carry[who, 3],
+        batch.carry[who, 4],
+        batch.carry[who, 5],
+    )
 
 
 @kernel
@@ -239,20 +286,35 @@ def empty(lanes, lane, batch, status):
         batch.carry[who, CARRIED + g] = lanes.prior[PRIOR_ROWS * g + NEW, lane]
     batch.carry[who, 0] = lanes.run[LANDED, lane]
     batch.carry[who, 1], batch.carry[who, 2] = lanes.run[BOUNCES, lane], lanes.run[STARTING, lane]
-    batch.carry[who, 3], batch.carry[who, 4], batch.carry[who, 5] = lanes.run[FLIPPED, lane], lanes.run[LIMIT, lane], lanes.run[MARK, lane]
+    batch.carry[who, 3], batch.carry[who, 4], batch.carry[who, 5] = (
+        lanes.run[FLIPPED, lane],
+        lanes.run[LIMIT, lane],
+        lanes.run[MARK, lane],
+    )
     batch.counters[who, STEPS] = int(lanes.run[TAKEN, lane])
-    batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED] = int(lanes.run[MET, lane]), int(lanes.run[SHALLOW, lane])
-    batch.minima[who, GAP_MARGIN], batch.minima[who, CONTACT_SPEED] = lanes.run[LEAST, lane], lanes.run[SLOWEST, lane]
+    batch.counters[who, EVENTS], batch.counters[who, UNRESOLVED] = (
+        int(lanes.run[MET, lane]),
+        int(lanes.run[SHALLOW, lane]),
+    )
+    batch.minima[who, GAP_MARGIN], batch.minima[who, CONTACT_SPEED] = (
+        lanes.run[LEAST, lane],
+        lanes.run[SLOWEST, lane],
+    )
     lanes.run[ACTIVE, lane] = 0.0
     lanes.memo[lane, WHO] = -1
 
 
 @kernel
 def refill(lanes, lane, cursor, batch, slow):
-    """Give an idle lane the next trajectory that wants to run; returns where to look for the one after it."""
+    """Give an idle lane the next trajectory that wants to run; returns where to look for the one
+    after it.
+    """
     while cursor < batch.status.shape[0]:
         if batch.status[cursor] == RUNNING:
-            if batch.count[cursor] < batch.end_count[cursor] or batch.phase[cursor] < batch.end_phase[cursor]:
+            if (
+                batch.count[cursor] < batch.end_count[cursor]
+                or batch.phase[cursor] < batch.end_phase[cursor]
+            ):
                 fill(lanes, lane, cursor, batch, slow)
                 return cursor + 1
             batch.status[cursor] = OK
@@ -260,20 +322,122 @@ def refill(lanes, lane, cursor, batch, slow):
     return cursor
 
 
-# -- the whole batch -----------------------------------------------------------------------------------------------------------
+# -- the whole batch -------------------------------------------------------------------------------
 @entry
-def propagate(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
-              sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options, data, budget,
-              lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found,
-              lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo,
-              slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches, slow_held, slow_numbers):  # fmt: skip
-    """Move every trajectory whose status is RUNNING to its end, `budget` steps of the lanes at most. See flow/engine.py for the arrays."""
-    batch = Batch(period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count, end_phase, counters, minima,
-                  sample_count, sample_fraction, cursor, samples, sample_mode, rec_first, rec_i, rec_f, rec_used, options,
-                  data)  # fmt: skip
-    lanes = Lanes(lane_y, lane_side, lane_fresh, lane_clock, lane_c, lane_work, lane_bounds, lane_prior, lane_poly, lane_run, lane_found,
-                  lane_probe_y, lane_probe_clock, lane_probe_rate, lane_memo)  # fmt: skip
-    slow = Slow(slow_q, slow_b, slow_bounds, slow_rates, slow_out, slow_gaps, slow_state, slow_touches, slow_held, slow_numbers)
+def propagate(
+    period,
+    origin,
+    param,
+    stride,
+    state,
+    count,
+    phase,
+    mode,
+    fresh,
+    carry,
+    status,
+    end_count,
+    end_phase,
+    counters,
+    minima,
+    sample_count,
+    sample_fraction,
+    cursor,
+    samples,
+    sample_mode,
+    rec_first,
+    rec_i,
+    rec_f,
+    rec_used,
+    options,
+    data,
+    budget,
+    lane_y,
+    lane_side,
+    lane_fresh,
+    lane_clock,
+    lane_c,
+    lane_work,
+    lane_bounds,
+    lane_prior,
+    lane_poly,
+    lane_run,
+    lane_found,
+    lane_probe_y,
+    lane_probe_clock,
+    lane_probe_rate,
+    lane_memo,
+    slow_q,
+    slow_b,
+    slow_bounds,
+    slow_rates,
+    slow_out,
+    slow_gaps,
+    slow_state,
+    slow_touches,
+    slow_held,
+    slow_numbers,
+):
+    """Move every trajectory whose status is RUNNING to its end, `budget` steps of the lanes at
+    most. See flow/engine.py for the arrays.
+    """
+    batch = Batch(
+        period,
+        origin,
+        param,
+        stride,
+        state,
+        count,
+        phase,
+        mode,
+        fresh,
+        carry,
+        status,
+        end_count,
+        end_phase,
+        counters,
+        minima,
+        sample_count,
+        sample_fraction,
+        cursor,
+        samples,
+        sample_mode,
+        rec_first,
+        rec_i,
+        rec_f,
+        rec_used,
+        options,
+        data,
+    )
+    lanes = Lanes(
+        lane_y,
+        lane_side,
+        lane_fresh,
+        lane_clock,
+        lane_c,
+        lane_work,
+        lane_bounds,
+        lane_prior,
+        lane_poly,
+        lane_run,
+        lane_found,
+        lane_probe_y,
+        lane_probe_clock,
+        lane_probe_rate,
+        lane_memo,
+    )
+    slow = Slow(
+        slow_q,
+        slow_b,
+        slow_bounds,
+        slow_rates,
+        slow_out,
+        slow_gaps,
+        slow_state,
+        slow_touches,
+        slow_held,
+        slow_numbers,
+    )
     roomy = rec_i.shape[0] - STEP_RECORDS
     following = 0
     busy = 0

@@ -1,21 +1,25 @@
-"""Template, 1 of 6 of the Taylor flow: what its work arrays hold. codegen puts a generated head before the six.
+"""Template, 1 of 6 of the Taylor flow: what its work arrays hold. codegen puts a generated head
+before the six.
 
-One step of all lanes reads: jets -> step length (taylor_step.py) -> locate contacts (taylor_crossings.py) -> advance and land
-(taylor_step.py), then attend to the lanes where more happened: a contact to be recorded or hard to settle (taylor_contacts.py), the end of
-a period, a sample, the end (taylor_lanes.py).
-Steps are arithmetic on lanes without branches on their contents, or with branches that only skip work; so a trajectory's digits don't
-depend on its neighbours.
+One step of all lanes reads: jets -> step length (taylor_step.py) -> locate contacts
+(taylor_crossings.py) -> advance and land (taylor_step.py), then attend to the lanes where more
+happened: a contact to be recorded or hard to settle (taylor_contacts.py), the end of a period, a
+sample, the end (taylor_lanes.py). Steps are arithmetic on lanes without branches on their contents,
+or with branches that only skip work; so a trajectory's digits don't depend on its neighbours.
 
 Symbols
 -------
-N = ORDER; y_k Taylor coefficient k of state y; g gap; s = +1/-1 the side of a guard that the mode says; P(d) = s*g along the step, d the
-time since its start; h step length; T forcing period; tau phase in [0, T); c parameter-only constants of each lane.
-A guard is *fresh* while its lane stands exactly on the boundary: P(0) = 0, and that known root is divided out.
+N = ORDER; y_k Taylor coefficient k of state y; g gap; s = +1/-1 the side of a guard that the mode
+says; P(d) = s*g along the step, d the time since its start; h step length; T forcing period; tau
+phase in [0, T); c parameter-only constants of each lane. A guard is *fresh* while its lane stands
+exactly on the boundary: P(0) = 0, and that known root is divided out.
 
-The head supplies the sizes LANES, NSTATES, NGUARDS, ORDER, NCONST, NTURNS, ROWS, NSERIES, the rows SERIES_ROW, GUARD_ROW, GUARD_SERIES,
-GUARD_SIGN, GAP_ROW, SCALE_ROW, SNAP_STATE, SNAP_CONST, the degrees NEWTON_DEGREE_1 and _2, and the functions constants(p, c, lane),
-gaps(t, y, p, h, out), turns(p, origin, period, count, lane, clock) -> whether they change from period to period, jets(y, side, c, clock,
-work) and rates(y, side, c, clock, work), the right-hand side alone; PROBED says whether a step must be probed with it.
+The head supplies the sizes LANES, NSTATES, NGUARDS, ORDER, NCONST, NTURNS, ROWS, NSERIES, the rows
+SERIES_ROW, GUARD_ROW, GUARD_SERIES, GUARD_SIGN, GAP_ROW, SCALE_ROW, SNAP_STATE, SNAP_CONST, the
+degrees NEWTON_DEGREE_1 and _2, and the functions constants(p, c, lane), gaps(t, y, p, h, out),
+turns(p, origin, period, count, lane, clock) -> whether they change from period to period, jets(y,
+side, c, clock, work) and rates(y, side, c, clock, work), the right-hand side alone; PROBED says
+whether a step must be probed with it.
 """
 
 from collections import namedtuple
@@ -25,42 +29,69 @@ import numpy as np
 from saltus.kernels.clocks_layout import HELD, NUMBERS
 from saltus.kernels.isolation import DEEPEST, MOST_TOUCHES
 
-# Rows of `clock`: phase, time at phase zero, then one phase offset for each harmonic of the forcing; then, from
-# CLOCK_ROW on, what the clocks hold.
+# Rows of `clock`: phase, time at phase zero, then one phase offset for each harmonic of the
+# forcing; then, from CLOCK_ROW on, what the clocks hold.
 TAU, BASE, TURN = 0, 1, 2
 CLOCK_ROWS = CLOCK_ROW + HELD * NCLOCKS
-# Rows of `run`: the phase at which the current stretch ends, the next sample's phase, steps taken, smallest gap margin, active (0/1), the
-# step length, the phase at its start, time of the last landing, contacts in a row without time passing, whether the mode at the start is
-# still being settled (0/1); contacts so far, those too shallow to be sure of, the slowest; the guards that changed sides at the last
-# landing's instant (bits; bit NGUARDS: one of them changed back and was counted again); the number of steps at which its pace is looked at
-# next, and the periods behind it when that was done last; the phase of the next break of a clock, and from which on it counts as reached;
-# log2 of the tolerance, and the contacts that the trajectory may make.
-END, DUE, TAKEN, LEAST, ACTIVE, STEP, START, LANDED, BOUNCES, STARTING, MET, SHALLOW, SLOWEST, FLIPPED, LIMIT, MARK, BREAK, WATCH = range(
-    18
-)
+# Rows of `run`: the phase at which the current stretch ends, the next sample's phase, steps taken,
+# smallest gap margin, active (0/1), the step length, the phase at its start, time of the last
+# landing, contacts in a row without time passing, whether the mode at the start is still being
+# settled (0/1); contacts so far, those too shallow to be sure of, the slowest; the guards that
+# changed sides at the last landing's instant (bits; bit NGUARDS: one of them changed back and was
+# counted again); the number of steps at which its pace is looked at next, and the periods behind it
+# when that was done last; the phase of the next break of a clock, and from which on it counts as
+# reached; log2 of the tolerance, and the contacts that the trajectory may make.
+(
+    END,
+    DUE,
+    TAKEN,
+    LEAST,
+    ACTIVE,
+    STEP,
+    START,
+    LANDED,
+    BOUNCES,
+    STARTING,
+    MET,
+    SHALLOW,
+    SLOWEST,
+    FLIPPED,
+    LIMIT,
+    MARK,
+    BREAK,
+    WATCH,
+) = range(18)
 TOLERANCE, MOST_MET = 18, 19
 RUN_ROWS = 20
 # Rows of `bounds`, for each series that a gap reads (see bound_series).
 LINEAR, QUADRATIC, CUBIC, CHANGE, SLOPE_AT_END, REST, BOUNDS = range(7)
-# Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none), smallest depth at which a gap turned and when.
-# Of that guard: +1/-1 by which its series becomes P, P(0), whether it is fresh (0/1), the row of its series, the share of the step within
-# which it crosses just once (0: it crosses twice); terms 0 to 3 of P on [0, 1], or of P/x if it is fresh. From RIVALS on, of each guard:
-# -1 if it needn't be asked whether the one chosen crosses before it; else its rounding error, or infinity if it may cross twice.
-DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, UNTIL, P0, P1, P2, P3, RIVALS = range(15)
-# Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that it found to cross (bits), guards on
-# which the state rests (bits), whether a harmonic of time has another phase in every period, whether this step isn't made of numbers.
+# Rows of `found`: time to the event or end of step, rate of the gap there, guard (-1: none),
+# smallest depth at which a gap turned and when. Of that guard: +1/-1 by which its series becomes P,
+# P(0), whether it is fresh (0/1), the row of its series, the share of the step within which it
+# crosses just once (0: it crosses twice); terms 0 to 3 of P on [0, 1], or of P/x if it is fresh.
+# From RIVALS on, of each guard: -1 if it needn't be asked whether the one chosen crosses before it;
+# else its rounding error, or infinity if it may cross twice.
+DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, UNTIL, P0, P1, P2, P3, RIVALS = (
+    range(15)
+)
+# Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that
+# it found to cross (bits), guards on which the state rests (bits), whether a harmonic of time has
+# another phase in every period, whether this step isn't made of numbers.
 WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN = range(7)
 MEMO = 7
-# Columns of `options`: log2 of the tolerance; steps after which a trajectory's pace is looked at; contacts that it may make; periods that
-# it must have gained by then, infinite if the steps are all that it may take.
+# Columns of `options`: log2 of the tolerance; steps after which a trajectory's pace is looked at;
+# contacts that it may make; periods that it must have gained by then, infinite if the steps are all
+# that it may take.
 LOG2_TOLERANCE, MOST_STEPS, MOST_CONTACTS, PACE = range(4)
-# Rows of `prior`, for each guard: the size of the terms of its gap up to the step before, and up to this one, each step counting half of
-# the one after it; their rounding is inherited.
+# Rows of `prior`, for each guard: the size of the terms of its gap up to the step before, and up to
+# this one, each step counting half of the one after it; their rounding is inherited.
 OLD, NEW, PRIOR_ROWS = range(3)
-# Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING, FLIPPED, LIMIT, MARK, then NEW for each guard.
+# Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING,
+# FLIPPED, LIMIT, MARK, then NEW for each guard.
 CARRIED = 6
 CARRY = CARRIED + NGUARDS
-#: Records that one step may write at most: contacts and touches of all lanes, in the step and at the end of the run.
+#: Records that one step may write at most: contacts and touches of all lanes, in the step and at
+#: the end of the run.
 STEP_RECORDS = 2 * LANES * (NGUARDS + MOST_TOUCHES)
 #: Times within this many ulp are one event (EVENTS.md, rule 6).
 COINCIDENT = 10.0 * 2.220446049250313e-16
@@ -71,18 +102,20 @@ HUGE = 1.0e300
 HORNER = min(8, ORDER - 4 - ORDER % 2)
 #: A probed step is at most this share of a period, or of an unforced span (MATLAB's default too).
 LONGEST_SHARE = 0.1
-#: Defect that a sound step may have, in units of the tolerance and of the rounding of the right-hand side's terms: the derivative of the
-#: last terms is some N times their size.
+#: Defect that a sound step may have, in units of the tolerance and of the rounding of the
+#: right-hand side's terms: the derivative of the last terms is some N times their size.
 DEFECT = 1024.0
 #: Halvings of a step that its probes can ask for.
 MOST_HALVINGS = 40
 
 # -- steps that prove nothing are shortened (settle_sooner), shares of the longest step --
-#: Such a step goes so much further than the first crossing that is predicted: about the error of the prediction.
+#: Such a step goes so much further than the first crossing that is predicted: about the error of
+#: the prediction.
 BEHIND = 1.1
 #: A crossing later than this isn't aimed at: a step hardly shorter proves hardly more.
 WORTH_AIMING = 0.9
-#: The share that is tried then. A number of two bits, so that motions with round numbers stay exact.
+#: The share that is tried then. A number of two bits, so that motions with round numbers stay
+#: exact.
 SHORTENED = 0.75
 #: Crossings predicted so near to each other may be one event.
 TOGETHER = 2.0**-10
@@ -94,30 +127,37 @@ TURN_FOUND = 2.0**-20
 LEAST_SHARE = 2.0**-40
 
 # -- laws without a series on a boundary (taylor_singular.py) --
-#: Effect on a state, relative to it, below which the terms without a series are left out of a step's series.
+#: Effect on a state, relative to it, below which the terms without a series are left out of a
+#: step's series.
 NEGLIGIBLE = 2.0**-50
 #: Share of the way to the boundary that other steps may go.
 REACH = 0.9
-#: All steps behind such a boundary are shorter by this factor, as if the tolerance were 2**-13 of itself: near the edge of its disc a
-#: series converges so slowly that its last terms are a small part of what follows them (with 2**-8 a Hertz contact takes 1e-15 of the
-#: energy away, each time).
+#: All steps behind such a boundary are shorter by this factor, as if the tolerance were 2**-13 of
+#: itself: near the edge of its disc a series converges so slowly that its last terms are a small
+#: part of what follows them (with 2**-8 a Hertz contact takes 1e-15 of the energy away, each time).
 FINER = 2.0 ** (-13.0 / ORDER)
 #: A gap that is so many rounding errors wide can be told from zero.
 TOLD = 64.0
 #: Way to the boundary [s] below which coefficients of the last order could overflow.
 SHORTEST = 2.0 ** (-950.0 / ORDER)
-#: Exponent of time that the search for a negligible step begins with: force d**1.5, and one for its integral.
+#: Exponent of time that the search for a negligible step begins with: force d**1.5, and one for its
+#: integral.
 USUAL_POWER = 2.5
 #: Steps that this search tries.
 MOST_TRIALS = 12
 
-Lanes = namedtuple("Lanes", "y side fresh clock c work bounds prior poly run found probe_y probe_clock probe_rate memo")
+Lanes = namedtuple(
+    "Lanes",
+    "y side fresh clock c work bounds prior poly run found probe_y probe_clock probe_rate memo",
+)
 Slow = namedtuple("Slow", "q b bounds rates out gaps state touches held numbers")
 
 
-# -- memory --------------------------------------------------------------------------------------------------------------------
+# -- memory ----------------------------------------------------------------------------------------
 def rows_of_lanes(count):
-    """Zeros float64[count, LANES] that begin at a cache line: a row that lies in two costs twice."""
+    """Zeros float64[count, LANES] that begin at a cache line: a row that lies in two
+    costs twice.
+    """
     room = np.zeros(count * LANES + 8)
     first = -room.ctypes.data // 8 % 8
     return room[first : first + count * LANES].reshape(count, LANES)
@@ -127,14 +167,21 @@ def workspace():
     """The memory that one call of `propagate` works in; one set for each thread."""
     guards = max(NGUARDS, 1)
     rows = dict(
-        y=NSTATES, side=guards + NSINGULAR, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS, bounds=BOUNDS * max(NSERIES, 1),
-        prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=RIVALS + guards, probe_y=NSTATES,
+        y=NSTATES, side=guards + NSINGULAR, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS,
+        bounds=BOUNDS * max(NSERIES, 1),
+        prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=RIVALS + guards,
+        probe_y=NSTATES,
         probe_clock=CLOCK_ROWS, probe_rate=(6 if NSINGULAR > 0 else 3) * NSTATES,
     )  # fmt: skip
-    lanes = Lanes(memo=np.zeros((LANES, MEMO), np.int64), **{name: rows_of_lanes(count) for name, count in rows.items()})
+    lanes = Lanes(
+        memo=np.zeros((LANES, MEMO), np.int64),
+        **{name: rows_of_lanes(count) for name, count in rows.items()},
+    )
     slow = Slow(
-        q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)), bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(2), gaps=np.zeros(guards), state=np.zeros(NSTATES), touches=np.zeros((MOST_TOUCHES, 2)),
+        q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)),
+        bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
+        out=np.zeros(2), gaps=np.zeros(guards), state=np.zeros(NSTATES),
+        touches=np.zeros((MOST_TOUCHES, 2)),
         held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
     )  # fmt: skip
     return (*lanes, *slow)

@@ -1,14 +1,18 @@
-"""Template, 2 of 6 of the Taylor flow: forces without a Taylor series on a boundary, such as d**1.5 where a contact begins or ends.
+"""Template, 2 of 6 of the Taylor flow: forces without a Taylor series on a boundary, such as d**1.5
+where a contact begins or ends.
 
-Off the boundary such a force is analytic; its series converges as far as the boundary is away. So steps grow, and shrink, in proportion
-to that way (`away_from_boundaries`). The first step off a boundary and the last step onto it can't be taken like that: there the terms
-without a series are *set aside*. The step sees the rest of the equations, is so short that the terms left out change no state by more
-than rounding, and their integral is added at its end (`add_what_was_left_out`). Its polynomials are those of smooth equations: that no
-crossing is missed is proven as always. docs/decisions/0013.
+Off the boundary such a force is analytic; its series converges as far as the boundary is away. So
+steps grow, and shrink, in proportion to that way (`away_from_boundaries`). The first step off a
+boundary and the last step onto it can't be taken like that: there the terms without a series are
+*set aside*. The step sees the rest of the equations, is so short that the terms left out change no
+state by more than rounding, and their integral is added at its end (`add_what_was_left_out`). Its
+polynomials are those of smooth equations: that no crossing is missed is proven as always.
+docs/decisions/0013.
 
-The head supplies NSINGULAR and SINGULAR_GUARD, the boundaries concerned; rows NGUARDS + j of `side` are +1 where the terms of boundary j
-are set aside, else -1; rows CALM_ROW + j*NMOVED of `work` hold the rates without them, of the NMOVED states that aren't a tangent.
-Whether a lane's terms are set aside is a function of its state and of the boundaries that it stands on, never of what came before.
+The head supplies NSINGULAR and SINGULAR_GUARD, the boundaries concerned; rows NGUARDS + j of `side`
+are +1 where the terms of boundary j are set aside, else -1; rows CALM_ROW + j*NMOVED of `work` hold
+the rates without them, of the NMOVED states that aren't a tangent. Whether a lane's terms are set
+aside is a function of its state and of the boundaries that it stands on, never of what came before.
 """
 
 import math
@@ -33,7 +37,9 @@ from saltus.kernels.lanes import (
 
 @inner
 def coefficients(lanes):
-    """Taylor coefficients of all lanes; again while lanes turn out to be so near a boundary that its terms are set aside."""
+    """Taylor coefficients of all lanes; again while lanes turn out to be so near a boundary that
+    its terms are set aside.
+    """
     if NSINGULAR == 0:
         jets(lanes.y, lanes.side, lanes.c, lanes.clock, lanes.work)
     else:
@@ -48,9 +54,14 @@ def coefficients(lanes):
 
 @inner
 def way(lanes, g):
-    """Time in which the quadratic part of a gap changes by the gap itself: how far the boundary is away."""
+    """Time in which the quadratic part of a gap changes by the gap itself: how far the boundary is
+    away.
+    """
     gap = larger(load(lanes.side, g, LANES) * load(lanes.work, GAP_ROW + g, LANES), 0.0)
-    rate, bend = magnitude(load(lanes.work, GUARD_ROW[g] + 1, LANES)), magnitude(load(lanes.work, GUARD_ROW[g] + 2, LANES))
+    rate, bend = (
+        magnitude(load(lanes.work, GUARD_ROW[g] + 1, LANES)),
+        magnitude(load(lanes.work, GUARD_ROW[g] + 2, LANES)),
+    )
     return select(gap > 0.0, 2.0 * gap / (rate + root(rate * rate + 4.0 * bend * gap)), 0.0)
 
 
@@ -59,7 +70,10 @@ def acts(lanes, j):
     """Where the terms of a boundary change a rate, or aren't numbers."""
     different = splat(0.0, LANES) > 1.0
     for i in range(NMOVED):
-        rate, calm = load(lanes.work, i * (ORDER + 1) + 1, LANES), load(lanes.work, CALM_ROW + j * NMOVED + i, LANES)
+        rate, calm = (
+            load(lanes.work, i * (ORDER + 1) + 1, LANES),
+            load(lanes.work, CALM_ROW + j * NMOVED + i, LANES),
+        )
         different = different | (~(magnitude(rate - calm) <= 0.0))
     return different & (load(lanes.run, ACTIVE, LANES) > 0.5)
 
@@ -72,7 +86,9 @@ def told(lanes, g):
 
 @inner
 def set_aside(lanes):
-    """Set aside the terms that, from here to their boundary, change no state by more than rounding; returns whether there are any."""
+    """Set aside the terms that, from here to their boundary, change no state by more than rounding;
+    returns whether there are any.
+    """
     found = splat(0.0, LANES) > 1.0
     for j in range(NSINGULAR):
         g = SINGULAR_GUARD[j]
@@ -80,11 +96,16 @@ def set_aside(lanes):
         d = way(lanes, g)
         weak = splat(1.0, LANES) > 0.0
         for i in range(NMOVED):
-            rate, calm = load(lanes.work, i * (ORDER + 1) + 1, LANES), load(lanes.work, CALM_ROW + j * NMOVED + i, LANES)
+            rate, calm = (
+                load(lanes.work, i * (ORDER + 1) + 1, LANES),
+                load(lanes.work, CALM_ROW + j * NMOVED + i, LANES),
+            )
             size = magnitude(load(lanes.work, i * (ORDER + 1), LANES)) + d * magnitude(calm)
             weak = weak & (d * magnitude(rate - calm) <= 0.25 * NEGLIGIBLE * size)
         gap = load(lanes.side, g, LANES) * load(lanes.work, GAP_ROW + g, LANES)
-        near = (weak | (d <= SHORTEST) | (~(gap > told(lanes, g)))) & acts(lanes, j) & (before < 0.0)
+        near = (
+            (weak | (d <= SHORTEST) | (~(gap > told(lanes, g)))) & acts(lanes, j) & (before < 0.0)
+        )
         store(lanes.side, NGUARDS + j, select(near, splat(1.0, LANES), before))
         found = found | near
     return any_lane(found)
@@ -92,13 +113,17 @@ def set_aside(lanes):
 
 @inner
 def away_from_boundaries(lanes, h, room):
-    """h, shortened: to a share of the way to a boundary whose terms act; where they are set aside, until leaving them out is negligible.
+    """h, shortened: to a share of the way to a boundary whose terms act; where they are set aside,
+    until leaving them out is negligible.
 
-    At most the room, which is no reason to shorten: a share of what is left would never reach the end.
+    At most the room, which is no reason to shorten: a share of what is left would never reach the
+    end.
     """
     for j in range(NSINGULAR):
         aside = load(lanes.side, NGUARDS + j, LANES) > 0.0
-        h = select(acts(lanes, j) & (~aside), smaller(REACH * way(lanes, SINGULAR_GUARD[j]), FINER * h), h)
+        h = select(
+            acts(lanes, j) & (~aside), smaller(REACH * way(lanes, SINGULAR_GUARD[j]), FINER * h), h
+        )
         aside = aside & (load(lanes.run, ACTIVE, LANES) > 0.5)
         if any_lane(aside):
             h = select(aside, negligible_step(lanes, smaller(h, room), j, aside), h)
@@ -112,7 +137,10 @@ def rounding_of_gaps(lanes, i):
     if i < NMOVED:
         for j in range(NSINGULAR):
             gap = magnitude(load(lanes.work, GAP_ROW + SINGULAR_GUARD[j], LANES))
-            force = magnitude(load(lanes.work, i * (ORDER + 1) + 1, LANES) - load(lanes.work, CALM_ROW + j * NMOVED + i, LANES))
+            force = magnitude(
+                load(lanes.work, i * (ORDER + 1) + 1, LANES)
+                - load(lanes.work, CALM_ROW + j * NMOVED + i, LANES)
+            )
             part = force * ROUNDING * load(lanes.work, SCALE_ROW + SINGULAR_GUARD[j], LANES) / gap
             total = total + select(part < HUGE, part, 0.0)
     return total
@@ -122,7 +150,8 @@ def rounding_of_gaps(lanes, i):
 def negligible_step(lanes, h, j, wanted):
     """About the longest step up to h over which the terms of boundary j may be left out.
 
-    Not shorter than the gap needs to be told from zero, nor than SHORTEST. By the secant rule on the logarithms, in a bracket.
+    Not shorter than the gap needs to be told from zero, nor than SHORTEST. By the secant rule on
+    the logarithms, in a bracket.
     """
     g = SINGULAR_GUARD[j]
     goal, rate, bend = (
@@ -131,9 +160,12 @@ def negligible_step(lanes, h, j, wanted):
         magnitude(load(lanes.work, GUARD_ROW[g] + 2, LANES)),
     )
     longest = h
-    floor = smaller(larger(2.0 * goal / (rate + root(rate * rate + 4.0 * bend * goal)), SHORTEST), longest)
+    floor = smaller(
+        larger(2.0 * goal / (rate + root(rate * rate + 4.0 * bend * goal)), SHORTEST), longest
+    )
     power, before, log_before = splat(USUAL_POWER, LANES), splat(2000.0, LANES), splat(0.0, LANES)
-    low, high = coarse_log2(floor), coarse_log2(longest)  # logs of a step short enough, and of one too long
+    # logs of a step short enough, and of one too long
+    low, high = coarse_log2(floor), coarse_log2(longest)
     tries = 0
     while tries < MOST_TRIALS and any_lane(wanted):
         effect, log_h = coarse_log2(left_out(lanes, h, j)), coarse_log2(h)
@@ -152,10 +184,15 @@ def negligible_step(lanes, h, j, wanted):
 
 @inner
 def left_out(lanes, h, j):
-    """Change of the states by the terms of boundary j over h, in units of what is negligible; judged where its gap is widest."""
+    """Change of the states by the terms of boundary j over h, in units of what is negligible;
+    judged where its gap is widest.
+    """
     g = SINGULAR_GUARD[j]
     s = load(lanes.side, g, LANES) * GUARD_SIGN[g]
-    rate, bend = s * load(lanes.work, GUARD_ROW[g] + 1, LANES), s * load(lanes.work, GUARD_ROW[g] + 2, LANES)
+    rate, bend = (
+        s * load(lanes.work, GUARD_ROW[g] + 1, LANES),
+        s * load(lanes.work, GUARD_ROW[g] + 2, LANES),
+    )
     turn = smaller(-0.5 * rate / bend, h)
     rising = rate + 2.0 * bend * h >= 0.0
     widest = select(rising, select(fma(bend, h, rate) > 0.0, h, 0.0), select(rate > 0.0, turn, 0.0))
@@ -164,8 +201,14 @@ def left_out(lanes, h, j):
     for i in range(NMOVED):
         rate, slope = load(lanes.probe_rate, i, LANES), load(lanes.probe_rate, NSTATES + i, LANES)
         defect = magnitude(rate - slope) - ROUNDING * load(lanes.probe_rate, 2 * NSTATES + i, LANES)
-        size = magnitude(load(lanes.work, i * (ORDER + 1), LANES)) + h * magnitude(load(lanes.work, i * (ORDER + 1) + 1, LANES))
-        share = select(defect > 0.0, defect * h / (NEGLIGIBLE * size), select(defect <= 0.0, splat(0.0, LANES), math.inf))
+        size = magnitude(load(lanes.work, i * (ORDER + 1), LANES)) + h * magnitude(
+            load(lanes.work, i * (ORDER + 1) + 1, LANES)
+        )
+        share = select(
+            defect > 0.0,
+            defect * h / (NEGLIGIBLE * size),
+            select(defect <= 0.0, splat(0.0, LANES), math.inf),
+        )
         worst = larger(share, worst)
     return worst
 
@@ -193,13 +236,19 @@ def gap_at(lanes, g, d):
 def add_what_was_left_out(lanes, d):
     """Add to the states at d the integral of the terms that were set aside."""
     for j in range(NSINGULAR):
-        aside = (load(lanes.side, NGUARDS + j, LANES) > 0.0) & (load(lanes.run, ACTIVE, LANES) > 0.5) & (d > 0.0)
+        aside = (
+            (load(lanes.side, NGUARDS + j, LANES) > 0.0)
+            & (load(lanes.run, ACTIVE, LANES) > 0.5)
+            & (d > 0.0)
+        )
         if any_lane(aside):
             g = SINGULAR_GUARD[j]
             for third in range(3):  # at the start, in the middle, at the end
                 look_with(lanes, (0.5 * third) * d, j)
                 for i in range(NSTATES):
-                    defect = load(lanes.probe_rate, i, LANES) - load(lanes.probe_rate, NSTATES + i, LANES)
+                    defect = load(lanes.probe_rate, i, LANES) - load(
+                        lanes.probe_rate, NSTATES + i, LANES
+                    )
                     store(lanes.probe_rate, (3 + third) * NSTATES + i, defect)
             small = 0.001 * gap_at(lanes, g, 0.5 * d)
             starts, ends = gap_at(lanes, g, 0.0 * d) <= small, gap_at(lanes, g, d) <= small
@@ -211,13 +260,21 @@ def add_what_was_left_out(lanes, d):
 
 @inner
 def integral(lanes, i, d, starts, ends):
-    """Integral over d of what was left out of rate i: as a power of the time since, or until, the boundary; else by Simpson's rule."""
-    first, middle = load(lanes.probe_rate, 3 * NSTATES + i, LANES), load(lanes.probe_rate, 4 * NSTATES + i, LANES)
+    """Integral over d of what was left out of rate i: as a power of the time since, or until, the
+    boundary; else by Simpson's rule.
+    """
+    first, middle = (
+        load(lanes.probe_rate, 3 * NSTATES + i, LANES),
+        load(lanes.probe_rate, 4 * NSTATES + i, LANES),
+    )
     last = load(lanes.probe_rate, 5 * NSTATES + i, LANES)
     outer = select(starts, last, first)
     ratio = outer / middle
     power = larger(smaller(libm_log(ratio) * (1.0 / math.log(2.0)), 40.0), -0.9)
     by_power = select((ratio > 0.0) & (ratio < HUGE), outer * d / (power + 1.0), 0.0)
-    first, last = select(magnitude(first) < HUGE, first, 0.0), select(magnitude(last) < HUGE, last, 0.0)
+    first, last = (
+        select(magnitude(first) < HUGE, first, 0.0),
+        select(magnitude(last) < HUGE, last, 0.0),
+    )
     by_simpson = (first + 4.0 * middle + last) * d * (1.0 / 6.0)
     return select((starts | ends) & (~(starts & ends)), by_power, by_simpson)

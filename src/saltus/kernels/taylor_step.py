@@ -1,69 +1,114 @@
-"""Template, 4 of 6 of the Taylor flow: one step of all lanes, as arithmetic on lanes: how long it is, how it is taken."""
+"""Template, 4 of 6 of the Taylor flow: one step of all lanes, as arithmetic on lanes: how long it
+is, how it is taken.
+"""
 
 from saltus.kernels.isolation import ROUNDING
-from saltus.kernels.lanes import any_lane, bits, coarse_exp2, coarse_log2, fma, larger, load, magnitude, select, smaller, splat, store
+from saltus.kernels.lanes import (
+    any_lane,
+    bits,
+    coarse_exp2,
+    coarse_log2,
+    fma,
+    larger,
+    load,
+    magnitude,
+    select,
+    smaller,
+    splat,
+    store,
+)
 
 
 @inner
 def step_length(work, log2_tolerance):
-    """Longest step whose last two terms stay below the tolerance times the leading terms, for every series on its own scale.
+    """Longest step whose last two terms stay below the tolerance times the leading terms, for every
+    series on its own scale.
 
-    After Jorba & Zou (2005), with the scale of a series taken from its value, its rate or its acceleration times the step, whichever
-    allows most: a state that passes through zero doesn't shrink the step, and changing units changes nothing. Gaps that aren't a state
-    count too: a wall may move while the body rests.
+    After Jorba & Zou (2005), with the scale of a series taken from its value, its rate or its
+    acceleration times the step, whichever allows most: a state that passes through zero doesn't
+    shrink the step, and changing units changes nothing. Gaps that aren't a state count too: a wall
+    may move while the body rests.
     """
     log_h = splat(1000.0, LANES)
     for i in range(NSTEPPED):
         base = STEP_ROW[i]
         log_h = smaller(longest(work, base, ORDER - 1, log2_tolerance), log_h)
         log_h = smaller(longest(work, base, ORDER, log2_tolerance), log_h)
-        vanishing = magnitude(load(work, base + ORDER, LANES)) + magnitude(load(work, base + ORDER - 1, LANES)) <= 0.0
-        if any_lane(vanishing):  # a series with holes, or a polynomial: ask the upper half of its terms
+        vanishing = (
+            magnitude(load(work, base + ORDER, LANES))
+            + magnitude(load(work, base + ORDER - 1, LANES))
+            <= 0.0
+        )
+        # a series with holes, or a polynomial: ask the upper half of its terms
+        if any_lane(vanishing):
             for j in range((ORDER + 1) // 2, ORDER - 1):
-                log_h = smaller(select(vanishing, longest(work, base, j, log2_tolerance), 1000.0), log_h)
+                log_h = smaller(
+                    select(vanishing, longest(work, base, j, log2_tolerance), 1000.0), log_h
+                )
     return coarse_exp2(log_h)
 
 
 @inner
 def longest(work, base, j, log2_tolerance):
-    """log2 of the step at which term j of a series is as large as the tolerance times its first three (at rest: its first ones)."""
+    """log2 of the step at which term j of a series is as large as the tolerance times its first
+    three (at rest: its first ones).
+    """
     last = coarse_log2(load(work, base + j, LANES)) - log2_tolerance
-    value, rate, acceleration = load(work, base, LANES), load(work, base + 1, LANES), load(work, base + 2, LANES)
-    by_value, by_rate = (coarse_log2(value) - last) * (1.0 / j), (coarse_log2(rate) - last) * (1.0 / (j - 1))
+    value, rate, acceleration = (
+        load(work, base, LANES),
+        load(work, base + 1, LANES),
+        load(work, base + 2, LANES),
+    )
+    by_value, by_rate = (
+        (coarse_log2(value) - last) * (1.0 / j),
+        (coarse_log2(rate) - last) * (1.0 / (j - 1)),
+    )
     best = larger(larger(by_value, by_rate), (coarse_log2(acceleration) - last) * (1.0 / (j - 2)))
     at_rest = magnitude(value) + magnitude(rate) + magnitude(acceleration) <= 0.0
     if any_lane(at_rest):
         for i in range(3, ORDER // 2):
-            best = select(at_rest, larger(best, (coarse_log2(load(work, base + i, LANES)) - last) * (1.0 / (j - i))), best)
+            best = select(
+                at_rest,
+                larger(best, (coarse_log2(load(work, base + i, LANES)) - last) * (1.0 / (j - i))),
+                best,
+            )
     return select(last + log2_tolerance < -1000.0, 1000.0, best)
 
 
 @inner
 def probed(lanes, h, log2_tolerance):
-    """h, halved in each lane until the right-hand side at its middle and end agrees with the derivative of the series there.
+    """h, halved in each lane until the right-hand side at its middle and end agrees with the
+    derivative of the series there.
 
-    The last coefficients say nothing of a term that sleeps at the start of the step - a saturated tanh, a pulse to come - and wakes within
-    it. Corliss & Chang, ACM Trans. Math. Software 8 (1982), section 4, on validating a Taylor step by its defect.
+    The last coefficients say nothing of a term that sleeps at the start of the step - a saturated
+    tanh, a pulse to come - and wakes within it. Corliss & Chang, ACM Trans. Math. Software 8
+    (1982), section 4, on validating a Taylor step by its defect.
     """
     tries = 0
     wrong = disagrees(lanes, h, 1.0, log2_tolerance) | disagrees(lanes, h, 0.5, log2_tolerance)
     while tries < MOST_HALVINGS and any_lane(wrong):
         h = select(wrong, 0.5 * h, h)
-        wrong = wrong & (disagrees(lanes, h, 1.0, log2_tolerance) | disagrees(lanes, h, 0.5, log2_tolerance))
+        wrong = wrong & (
+            disagrees(lanes, h, 1.0, log2_tolerance) | disagrees(lanes, h, 0.5, log2_tolerance)
+        )
         tries += 1
     return h
 
 
 @inner
 def disagrees(lanes, h, share, log2_tolerance):
-    """Where the defect of the series at a share of h, times h, is larger than truncation and rounding explain."""
+    """Where the defect of the series at a share of h, times h, is larger than truncation and
+    rounding explain.
+    """
     work, d = lanes.work, h * share
     look_ahead(lanes, d)
     wrong = splat(0.0, LANES) > 1.0
     for i in range(NSTATES):
         base = i * (ORDER + 1)
         rate, slope = load(lanes.probe_rate, i, LANES), load(lanes.probe_rate, NSTATES + i, LANES)
-        size = magnitude(load(work, base, LANES)) + h * (magnitude(load(work, base + 1, LANES)) + magnitude(rate))
+        size = magnitude(load(work, base, LANES)) + h * (
+            magnitude(load(work, base + 1, LANES)) + magnitude(rate)
+        )
         rounding = ROUNDING * load(lanes.probe_rate, 2 * NSTATES + i, LANES)
         if NSINGULAR > 0:
             rounding = rounding + rounding_of_gaps(lanes, i)
@@ -74,7 +119,9 @@ def disagrees(lanes, h, share, log2_tolerance):
 
 @inner
 def look_ahead(lanes, d):
-    """The right-hand side at the states of the series at d; beside it the derivative of the series, and the size of the terms."""
+    """The right-hand side at the states of the series at d; beside it the derivative of the series,
+    and the size of the terms.
+    """
     work = lanes.work
     for i in range(NSTATES):
         value = load(work, i * (ORDER + 1) + ORDER, LANES)
@@ -93,19 +140,25 @@ def look_ahead(lanes, d):
 
 @inner
 def size_of_terms(lanes, g, share):
-    """Size of the terms of a gap over a share of the step: what its rounding error is measured by."""
+    """Size of the terms of a gap over a share of the step: what its rounding error is
+    measured by.
+    """
     j = BOUNDS * GUARD_SERIES[g]
-    t1, t2 = magnitude(load(lanes.bounds, j + LINEAR, LANES)), magnitude(load(lanes.bounds, j + QUADRATIC, LANES))
+    t1, t2 = (
+        magnitude(load(lanes.bounds, j + LINEAR, LANES)),
+        magnitude(load(lanes.bounds, j + QUADRATIC, LANES)),
+    )
     t3 = magnitude(load(lanes.bounds, j + CUBIC, LANES)) + load(lanes.bounds, j + REST, LANES)
     return fma(fma(fma(t3, share, t2), share, t1), share, load(lanes.work, SCALE_ROW + g, LANES))
 
 
 @inner
 def state_after(work, base, d):
-    """Value of a series at d. Even and odd terms apart, for half the latency; the leading terms by Horner's rule.
+    """Value of a series at d. Even and odd terms apart, for half the latency; the leading terms by
+    Horner's rule.
 
-    Powers of d * d, which is rounded, would multiply the leading terms by the same wrong factor in every step of one length, and energy
-    would drift with time.
+    Powers of d * d, which is rounded, would multiply the leading terms by the same wrong factor in
+    every step of one length, and energy would drift with time.
     """
     u, top_even, top_odd = d * d, ORDER - ORDER % 2, ORDER - 1 + ORDER % 2
     even, odd = load(work, base + top_even, LANES), load(work, base + top_odd, LANES)
@@ -121,7 +174,9 @@ def state_after(work, base, d):
 
 @inner
 def advance(lanes, room, records):
-    """Evaluate the states at the end of the step, move the clock, land where that is simple; returns the lanes that need attention."""
+    """Evaluate the states at the end of the step, move the clock, land where that is simple;
+    returns the lanes that need attention.
+    """
     work, clock, run = lanes.work, lanes.clock, lanes.run
     d = load(lanes.found, DELTA, LANES)
     turned = load(lanes.found, TURNED, LANES) <= d
@@ -147,7 +202,12 @@ def advance(lanes, room, records):
     store(run, START, start)
     taken = load(run, TAKEN, LANES) + 1.0
     store(run, TAKEN, taken)
-    due = (tau >= end) | (tau >= load(run, DUE, LANES)) | (~(total < HUGE)) | (taken > load(run, LIMIT, LANES))
+    due = (
+        (tau >= end)
+        | (tau >= load(run, DUE, LANES))
+        | (~(total < HUGE))
+        | (taken > load(run, LIMIT, LANES))
+    )
     if NCLOCKS > 0:
         due = due | (tau >= load(run, WATCH, LANES))
     crosses = load(lanes.found, WHICH, LANES) >= 0.0
@@ -155,35 +215,58 @@ def advance(lanes, room, records):
         due = due | crosses
     else:
         land_simply(lanes, crosses & (~due), tau)
-        due = due | (load(run, MET, LANES) >= load(run, MOST_MET, LANES)) | (load(lanes.found, WHICH, LANES) >= 0.0)
+        due = (
+            due
+            | (load(run, MET, LANES) >= load(run, MOST_MET, LANES))
+            | (load(lanes.found, WHICH, LANES) >= 0.0)
+        )
     return (load(run, ACTIVE, LANES) > 0.5) & due
 
 
 @inner
 def land_simply(lanes, simple, tau):
-    """Land the lanes in which Newton's method found one contact, nothing else happens, and nobody records it: `land_all`, on lanes."""
+    """Land the lanes in which Newton's method found one contact, nothing else happens, and nobody
+    records it: `land_all`, on lanes.
+    """
     run, found, prior = lanes.run, lanes.found, lanes.prior
-    which, rate, h = load(found, WHICH, LANES), magnitude(load(found, RATE, LANES)), load(run, STEP, LANES)
+    which, rate, h = (
+        load(found, WHICH, LANES),
+        magnitude(load(found, RATE, LANES)),
+        load(run, STEP, LANES),
+    )
     depth = rate * rate * h * h
     shallow, flipped = load(run, SHALLOW, LANES), load(run, FLIPPED, LANES)
     for g in range(NGUARDS):
         here = simple & (magnitude(which - g) < 0.5)
         j = BOUNDS * GUARD_SERIES[g]
-        curvature = 2.0 * (magnitude(load(lanes.bounds, j + QUADRATIC, LANES)) + 3.0 * magnitude(load(lanes.bounds, j + CUBIC, LANES)))
+        curvature = 2.0 * (
+            magnitude(load(lanes.bounds, j + QUADRATIC, LANES))
+            + 3.0 * magnitude(load(lanes.bounds, j + CUBIC, LANES))
+        )
         size = load(prior, PRIOR_ROWS * g + NEW, LANES) + load(prior, PRIOR_ROWS * g + OLD, LANES)
-        shallow = shallow + select(here & (depth <= 2.0 * ROUNDING * size * curvature), splat(1.0, LANES), 0.0)
+        shallow = shallow + select(
+            here & (depth <= 2.0 * ROUNDING * size * curvature), splat(1.0, LANES), 0.0
+        )
         flipped = select(here, float(1 << g), flipped)
         side = load(lanes.side, g, LANES)
         store(lanes.side, g, select(here, -side, side))
         store(lanes.fresh, g, select(here, 1.0, load(lanes.fresh, g, LANES)))
         if SNAP_STATE[g] >= 0:
-            store(lanes.y, SNAP_STATE[g], select(here, load(lanes.c, SNAP_CONST[g], LANES), load(lanes.y, SNAP_STATE[g], LANES)))
+            store(
+                lanes.y,
+                SNAP_STATE[g],
+                select(
+                    here, load(lanes.c, SNAP_CONST[g], LANES), load(lanes.y, SNAP_STATE[g], LANES)
+                ),
+            )
     store(run, SHALLOW, shallow)
     store(run, FLIPPED, flipped)
     met, slowest = load(run, MET, LANES), load(run, SLOWEST, LANES)
     store(run, MET, select(simple, met + 1.0, met))
     store(run, SLOWEST, select(simple, smaller(rate, slowest), slowest))
-    store(run, LANDED, select(simple, tau + load(lanes.clock, BASE, LANES), load(run, LANDED, LANES)))
+    store(
+        run, LANDED, select(simple, tau + load(lanes.clock, BASE, LANES), load(run, LANDED, LANES))
+    )
     store(run, BOUNCES, select(simple, 0.0, load(run, BOUNCES, LANES)))
     store(run, STARTING, select(simple, 0.0, load(run, STARTING, LANES)))
     store(found, WHICH, select(simple, -1.0, which))
@@ -203,7 +286,11 @@ def step_all(lanes, batch, slow):
         h = probed(lanes, smaller(h, LONGEST_SHARE * load(lanes.run, END, LANES)), log2_tolerance)
     store(lanes.run, STEP, h)
     undecided = locate(lanes, h)
-    open_lanes = settle_sooner(lanes, undecided) if any_lane(undecided) else bits(refine_crossings(lanes, h, undecided))
+    open_lanes = (
+        settle_sooner(lanes, undecided)
+        if any_lane(undecided)
+        else bits(refine_crossings(lanes, h, undecided))
+    )
     waiting = open_lanes
     while waiting != 0:
         decide(lanes, lowest_bit(waiting), batch, slow)

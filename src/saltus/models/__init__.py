@@ -1,4 +1,5 @@
-"""Published systems, ready to run. One file each: equations, parameter table, source, known results.
+"""Published systems, ready to run. One file each: equations, parameter table, source, known
+results.
 
 Every entry of :data:`MODELS` is a function that takes parameter values by name and returns a
 :class:`~saltus.system.System`. Nothing is traced before a model is asked for.
@@ -18,7 +19,9 @@ from saltus.models.gear_pair import gear_pair
 from saltus.system import System
 
 #: Every model by name.
-MODELS: dict[str, Callable[..., System]] = {one.__name__: one for one in (delangre, chain, gear_pair, aeroelastic)}
+MODELS: dict[str, Callable[..., System]] = {
+    one.__name__: one for one in (delangre, chain, gear_pair, aeroelastic)
+}
 
 
 def find(name: str) -> Callable[..., System]:
@@ -35,7 +38,8 @@ def find(name: str) -> Callable[..., System]:
 
 
 def energy(name: str) -> dict[str, Callable[..., Any]]:
-    """Energy and powers of a model, as :func:`saltus.energy_balance` takes them: ``**sl.models.energy("chain")``.
+    """Energy and powers of a model, as :func:`saltus.energy_balance` takes them:
+    ``**sl.models.energy("chain")``.
 
     Parameters
     ----------
@@ -45,7 +49,8 @@ def energy(name: str) -> dict[str, Callable[..., Any]]:
     Returns
     -------
     dict
-        ``energy`` [J] (stored), ``supplied`` and ``dissipated`` [W]: functions of (t, states, parameters).
+        ``energy`` [J] (stored), ``supplied`` and ``dissipated`` [W]: functions of (t, states,
+        parameters).
 
     Raises
     ------
@@ -63,7 +68,10 @@ def describe() -> dict[str, str]:
 def __getattr__(name: str) -> Any:
     if name.startswith("__"):
         raise AttributeError(name)
-    raise AttributeError(f"no model is called {shown(name)}. Models: {', '.join(MODELS)}. Write your own equation with @sl.system.")
+    raise AttributeError(
+        f"no model is called {shown(name)}. Models: {', '.join(MODELS)}. Write "
+        f"your own equation with @sl.system."
+    )
 
 
 __all__ = ["MODELS", "aeroelastic", "chain", "delangre", "describe", "energy", "find", "gear_pair"]

@@ -1,7 +1,8 @@
 r"""Two masses in a row with two clearances: one to the ground, one between the masses.
 
 .. math::
-    m_1 \dot v_1 &= F \cos(2 \pi f t) - k_1 x_1 - c_1 v_1 - f_1(x_1) + k_2 (x_2 - x_1) + c_2 (v_2 - v_1) + f_2(x_2 - x_1) \\
+    m_1 \dot v_1 &= F \cos(2 \pi f t) - k_1 x_1 - c_1 v_1 - f_1(x_1)
+        + k_2 (x_2 - x_1) + c_2 (v_2 - v_1) + f_2(x_2 - x_1) \\
     m_2 \dot v_2 &= -k_2 (x_2 - x_1) - c_2 (v_2 - v_1) - f_2(x_2 - x_1)
 
 where :math:`f_i` is zero inside a symmetric clearance and a linear spring beyond it.
@@ -22,13 +23,16 @@ from saltus.system import cos, freeplay, pi
     source="Textbook configuration; round values chosen for saltus.",
 )
 def chain(
-    t, x1, x2, v1, v2, *, first_mass="1 kg", second_mass="0.5 kg", ground_stiffness="1e3 N/m", coupling_stiffness="400 N/m",
-    ground_damping="4 N*s/m", coupling_damping="2 N*s/m", ground_contact_stiffness="20e3 N/m", ground_gap="1 mm",
+    t, x1, x2, v1, v2, *, first_mass="1 kg", second_mass="0.5 kg", ground_stiffness="1e3 N/m",
+    coupling_stiffness="400 N/m",
+    ground_damping="4 N*s/m", coupling_damping="2 N*s/m", ground_contact_stiffness="20e3 N/m",
+    ground_gap="1 mm",
     coupling_contact_stiffness="10e3 N/m", coupling_gap="0.5 mm", force="2 N", frequency="7 Hz",
 ):  # fmt: skip
     """Chain of two masses with two clearances, shaken harmonically.
 
-    States are the displacements ``x1``, ``x2`` [m] and velocities ``v1``, ``v2`` [m/s]; it is forced at ``frequency``.
+    States are the displacements ``x1``, ``x2`` [m] and velocities ``v1``, ``v2`` [m/s]; it is
+    forced at ``frequency``.
 
     ==========================  =========  =================================================
     parameter                   default    meaning
@@ -48,22 +52,30 @@ def chain(
 
     Notes
     -----
-    A textbook configuration with round values chosen here, not one publication's. One clearance acts on a state, the other on the
-    difference of two. Without contact it is linear; its undamped natural frequencies are then 3.412 Hz and 6.639 Hz. At the default
-    values it settles from rest to an orbit of one forcing period with 12 contacts a period.
+    A textbook configuration with round values chosen here, not one publication's. One clearance
+    acts on a state, the other on the difference of two. Without contact it is linear; its undamped
+    natural frequencies are then 3.412 Hz and 6.639 Hz. At the default values it settles from rest
+    to an orbit of one forcing period with 12 contacts a period.
     """
     stretch, rate = x2 - x1, v2 - v1
-    ground = ground_stiffness * x1 + ground_damping * v1 + freeplay(x1, stiffness=ground_contact_stiffness, gap=ground_gap)
+    ground = (
+        ground_stiffness * x1
+        + ground_damping * v1
+        + freeplay(x1, stiffness=ground_contact_stiffness, gap=ground_gap)
+    )
     coupling = (
-        coupling_stiffness * stretch + coupling_damping * rate + freeplay(stretch, stiffness=coupling_contact_stiffness, gap=coupling_gap)
+        coupling_stiffness * stretch
+        + coupling_damping * rate
+        + freeplay(stretch, stiffness=coupling_contact_stiffness, gap=coupling_gap)
     )
     drive = force * cos(2 * pi * frequency * t)
     return v1, v2, (drive - ground + coupling) / first_mass, -coupling / second_mass
 
 
-# -- energy --------------------------------------------------------------------------------------------------------------------
+# -- energy ----------------------------------------------------------------------------------------
 def _stored(
-    x1, x2, v1, v2, *, first_mass, second_mass, ground_stiffness, coupling_stiffness, ground_contact_stiffness, ground_gap,
+    x1, x2, v1, v2, *, first_mass, second_mass, ground_stiffness, coupling_stiffness,
+    ground_contact_stiffness, ground_gap,
     coupling_contact_stiffness, coupling_gap,
 ):  # fmt: skip
     """Of the masses, the springs and the contacts."""
@@ -85,4 +97,8 @@ def _dissipated(v1, v2, *, ground_damping, coupling_damping):
 
 
 #: Stored energy [J], power supplied and dissipated [W].
-ENERGY: dict[str, Callable[..., Any]] = {"energy": _stored, "supplied": _supplied, "dissipated": _dissipated}
+ENERGY: dict[str, Callable[..., Any]] = {
+    "energy": _stored,
+    "supplied": _supplied,
+    "dissipated": _dissipated,
+}

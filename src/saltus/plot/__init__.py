@@ -1,4 +1,6 @@
-"""Pictures: a Dataset in, Axes out. Nothing is computed here, and nothing is shown: that is left to the caller."""
+"""Pictures: a Dataset in, Axes out. Nothing is computed here, and nothing is shown: that is left to
+the caller.
+"""
 
 from typing import Any
 
@@ -19,7 +21,8 @@ from saltus.plot.style import OKABE_ITO, style
 from saltus.plot.type_map import type_map
 
 __all__ = [
-    "OKABE_ITO", "agreement", "basins", "bifurcation_diagram", "energy", "exponents", "frequency_response", "gallery", "history",
+    "OKABE_ITO", "agreement", "basins", "bifurcation_diagram", "energy", "exponents",
+    "frequency_response", "gallery", "history",
     "impacts", "methods", "phase", "section", "spectrum", "style", "type_map",
 ]  # fmt: skip
 

@@ -27,7 +27,8 @@ _LOOKS = {
     -1: ("#3C3C3C", "not settled in one of them"),
 }
 _WHERE = {(True, True): "in both", (True, False): "left only", (False, True): "right only"}
-#: More attractors than this are not named in a legend of their own: the maps of plot.basins do that.
+#: More attractors than this are not named in a legend of their own: the maps of plot.basins do
+#: that.
 _NAMED = 8
 
 
@@ -38,8 +39,8 @@ _NEEDS = ("agreement", "basin_a", "basin_b", "match_a", "match_b", "match_type",
 def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
     """Two maps of basins side by side, and where they differ; with one Axes only where they differ.
 
-    Both maps have the same hues. Titles name the maps (attributes ``name_a`` and ``name_b``, where the Dataset has them) and the share of
-    the starts that settle to the same attractor in both.
+    Both maps have the same hues. Titles name the maps (attributes ``name_a`` and ``name_b``, where
+    the Dataset has them) and the share of the starts that settle to the same attractor in both.
 
     Parameters
     ----------
@@ -65,7 +66,9 @@ def agreement(ds: xr.Dataset, ax: Any = None) -> Any:
             return _three(panels, ds, pair)
     panels = np.ravel(np.asarray(ax, dtype=object))
     if panels.size not in (1, 3) or not all(isinstance(one, Axes) for one in panels):
-        raise ParameterError(f"ax={type(ax).__name__}. Give one Axes, or three, such as plt.subplots(1, 3) makes.")
+        raise ParameterError(
+            f"ax={type(ax).__name__}. Give one Axes, or three, such as plt.subplots(1, 3) makes."
+        )
     if panels.size == 1:
         _difference(panels[0], ds, pair)
         return panels[0]
@@ -81,12 +84,18 @@ def _three(panels: np.ndarray, ds: xr.Dataset, pair: tuple[str, str]) -> np.ndar
     other = "exact" if any(methods.values()) else ""
     for panel, which in zip(panels, "ab", strict=False):
         maps.draw_cells(panel, ds, pair, scales, paint(ds[f"basin_{which}"].values, colors))
-        panel.set_title(str(ds.attrs.get(f"name_{which}", methods[which] or other or f"map {which}")))
+        panel.set_title(
+            str(ds.attrs.get(f"name_{which}", methods[which] or other or f"map {which}"))
+        )
     _difference(panels[2], ds, pair)
     for panel in panels[1:]:
         panel.set_ylabel("")
-    handles = [Patch(fc=colors[key], label=_name(ds, key)) for key in ids] if len(ids) <= _NAMED else []
-    handles += [Patch(fc=maps.UNSETTLED[code].color, label=maps.UNSETTLED[code].label) for code in codes]
+    handles = (
+        [Patch(fc=colors[key], label=_name(ds, key)) for key in ids] if len(ids) <= _NAMED else []
+    )
+    handles += [
+        Patch(fc=maps.UNSETTLED[code].color, label=maps.UNSETTLED[code].label) for code in codes
+    ]
     if handles:
         _below(panels[0], handles, columns=2)
     return panels
@@ -99,9 +108,15 @@ def _difference(ax: Axes, ds: xr.Dataset, pair: tuple[str, str]) -> None:
     table = maps.as_bytes(np.array([to_rgb(_LOOKS[key][0]) for key in (-1, 0, 1)]))
     maps.draw_cells(ax, ds, pair, scales, table[np.nan_to_num(values, nan=-1).astype(np.int64) + 1])
     settled = int((values >= 0).sum())
-    ax.set_title(f"{maps.share_text((values == 1).sum() / settled)} agree" if settled else "nothing settles in both")
+    ax.set_title(
+        f"{maps.share_text((values == 1).sum() / settled)} agree"
+        if settled
+        else "nothing settles in both"
+    )
     handles = [
-        Patch(fc=color, label=f"{name}, {int((values == key).sum())}") for key, (color, name) in _LOOKS.items() if (values == key).any()
+        Patch(fc=color, label=f"{name}, {int((values == key).sum())}")
+        for key, (color, name) in _LOOKS.items()
+        if (values == key).any()
     ]
     _below(ax, handles, columns=1)
 
@@ -110,14 +125,17 @@ def _below(ax: Axes, handles: list[Any], columns: int) -> None:
     """A legend under the name of the axis."""
     below = ax.transAxes + ScaledTranslation(0, -0.4, ax.figure.dpi_scale_trans)
     ax.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below, ncols=columns, frameon=False, handlelength=1.0,
+        handles=handles, loc="upper left", bbox_to_anchor=(0, 0), bbox_transform=below,
+        ncols=columns, frameon=False, handlelength=1.0,
         handleheight=0.9, fontsize=7.5, labelspacing=0.35,
     )  # fmt: skip
 
 
 def _occurring(ds: xr.Dataset) -> tuple[list[int], list[int]]:
     """Ids of the attractors and codes of the rest that occur in one of the maps."""
-    both = np.concatenate([np.unique(np.nan_to_num(ds[name].values, nan=-4)) for name in ("basin_a", "basin_b")])
+    both = np.concatenate(
+        [np.unique(np.nan_to_num(ds[name].values, nan=-4)) for name in ("basin_a", "basin_b")]
+    )
     found = np.unique(both).astype(np.int64).tolist()
     return [key for key in found if key >= 0], [code for code in maps.UNSETTLED if code in found]
 
@@ -126,4 +144,6 @@ def _name(ds: xr.Dataset, key: int) -> str:
     """A pair of attractors in words: ``3T, in both``."""
     pair = ds.sel(pair=key)
     known = int(pair["match_a"]) >= 0, int(pair["match_b"]) >= 0
-    return f"{kind_text(str(pair['match_type'].item()), int(pair['match_period']))}, {_WHERE[known]}"
+    return (
+        f"{kind_text(str(pair['match_type'].item()), int(pair['match_period']))}, {_WHERE[known]}"
+    )

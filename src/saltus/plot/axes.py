@@ -1,4 +1,6 @@
-"""What every picture of a run draws: coloured pieces of curve, gap lines, contact regions, limits, notes."""
+"""What every picture of a run draws: coloured pieces of curve, gap lines, contact regions, limits,
+notes.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ from saltus.plot.regions import Regions
 from saltus.plot.style import QUIET, RASTERISE_ABOVE, Scale, style, styled
 
 Direction = Literal["x", "y"]
-#: A gap is drawn into the limits if the axis grows by no more than this: an orbit far inside its gap must stay visible.
+#: A gap is drawn into the limits if the axis grows by no more than this: an orbit far inside its
+#: gap must stay visible.
 _WIDEN = 2.0
 #: Numbers that differ by no more than this share of their size are one number.
 _FLAT = 1e-12
@@ -33,7 +36,9 @@ _NAME = 0.45
 
 @contextmanager
 def panels(ax: Any, count: int, size: tuple[float, float]) -> Iterator[list[Axes]]:
-    """The Axes to draw into: those that the user handed over, or a new figure of panels, one above the other, in saltus's style."""
+    """The Axes to draw into: those that the user handed over, or a new figure of panels, one above
+    the other, in saltus's style.
+    """
     if ax is not None:
         given = _given(ax, count)
         with style() if all(styled(one.get_figure(root=True)) for one in given) else nullcontext():
@@ -49,20 +54,36 @@ def _given(ax: Any, count: int) -> list[Axes]:
     several = isinstance(ax, list | tuple | np.ndarray)
     axes = list(np.ravel(np.asarray(ax, dtype=object))) if several else [ax]
     if not all(isinstance(one, Axes) for one in axes):
-        raise ParameterError(f"ax={type(ax).__name__}. Give matplotlib Axes, such as plt.subplots() makes.")
+        raise ParameterError(
+            f"ax={type(ax).__name__}. Give matplotlib Axes, such as plt.subplots() makes."
+        )
     if len(axes) != count:
-        raise ParameterError(f"{count} trajectories need {count} Axes, not {len(axes)}. Choose one with trajectory=.")
+        raise ParameterError(
+            f"{count} trajectories need {count} Axes, not {len(axes)}. Choose one with trajectory=."
+        )
     return axes
 
 
-def draw_pieces(ax: Axes, x: np.ndarray, y: np.ndarray, region: np.ndarray, regions: Regions, width: float) -> None:
-    """One line for each region that occurs; pieces of the same region are separated by NaN, neighbours share the point between them."""
+def draw_pieces(
+    ax: Axes, x: np.ndarray, y: np.ndarray, region: np.ndarray, regions: Regions, width: float
+) -> None:
+    """One line for each region that occurs; pieces of the same region are separated by NaN,
+    neighbours share the point between them.
+    """
     starts = np.concatenate([[0], np.flatnonzero(np.diff(region)) + 1])
     stops = np.concatenate([starts[1:] + 1, [region.size]])
     for k in np.unique(region):
         mine = [np.arange(a, b) for a, b in zip(starts, stops, strict=True) if region[a] == k]
         xs, ys = (_join([values[piece] for piece in mine]) for values in (x, y))
-        ax.plot(xs, ys, color=regions.regions[k].color, label=regions.regions[k].label or None, lw=width, zorder=2, solid_capstyle="butt")
+        ax.plot(
+            xs,
+            ys,
+            color=regions.regions[k].color,
+            label=regions.regions[k].label or None,
+            lw=width,
+            zorder=2,
+            solid_capstyle="butt",
+        )
 
 
 def _join(pieces: Sequence[np.ndarray]) -> np.ndarray:
@@ -71,13 +92,17 @@ def _join(pieces: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def draw_points(ax: Axes, x: np.ndarray, y: np.ndarray, **marks: Any) -> None:
-    """Markers, whole ones at the limits of the Axes too; many of them become pixels in vector files."""
+    """Markers, whole ones at the limits of the Axes too; many of them become pixels in vector
+    files.
+    """
     (points,) = ax.plot(x, y, ls="none", rasterized=x.size > RASTERISE_ABOVE, **marks)
     points.set_clip_box(_Around(ax, points.get_markersize() / 2 + points.get_markeredgewidth()))
 
 
 class _Around(BboxBase):
-    """The frame of an Axes, wider by some points (1/72 inch) on each side, whatever becomes of the figure."""
+    """The frame of an Axes, wider by some points (1/72 inch) on each side, whatever becomes of the
+    figure.
+    """
 
     def __init__(self, ax: Axes, wider: float) -> None:
         super().__init__()
@@ -91,8 +116,15 @@ class _Around(BboxBase):
         return np.asarray(self._ax.bbox.padded(pixels).get_points())
 
 
-def set_limits(ax: Axes, direction: Direction, values: np.ndarray, marks: Sequence[float] = (), margin: float = 0.06) -> None:
-    """Limits around the finite values, and around the marks where the axis doesn't grow too much for that.
+def set_limits(
+    ax: Axes,
+    direction: Direction,
+    values: np.ndarray,
+    marks: Sequence[float] = (),
+    margin: float = 0.06,
+) -> None:
+    """Limits around the finite values, and around the marks where the axis doesn't grow too much
+    for that.
 
     An Axes that was drawn into before keeps what it showed.
     """
@@ -114,13 +146,19 @@ def set_limits(ax: Axes, direction: Direction, values: np.ndarray, marks: Sequen
 
 
 def few_ticks(ax: Axes) -> None:
-    """Numbers under a narrow picture that don't touch: few of them, and a common power of ten in place of leading zeros."""
+    """Numbers under a narrow picture that don't touch: few of them, and a common power of ten in
+    place of leading zeros.
+    """
     ax.xaxis.set_major_locator(MaxNLocator(nbins=5))
     ax.ticklabel_format(axis="x", style="sci", scilimits=(-3, 5), useMathText=True)
 
 
-def draw_gaps(ax: Axes, direction: Direction, regions: Regions, scale: Scale, label: bool = True) -> None:
-    """Gap lines dashed and named, contact regions lightly shaded; once for an Axes, after its limits are set."""
+def draw_gaps(
+    ax: Axes, direction: Direction, regions: Regions, scale: Scale, label: bool = True
+) -> None:
+    """Gap lines dashed and named, contact regions lightly shaded; once for an Axes, after its
+    limits are set.
+    """
     tag = GAP_NAMES.format(direction)
     if any(artist.get_gid() == tag for artist in ax.get_children()):
         return
@@ -129,31 +167,60 @@ def draw_gaps(ax: Axes, direction: Direction, regions: Regions, scale: Scale, la
     transform = ax.get_xaxis_transform() if direction == "x" else ax.get_yaxis_transform()
     for region in regions.regions:
         if region.contact:
-            a, b = (np.clip(edge * scale.factor, low - far, high + far) for edge in (region.below, region.above))
+            a, b = (
+                np.clip(edge * scale.factor, low - far, high + far)
+                for edge in (region.below, region.above)
+            )
             corner, size = ((a, 0), (b - a, 1)) if direction == "x" else ((0, a), (1, b - a))
-            ax.add_artist(Rectangle(corner, *size, transform=transform, fc=region.color, alpha=0.07, ec="none", zorder=0, gid=tag))
+            ax.add_artist(
+                Rectangle(
+                    corner,
+                    *size,
+                    transform=transform,
+                    fc=region.color,
+                    alpha=0.07,
+                    ec="none",
+                    zorder=0,
+                    gid=tag,
+                )
+            )
     line = ax.axvline if direction == "x" else ax.axhline
     names: list[tuple[float, str, bool]] = []
     for i, boundary in enumerate(regions.boundaries):
         place = boundary.value * scale.factor
         line(place, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid=tag)
         if label and low <= place <= high:
-            lower = i == 0 and len(regions.boundaries) > 1 and place - low > 0.12 * (high - low)  # else it meets the ticks
-            high_up = direction == "y" and high - place < 0.12 * (high - low)  # else it meets the title
-            names.append((place, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up))
+            # else it meets the ticks
+            lower = i == 0 and len(regions.boundaries) > 1 and place - low > 0.12 * (high - low)
+            # else it meets the title
+            high_up = direction == "y" and high - place < 0.12 * (high - low)
+            names.append(
+                (place, f"{boundary.label}\n{scale.text(boundary.value)}", lower or high_up)
+            )
     if names:
         _name_gaps(ax, direction, names, tag)
 
 
-def _name_gaps(ax: Axes, direction: Direction, names: list[tuple[float, str, bool]], tag: str) -> None:
+def _name_gaps(
+    ax: Axes, direction: Direction, names: list[tuple[float, str, bool]], tag: str
+) -> None:
     """Name gap lines outside the axes: place, text, and whether it stands on the lower (left) side.
 
     Above the picture they are labels of an axis of its own, which a title keeps clear of.
     """
     if direction == "y":
         for place, text, below in names:
-            ax.text(1.01, place, text, transform=ax.get_yaxis_transform(), va="top" if below else "bottom", ha="left", color=QUIET,
-                    fontsize=7, linespacing=1.1)  # fmt: skip
+            ax.text(
+                1.01,
+                place,
+                text,
+                transform=ax.get_yaxis_transform(),
+                va="top" if below else "bottom",
+                ha="left",
+                color=QUIET,
+                fontsize=7,
+                linespacing=1.1,
+            )
         return
     top = ax.secondary_xaxis("top")
     top.set_gid(tag)
@@ -162,7 +229,8 @@ def _name_gaps(ax: Axes, direction: Direction, names: list[tuple[float, str, boo
     low, high = ax.get_xlim()
     close = [a[2] == b[2] and b[0] - a[0] < _NAME * (high - low) for a, b in pairwise(names)]
     texts = [
-        drawable(f"{text}\n\n" if raised else text) for (_, text, _), raised in zip(names, [*close, False], strict=True)
+        drawable(f"{text}\n\n" if raised else text)
+        for (_, text, _), raised in zip(names, [*close, False], strict=True)
     ]  # one above the other
     top.set_xticks([place for place, _, _ in names], texts, linespacing=1.1)
     for tick, (_, _, left) in zip(top.xaxis.get_major_ticks(), names, strict=True):
@@ -170,9 +238,12 @@ def _name_gaps(ax: Axes, direction: Direction, names: list[tuple[float, str, boo
 
 
 def legend(ax: Axes, regions: Regions, **place: Any) -> None:
-    """Name the colours and markers: regions from the top of the picture to its bottom, then the rest."""
+    """Name the colours and markers: regions from the top of the picture to its bottom, then the
+    rest.
+    """
     handles, labels = ax.get_legend_handles_labels()
-    first = dict(zip(labels[::-1], handles[::-1], strict=True))  # a picture of several trajectories names each thing once
+    # a picture of several trajectories names each thing once
+    first = dict(zip(labels[::-1], handles[::-1], strict=True))
     order = [region.label for region in regions.regions[::-1] if region.label in first]
     order += [label for label in dict.fromkeys(labels) if label not in order]
     if order:
@@ -180,7 +251,9 @@ def legend(ax: Axes, regions: Regions, **place: Any) -> None:
 
 
 def status_text(ds: xr.Dataset) -> str:
-    """How a trajectory ended, where it stopped early or rests on a graze that isn't decided; else empty."""
+    """How a trajectory ended, where it stopped early or rests on a graze that isn't decided; else
+    empty.
+    """
     status = str(ds["status"].values)
     if status == "ok":
         return ""
@@ -189,17 +262,42 @@ def status_text(ds: xr.Dataset) -> str:
 
 
 def note_status(ax: Axes, ds: xr.Dataset) -> None:
-    """Say in the picture when a trajectory stopped early, or rests on a graze that isn't decided."""
+    """Say in the picture when a trajectory stopped early, or rests on a graze that
+    isn't decided.
+    """
     text = status_text(ds)
     if text:
-        ax.text(0.99, 0.02, text, transform=ax.transAxes, ha="right", va="bottom", fontsize=7, color="#A00000")
+        ax.text(
+            0.99,
+            0.02,
+            text,
+            transform=ax.transAxes,
+            ha="right",
+            va="bottom",
+            fontsize=7,
+            color="#A00000",
+        )
 
 
 def say(ax: Axes, text: str, *datasets: xr.Dataset) -> None:
     """A sentence in place of an empty frame, with how the trajectories ended."""
-    singles = [one for ds in datasets for one in ([ds.sel(trajectory=i) for i in ds["trajectory"]] if "trajectory" in ds.dims else [ds])]
+    singles = [
+        one
+        for ds in datasets
+        for one in (
+            [ds.sel(trajectory=i) for i in ds["trajectory"]] if "trajectory" in ds.dims else [ds]
+        )
+    ]
     ends = [status_text(one) for one in singles]
     ax.set_axis_off()
     ax.text(0.02, 0.95, text, transform=ax.transAxes, va="top", linespacing=1.6)
     if any(ends):
-        ax.text(0.02, 0.05, "\n".join(dict.fromkeys(filter(None, ends))), transform=ax.transAxes, va="bottom", fontsize=7, color="#A00000")
+        ax.text(
+            0.02,
+            0.05,
+            "\n".join(dict.fromkeys(filter(None, ends))),
+            transform=ax.transAxes,
+            va="bottom",
+            fontsize=7,
+            color="#A00000",
+        )

@@ -27,8 +27,8 @@ from saltus.units import from_si
 
 #: Shades of a hue; the middle one is the hue itself.
 _LEVELS = 65
-#: Share of the settled starts that may be lighter or darker than the ends of the scale. Without it, a few late ones would make all
-#: others equally light.
+#: Share of the settled starts that may be lighter or darker than the ends of the scale. Without it,
+#: a few late ones would make all others equally light.
 _BEYOND = 0.02
 #: Width of a digit, in font sizes.
 _DIGIT = 0.64
@@ -45,10 +45,12 @@ def basins(
     points: bool = True,
     shade: bool = True,
 ) -> Axes:
-    """Map of the basins: a hue for each attractor, darker where it takes longer to settle, near-black where a start doesn't.
+    """Map of the basins: a hue for each attractor, darker where it takes longer to settle,
+    near-black where a start doesn't.
 
-    Cells are centred on the starts. White-edged dots are the attractors at whole forcing periods. Of more than two states the title says
-    where the others start, and the method if it isn't the exact one.
+    Cells are centred on the starts. White-edged dots are the attractors at whole forcing periods.
+    Of more than two states the title says where the others start, and the method if it isn't the
+    exact one.
 
     Parameters
     ----------
@@ -59,8 +61,9 @@ def basins(
     legend : bool
         Whether to draw the legend of the attractors.
     order : sequence of int, optional
-        Ids of the attractors in the order of their colours, to give an attractor the same hue in several maps; those left out follow. By
-        default the order of the ids: by period, then by amplitude.
+        Ids of the attractors in the order of their colours, to give an attractor the same hue in
+        several maps; those left out follow. By default the order of the ids: by period, then by
+        amplitude.
     points : bool
         Whether to draw the attractors themselves.
     shade : bool
@@ -81,37 +84,60 @@ def basins(
     settling = _settling(ds) if shade else None
     scales = maps.scale_of(ds, pair[0]), maps.scale_of(ds, pair[1])
     with draw.panels(ax, 1, (6.3, 3.9)) as (panel,):
-        maps.draw_cells(panel, ds, pair, scales, paint(ds["basin"].values, colors, settling.level(ds) if settling else None))
+        maps.draw_cells(
+            panel,
+            ds,
+            pair,
+            scales,
+            paint(ds["basin"].values, colors, settling.level(ds) if settling else None),
+        )
         if points:
             _points(panel, ds, pair, scales, colors)
         if legend:
             _legend(panel, ds, pair, colors, settling, points)
-        panel.set_title(", ".join(filter(None, (_section(ds, pair), maps.method_text(ds)))), loc="left", fontsize=8, color=QUIET)
+        panel.set_title(
+            ", ".join(filter(None, (_section(ds, pair), maps.method_text(ds)))),
+            loc="left",
+            fontsize=8,
+            color=QUIET,
+        )
     return panel
 
 
 def _section(ds: xr.Dataset, pair: tuple[str, str]) -> str:
     """Where the other states start, in words; empty where there are none."""
     try:
-        fixed = {name: float(value) for name, value in json.loads(ds.attrs.get("at", "{}")).items() if name not in pair}
+        fixed = {
+            name: float(value)
+            for name, value in json.loads(ds.attrs.get("at", "{}")).items()
+            if name not in pair
+        }
     except (ValueError, TypeError, AttributeError):  # of another program
         return ""
-    units = [ds[f"attractor_{name}"].attrs.get("units", "") if f"attractor_{name}" in ds else "" for name in fixed]
+    units = [
+        ds[f"attractor_{name}"].attrs.get("units", "") if f"attractor_{name}" in ds else ""
+        for name in fixed
+    ]
     return ", ".join(
-        f"{name.replace('_', ' ')} = {from_si(value, unit, 4)}" for (name, value), unit in zip(fixed.items(), units, strict=True)
+        f"{name.replace('_', ' ')} = {from_si(value, unit, 4)}"
+        for (name, value), unit in zip(fixed.items(), units, strict=True)
     )
 
 
-# -- cells ---------------------------------------------------------------------------------------------------------------------
+# -- cells -----------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Settling:
-    """Periods to settle as lightness: logarithmic between the few that settle first and the few that settle last."""
+    """Periods to settle as lightness: logarithmic between the few that settle first and the few
+    that settle last.
+    """
 
     first: float
     last: float
 
     def share(self, periods: np.ndarray) -> np.ndarray:
-        """0 for the first, 1 for the last; one is added to the periods, as a start on the attractor takes none."""
+        """0 for the first, 1 for the last; one is added to the periods, as a start on the attractor
+        takes none.
+        """
         low, high = np.log1p([self.first, self.last])
         return np.clip((np.log1p(np.maximum(periods, 0)) - low) / (high - low or 1.0), 0.0, 1.0)
 
@@ -135,19 +161,24 @@ def _settling(ds: xr.Dataset) -> Settling | None:
     return Settling(float(first), float(last)) if last > first else None
 
 
-def paint(basin: np.ndarray, colors: Mapping[int, np.ndarray], level: np.ndarray | None = None) -> np.ndarray:
+def paint(
+    basin: np.ndarray, colors: Mapping[int, np.ndarray], level: np.ndarray | None = None
+) -> np.ndarray:
     """The colour of each cell, uint8, shape (A, B, 3).
 
     Parameters
     ----------
     basin : array, shape (A, B)
-        Attractor ids, and negative codes. NaN, or an id that has no colour, is drawn as not computed.
+        Attractor ids, and negative codes. NaN, or an id that has no colour, is drawn as not
+        computed.
     colors : mapping of int to array of shape (3,)
         The hue of each attractor, sRGB in 0 to 1.
     level : array of int, shape (A, B), optional
         Shade of each cell, 0 to 64.
     """
-    table = np.stack([to_rgb(maps.UNSETTLED[code].color) for code in (-4, -3, -2, -1)])[:, None, :].repeat(_LEVELS, axis=1)
+    table = np.stack([to_rgb(maps.UNSETTLED[code].color) for code in (-4, -3, -2, -1)])[
+        :, None, :
+    ].repeat(_LEVELS, axis=1)
     if colors:
         table = np.concatenate([table, shades(np.stack(list(colors.values())), _LEVELS)])
     row = {code: code + 4 for code in maps.UNSETTLED} | {key: 4 + i for i, key in enumerate(colors)}
@@ -156,7 +187,7 @@ def paint(basin: np.ndarray, colors: Mapping[int, np.ndarray], level: np.ndarray
     return maps.as_bytes(table)[rows, _LEVELS // 2 if level is None else level]
 
 
-# -- attractors ----------------------------------------------------------------------------------------------------------------
+# -- attractors ------------------------------------------------------------------------------------
 def _stroboscopic(ds: xr.Dataset, pair: tuple[str, str], key: int) -> np.ndarray:
     """The points of one attractor in the plane of the map [SI], shape (point, 2)."""
     one = ds.sel(attractor=key)
@@ -166,8 +197,16 @@ def _stroboscopic(ds: xr.Dataset, pair: tuple[str, str], key: int) -> np.ndarray
     return both[np.isfinite(both).all(axis=-1)]
 
 
-def _points(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], scales: tuple[Scale, Scale], colors: Mapping[int, np.ndarray]) -> None:
-    """Every attractor at whole periods; those of many points first, so that a single one is never buried."""
+def _points(
+    ax: Axes,
+    ds: xr.Dataset,
+    pair: tuple[str, str],
+    scales: tuple[Scale, Scale],
+    colors: Mapping[int, np.ndarray],
+) -> None:
+    """Every attractor at whole periods; those of many points first, so that a single one is never
+    buried.
+    """
     clouds = {key: _stroboscopic(ds, pair, key) for key in colors}
     for key in sorted(colors, key=lambda key: -len(clouds[key])):
         cloud = clouds[key]
@@ -179,15 +218,30 @@ def _points(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], scales: tuple[Scale
         draw.draw_points(
             ax, *at, marker="o", ms=size + edge + 0.9, mfc="#222222", mec="none", zorder=4
         )  # white alone is lost on light tints
-        draw.draw_points(ax, *at, marker="o", ms=size, mfc=colors[key], mec="white", mew=edge, zorder=4, gid=f"attractor {key}")
+        draw.draw_points(
+            ax,
+            *at,
+            marker="o",
+            ms=size,
+            mfc=colors[key],
+            mec="white",
+            mew=edge,
+            zorder=4,
+            gid=f"attractor {key}",
+        )
 
 
 def _size(own: int, total: int) -> float:
-    """Diameter of the points of an attractor [pt]: smaller where they are many, its own or those of all, so that they hide no basin."""
-    return min(5.5 if own <= 12 else 4.2 if own <= 40 else 2.0, 5.5 if total <= 16 else 3.2 if total <= 60 else 2.0)
+    """Diameter of the points of an attractor [pt]: smaller where they are many, its own or those of
+    all, so that they hide no basin.
+    """
+    return min(
+        5.5 if own <= 12 else 4.2 if own <= 40 else 2.0,
+        5.5 if total <= 16 else 3.2 if total <= 60 else 2.0,
+    )
 
 
-# -- legend --------------------------------------------------------------------------------------------------------------------
+# -- legend ----------------------------------------------------------------------------------------
 class _Ramp(Rectangle):
     """Handle of a legend: a row of shades."""
 
@@ -207,8 +261,17 @@ class _Ruler(Line2D):
 class _DrawRamp(HandlerBase):
     """Draw a :class:`_Ramp`."""
 
-    def create_artists(self, legend: Legend, orig_handle: Any, xdescent: float, ydescent: float, width: float,  # noqa: ARG002
-                       height: float, fontsize: float, trans: Any) -> list[Any]:  # noqa: ARG002  # fmt: skip
+    def create_artists(
+        self,
+        legend: Legend,  # noqa: ARG002
+        orig_handle: Any,
+        xdescent: float,
+        ydescent: float,
+        width: float,
+        height: float,
+        fontsize: float,  # noqa: ARG002
+        trans: Any,
+    ) -> list[Any]:
         left = np.arange(len(orig_handle.row)) * width / len(orig_handle.row)
         return [  # each reaches to the end, under the next: no seams
             Rectangle((x - xdescent, -ydescent), width - x, height, fc=color, lw=0, transform=trans)
@@ -219,21 +282,49 @@ class _DrawRamp(HandlerBase):
 class _DrawRuler(HandlerBase):
     """Draw a :class:`_Ruler`."""
 
-    def create_artists(self, legend: Legend, orig_handle: Any, xdescent: float, ydescent: float, width: float,  # noqa: ARG002
-                       height: float, fontsize: float, trans: Any) -> list[Any]:  # fmt: skip
+    def create_artists(
+        self,
+        legend: Legend,  # noqa: ARG002
+        orig_handle: Any,
+        xdescent: float,
+        ydescent: float,
+        width: float,
+        height: float,
+        fontsize: float,
+        trans: Any,
+    ) -> list[Any]:
         top = height - ydescent + 0.35 * fontsize
-        artists: list[Any] = [Line2D([-xdescent, width - xdescent], [top, top], color=QUIET, lw=0.6, transform=trans)]
-        for value, place in _apart(orig_handle.values, orig_handle.places, width / (0.8 * fontsize)):
+        artists: list[Any] = [
+            Line2D([-xdescent, width - xdescent], [top, top], color=QUIET, lw=0.6, transform=trans)
+        ]
+        for value, place in _apart(
+            orig_handle.values, orig_handle.places, width / (0.8 * fontsize)
+        ):
             x = place * width - xdescent
-            artists.append(Line2D([x, x], [top, top - 0.25 * fontsize], color=QUIET, lw=0.6, transform=trans))
+            artists.append(
+                Line2D([x, x], [top, top - 0.25 * fontsize], color=QUIET, lw=0.6, transform=trans)
+            )
             side = "left" if place == 0 else "right" if place == 1 else "center"
-            text = Text(x, top - 0.4 * fontsize, f"{value}", ha=side, va="top", color=QUIET, fontsize=0.8 * fontsize, transform=trans)
+            text = Text(
+                x,
+                top - 0.4 * fontsize,
+                f"{value}",
+                ha=side,
+                va="top",
+                color=QUIET,
+                fontsize=0.8 * fontsize,
+                transform=trans,
+            )
             artists.append(text)
         return artists
 
 
-def _apart(values: Sequence[float], places: Sequence[float], width: float) -> list[tuple[float, float]]:
-    """The numbers of a ruler that don't touch: the middle one is left out where it would. ``width`` is that of the ruler, in font sizes."""
+def _apart(
+    values: Sequence[float], places: Sequence[float], width: float
+) -> list[tuple[float, float]]:
+    """The numbers of a ruler that don't touch: the middle one is left out where it would. ``width``
+    is that of the ruler, in font sizes.
+    """
     ticks = list(zip(values, places, strict=True))
     if len(ticks) == 3:
         first, middle, last = (_DIGIT * len(f"{value}") for value in values)
@@ -243,28 +334,55 @@ def _apart(values: Sequence[float], places: Sequence[float], width: float) -> li
     return ticks
 
 
-def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int, np.ndarray], settling: Settling | None,
-            points: bool) -> None:  # fmt: skip
+def _legend(
+    ax: Axes,
+    ds: xr.Dataset,
+    pair: tuple[str, str],
+    colors: Mapping[int, np.ndarray],
+    settling: Settling | None,
+    points: bool,
+) -> None:
     """Legend of the hues, the shades and the codes that occur."""
-    codes, counts = np.unique(np.nan_to_num(ds["basin"].values, nan=-4).astype(np.int64), return_counts=True)
+    codes, counts = np.unique(
+        np.nan_to_num(ds["basin"].values, nan=-4).astype(np.int64), return_counts=True
+    )
     shares = dict(zip(codes.tolist(), (counts / ds["basin"].size).tolist(), strict=True))
     if "attractor_fraction" in ds:
-        shares |= dict(zip(ds["attractor"].values.tolist(), ds["attractor_fraction"].values.tolist(), strict=True))
+        shares |= dict(
+            zip(
+                ds["attractor"].values.tolist(),
+                ds["attractor_fraction"].values.tolist(),
+                strict=True,
+            )
+        )
     named = [key for key in colors if shares.get(key) or _inside(ds, pair, key)]
     texts = _texts(ds, pair, named, shares)
-    handles: list[Any] = [_Ramp(shades(colors[key][None], _LEVELS if settling else 1)[0][::2]) for key in named]
+    handles: list[Any] = [
+        _Ramp(shades(colors[key][None], _LEVELS if settling else 1)[0][::2]) for key in named
+    ]
     if settling and named:
         ticks = settling.ticks()
         shares_of_ticks, every = settling.share(np.array(ticks)).tolist(), ds.attrs.get("every")
-        handles.append(_Ruler(ticks if every is None else [float(f"{tick * every:.3g}") for tick in ticks], shares_of_ticks))
+        handles.append(
+            _Ruler(
+                ticks if every is None else [float(f"{tick * every:.3g}") for tick in ticks],
+                shares_of_ticks,
+            )
+        )
         texts.append("periods to settle" if every is None else "s to settle")
     for code, unsettled in maps.UNSETTLED.items():
         if code in shares:
             handles.append(_Ramp(np.array([to_rgb(unsettled.color)])))
             texts.append(f"{unsettled.label}, {maps.share_text(shares[code])}")
     if points and colors and any(len(_stroboscopic(ds, pair, key)) for key in colors):
-        handles.append(Line2D([], [], ls="none", marker="o", ms=5, mfc="#BBBBBB", mec="#222222", mew=0.7))
-        texts.append("points of the attractors" if "attractor_cycle" in ds else "Poincaré points of the attractors")
+        handles.append(
+            Line2D([], [], ls="none", marker="o", ms=5, mfc="#BBBBBB", mec="#222222", mew=0.7)
+        )
+        texts.append(
+            "points of the attractors"
+            if "attractor_cycle" in ds
+            else "Poincaré points of the attractors"
+        )
     if len(named) < len(colors):
         handles.append(Line2D([], [], ls="none"))
         texts.append(f"{len(colors) - len(named)} more that no start of the map leads to")
@@ -272,12 +390,15 @@ def _legend(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], colors: Mapping[int
         small = len(handles) > _LONG_LEGEND
         drawing = {_Ramp: _DrawRamp(), _Ruler: _DrawRuler()}
         ax.legend(
-            handles, texts, handler_map=drawing, loc="upper left", bbox_to_anchor=(1.02, 1), handlelength=5.5, handleheight=0.9,
+            handles, texts, handler_map=drawing, loc="upper left", bbox_to_anchor=(1.02, 1),
+            handlelength=5.5, handleheight=0.9,
             frameon=False, fontsize=6.5 if small else 8, labelspacing=0.35 if small else 0.55,
         )  # fmt: skip
 
 
-def _texts(ds: xr.Dataset, pair: tuple[str, str], ids: Sequence[int], shares: Mapping[int, float]) -> list[str]:
+def _texts(
+    ds: xr.Dataset, pair: tuple[str, str], ids: Sequence[int], shares: Mapping[int, float]
+) -> list[str]:
     """Each attractor in words, with its share of the cells; equal ones with their peaks."""
     names = [maps.describe(ds.sel(attractor=key)) for key in ids]
     texts = []
@@ -286,7 +407,11 @@ def _texts(ds: xr.Dataset, pair: tuple[str, str], ids: Sequence[int], shares: Ma
         if names.count(name) > 1 and "attractor_peak" in one:
             name = f"{name}, {maps.peak_text(one)}"
         share = maps.share_text(shares[key]) if shares.get(key) else "no start"
-        outside = ", outside the map" if len(_stroboscopic(ds, pair, key)) and not _inside(ds, pair, key) else ""
+        outside = (
+            ", outside the map"
+            if len(_stroboscopic(ds, pair, key)) and not _inside(ds, pair, key)
+            else ""
+        )
         texts.append(f"{name}, {share}{outside}")
     return texts
 
@@ -295,4 +420,11 @@ def _inside(ds: xr.Dataset, pair: tuple[str, str], key: int) -> bool:
     """Whether a point of the attractor lies in the map, where it can be drawn."""
     cloud = _stroboscopic(ds, pair, key)
     limits = [maps.edges(ds[name].values) for name in pair]
-    return bool(np.logical_and.reduce([(cloud[:, i] >= edge.min()) & (cloud[:, i] <= edge.max()) for i, edge in enumerate(limits)]).any())
+    return bool(
+        np.logical_and.reduce(
+            [
+                (cloud[:, i] >= edge.min()) & (cloud[:, i] <= edge.max())
+                for i, edge in enumerate(limits)
+            ]
+        ).any()
+    )

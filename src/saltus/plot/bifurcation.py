@@ -18,7 +18,9 @@ from saltus.results.dataset.schema import response_name, sample_name, states_of
 
 #: What the vertical axis shows, by what was sampled.
 _SHOWN = {
-    "turning_points": "{} at turning points", "contacts": "{} at the contacts", "stroboscope": "{} at the Poincaré points",
+    "turning_points": "{} at turning points", "contacts": "{} at the contacts",
+    "stroboscope": "{} at the "
+        "Poincaré points",
 }  # fmt: skip
 #: Diameter of the smallest dots [pt]: more than a pixel of a screen.
 _SMALLEST = 0.6
@@ -27,16 +29,25 @@ _BESIDE_GAPS = 1.16
 
 
 @picture()
-def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: bool = True, legend: bool = True, ax: Any = None) -> Axes:
-    """Sampled values of every response against a parameter: a colour for each period, chaos in small dark dots, gaps dashed.
+def bifurcation_diagram(
+    ds: points.Source,
+    *,
+    state: str | None = None,
+    events: bool = True,
+    legend: bool = True,
+    ax: Any = None,
+) -> Axes:
+    """Sampled values of every response against a parameter: a colour for each period, chaos in
+    small dark dots, gaps dashed.
 
     The axis of the parameter is logarithmic where its values are even in their logarithms.
 
     Parameters
     ----------
     ds : Dataset, or mapping of str to Dataset
-        What ``sl.bifurcation_diagram`` returned, or a part of it; of any other responses the points at whole periods are drawn. Several by
-        name are drawn over each other, a colour for each: ``{"located": a, "ignored": b}``.
+        What ``sl.bifurcation_diagram`` returned, or a part of it; of any other responses the points
+        at whole periods are drawn. Several by name are drawn over each other, a colour for each:
+        ``{"located": a, "ignored": b}``.
     state : str, optional
         Which state; by default the first.
     events : bool
@@ -61,12 +72,16 @@ def bifurcation_diagram(ds: points.Source, *, state: str | None = None, events: 
     if any(state not in states_of(one.ds) for one in datasets):
         raise ParameterError(f"there is no state {shown(state)}. {nearest(state, names)}")
     variables = [_variable(one, state) for one in datasets]
-    scale = points.state_scale([one.ds[name] for one, name in zip(datasets, variables, strict=True)])
+    scale = points.state_scale(
+        [one.ds[name] for one, name in zip(datasets, variables, strict=True)]
+    )
     with draw.panels(ax, 1, (6.3, 3.6)) as (panel,):
         across = points.parameter_axis(panel, datasets)
         named: dict[str, Any] = {}
         for one, name in zip(datasets, variables, strict=True):
-            named |= (_compare if one.name else _kinds)(panel, one, one.ds[name].values * scale.factor, across)
+            named |= (_compare if one.name else _kinds)(
+                panel, one, one.ds[name].values * scale.factor, across
+            )
         _frame(panel, datasets, variables, state, scale, across)
         if events:
             points.draw_events(panel, datasets, across)
@@ -79,11 +94,16 @@ def _variable(one: points.Shown, state: str) -> str:
     """The sampled values; where there are none, the points at whole periods."""
     name = sample_name(state) if sample_name(state) in one.ds else response_name(state)
     if name not in one.ds:
-        raise ParameterError(f"{caller()} misses {name} in this Dataset. Give it the whole Dataset, not some variables of it.")
+        raise ParameterError(
+            f"{caller()} misses {name} in this Dataset. Give it the whole "
+            f"Dataset, not some variables of it."
+        )
     return name
 
 
-def _flat(one: points.Shown, values: np.ndarray, mask: np.ndarray, across: Scale) -> tuple[np.ndarray, np.ndarray]:
+def _flat(
+    one: points.Shown, values: np.ndarray, mask: np.ndarray, across: Scale
+) -> tuple[np.ndarray, np.ndarray]:
     """All points of the responses of ``mask``; the padding is left out."""
     y = values[mask]
     x = np.broadcast_to(one.values[mask][:, None] * across.factor, y.shape)
@@ -102,25 +122,55 @@ def _kinds(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> di
         x, y = _flat(one, values, of == code, across)
         aperiodic = not kinds.repeats(code)
         size = _size(x.size) * (0.5 if aperiodic else 1.0)
-        marks = {"marker": "o", "ms": max(size, _SMALLEST), "mfc": kinds.color(code), "mec": "none", "gid": f"kind {code}"}
+        marks = {
+            "marker": "o",
+            "ms": max(size, _SMALLEST),
+            "mfc": kinds.color(code),
+            "mec": "none",
+            "gid": f"kind {code}",
+        }
         draw.draw_points(ax, x, y, zorder=2 if aperiodic else 3, **marks)
     return points.kind_handles(one, of)
 
 
 def _compare(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> dict[str, Any]:
-    """One colour for a Dataset among several; the first lies below in larger dots, so that all are seen."""
+    """One colour for a Dataset among several; the first lies below in larger dots, so that all are
+    seen.
+    """
     x, y = _flat(one, values, np.ones(len(values), dtype=bool), across)
     color = points.dataset_color(one)
     size = _size(x.size) * (1.8 if one.rank == 0 else 1.0)
-    draw.draw_points(ax, x, y, marker="o", ms=size, mfc=color, mec="none", zorder=2 + 0.1 * one.rank, gid=f"dataset {one.name}")
+    draw.draw_points(
+        ax,
+        x,
+        y,
+        marker="o",
+        ms=size,
+        mfc=color,
+        mec="none",
+        zorder=2 + 0.1 * one.rank,
+        gid=f"dataset {one.name}",
+    )
     return {one.name: points.dot(color)}
 
 
-# -- frame ---------------------------------------------------------------------------------------------------------------------
-def _frame(ax: Axes, datasets: list[points.Shown], variables: list[str], state: str, scale: Scale, across: Scale) -> None:
+# -- frame -----------------------------------------------------------------------------------------
+def _frame(
+    ax: Axes,
+    datasets: list[points.Shown],
+    variables: list[str],
+    state: str,
+    scale: Scale,
+    across: Scale,
+) -> None:
     """Limits, gaps and the name of the vertical axis."""
     ds = datasets[0].ds
-    values = np.concatenate([np.ravel(one.ds[name].values) for one, name in zip(datasets, variables, strict=True)]) * scale.factor
+    values = (
+        np.concatenate(
+            [np.ravel(one.ds[name].values) for one, name in zip(datasets, variables, strict=True)]
+        )
+        * scale.factor
+    )
     varied, fixed = _boundaries(ds, state)
     marks = [boundary.value * scale.factor for boundary in fixed.boundaries] if fixed else []
     draw.set_limits(ax, "y", values, marks)
@@ -130,14 +180,36 @@ def _frame(ax: Axes, datasets: list[points.Shown], variables: list[str], state: 
     for row, name in zip(varied, names, strict=True):  # a gap that the parameter itself moves
         text, low, high = str(name).replace("_", " "), *ax.get_ylim()
         if low <= row[-1] * scale.factor <= high:
-            ax.text(1.01, row[-1] * scale.factor, text, transform=ax.get_yaxis_transform(), va="center", color=QUIET, fontsize=7)
-        ax.plot(ds[datasets[0].axis].values * across.factor, row * scale.factor, color=QUIET, lw=0.7, ls=(0, (4, 3)), zorder=1, gid="gap")
-    shown = str(ds.attrs.get("sample", "stroboscope")) if variables[0] == sample_name(state) else "stroboscope"
+            ax.text(
+                1.01,
+                row[-1] * scale.factor,
+                text,
+                transform=ax.get_yaxis_transform(),
+                va="center",
+                color=QUIET,
+                fontsize=7,
+            )
+        ax.plot(
+            ds[datasets[0].axis].values * across.factor,
+            row * scale.factor,
+            color=QUIET,
+            lw=0.7,
+            ls=(0, (4, 3)),
+            zorder=1,
+            gid="gap",
+        )
+    shown = (
+        str(ds.attrs.get("sample", "stroboscope"))
+        if variables[0] == sample_name(state)
+        else "stroboscope"
+    )
     ax.set_ylabel(scale.label(_SHOWN.get(shown, "{}").format(state)))
 
 
 def _boundaries(ds: xr.Dataset, state: str) -> tuple[np.ndarray, regions.Regions | None]:
-    """Boundaries of a state: those that move with the parameter, shape (guard, n), or the regions between fixed ones."""
+    """Boundaries of a state: those that move with the parameter, shape (guard, n), or the regions
+    between fixed ones.
+    """
     if "guard_boundary" not in ds or state not in ds["guard_state"].values.tolist():
         return np.empty((0, 0)), None
     if ds["guard_boundary"].ndim == 1:

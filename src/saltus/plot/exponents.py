@@ -15,16 +15,24 @@ from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.dataset.schema import EXPONENTS, kind_text
 
-#: Share of the time at the beginning whose running means aren't shown: they start anywhere, with intervals beyond any frame.
+#: Share of the time at the beginning whose running means aren't shown: they start anywhere, with
+#: intervals beyond any frame.
 _EARLY = 0.1
 
 
 @picture(EXPONENTS)
-def exponents(ds: xr.Dataset, trajectory: int | Sequence[int] | None = None, ax: Any = None, *, legend: bool = True) -> Any:
-    """Lyapunov exponents as they converge: mean so far and its 95 % interval, against the time since the transient.
+def exponents(
+    ds: xr.Dataset,
+    trajectory: int | Sequence[int] | None = None,
+    ax: Any = None,
+    *,
+    legend: bool = True,
+) -> Any:
+    """Lyapunov exponents as they converge: mean so far and its 95 % interval, against the time
+    since the transient.
 
-    The first tenth of the time isn't shown.
-    The values at the end stand in the legend; where the motion settled to an orbit, they are those of the orbit, drawn as dashed lines.
+    The first tenth of the time isn't shown. The values at the end stand in the legend; where the
+    motion settled to an orbit, they are those of the orbit, drawn as dashed lines.
 
     Parameters
     ----------
@@ -73,11 +81,15 @@ def _panel(ax: Axes, one: xr.Dataset, legend: bool) -> None:
     ax.axhline(0.0, color=QUIET, lw=0.7, zorder=1)
     for i in range(one.sizes["exponent"]):
         color = CYCLE[i % len(CYCLE)]
-        low, mean, high = (late[f"running_{name}"].values[i] for name in ("low", "exponent", "high"))
+        low, mean, high = (
+            late[f"running_{name}"].values[i] for name in ("low", "exponent", "high")
+        )
         ax.fill_between(time * x.factor, low, high, color=color, alpha=0.18, lw=0, zorder=1)
         ax.plot(time * x.factor, mean, color=color, lw=1.1, zorder=2, label=_value(one, i, unit))
         if settled:
-            ax.axhline(float(one["lyapunov_exponent"][i]), color=color, lw=0.9, ls=(0, (4, 3)), zorder=3)
+            ax.axhline(
+                float(one["lyapunov_exponent"][i]), color=color, lw=0.9, ls=(0, (4, 3)), zorder=3
+            )
     ax.set_xlabel(x.label("time after the transient"))
     ax.set_ylabel(Scale(1.0, unit).label("Lyapunov exponent"))
     ax.set_title("motion: " + kind_text(str(one["kind"].item()), int(one["response_period"])))
@@ -87,7 +99,9 @@ def _panel(ax: Axes, one: xr.Dataset, legend: bool) -> None:
 
 
 def _value(one: xr.Dataset, i: int, unit: str) -> str:
-    """An exponent with half of its interval, to the digits that it gives, six at most: ``5.98 ± 0.26 1/s``."""
+    """An exponent with half of its interval, to the digits that it gives, six at most: ``5.98 ±
+    0.26 1/s``.
+    """
     value = float(one["lyapunov_exponent"][i])
     half = float(one["lyapunov_high"][i]) - value
     if not np.isfinite(value):

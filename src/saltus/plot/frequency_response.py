@@ -22,11 +22,14 @@ from saltus.results.files.measured import read_measured
 from saltus.units import to_si
 
 Quantity = Literal[
-    "rms", "peak", "maximum", "minimum", "peak_to_peak", "mean", "rms_about_mean", "amplitude", "phase", "transmissibility"
+    "rms", "peak", "maximum", "minimum", "peak_to_peak", "mean", "rms_about_mean", "amplitude",
+    "phase", "transmissibility"
 ]  # fmt: skip
 _LABELS = {
-    "rms": "steady rms of {}", "peak": "peak |{}|", "maximum": "largest {}", "minimum": "smallest {}", "peak_to_peak": "peak to peak of {}",
-    "mean": "mean of {}", "rms_about_mean": "rms of {} about its mean", "amplitude": "first harmonic of {}", "phase": "phase of {} [deg]",
+    "rms": "steady rms of {}", "peak": "peak |{}|", "maximum": "largest {}",
+    "minimum": "smallest {}", "peak_to_peak": "peak to peak of {}",
+    "mean": "mean of {}", "rms_about_mean": "rms of {} about its mean",
+    "amplitude": "first harmonic of {}", "phase": "phase of {} [deg]",
     "transmissibility": "{}",
 }  # fmt: skip
 #: Quantities that begin at zero.
@@ -45,22 +48,26 @@ def frequency_response(
     legend: bool = True,
     ax: Any = None,
 ) -> Axes:
-    """Size of every steady response against the frequency (or any other parameter): a colour for each period, branches as lines.
+    """Size of every steady response against the frequency (or any other parameter): a colour for
+    each period, branches as lines.
 
     Parameters
     ----------
     ds : Dataset, or mapping of str to Dataset
-        What ``sl.frequency_response`` returned; a part of it, such as ``ds.sel(frequency=slice(14, 17))``, is drawn alone. Several by name
-        are drawn over each other, a colour and a marker for each: ``{"exact": a, "ode45": b}``.
+        What ``sl.frequency_response`` returned; a part of it, such as ``ds.sel(frequency=slice(14,
+        17))``, is drawn alone. Several by name are drawn over each other, a colour and a marker for
+        each: ``{"exact": a, "ode45": b}``.
     quantity : str
-        ``"rms"`` (about zero), ``"peak"`` (largest magnitude), ``"maximum"``, ``"minimum"``, ``"peak_to_peak"``, ``"mean"``,
-        ``"rms_about_mean"``; ``"amplitude"`` or ``"phase"`` of the first harmonic A cos(2 pi f t + phase); or ``"transmissibility"``, once
-        :func:`saltus.transmissibility` has added it. For amplitude and phase under each other give two Axes one after the other.
+        ``"rms"`` (about zero), ``"peak"`` (largest magnitude), ``"maximum"``, ``"minimum"``,
+        ``"peak_to_peak"``, ``"mean"``, ``"rms_about_mean"``; ``"amplitude"`` or ``"phase"`` of the
+        first harmonic A cos(2 pi f t + phase); or ``"transmissibility"``, once
+        :func:`saltus.transmissibility` has added it. For amplitude and phase under each other give
+        two Axes one after the other.
     output : str, optional
         A state, or an output that was asked for; default the first state.
     measured : path or Dataset, optional
-        Measured points to draw with it: a CSV with the columns ``frequency [Hz]`` and ``amplitude [mm]``, any units, or a Dataset with
-        these two variables and their attribute ``units``.
+        Measured points to draw with it: a CSV with the columns ``frequency [Hz]`` and ``amplitude
+        [mm]``, any units, or a Dataset with these two variables and their attribute ``units``.
     events : bool
         Whether to mark grazes, period doublings and folds above the picture.
     legend : bool
@@ -85,19 +92,30 @@ def frequency_response(
     variable = "drawn"
     marks = None if measured is None else _measured(measured, datasets[0], variable)
     with draw.panels(ax, 1, (6.3, 3.4)) as (panel,):
-        across, up = points.parameter_axis(panel, datasets), points.state_scale([one.ds[variable] for one in datasets])
+        across, up = (
+            points.parameter_axis(panel, datasets),
+            points.state_scale([one.ds[variable] for one in datasets]),
+        )
         named: dict[str, Any] = {}
         for one in datasets:
-            named |= (_compare if one.name else _kinds)(panel, one, one.ds[variable].values * up.factor, across)
+            named |= (_compare if one.name else _kinds)(
+                panel, one, one.ds[variable].values * up.factor, across
+            )
         if marks is not None:
-            _draw_measured(panel, marks[datasets[0].axis].values * across.factor, marks["amplitude"].values * up.factor)
+            _draw_measured(
+                panel,
+                marks[datasets[0].axis].values * across.factor,
+                marks["amplitude"].values * up.factor,
+            )
         if quantity in _SIZES:
             panel.set_ylim(bottom=0)
         if quantity == "phase":
             panel.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 1.5, 3, 4.5, 9, 10]))
         named_output = datasets[0].ds[variable].attrs["long_name"]
         panel.set_ylabel(
-            _LABELS[quantity].format(named_output) if quantity == "phase" else up.label(_LABELS[quantity].format(named_output))
+            _LABELS[quantity].format(named_output)
+            if quantity == "phase"
+            else up.label(_LABELS[quantity].format(named_output))
         )
         if events:
             points.draw_events(panel, datasets, across)
@@ -112,18 +130,29 @@ def _chosen(one: points.Shown, quantity: str, output: str | None) -> points.Show
     first = states_of(ds)[0]
     if quantity == "transmissibility":
         if quantity not in ds:
-            raise ParameterError(f'there is no transmissibility yet. Add it: ds = sl.transmissibility(ds, "{first}", "base").')
+            raise ParameterError(
+                f"there is no transmissibility yet. Add it: ds = "
+                f'sl.transmissibility(ds, "{first}", "base").'
+            )
         return replace(one, ds=ds.assign(drawn=ds[quantity]))
     if f"response_{quantity}" in ds and output in (None, first):
-        return replace(one, ds=ds.assign(drawn=ds[f"response_{quantity}"].assign_attrs(long_name=first)))
+        return replace(
+            one, ds=ds.assign(drawn=ds[f"response_{quantity}"].assign_attrs(long_name=first))
+        )
     known = ds["output"].values.tolist() if "output" in ds else []
     name = first if output is None else output
     if name not in known:
         raise ParameterError(f"the Dataset has no output {shown(name)}. {nearest(name, known)}")
     chosen = ds.sel(output=name)
     unit = "1" if quantity == "phase" else chosen["output_units"].item()
-    values = np.rad2deg(chosen["output_phase"].values) if quantity == "phase" else chosen[f"output_{quantity}"].values
-    return replace(one, ds=ds.assign(drawn=("response", values, {"units": unit, "long_name": name})))
+    values = (
+        np.rad2deg(chosen["output_phase"].values)
+        if quantity == "phase"
+        else chosen[f"output_{quantity}"].values
+    )
+    return replace(
+        one, ds=ds.assign(drawn=("response", values, {"units": unit, "long_name": name}))
+    )
 
 
 def _size(count: int) -> float:
@@ -134,38 +163,66 @@ def _size(count: int) -> float:
 def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[str, Any]:
     """A colour for each kind of motion: lines along branches, dots at every response."""
     of = kinds.of(one.ds)
-    for code in sorted(np.unique(of).tolist(), key=lambda code: (code != kinds.CHAOTIC, code)):  # chaos lies under the others
+    # chaos lies under the others
+    for code in sorted(np.unique(of).tolist(), key=lambda code: (code != kinds.CHAOTIC, code)):
         color, mine = kinds.color(code), of == code
         if kinds.repeats(code):
             line = points.branch_lines(one, y, mine)
-            ax.plot(line[0] * across.factor, line[1], color=color, lw=0.8, zorder=2, gid=f"branches {code}")
-        size = _size(mine.sum()) * (1.2 if code == kinds.CHAOTIC else 1.0)  # of its marker half is seen
+            ax.plot(
+                line[0] * across.factor,
+                line[1],
+                color=color,
+                lw=0.8,
+                zorder=2,
+                gid=f"branches {code}",
+            )
+        # of its marker half is seen
+        size = _size(mine.sum()) * (1.2 if code == kinds.CHAOTIC else 1.0)
         marks = {"marker": kinds.marker(code), "mfc": color, "mec": "none"}
-        draw.draw_points(ax, one.values[mine] * across.factor, y[mine], ms=size, zorder=3, gid=f"kind {code}", **marks)
+        draw.draw_points(
+            ax,
+            one.values[mine] * across.factor,
+            y[mine],
+            ms=size,
+            zorder=3,
+            gid=f"kind {code}",
+            **marks,
+        )
     return points.kind_handles(one, of, markers=True)
 
 
 def _compare(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[str, Any]:
-    """One colour and marker for a Dataset among several; the first is drawn largest, so that none hides another."""
+    """One colour and marker for a Dataset among several; the first is drawn largest, so that none
+    hides another.
+    """
     color, marker = points.dataset_color(one), points.MARKERS[one.rank]
     size = _size(y.size) * (1.9 if one.rank == 0 else 1.0)
     draw.draw_points(
-        ax, one.values * across.factor, y, marker=marker, ms=size, mfc="none" if one.rank == 0 else color, mec=color,
+        ax, one.values * across.factor, y, marker=marker, ms=size,
+        mfc="none" if one.rank == 0 else color, mec=color,
         mew=0.6 if one.rank == 0 else 0.0, zorder=3, gid=f"dataset {one.name}",
     )  # fmt: skip
     return {one.name: points.dot(color, marker, hollow=one.rank == 0)}
 
 
-# -- measured points -----------------------------------------------------------------------------------------------------------
+# -- measured points -------------------------------------------------------------------------------
 def _measured(measured: Measured, one: points.Shown, variable: str) -> xr.Dataset:
     """Measured points in SI."""
-    units = {one.axis: one.ds[one.axis].attrs.get("units", ""), "amplitude": one.ds[variable].attrs.get("units", "")}
+    units = {
+        one.axis: one.ds[one.axis].attrs.get("units", ""),
+        "amplitude": one.ds[variable].attrs.get("units", ""),
+    }
     if not isinstance(measured, xr.Dataset):
         return read_measured(measured, one.axis, *units.values())  # type: ignore[arg-type]
     lacking = [name for name in units if name not in measured.variables]
     if lacking:
-        raise ParameterError(f"measured has no {lacking[0]!r}. It needs {' and '.join(units)}, each with the attribute units.")
-    return xr.Dataset({name: ("point", _in_si(measured[name], unit)) for name, unit in units.items()})
+        raise ParameterError(
+            f"measured has no {lacking[0]!r}. It needs {' and '.join(units)}, "
+            f"each with the attribute units."
+        )
+    return xr.Dataset(
+        {name: ("point", _in_si(measured[name], unit)) for name, unit in units.items()}
+    )
 
 
 def _draw_measured(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
@@ -177,8 +234,15 @@ def _draw_measured(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
 def _in_si(values: xr.DataArray, unit: str) -> np.ndarray:
     given = values.attrs.get("units", "")
     if not given and unit not in ("", "1"):
-        raise ParameterError(f"measured {values.name} has no attribute units. Write it, such as units='{unit}'.")
+        raise ParameterError(
+            f"measured {values.name} has no attribute units. Write it, such as units='{unit}'."
+        )
     try:
-        return np.array([to_si(f"{float(value)!r} {given}", unit, str(values.name)) for value in np.ravel(values.values)])
+        return np.array(
+            [
+                to_si(f"{float(value)!r} {given}", unit, str(values.name))
+                for value in np.ravel(values.values)
+            ]
+        )
     except UnitError as error:
         raise ParameterError(f"{error}") from None

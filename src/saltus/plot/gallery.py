@@ -23,18 +23,29 @@ from saltus.plot.picture import caller, check, picture
 from saltus.plot.style import display_scale, style
 from saltus.results.dataset import schema
 
-#: Forcing periods in the time history of a response that doesn't repeat, and the fewest of one that does: it takes two to see a repeat.
+#: Forcing periods in the time history of a response that doesn't repeat, and the fewest of one that
+#: does: it takes two to see a repeat.
 _SHOWN_IF_APERIODIC, _FEWEST = 12, 2
 #: The most rows that fit a figure.
 _MOST = 20
 _ELSEWHERE = "#D2D2D2"
-#: A picture of Poincare points is no narrower than this share of the orbit: a single point would have no scale.
+#: A picture of Poincare points is no narrower than this share of the orbit: a single point would
+#: have no scale.
 _NARROWEST = 0.25
 
 
-@picture(schema.BASINS, schema.ATTRACTORS, needs=("attractor", "attractor_period", "attractor_contacts"))
-def gallery(ds: xr.Dataset, runs: xr.Dataset, attractors: Sequence[int] | None = None, *, order: Sequence[int] | None = None) -> Figure:
-    """A row for each attractor: time history over its period, phase portrait, Poincare points in the hue that it has in the map.
+@picture(
+    schema.BASINS, schema.ATTRACTORS, needs=("attractor", "attractor_period", "attractor_contacts")
+)
+def gallery(
+    ds: xr.Dataset,
+    runs: xr.Dataset,
+    attractors: Sequence[int] | None = None,
+    *,
+    order: Sequence[int] | None = None,
+) -> Figure:
+    """A row for each attractor: time history over its period, phase portrait, Poincare points in
+    the hue that it has in the map.
 
     Poincare points of the other attractors stay in the background, pale, where they lie nearby.
 
@@ -56,16 +67,24 @@ def gallery(ds: xr.Dataset, runs: xr.Dataset, attractors: Sequence[int] | None =
     Raises
     ------
     ParameterError
-        If ``ds`` or ``runs`` is something else, they don't fit one another, or there is nothing to show.
+        If ``ds`` or ``runs`` is something else, they don't fit one another, or there is nothing to
+        show.
     """
     check(runs, [schema.TRAJECTORY])
     colors = maps.colors_of(ds, order)
     ids = _chosen(runs, list(colors), attractors)
     pair = _pair(runs)
-    columns = 3 if len(pair) == 2 and all(f"attractor_{name}" in ds for name in pair) else 2 if len(pair) == 2 else 1
+    columns = (
+        3
+        if len(pair) == 2 and all(f"attractor_{name}" in ds for name in pair)
+        else 2
+        if len(pair) == 2
+        else 1
+    )
     with style():
         figure, grid = plt.subplots(
-            len(ids), columns, figsize=((4.6, 6.6, 9.0)[columns - 1], 1.75 * len(ids) + 0.35), squeeze=False,
+            len(ids), columns, figsize=((4.6, 6.6, 9.0)[columns - 1], 1.75 * len(ids) + 0.35),
+            squeeze=False,
             width_ratios=[2.4, 1.15, 1.15][:columns], layout="constrained",
         )  # fmt: skip
         for row, key in zip(grid, ids, strict=True):
@@ -86,7 +105,9 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
     chosen = ids if attractors is None else [int(one) for one in np.atleast_1d(attractors).tolist()]
     strange = [one for one in chosen if one not in ids]
     if strange:
-        raise ParameterError(f"there is no attractor {strange[0]}. Known: {', '.join(map(str, ids)) or 'none'}.")
+        raise ParameterError(
+            f"there is no attractor {strange[0]}. Known: {', '.join(map(str, ids)) or 'none'}."
+        )
     if not 0 < len(chosen) <= _MOST:
         some = " Choose, such as attractors=[0, 1]." if ids else " Nothing settled in this Dataset."
         raise ParameterError(f"{caller()} shows 1 to {_MOST} attractors, not {len(chosen)}.{some}")
@@ -94,8 +115,10 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
     lacking = [one for one in chosen if one not in held]
     if lacking:
         raise ParameterError(
-            f"runs holds {len(held)} trajectories, none for attractor {lacking[0]} of {len(ids)}. Simulate a batch whose "
-            f"trajectory i starts on attractor i: from ds.attractor_{schema.states_of(runs)[0]}[:, 0] and so on."
+            f"runs holds {len(held)} trajectories, none for attractor {lacking[0]} of {len(ids)}. "
+            f"Simulate a batch whose "
+            f"trajectory i starts on attractor i: from ds.attractor_{schema.states_of(runs)[0]}[:, "
+            f"0] and so on."
         )
     return chosen
 
@@ -103,10 +126,12 @@ def _chosen(runs: xr.Dataset, ids: list[int], attractors: Any) -> list[int]:
 def _pair(runs: xr.Dataset) -> tuple[str, ...]:
     """The states of the phase portrait, as plot.phase chooses them; one where there are no two."""
     known = schema.states_of(runs)
-    return (known[0], selection.rate_of(runs, known[0]) or known[1]) if len(known) > 1 else known[:1]
+    return (
+        (known[0], selection.rate_of(runs, known[0]) or known[1]) if len(known) > 1 else known[:1]
+    )
 
 
-# -- one row -------------------------------------------------------------------------------------------------------------------
+# -- one row ---------------------------------------------------------------------------------------
 def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
     """The time history and the phase portrait."""
     n = int(ds["attractor_period"].sel(attractor=key))
@@ -117,22 +142,34 @@ def _row(row: np.ndarray, ds: xr.Dataset, runs: xr.Dataset, key: int) -> None:
     shown = (max(n, _FEWEST), n) if n else (_SHOWN_IF_APERIODIC, held)
     in_time, in_phase = (min(periods, held) if "period" in one else None for periods in shown)
     history(runs, label, periods=in_time, ax=row[0], time="T", legend=False)
-    if len(row) > 1 and str(ds["attractor_type"].sel(attractor=key).item()) == "equilibrium":  # all else would be rounding
+    # all else would be rounding
+    if len(row) > 1 and str(ds["attractor_type"].sel(attractor=key).item()) == "equilibrium":
         names = [name for name in schema.states_of(runs) if f"attractor_{name}" in ds]
         places = [ds[f"attractor_{name}"].sel(attractor=key).values.ravel()[0] for name in names]
-        scales = [display_scale(runs[name].attrs.get("units", ""), abs(place)) for name, place in zip(names, places, strict=True)]
-        places_text = [f"{name} = {scale.text(place)}" for name, place, scale in zip(names, places, scales, strict=True)]
+        scales = [
+            display_scale(runs[name].attrs.get("units", ""), abs(place))
+            for name, place in zip(names, places, strict=True)
+        ]
+        places_text = [
+            f"{name} = {scale.text(place)}"
+            for name, place, scale in zip(names, places, scales, strict=True)
+        ]
         draw.say(row[1], "\n".join(["At rest at", *places_text]))
     elif len(row) > 1:
         phase(runs, label, periods=in_phase, ax=row[1], legend=False)
-        for names in [one for one in row[1].child_axes if one.get_gid() == draw.GAP_NAMES.format("x")]:
-            names.remove()  # the time history beside it names the gaps too; here the names would meet the title
+        for names in [
+            one for one in row[1].child_axes if one.get_gid() == draw.GAP_NAMES.format("x")
+        ]:
+            # the time history beside it names the gaps too; here the names would meet the title
+            names.remove()
 
 
 def _poincare(ax: Axes, ds: xr.Dataset, runs: xr.Dataset, key: int, color: np.ndarray) -> None:
     """The attractor at whole periods, the others pale behind it."""
     pair = _pair(runs)
-    clouds = np.stack([ds[f"attractor_{name}"].transpose("attractor", "phase").values for name in pair], axis=-1)
+    clouds = np.stack(
+        [ds[f"attractor_{name}"].transpose("attractor", "phase").values for name in pair], axis=-1
+    )
     own = ds["attractor"].values == key
     mine, others = (cloud[np.isfinite(cloud).all(axis=-1)] for cloud in (clouds[own], clouds[~own]))
     orbit = selection.single(runs, key if "trajectory" in runs.dims else None)
@@ -155,7 +192,17 @@ def _poincare(ax: Axes, ds: xr.Dataset, runs: xr.Dataset, key: int, color: np.nd
         "gid": f"attractor {key}",
     }
     if len(others):
-        draw.draw_points(ax, *others.T, marker="o", ms=2.4, mfc=_ELSEWHERE, mec="none", zorder=1, label="other attractors", gid="others")
+        draw.draw_points(
+            ax,
+            *others.T,
+            marker="o",
+            ms=2.4,
+            mfc=_ELSEWHERE,
+            mec="none",
+            zorder=1,
+            label="other attractors",
+            gid="others",
+        )
     draw.draw_points(ax, *mine.T, zorder=3, **marks)
 
 
@@ -163,22 +210,36 @@ def _window(points: np.ndarray, orbit: np.ndarray) -> tuple[float, float]:
     """Limits around the points, at least as wide as the labels of an axis need."""
     ends = [points.min(), points.max()] if points.size else [np.nanmin(orbit), np.nanmax(orbit)]
     middle = 0.5 * (ends[0] + ends[1])
-    half = max(0.5 * (ends[1] - ends[0]), 0.5 * _NARROWEST * float(np.nanmax(orbit) - np.nanmin(orbit)))
+    half = max(
+        0.5 * (ends[1] - ends[0]), 0.5 * _NARROWEST * float(np.nanmax(orbit) - np.nanmin(orbit))
+    )
     return float(middle - half), float(middle + half)
 
 
-# -- words ---------------------------------------------------------------------------------------------------------------------
+# -- words -----------------------------------------------------------------------------------------
 def _title(ax: Axes, ds: xr.Dataset, key: int, color: np.ndarray) -> None:
     """What the attractor is, after a dot in its hue."""
     title: Text = ax.set_title(title_of(ds, key))
     shift = ScaledTranslation(12 / 72, 0, ax.figure.dpi_scale_trans)
     title.set_transform(title.get_transform() + shift)
-    ax.annotate("\N{BLACK CIRCLE}", (0, 1), (0, 4.5), xycoords="axes fraction", textcoords="offset points", color=tuple(color), fontsize=11,
-                ha="left", va="baseline", annotation_clip=False)  # fmt: skip
+    ax.annotate(
+        "\N{BLACK CIRCLE}",
+        (0, 1),
+        (0, 4.5),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        color=tuple(color),
+        fontsize=11,
+        ha="left",
+        va="baseline",
+        annotation_clip=False,
+    )
 
 
 def title_of(ds: xr.Dataset, key: int) -> str:
-    """An attractor in one line: ``3T, 8 contacts, multipliers |µ| = 0.53, peak 0.91 mm, 12.3 % of the starts``."""
+    """An attractor in one line: ``3T, 8 contacts, multipliers |µ| = 0.53, peak 0.91 mm, 12.3 % of
+    the starts``.
+    """
     one = ds.sel(attractor=key)
     parts = [maps.describe(one), _stability(one)]
     if "attractor_peak" in one:
@@ -191,18 +252,31 @@ def title_of(ds: xr.Dataset, key: int) -> str:
 def _stability(one: xr.Dataset) -> str:
     """The largest multiplier of what repeats, else the largest exponent."""
     if int(one["attractor_period"]) > 0 and "attractor_multiplier_real" in one:
-        size = np.hypot(one["attractor_multiplier_real"].values, one["attractor_multiplier_imag"].values)
+        size = np.hypot(
+            one["attractor_multiplier_real"].values, one["attractor_multiplier_imag"].values
+        )
         size = np.sort(size[np.isfinite(size)])[::-1]
         texts = list(dict.fromkeys(f"{value:.3g}" for value in size))
         return f"multipliers |µ| = {', '.join(texts[:3])}" if texts else ""
     if "attractor_exponent" in one and math.isfinite(float(one["attractor_exponent"])):
-        error = float(one["attractor_exponent_error"]) if "attractor_exponent_error" in one else math.nan
-        return f"exponent {float(one['attractor_exponent']):.3g}{f' ± {error:.1g}' if math.isfinite(error) else ''} 1/s"
+        error = (
+            float(one["attractor_exponent_error"])
+            if "attractor_exponent_error" in one
+            else math.nan
+        )
+        spread = f" ± {error:.1g}" if math.isfinite(error) else ""
+        return f"exponent {float(one['attractor_exponent']):.3g}{spread} 1/s"
     return ""
 
 
 def _name_colours(figure: Figure, grid: np.ndarray) -> None:
     """One legend for all rows."""
-    named = {label: handle for one in grid.flat for handle, label in zip(*one.get_legend_handles_labels(), strict=True)}
+    named = {
+        label: handle
+        for one in grid.flat
+        for handle, label in zip(*one.get_legend_handles_labels(), strict=True)
+    }
     if named:
-        figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=len(named))
+        figure.legend(
+            list(named.values()), list(named), loc="outside lower center", ncols=len(named)
+        )

@@ -16,7 +16,13 @@ from saltus.plot import axes as draw
 from saltus.plot import regions, selection
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, QUIET, Scale, display_scale
-from saltus.results.dataset.schema import TRAJECTORY, contact_name, equations_of, forcing_period, states_of
+from saltus.results.dataset.schema import (
+    TRAJECTORY,
+    contact_name,
+    equations_of,
+    forcing_period,
+    states_of,
+)
 
 #: Marker, face and name of each kind of contact. Hollow means undecided.
 _MARKERS: dict[str, dict[str, Any]] = {
@@ -40,8 +46,8 @@ def history(
 ) -> Any:
     """Time history of one state, coloured by region, every contact marked.
 
-    Gap lines are dashed, contact regions lightly shaded. Colours change exactly at the contacts. A trajectory that did not reach its end
-    says so in the picture.
+    Gap lines are dashed, contact regions lightly shaded. Colours change exactly at the contacts. A
+    trajectory that did not reach its end says so in the picture.
 
     Parameters
     ----------
@@ -87,11 +93,20 @@ def history(
             if legend and i == 0:
                 ticks = 0.25 if time == "both" and "period" in one else 0.05  # inches
                 above = panel.transAxes + ScaledTranslation(0, ticks, panel.figure.dpi_scale_trans)
-                draw.legend(panel, regions.find(one, [state]), loc="lower right", bbox_to_anchor=(1, 1), bbox_transform=above, ncols=8)
+                draw.legend(
+                    panel,
+                    regions.find(one, [state]),
+                    loc="lower right",
+                    bbox_to_anchor=(1, 1),
+                    bbox_transform=above,
+                    ncols=8,
+                )
     return panels[0] if len(singles) == 1 else np.array(panels, dtype=object)
 
 
-def _panel(ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], time: str, unit: str | None) -> None:
+def _panel(
+    ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], time: str, unit: str | None
+) -> None:
     """One trajectory in one Axes."""
     curve = selection.path(ds, (state,), *shown)
     if shown[0] == shown[1]:
@@ -103,18 +118,35 @@ def _panel(ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], tim
     y = display_scale(ds[state].attrs.get("units", ""), float(finite.max(initial=0.0)), unit)
     period = forcing_period(ds)
     in_periods = time == "T" and "period" in ds
-    x = Scale(1 / period, "T") if in_periods else display_scale("s", float(np.abs(curve.time).max()))
+    x = (
+        Scale(1 / period, "T")
+        if in_periods
+        else display_scale("s", float(np.abs(curve.time).max()))
+    )
     coloured = regions.find(ds, [state])
     own = regions.along(ds, state)
 
     width = 1.1 if shown[1] - shown[0] <= 40 or "period" not in ds else 0.7
-    draw.draw_pieces(ax, curve.time * x.factor, values * y.factor, coloured.of(curve.mode), coloured, width)
+    draw.draw_pieces(
+        ax, curve.time * x.factor, values * y.factor, coloured.of(curve.mode), coloured, width
+    )
     draw.set_limits(ax, "x", curve.time * x.factor, margin=0.0)
-    draw.set_limits(ax, "y", values * y.factor, [boundary.value * y.factor for boundary in own.boundaries])
+    draw.set_limits(
+        ax, "y", values * y.factor, [boundary.value * y.factor for boundary in own.boundaries]
+    )
     table = selection.contacts_in(ds, *shown)
-    owners = {str(guard): str(owner) for guard, owner in zip(ds["guard"].values, ds["guard_state"].values, strict=True)}
-    mine = {"", state, *(owner for owner in owners.values() if f"d{owner}/dt = {state}" in equations_of(ds))}
-    theirs = np.array([owners[str(guard)] not in mine for guard in table["contact_guard"].values], dtype=bool)
+    owners = {
+        str(guard): str(owner)
+        for guard, owner in zip(ds["guard"].values, ds["guard_state"].values, strict=True)
+    }
+    mine = {
+        "",
+        state,
+        *(owner for owner in owners.values() if f"d{owner}/dt = {state}" in equations_of(ds)),
+    }
+    theirs = np.array(
+        [owners[str(guard)] not in mine for guard in table["contact_guard"].values], dtype=bool
+    )
     _mark_contacts(ax, table.isel(contact=~theirs), state, x, y)
     _note_contacts(ax, table.isel(contact=theirs), owners, x)
     draw.draw_gaps(ax, "y", own, y)
@@ -126,7 +158,9 @@ def _panel(ax: Axes, ds: xr.Dataset, state: str, shown: tuple[float, float], tim
 
 
 def _period_axis(ax: Axes, period: float) -> None:
-    """A second axis at the top that counts forcing periods; ``period`` in units of the axis below."""
+    """A second axis at the top that counts forcing periods; ``period`` in units of
+    the axis below.
+    """
 
     def count(time: Any) -> Any:
         return np.asarray(time, dtype=float) / period
@@ -140,12 +174,25 @@ def _period_axis(ax: Axes, period: float) -> None:
 
 
 def _note_contacts(ax: Axes, table: xr.Dataset, owners: Mapping[str, str], x: Scale) -> None:
-    """A stroke at the foot of the picture for each contact at a boundary of another state: on this curve it would lie on no line."""
+    """A stroke at the foot of the picture for each contact at a boundary of another state: on this
+    curve it would lie on no line.
+    """
     if table.sizes["contact"]:
-        names = ", ".join(dict.fromkeys(owners[str(guard)] for guard in table["contact_guard"].values))
+        names = ", ".join(
+            dict.fromkeys(owners[str(guard)] for guard in table["contact_guard"].values)
+        )
         place = np.full(table.sizes["contact"], 0.03)
-        draw.draw_points(ax, table["contact_time"].values * x.factor, place, transform=ax.get_xaxis_transform(), marker="|", ms=6, mew=0.8,
-                         color=QUIET, label=f"contact of {names}")  # fmt: skip
+        draw.draw_points(
+            ax,
+            table["contact_time"].values * x.factor,
+            place,
+            transform=ax.get_xaxis_transform(),
+            marker="|",
+            ms=6,
+            mew=0.8,
+            color=QUIET,
+            label=f"contact of {names}",
+        )
 
 
 def _mark_contacts(ax: Axes, table: xr.Dataset, state: str, x: Scale, y: Scale) -> None:
@@ -156,5 +203,10 @@ def _mark_contacts(ax: Axes, table: xr.Dataset, state: str, x: Scale, y: Scale) 
         rows = np.flatnonzero(kinds == kind)
         if rows.size:
             grow = 1.0 if kind == "crossing" else 1.5
-            at = table["contact_time"].values[rows] * x.factor, table[contact_name(state)].values[rows] * y.factor
-            draw.draw_points(ax, *at, ms=size * grow, mec=OKABE_ITO["black"], mew=0.5, zorder=3, **marker)
+            at = (
+                table["contact_time"].values[rows] * x.factor,
+                table[contact_name(state)].values[rows] * y.factor,
+            )
+            draw.draw_points(
+                ax, *at, ms=size * grow, mec=OKABE_ITO["black"], mew=0.5, zorder=3, **marker
+            )

@@ -1,4 +1,6 @@
-"""Kinds of motion as colours: the same kind has the same colour in every picture, whatever else is in it."""
+"""Kinds of motion as colours: the same kind has the same colour in every picture, whatever else is
+in it.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +12,21 @@ import xarray as xr
 from saltus.plot.palette import hues, shades
 from saltus.results.dataset.schema import period_text
 
-#: Periods with a hue of their own; longer ones share the next. More hues than these can't be distinguished as small dots.
+#: Periods with a hue of their own; longer ones share the next. More hues than these can't be
+#: distinguished as small dots.
 OWN_HUES = 8
 #: Codes of the kinds: the period itself up to :data:`OWN_HUES`, then these.
 LONG, QUASI_PERIODIC, CHAOTIC = OWN_HUES + 1, OWN_HUES + 2, OWN_HUES + 3
-#: Of systems without forcing; a limit cycle has the hue of period 1, as there is no other, an equilibrium that of period 2.
+#: Of systems without forcing; a limit cycle has the hue of period 1, as there is no other, an
+#: equilibrium that of period 2.
 LIMIT_CYCLE, EQUILIBRIUM = OWN_HUES + 4, OWN_HUES + 5
 _HUE_OF = {LIMIT_CYCLE: 1, EQUILIBRIUM: 2}
-_NAMES = {QUASI_PERIODIC: "quasi-periodic", CHAOTIC: "chaotic", LIMIT_CYCLE: "limit cycle", EQUILIBRIUM: "equilibrium"}
+_NAMES = {
+    QUASI_PERIODIC: "quasi-periodic",
+    CHAOTIC: "chaotic",
+    LIMIT_CYCLE: "limit cycle",
+    EQUILIBRIUM: "equilibrium",
+}
 _OWN = {"quasi_periodic": QUASI_PERIODIC, "limit_cycle": LIMIT_CYCLE, "equilibrium": EQUILIBRIUM}
 #: Motion that never repeats is grey, so that no period is taken for it.
 _GREYS = {QUASI_PERIODIC: (0.70, 0.70, 0.70), CHAOTIC: (0.20, 0.20, 0.20)}
@@ -56,7 +65,11 @@ def label(code: int, periods: np.ndarray) -> str:
     """A kind in a legend; ``periods`` are those that occur, to name the long ones."""
     if code == LONG:
         long = np.unique(periods[periods > OWN_HUES]).tolist()
-        return ", ".join(map(period_text, long)) if len(long) <= 3 else f"{period_text(long[0])} to {period_text(long[-1])}"
+        return (
+            ", ".join(map(period_text, long))
+            if len(long) <= 3
+            else (f"{period_text(long[0])} to {period_text(long[-1])}")
+        )
     return _NAMES.get(code) or period_text(code)
 
 

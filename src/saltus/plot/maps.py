@@ -1,4 +1,6 @@
-"""What all pictures of basins share: the right Dataset, the starts as cells, codes and colours, attractors in words."""
+"""What all pictures of basins share: the right Dataset, the starts as cells, codes and colours,
+attractors in words.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,8 @@ class Unsettled:
     color: str
 
 
-#: Without hue, so that no shade is taken for them: near-black where nothing settled, grey where a start left, pale where nothing is known.
+#: Without hue, so that no shade is taken for them: near-black where nothing settled, grey where a
+#: start left, pale where nothing is known.
 UNSETTLED: dict[int, Unsettled] = {
     Kind.ESCAPED: Unsettled("escaped", "#BDBDBD"),
     Kind.UNCONVERGED: Unsettled("not settled", "#1E1E1E"),
@@ -36,7 +39,7 @@ UNSETTLED: dict[int, Unsettled] = {
 }
 
 
-# -- the Dataset ---------------------------------------------------------------------------------------------------------------
+# -- the Dataset -----------------------------------------------------------------------------------
 def ranked(ds: xr.Dataset, order: Sequence[int] | None) -> list[int]:
     """Ids of the attractors in the order of their colours: those of ``order``, then the others.
 
@@ -49,11 +52,15 @@ def ranked(ds: xr.Dataset, order: Sequence[int] | None) -> list[int]:
     try:
         first = [] if order is None else [int(one) for one in np.atleast_1d(order).tolist()]
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"order must hold numbers of attractors, not {shown(order)}.") from None
+        raise ParameterError(
+            f"order must hold numbers of attractors, not {shown(order)}."
+        ) from None
     strange = [one for one in first if one not in known]
     if strange or len(set(first)) < len(first):
         what = f"there is no attractor {strange[0]}" if strange else "an attractor occurs twice"
-        raise ParameterError(f"order={first}, but {what}. Known: {', '.join(map(str, known)) or 'none'}.")
+        raise ParameterError(
+            f"order={first}, but {what}. Known: {', '.join(map(str, known)) or 'none'}."
+        )
     return first + [one for one in known if one not in first]
 
 
@@ -63,16 +70,18 @@ def colors_of(ds: xr.Dataset, order: Sequence[int] | None) -> dict[int, np.ndarr
     return dict(zip(ids, hues(len(ids)), strict=True))
 
 
-# -- words ---------------------------------------------------------------------------------------------------------------------
+# -- words -----------------------------------------------------------------------------------------
 def describe(one: xr.Dataset) -> str:
-    """An attractor in a few words: ``24T, 60 contacts``; ``chaotic, 2.4 contacts per T``; ``limit cycle, 0.3 s, 4 contacts``.
+    """An attractor in a few words: ``24T, 60 contacts``; ``chaotic, 2.4 contacts per T``; ``limit
+    cycle, 0.3 s, 4 contacts``.
 
     Of a noisy one how far it scatters too: ``noisy 24T, scatter 4.3 µm, 60 contacts``.
     """
     period, contacts = int(one["attractor_period"]), float(one["attractor_contacts"])
     name = kind_text(str(one["attractor_type"].item()), period)
     if "attractor_scatter" in one and math.isfinite(float(one["attractor_scatter"])):
-        name += f", scatter {from_si(float(one['attractor_scatter']), one['attractor_scatter'].attrs.get('units', ''), 2)}"
+        scatter = one["attractor_scatter"]
+        name += f", scatter {from_si(float(scatter), scatter.attrs.get('units', ''), 2)}"
     if not math.isfinite(contacts):
         return name
     if period > 0:
@@ -84,11 +93,16 @@ def describe(one: xr.Dataset) -> str:
         return f"{name}, {contacts:.3g} contacts per T"
     if kind != "limit_cycle":
         return name
-    return f"{name}, {from_si(float(one['attractor_cycle']), 's', 3)}, {contacts:.4g} contact{'' if contacts == 1 else 's'}"
+    return (
+        f"{name}, {from_si(float(one['attractor_cycle']), 's', 3)}, {contacts:.4g} "
+        f"contact{'' if contacts == 1 else 's'}"
+    )
 
 
 def method_text(ds: xr.Dataset, suffix: str = "") -> str:
-    """How a map was computed, such as ``ode45, rtol 0.0001, atol 1e-07``; empty for the exact method. ``suffix``: ``_a`` of two maps."""
+    """How a map was computed, such as ``ode45, rtol 0.0001, atol 1e-07``; empty for the exact
+    method. ``suffix``: ``_a`` of two maps.
+    """
     name = str(ds.attrs.get(f"method{suffix}", "Taylor"))
     if name == "Taylor":
         return ""
@@ -111,23 +125,28 @@ def share_text(fraction: float) -> str:
 
 
 def peak_text(one: xr.Dataset) -> str:
-    """The largest first state of an attractor, such as ``peak 0.91 mm``; of an equilibrium where it lies, such as ``x = -0.91 mm``."""
+    """The largest first state of an attractor, such as ``peak 0.91 mm``; of an equilibrium where it
+    lies, such as ``x = -0.91 mm``.
+    """
     state = str(one.attrs.get("states", "")).split(" ")[0]
+    unit = one["attractor_peak"].attrs.get("units", "")
     if str(one["attractor_type"].item()) == "equilibrium" and f"attractor_{state}" in one:
         place = float(np.ravel(one[f"attractor_{state}"].values)[0])
-        return f"{state} = {display_scale(one['attractor_peak'].attrs.get('units', ''), abs(place)).text(float(f'{place:.3g}'))}"
+        return f"{state} = {display_scale(unit, abs(place)).text(float(f'{place:.3g}'))}"
     peak = float(one["attractor_peak"])
-    return f"peak {display_scale(one['attractor_peak'].attrs.get('units', ''), abs(peak)).text(float(f'{peak:.3g}'))}"
+    return f"peak {display_scale(unit, abs(peak)).text(float(f'{peak:.3g}'))}"
 
 
-# -- the starts ----------------------------------------------------------------------------------------------------------------
+# -- the starts ------------------------------------------------------------------------------------
 def plane(ds: xr.Dataset, variable: str) -> tuple[str, str]:
     """Names of the two states on the axes of a map."""
     dims = ds[variable].dims
     if len(dims) != 2 or any(dim not in ds.coords for dim in dims):
         raise ParameterError(
-            f"{variable} has the dims {dims}; a map needs two states with their starts as coordinates. "
-            f"Of more states choose a section first, such as ds.isel({dims[-1] if dims else 'x'}=0)."
+            f"{variable} has the dims {dims}; a map needs two states with their starts as "
+            f"coordinates. "
+            f"Of more states choose a section first, such as "
+            f"ds.isel({dims[-1] if dims else 'x'}=0)."
         )
     if 0 in ds[variable].shape:
         raise ParameterError(f"this map holds no starts (its shape is {ds[variable].shape}).")
@@ -141,7 +160,9 @@ def scale_of(ds: xr.Dataset, state: str) -> Scale:
 
 
 def edges(starts: np.ndarray) -> np.ndarray:
-    """Edges of the cells around the starts, shape (start + 1,): half-way between neighbours, the outer cells symmetric."""
+    """Edges of the cells around the starts, shape (start + 1,): half-way between neighbours, the
+    outer cells symmetric.
+    """
     starts = np.asarray(starts, dtype=float)
     if starts.size == 1:
         half = 0.5 * abs(starts[0]) or 0.5
@@ -150,16 +171,30 @@ def edges(starts: np.ndarray) -> np.ndarray:
     return np.concatenate([[2 * starts[0] - between[0]], between, [2 * starts[-1] - between[-1]]])
 
 
-def draw_cells(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], scales: tuple[Scale, Scale], colors: np.ndarray) -> None:
+def draw_cells(
+    ax: Axes, ds: xr.Dataset, pair: tuple[str, str], scales: tuple[Scale, Scale], colors: np.ndarray
+) -> None:
     """Colour every cell, uint8, shape (A, B, 3), and name the axes.
 
-    No colours are mixed, however small the cells: a mixture of two hues would be taken for a third attractor.
+    No colours are mixed, however small the cells: a mixture of two hues would be taken for a third
+    attractor.
     """
     x, y = (edges(ds[name].values * scale.factor) for name, scale in zip(pair, scales, strict=True))
     image = np.ascontiguousarray(colors.swapaxes(0, 1))
-    if all(np.allclose(np.diff(axis), (axis[-1] - axis[0]) / (axis.size - 1), rtol=1e-6, atol=0.0) for axis in (x, y)):
+    if all(
+        np.allclose(np.diff(axis), (axis[-1] - axis[0]) / (axis.size - 1), rtol=1e-6, atol=0.0)
+        for axis in (x, y)
+    ):
         extent = (x[0], x[-1], y[0], y[-1])
-        ax.imshow(image, origin="lower", extent=extent, interpolation="nearest", aspect="auto", zorder=0, rasterized=True)
+        ax.imshow(
+            image,
+            origin="lower",
+            extent=extent,
+            interpolation="nearest",
+            aspect="auto",
+            zorder=0,
+            rasterized=True,
+        )
     else:
         ax.pcolormesh(x, y, image, zorder=0, rasterized=True)
     ax.set_xlim(x.min(), x.max())

@@ -16,16 +16,19 @@ from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 from saltus.results.dataset.schema import ENERGY, IMPACTS
 
-#: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a motion that repeats, and how often each
-#: must be seen.
+#: Speeds of a guard that are equal to this share of the largest are one speed; the most speeds of a
+#: motion that repeats, and how often each must be seen.
 _SAME, _MOST_SPEEDS, _REPEATED = 1e-7, 6, 3
 #: Characters of a line in a picture of words.
 _LINE = 60
 
 
 @picture(IMPACTS)
-def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
-    """Histogram of the speeds at contact, a colour for each guard. Where they repeat, or there are none, it is said in words.
+def impacts(
+    ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True
+) -> Axes:
+    """Histogram of the speeds at contact, a colour for each guard. Where they repeat, or there are
+    none, it is said in words.
 
     Parameters
     ----------
@@ -50,7 +53,11 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
     counts = ds["speed_histogram"]
     labels: np.ndarray | None = None
     if "trajectory" in counts.dims:
-        labels = np.asarray(selection.chosen(ds, trajectory)) if trajectory is not None else ds["trajectory"].values
+        labels = (
+            np.asarray(selection.chosen(ds, trajectory))
+            if trajectory is not None
+            else ds["trajectory"].values
+        )
         counts = counts.sel(trajectory=labels).sum("trajectory")
     low, high = ds["speed_low"].values, ds["speed_high"].values
     scale = display_scale(ds["speed_low"].attrs.get("units", ""), float(np.abs(high).max()))
@@ -78,7 +85,9 @@ def impacts(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, le
 
 
 def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, scale: Scale) -> str:
-    """What there is to say of contacts that make no histogram: there are none, or their speeds come again and again."""
+    """What there is to say of contacts that make no histogram: there are none, or their speeds come
+    again and again.
+    """
     if not counts.values.sum():
         return "No contact in the observed time."
     mine = slice(None) if labels is None else np.isin(ds["contact_trajectory"].values, labels)
@@ -86,18 +95,28 @@ def _in_words(ds: xr.Dataset, labels: np.ndarray | None, counts: xr.DataArray, s
     lines = []
     for name in ds["guard"].values.tolist():
         own = np.sort(speeds[(guards == name) & np.isfinite(speeds)])
-        first = np.flatnonzero(np.diff(own, prepend=-np.inf) > _SAME * own.max(initial=0.0))  # of each group of equal ones
+        # of each group of equal ones
+        first = np.flatnonzero(np.diff(own, prepend=-np.inf) > _SAME * own.max(initial=0.0))
         if len(own) and (len(first) > _MOST_SPEEDS or len(own) < _REPEATED * len(first)):
             return ""
         if len(own):
             values = ", ".join(scale.text(float(f"{own[i]:.6g}")) for i in first)
-            lines.append(textwrap.fill(f"{name.replace('_', ' ')}: {len(own)} contacts, at {values}", _LINE, subsequent_indent="    "))
+            lines.append(
+                textwrap.fill(
+                    f"{name.replace('_', ' ')}: {len(own)} contacts, at {values}",
+                    _LINE,
+                    subsequent_indent="    ",
+                )
+            )
     return "\n".join(["The speeds at contact repeat.", *lines])
 
 
 @picture(ENERGY)
-def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True) -> Axes:
-    """Energy supplied, dissipated and stored, interval by interval; the largest imbalance is in the title.
+def energy(
+    ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, legend: bool = True
+) -> Axes:
+    """Energy supplied, dissipated and stored, interval by interval; the largest imbalance is in the
+    title.
 
     Parameters
     ----------
@@ -129,14 +148,29 @@ def energy(ds: xr.Dataset, trajectory: int | None = None, ax: Any = None, *, leg
         "change": (OKABE_ITO["green"], "-"),
         "energy": (OKABE_ITO["black"], (0, (4, 2))),
     }
-    scale = display_scale("J", max(float(np.abs(ds[name].values).max(initial=0.0)) for name in curves))
+    scale = display_scale(
+        "J", max(float(np.abs(ds[name].values).max(initial=0.0)) for name in curves)
+    )
     with draw.panels(ax, 1, (6.0, 2.8)) as (panel,):
         if not np.isfinite(ds["residual"].values).any():
-            draw.say(panel, "There is no balance: the motion stopped before the first interval had passed.", ds)
+            draw.say(
+                panel,
+                "There is no balance: the motion stopped before the first interval had passed.",
+                ds,
+            )
             return panel
         for name, (color, line) in curves.items():
-            label = {"change": "change of the stored energy", "energy": "stored at the end"}.get(name, name)
-            panel.plot(ds[dim].values, ds[name].values * scale.factor, color=color, ls=line, lw=1.0, label=label)
+            label = {"change": "change of the stored energy", "energy": "stored at the end"}.get(
+                name, name
+            )
+            panel.plot(
+                ds[dim].values,
+                ds[name].values * scale.factor,
+                color=color,
+                ls=line,
+                lw=1.0,
+                label=label,
+            )
         if dim != "time":
             panel.xaxis.set_major_locator(MaxNLocator(integer=True))
         panel.set_xlabel("time [s]" if dim == "time" else "forcing periods")

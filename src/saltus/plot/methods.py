@@ -1,4 +1,6 @@
-"""Methods side by side over one parameter: the error that each makes, where it gives another answer, and what it costs."""
+"""Methods side by side over one parameter: the error that each makes, where it gives another
+answer, and what it costs.
+"""
 
 from __future__ import annotations
 
@@ -17,23 +19,28 @@ from saltus.plot.response_points import is_log, parameter_scale
 from saltus.plot.style import CYCLE
 from saltus.results.dataset.schema import METHODS
 
-#: Pieces of the axis over which medians and shares are taken: the eye can't follow 2000 values, and a share needs some dozen.
+#: Pieces of the axis over which medians and shares are taken: the eye can't follow 2000 values, and
+#: a share needs some dozen.
 PIECES = 30
-#: Up to this number of values they are drawn as dots; up to this number of pieces their means as steps.
+#: Up to this number of values they are drawn as dots; up to this number of pieces their means as
+#: steps.
 FEW, STEPS = 100, 8
 
 
 @picture(METHODS)
 def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
-    """What a method does to steady responses, against one parameter: three panels, the first method of ``ds`` being the reference.
+    """What a method does to steady responses, against one parameter: three panels, the first method
+    of ``ds`` being the reference.
 
-    From above: the error of one forcing period started on the reference's own responses (dots, and medians over pieces of the axis); the
-    share of starts whose answer differs from the reference's, piece by piece, with its 95 % interval; the steps tried in a forcing period.
+    From above: the error of one forcing period started on the reference's own responses (dots, and
+    medians over pieces of the axis); the share of starts whose answer differs from the reference's,
+    piece by piece, with its 95 % interval; the steps tried in a forcing period.
 
     Parameters
     ----------
     ds : Dataset
-        What ``sl.compare_methods`` returned for a frequency response or a bifurcation diagram over one parameter.
+        What ``sl.compare_methods`` returned for a frequency response or a bifurcation diagram over
+        one parameter.
     ax : sequence of three Axes, optional
         Where to draw; a new figure by default.
 
@@ -49,7 +56,8 @@ def methods(ds: xr.Dataset, *, ax: Any = None) -> list[Axes]:
     """
     if "step_error" not in ds or ds["step_error"].ndim != 2:
         raise ParameterError(
-            f"{caller()} draws responses over one parameter. For basins draw plot.agreement, for two parameters select one."
+            f"{caller()} draws responses over one parameter. For basins draw plot.agreement, for "
+            f"two parameters select one."
         )
     axis = str(ds["step_error"].dims[1])
     values, unit = ds[axis].values, ds[axis].attrs.get("units", "")
@@ -80,21 +88,42 @@ def _in_pieces(x: np.ndarray, bins: np.ndarray) -> list[np.ndarray]:
 
 
 def _middles(bins: np.ndarray) -> np.ndarray:
-    return np.sqrt(bins[1:] * bins[:-1]) if bins[0] > 0 and bins[-1] > 100 * bins[0] else 0.5 * (bins[1:] + bins[:-1])
+    return (
+        np.sqrt(bins[1:] * bins[:-1])
+        if bins[0] > 0 and bins[-1] > 100 * bins[0]
+        else 0.5 * (bins[1:] + bins[:-1])
+    )
 
 
 def _over(bins: np.ndarray, values: Any) -> tuple[np.ndarray, np.ndarray]:
-    """What is drawn of a number for each piece: a curve through their middles; of few pieces a step over each."""
+    """What is drawn of a number for each piece: a curve through their middles; of few pieces a step
+    over each.
+    """
     if len(bins) > STEPS:
         return _middles(bins), np.asarray(values)
     return np.repeat(bins, 2)[1:-1], np.repeat(np.asarray(values), 2)
 
 
-def _draw_error(ax: Axes, one: xr.Dataset, x: np.ndarray, bins: np.ndarray, name: str, color: str) -> None:
+def _draw_error(
+    ax: Axes, one: xr.Dataset, x: np.ndarray, bins: np.ndarray, name: str, color: str
+) -> None:
     error = np.where(one["step_error"].values > 0, one["step_error"].values, np.nan)
     few = x.size <= FEW
-    draw.draw_points(ax, x, error, marker="o", ms=3.0 if few else 1.3, mfc=color, mec="none", alpha=0.6 if few else 0.35, zorder=2)
-    medians = [float(np.nanmedian(error[piece])) if np.isfinite(error[piece]).any() else np.nan for piece in _in_pieces(x, bins)]
+    draw.draw_points(
+        ax,
+        x,
+        error,
+        marker="o",
+        ms=3.0 if few else 1.3,
+        mfc=color,
+        mec="none",
+        alpha=0.6 if few else 0.35,
+        zorder=2,
+    )
+    medians = [
+        float(np.nanmedian(error[piece])) if np.isfinite(error[piece]).any() else np.nan
+        for piece in _in_pieces(x, bins)
+    ]
     ax.plot(*_over(bins, medians), color=color, lw=1.4, label=name, zorder=3)
 
 
@@ -105,7 +134,9 @@ def _draw_share(ax: Axes, one: xr.Dataset, x: np.ndarray, bins: np.ndarray, colo
     differ = np.array([(agrees[piece] == 0).sum() for piece in pieces], float)
     share = np.divide(differ, settled, out=np.full(len(pieces), np.nan), where=settled > 0)
     low, high = wilson(differ, settled)
-    ax.fill_between(*_over(bins, 100 * low), _over(bins, 100 * high)[1], color=color, alpha=0.2, lw=0, zorder=2)
+    ax.fill_between(
+        *_over(bins, 100 * low), _over(bins, 100 * high)[1], color=color, alpha=0.2, lw=0, zorder=2
+    )
     ax.plot(*_over(bins, 100 * share), color=color, lw=1.4, zorder=3)
 
 
@@ -113,7 +144,17 @@ def _draw_cost(ax: Axes, one: xr.Dataset, x: np.ndarray, name: str, color: str) 
     cost = float(one["method_cpu_seconds"])
     label = f"{name}: {cost:.3g} s" if np.isfinite(cost) else name
     size = 3.0 if x.size <= FEW else 1.5
-    draw.draw_points(ax, x, one["steps_per_period"].values, marker="o", ms=size, mfc=color, mec="none", label=label, zorder=2)
+    draw.draw_points(
+        ax,
+        x,
+        one["steps_per_period"].values,
+        marker="o",
+        ms=size,
+        mfc=color,
+        mec="none",
+        label=label,
+        zorder=2,
+    )
 
 
 def _finish(panels: list[Axes], label: str, log: bool, x: np.ndarray) -> None:

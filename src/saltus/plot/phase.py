@@ -16,8 +16,9 @@ from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, OKABE_ITO, Scale, display_scale
 from saltus.results.dataset.schema import STROBOSCOPE, TRAJECTORY, kind_of, states_of
 
-#: Without `periods` the last part of a forced run is shown: transients of lightly damped systems have mostly gone by then (of the rig with
-#: 3 % damping after 40 periods, at 15 Hz), and subharmonic orbits still show several of their periods.
+#: Without `periods` the last part of a forced run is shown: transients of lightly damped systems
+#: have mostly gone by then (of the rig with 3 % damping after 40 periods, at 15 Hz), and
+#: subharmonic orbits still show several of their periods.
 SETTLED_SHARE = 0.3
 
 
@@ -33,10 +34,11 @@ def phase(
     units: Mapping[str, str] | None = None,
     legend: bool = True,
 ) -> Axes:
-    """Phase portrait of one trajectory, coloured by region; or of several in one picture, a colour each.
+    """Phase portrait of one trajectory, coloured by region; or of several in one picture, a colour
+    each.
 
-    Gap lines are dashed, contact regions lightly shaded, the states at whole forcing periods (Poincare points) are dots. What
-    ``stroboscope`` returned shows as dots alone.
+    Gap lines are dashed, contact regions lightly shaded, the states at whole forcing periods
+    (Poincare points) are dots. What ``stroboscope`` returned shows as dots alone.
 
     Parameters
     ----------
@@ -45,10 +47,11 @@ def phase(
     trajectory : int or list of int, optional
         Which of a batch; without it all are laid over one another, at most 8.
     states : pair of str, optional
-        On the horizontal and the vertical axis; by default the first one and the state that is its rate, else the second one.
+        On the horizontal and the vertical axis; by default the first one and the state that is its
+        rate, else the second one.
     periods : int, float or pair, optional
-        Number of forcing periods at the end, or (first, last) period. By default the last 30 % of a forced run,
-        as the picture says, and all of a run without forcing.
+        Number of forcing periods at the end, or (first, last) period. By default the last 30 % of a
+        forced run, as the picture says, and all of a run without forcing.
     ax : Axes, optional
         Where to draw; a new figure by default.
     poincare : bool
@@ -84,13 +87,26 @@ def phase(
             if kind_of(run) != STROBOSCOPE:
                 _curve(panel, one, pair, shown, scales, color, name)
             if poincare or kind_of(run) == STROBOSCOPE:
-                part = f", {shown[0]:g} T to {shown[1]:g} T" if periods is None and shown[0] > 0 else ""
-                _dots(panel, selection.stroboscope_points(one, pair, *shown), scales, color, name or f"Poincaré points{part}")
+                part = (
+                    f", {shown[0]:g} T to {shown[1]:g} T"
+                    if periods is None and shown[0] > 0
+                    else ""
+                )
+                _dots(
+                    panel,
+                    selection.stroboscope_points(one, pair, *shown),
+                    scales,
+                    color,
+                    name or f"Poincaré points{part}",
+                )
             draw.note_status(panel, one)
         _frame(panel, singles[0], pair, np.concatenate(curves), scales)
         if legend:
-            right = 1.25 if any(text.get_position()[0] > 1.0 for text in panel.texts) else 1.02  # the names of gaps
-            draw.legend(panel, regions.find(singles[0], pair), loc="upper left", bbox_to_anchor=(right, 1))
+            # the names of gaps
+            right = 1.25 if any(text.get_position()[0] > 1.0 for text in panel.texts) else 1.02
+            draw.legend(
+                panel, regions.find(singles[0], pair), loc="upper left", bbox_to_anchor=(right, 1)
+            )
     return panel
 
 
@@ -99,10 +115,19 @@ def _pair(run: xr.Dataset, states: Any) -> tuple[str, str]:
     known = states_of(run)
     if states is None:
         if len(known) < 2:
-            raise ParameterError(f"a phase portrait needs two states, this system has only {known[0]!r}. See plot.history.")
+            raise ParameterError(
+                f"a phase portrait needs two states, this system has only "
+                f"{known[0]!r}. See plot.history."
+            )
         return known[0], selection.rate_of(run, known[0]) or known[1]
-    if not isinstance(states, list | tuple | np.ndarray) or getattr(states, "shape", None) == () or len(states) != 2:
-        raise ParameterError(f"states={shown(states)}. Give two names, such as states={known[:2]!r}.")
+    if (
+        not isinstance(states, list | tuple | np.ndarray)
+        or getattr(states, "shape", None) == ()
+        or len(states) != 2
+    ):
+        raise ParameterError(
+            f"states={shown(states)}. Give two names, such as states={known[:2]!r}."
+        )
     first, second = (selection.state_named(run, name) for name in states)
     return first, second
 
@@ -114,15 +139,27 @@ def _values(ds: xr.Dataset, pair: tuple[str, str], shown: tuple[float, float]) -
     return selection.path(ds, pair, *shown).values
 
 
-def _scales(run: xr.Dataset, pair: tuple[str, str], values: np.ndarray, units: Mapping[str, str]) -> tuple[Scale, Scale]:
+def _scales(
+    run: xr.Dataset, pair: tuple[str, str], values: np.ndarray, units: Mapping[str, str]
+) -> tuple[Scale, Scale]:
     """Display units of the two axes."""
     largest = np.abs(np.where(np.isfinite(values), values, 0.0)).max(axis=0, initial=0.0)
-    first, second = (display_scale(run[name].attrs.get("units", ""), float(largest[i]), units.get(name)) for i, name in enumerate(pair))
+    first, second = (
+        display_scale(run[name].attrs.get("units", ""), float(largest[i]), units.get(name))
+        for i, name in enumerate(pair)
+    )
     return first, second
 
 
-def _curve(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], shown: tuple[float, float], scales: tuple[Scale, Scale],
-           color: str | None, name: str | None) -> None:  # fmt: skip
+def _curve(
+    ax: Axes,
+    ds: xr.Dataset,
+    pair: tuple[str, str],
+    shown: tuple[float, float],
+    scales: tuple[Scale, Scale],
+    color: str | None,
+    name: str | None,
+) -> None:
     """The orbit: a colour for each region, or one colour of its own among several."""
     curve = selection.path(ds, pair, *shown)
     x, y = (curve.values[:, i] * scales[i].factor for i in (0, 1))
@@ -134,18 +171,35 @@ def _curve(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], shown: tuple[float, 
         draw.draw_pieces(ax, x, y, coloured.of(curve.mode), coloured, width)
 
 
-def _dots(ax: Axes, points: np.ndarray, scales: tuple[Scale, Scale], color: str | None, name: str) -> None:
+def _dots(
+    ax: Axes, points: np.ndarray, scales: tuple[Scale, Scale], color: str | None, name: str
+) -> None:
     """The Poincare points; smaller where they are many."""
     size = 4.5 if len(points) <= 60 else 2.5 if len(points) <= 500 else 1.2
     label = name if color is None or name not in ax.get_legend_handles_labels()[1] else None
-    marks = {"marker": "o", "ms": size, "mfc": color or OKABE_ITO["black"], "mec": "white", "mew": 0.4 if size > 2 else 0.0}
+    marks = {
+        "marker": "o",
+        "ms": size,
+        "mfc": color or OKABE_ITO["black"],
+        "mec": "white",
+        "mew": 0.4 if size > 2 else 0.0,
+    }
     if color is None and size > 4:  # open circles: filled ones are contacts, in time histories
         marks |= {"ms": 4.2, "mfc": "white", "mec": OKABE_ITO["black"], "mew": 1.1}
     if len(points):
-        draw.draw_points(ax, points[:, 0] * scales[0].factor, points[:, 1] * scales[1].factor, zorder=4, label=label, **marks)
+        draw.draw_points(
+            ax,
+            points[:, 0] * scales[0].factor,
+            points[:, 1] * scales[1].factor,
+            zorder=4,
+            label=label,
+            **marks,
+        )
 
 
-def _frame(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], values: np.ndarray, scales: tuple[Scale, Scale]) -> None:
+def _frame(
+    ax: Axes, ds: xr.Dataset, pair: tuple[str, str], values: np.ndarray, scales: tuple[Scale, Scale]
+) -> None:
     """Limits, gap lines and names of the axes."""
     directions: tuple[draw.Direction, draw.Direction] = ("x", "y")
     own = [regions.along(ds, name) for name in pair]

@@ -1,4 +1,6 @@
-"""What every public picture does besides its work: check its arguments, name itself in messages, and leave no text that can't be drawn."""
+"""What every public picture does besides its work: check its arguments, name itself in messages,
+and leave no text that can't be drawn.
+"""
 
 from __future__ import annotations
 
@@ -36,13 +38,14 @@ _NAME: ContextVar[str] = ContextVar("name", default="the picture")
 def picture(*kinds: str, needs: Sequence[str] = ()) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Make a function that draws Axes or a Figure a public picture.
 
-    Names of maps, outputs and boundaries may hold dollar signs. What is a formula between two of them is drawn as one; what isn't, and
-    would end saving the figure, is drawn as it is written.
+    Names of maps, outputs and boundaries may hold dollar signs. What is a formula between two of
+    them is drawn as one; what isn't, and would end saving the figure, is drawn as it is written.
 
     Parameters
     ----------
     *kinds : str
-        Kinds of Dataset (:data:`saltus.results.schema.MAKERS`) that the first argument may be. Without any, the function checks itself.
+        Kinds of Dataset (:data:`saltus.results.schema.MAKERS`) that the first argument may be.
+        Without any, the function checks itself.
     needs : sequence of str
         Variables that it must hold, besides those of its kind.
     """
@@ -76,27 +79,36 @@ def picture(*kinds: str, needs: Sequence[str] = ()) -> Callable[[Callable[P, R]]
 
 
 def caller() -> str:
-    """The name of the picture that is being drawn, such as ``plot.history``: the subject of its messages."""
+    """The name of the picture that is being drawn, such as ``plot.history``: the subject of its
+    messages.
+    """
     return _NAME.get()
 
 
 def check(ds: Any, kinds: Sequence[str], needs: Sequence[str] = ()) -> None:
-    """Raise a ParameterError unless ``ds`` is a Dataset of one of these kinds and holds these variables."""
+    """Raise a ParameterError unless ``ds`` is a Dataset of one of these kinds and holds these
+    variables.
+    """
     kind = schema.kind_of(ds)
     try:
         schema.check(ds, caller=caller(), kinds=kinds)
     except ParameterError as error:
-        better = f" Draw it with {_PICTURES[kind]}." if kind not in kinds and kind in _PICTURES else ""
+        better = (
+            f" Draw it with {_PICTURES[kind]}." if kind not in kinds and kind in _PICTURES else ""
+        )
         raise ParameterError(f"{error}{better}") from None
     missing = [one for one in needs if one not in ds.variables]
     if missing:
         raise ParameterError(
-            f"{caller()} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not some variables of it."
+            f"{caller()} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, "
+            f"not some variables of it."
         )
 
 
 def keep_drawable(artist: Artist) -> None:
-    """Have every text of a Figure or Axes drawn as it is written if Matplotlib can't read the formulas in it."""
+    """Have every text of a Figure or Axes drawn as it is written if Matplotlib can't read the
+    formulas in it.
+    """
     for text in artist.findobj(Text):
         if isinstance(text, Text) and drawable(text.get_text()) != text.get_text():
             text.set_text(drawable(text.get_text()))
@@ -104,7 +116,9 @@ def keep_drawable(artist: Artist) -> None:
 
 @functools.lru_cache(maxsize=256)
 def drawable(text: str) -> str:
-    """The text itself if Matplotlib can read the formulas in it, else one that is drawn as it is written."""
+    """The text itself if Matplotlib can read the formulas in it, else one that is drawn as it is
+    written.
+    """
     parser: Any = MathTextParser("path")
     try:
         if is_math_text(text):

@@ -39,7 +39,9 @@ class Boundary:
 
 @dataclass(frozen=True)
 class Region:
-    """One side: its colour, its name in a legend, whether it is a contact and the interval of the state that it covers."""
+    """One side: its colour, its name in a legend, whether it is a contact and the interval of the
+    state that it covers.
+    """
 
     color: str
     label: str
@@ -84,8 +86,13 @@ def _mask(bits: Sequence[int]) -> int:
 
 
 def _positive(mode: np.ndarray, bits: Sequence[int]) -> np.ndarray:
-    """How many of the guards are positive: along one state that is the place among its boundaries."""
-    return sum(((np.asarray(mode) >> bit) & 1 for bit in bits), start=np.zeros(np.shape(mode), dtype=np.int64))
+    """How many of the guards are positive: along one state that is the place among
+    its boundaries.
+    """
+    return sum(
+        ((np.asarray(mode) >> bit) & 1 for bit in bits),
+        start=np.zeros(np.shape(mode), dtype=np.int64),
+    )
 
 
 def find(ds: xr.Dataset, shown: Sequence[str]) -> Regions:
@@ -96,11 +103,14 @@ def find(ds: xr.Dataset, shown: Sequence[str]) -> Regions:
     ds : Dataset
         One trajectory.
     shown : sequence of str
-        States on the axes, the most important first. Their own guards decide; if they have none, those of the only state that has any;
-        else every guard does, a colour for each combination of sides that occurs.
+        States on the axes, the most important first. Their own guards decide; if they have none,
+        those of the only state that has any; else every guard does, a colour for each combination
+        of sides that occurs.
     """
     owners = ds["guard_state"].values.tolist()
-    bounded = [state for state in shown if state in owners] or (owners[:1] if len(set(owners)) == 1 and owners[0] else [])
+    bounded = [state for state in shown if state in owners] or (
+        owners[:1] if len(set(owners)) == 1 and owners[0] else []
+    )
     if not owners or not bounded:
         return _by_mode(ds)
     return along(ds, bounded[0])
@@ -109,7 +119,11 @@ def find(ds: xr.Dataset, shown: Sequence[str]) -> Regions:
 def along(ds: xr.Dataset, state: str) -> Regions:
     """The regions between the boundaries of one state; a single free one if it has none."""
     values = ds["guard_boundary"].values
-    mine = [i for i, owner in enumerate(ds["guard_state"].values.tolist()) if owner == state and np.isfinite(values[i])]
+    mine = [
+        i
+        for i, owner in enumerate(ds["guard_state"].values.tolist())
+        if owner == state and np.isfinite(values[i])
+    ]
     bits = tuple(sorted(mine, key=lambda i: values[i]))
     boundaries = tuple(Boundary(str(ds["guard"].values[i]), float(values[i])) for i in bits)
     free = _free_region(boundaries)
@@ -126,12 +140,15 @@ def along(ds: xr.Dataset, state: str) -> Regions:
 
 
 def _free_region(boundaries: Sequence[Boundary]) -> int:
-    """Which region is free of contact: above the guards called lower and below those called upper, else the one that holds zero.
+    """Which region is free of contact: above the guards called lower and below those called upper,
+    else the one that holds zero.
 
     Where zero is itself a boundary it is the middle one, and below a single boundary.
     """
     lower = ["lower" in boundary.name for boundary in boundaries]
-    if boundaries and all(low or "upper" in boundary.name for low, boundary in zip(lower, boundaries, strict=True)):
+    if boundaries and all(
+        low or "upper" in boundary.name for low, boundary in zip(lower, boundaries, strict=True)
+    ):
         return sum(lower)
     if any(boundary.value == 0 for boundary in boundaries):
         return len(boundaries) // 2
@@ -141,16 +158,26 @@ def _free_region(boundaries: Sequence[Boundary]) -> int:
 def _contact_label(boundary: Boundary) -> str:
     """``upper_gap`` bounds the ``upper contact``; ``pitch = pitch_gap`` is no such name."""
     stem = boundary.name.removesuffix("_gap")
-    return f"{stem.replace('_', ' ')} contact" if stem != boundary.name and stem.isidentifier() else f"beyond {boundary.label}"
+    return (
+        f"{stem.replace('_', ' ')} contact"
+        if stem != boundary.name and stem.isidentifier()
+        else f"beyond {boundary.label}"
+    )
 
 
 def _by_mode(ds: xr.Dataset) -> Regions:
     """A colour for every combination of sides that occurs, named after the sides."""
     names = ds["guard"].values.tolist()
-    modes = np.concatenate([np.ravel(ds["mode"].values), ds["contact_mode_after"].values]) if "mode" in ds else np.zeros(1, dtype=np.int64)
+    modes = (
+        np.concatenate([np.ravel(ds["mode"].values), ds["contact_mode_after"].values])
+        if "mode" in ds
+        else np.zeros(1, dtype=np.int64)
+    )
     codes = np.unique(modes)
     regions = []
-    for color, label in zip(_mode_colors(codes.tolist()), _mode_labels(codes.tolist(), names), strict=True):
+    for color, label in zip(
+        _mode_colors(codes.tolist()), _mode_labels(codes.tolist(), names), strict=True
+    ):
         regions.append(Region(color, label, contact=False))
     if not names:
         regions = [Region(CYCLE[0], "", contact=False)]
@@ -159,9 +186,11 @@ def _by_mode(ds: xr.Dataset) -> Regions:
 
 
 def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:
-    """Where the modes are those of a freeplay: the places of the free one, and of those below and above it.
+    """Where the modes are those of a freeplay: the places of the free one, and of those below and
+    above it.
 
-    Two gaps of a freeplay give the modes none, one, both positive if they point the same way, and none, one, the other if they don't.
+    Two gaps of a freeplay give the modes none, one, both positive if they point the same way, and
+    none, one, the other if they don't.
     """
     if len(codes) != 3:
         return None
@@ -171,17 +200,23 @@ def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:
 
 
 def _mode_colors(codes: Sequence[int]) -> list[str]:
-    """The colours of a freeplay where the modes are those of one, so that green is free there too; else a colour each."""
+    """The colours of a freeplay where the modes are those of one, so that green is free there too;
+    else a colour each.
+    """
     places = _freeplay(codes)
     if places:
-        return [color for _, color in sorted(zip(places, (_FREE, _BELOW[0], _ABOVE[0]), strict=True))]
+        return [
+            color for _, color in sorted(zip(places, (_FREE, _BELOW[0], _ABOVE[0]), strict=True))
+        ]
     if len(codes) == 2 and codes[0] == 0 and codes[1].bit_count() == 1:
         return [_FREE, _ABOVE[0]]
     return [CYCLE[i % len(CYCLE)] for i in range(len(codes))]
 
 
 def _mode_labels(codes: Sequence[int], names: Sequence[str]) -> list[str]:
-    """The sides in words: those of a freeplay by what is met, others by the guards in which they differ; a single one has no name."""
+    """The sides in words: those of a freeplay by what is met, others by the guards in which they
+    differ; a single one has no name.
+    """
     places = _freeplay(codes)
     changing = [bit for bit in range(len(names)) if len({code >> bit & 1 for code in codes}) > 1]
     if places and len(changing) == 2:
@@ -194,4 +229,8 @@ def _mode_labels(codes: Sequence[int], names: Sequence[str]) -> list[str]:
 def _side(name: str, positive: int) -> str:
     """A side of a guard: ``gap`` is the name of a boundary, ``x - y = gap`` its equation."""
     left, equal, right = name.replace("_", " ").partition(" = ")
-    return f"{left} {'>' if positive else '<'} {right}" if equal else f"{'above' if positive else 'below'} {left}"
+    return (
+        f"{left} {'>' if positive else '<'} {right}"
+        if equal
+        else (f"{'above' if positive else 'below'} {left}")
+    )

@@ -1,4 +1,6 @@
-"""What all pictures of responses share: one or several Datasets, which of their responses are shown, axes, events, legends."""
+"""What all pictures of responses share: one or several Datasets, which of their responses are
+shown, axes, events, legends.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +25,11 @@ Source = xr.Dataset | Mapping[str, xr.Dataset]
 NEEDS = ("response_of", "response_branch", "response_type", "response_period")
 #: Markers of Datasets that are drawn over each other.
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-#: Name and marker of what happens to a branch between two values. That a branch isn't found any more is no mark: the picture shows it.
+#: Name and marker of what happens to a branch between two values. That a branch isn't found any
+#: more is no mark: the picture shows it.
 _EVENTS = {
-    "hopf": ("Hopf", "p"), "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"), "neimark_sacker": ("Neimark-Sacker", "h"),
+    "hopf": ("Hopf", "p"), "fold": ("fold", ">"), "period_doubling": ("period doubling", "D"),
+    "neimark_sacker": ("Neimark-Sacker", "h"),
     "chaos": ("onset of chaos", "s"), "graze": ("graze", "^"),
 }  # fmt: skip
 #: Where the marks of events stand, in heights of the Axes.
@@ -34,7 +38,8 @@ _EVENTS_AT = 1.025
 _ROOM = "saltus-room-of-events"
 #: Values this even in their logarithms, and not in themselves, are drawn over a logarithmic axis.
 _EVEN = 1e-6
-#: Up to this number, marks of bifurcations stand on a line through the picture; more are drawn smaller, without it.
+#: Up to this number, marks of bifurcations stand on a line through the picture; more are drawn
+#: smaller, without it.
 _MANY_EVENTS, _FEW_EVENTS = 40, 12
 #: A legend of more entries is set smaller, so that it fits next to its picture.
 _LONG_LEGEND = 14
@@ -70,24 +75,34 @@ class Shown:
         return np.asarray(self.ds[response_name(self.axis)].values, dtype=float)
 
 
-# -- which responses -----------------------------------------------------------------------------------------------------------
+# -- which responses -------------------------------------------------------------------------------
 def shown(source: Any, needs: Sequence[str]) -> list[Shown]:
     """The Datasets to draw, each with the responses that are left in it.
 
     Raises
     ------
     ParameterError
-        If there is none, one is of another kind, has two parameters, or they aren't over the same parameter.
+        If there is none, one is of another kind, has two parameters, or they aren't over the same
+        parameter.
     """
     several = isinstance(source, Mapping) and not isinstance(source, xr.Dataset)
     named = dict(source) if several else {"": source}
     if not named:
-        raise ParameterError("there is nothing to draw. Give a Dataset, or several by name: {'exact': a, 'ode45': b}.")
+        raise ParameterError(
+            "there is nothing to draw. Give a Dataset, or several by name: "
+            "{'exact': a, 'ode45': b}."
+        )
     if len(named) > len(MARKERS):
-        raise ParameterError(f"{caller()} tells {len(MARKERS)} Datasets apart, not {len(named)}. Draw them in several pictures.")
+        raise ParameterError(
+            f"{caller()} tells {len(MARKERS)} Datasets apart, not {len(named)}. "
+            f"Draw them in several pictures."
+        )
     found = [_of(ds, str(name), i, needs) for i, (name, ds) in enumerate(named.items())]
     if len({one.axis for one in found}) > 1:
-        raise ParameterError(f"these are over {', '.join(sorted({one.axis for one in found}))}. Draw each in a picture of its own.")
+        raise ParameterError(
+            f"these are over {', '.join(sorted({one.axis for one in found}))}. "
+            f"Draw each in a picture of its own."
+        )
     return found
 
 
@@ -95,8 +110,17 @@ def _of(ds: Any, name: str, rank: int, needs: Sequence[str]) -> Shown:
     check(ds, [RESPONSES], [*NEEDS, *needs])
     axes = parameters_of(ds)
     if len(axes) != 1:
-        over = f"{' and '.join(axes)}: choose one value, such as ds.isel({axes[-1]}=0), or draw plot.type_map" if axes else "no parameter"
-        raise ParameterError(f"{caller()} draws responses over one parameter; this Dataset has {over}.")
+        over = (
+            (
+                f"{' and '.join(axes)}: choose one value, such as ds.isel({axes[-1]}=0), or draw "
+                f"plot.type_map"
+            )
+            if axes
+            else "no parameter"
+        )
+        raise ParameterError(
+            f"{caller()} draws responses over one parameter; this Dataset has {over}."
+        )
     left = select(ds)
     values = ds[axes[0]].values
     order = np.argsort(values, kind="stable")
@@ -105,11 +129,15 @@ def _of(ds: Any, name: str, rank: int, needs: Sequence[str]) -> Shown:
 
 
 def select(ds: xr.Dataset) -> xr.Dataset:
-    """The Dataset with the responses at the values and starts that are left in it: what remains after ``ds.sel(frequency=...)``.
+    """The Dataset with the responses at the values and starts that are left in it: what remains
+    after ``ds.sel(frequency=...)``.
 
     Responses that no start leads to at any value (found by following a branch) stay.
     """
-    keep = np.isin(np.arange(ds.sizes["response"]) if "response" not in ds.coords else ds["response"].values, ds["response_of"].values)
+    keep = np.isin(
+        np.arange(ds.sizes["response"]) if "response" not in ds.coords else ds["response"].values,
+        ds["response_of"].values,
+    )
     if "response_share" in ds:
         keep |= ds["response_share"].values == 0
     for coord in map(str, ds.coords):
@@ -119,9 +147,11 @@ def select(ds: xr.Dataset) -> xr.Dataset:
     return ds.isel(response=np.flatnonzero(keep))
 
 
-# -- curves --------------------------------------------------------------------------------------------------------------------
+# -- curves ----------------------------------------------------------------------------------------
 def branch_lines(one: Shown, y: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Curves through the responses of ``mask``, neighbours on a branch joined, NaN between the pieces; shape (n,) each."""
+    """Curves through the responses of ``mask``, neighbours on a branch joined, NaN between the
+    pieces; shape (n,) each.
+    """
     index = np.flatnonzero(mask)
     branch, place = one.ds["response_branch"].values[index], one.place[index]
     order = np.lexsort((place, branch))
@@ -130,7 +160,7 @@ def branch_lines(one: Shown, y: np.ndarray, mask: np.ndarray) -> tuple[np.ndarra
     return np.insert(one.values[index], breaks, np.nan), np.insert(y[index], breaks, np.nan)
 
 
-# -- axes ----------------------------------------------------------------------------------------------------------------------
+# -- axes ------------------------------------------------------------------------------------------
 def is_log(values: np.ndarray) -> bool:
     """Whether a grid is even in its logarithms rather than in its values."""
     values = np.sort(np.asarray(values, dtype=float))
@@ -141,7 +171,9 @@ def is_log(values: np.ndarray) -> bool:
 
 
 def parameter_scale(values: np.ndarray, unit: str, log: bool) -> Scale:
-    """Display unit of a parameter; over a logarithmic axis, which shows many sizes at once, the SI unit itself."""
+    """Display unit of a parameter; over a logarithmic axis, which shows many sizes at once, the SI
+    unit itself.
+    """
     return Scale(1.0, unit) if log else display_scale(unit, float(np.abs(values).max(initial=0.0)))
 
 
@@ -165,24 +197,33 @@ def parameter_axis(ax: Axes, datasets: Sequence[Shown]) -> Scale:
 
 def state_scale(arrays: Sequence[xr.DataArray]) -> Scale:
     """Display unit of a variable, over all Datasets."""
-    largest = max((float(np.nanmax(np.abs(one.values), initial=0.0)) for one in arrays), default=0.0)
+    largest = max(
+        (float(np.nanmax(np.abs(one.values), initial=0.0)) for one in arrays), default=0.0
+    )
     return display_scale(arrays[0].attrs.get("units", ""), largest)
 
 
-# -- colours and legend --------------------------------------------------------------------------------------------------------
+# -- colours and legend ----------------------------------------------------------------------------
 def dataset_color(one: Shown) -> str:
     """The colour of a Dataset where several are drawn."""
     return CYCLE[one.rank % len(CYCLE)]
 
 
 def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str, Line2D]:
-    """The kinds that occur, in the order of the legend, with their colours, and their markers if asked for."""
+    """The kinds that occur, in the order of the legend, with their colours, and their markers if
+    asked for.
+    """
     periods = one.ds["response_period"].values
-    return {kinds.label(code, periods): dot(kinds.color(code), kinds.marker(code) if markers else "o") for code in np.unique(of).tolist()}
+    return {
+        kinds.label(code, periods): dot(kinds.color(code), kinds.marker(code) if markers else "o")
+        for code in np.unique(of).tolist()
+    }
 
 
 def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
-    """Marks above the picture, clear of its ticks, where something happens to a branch; each kind is named once."""
+    """Marks above the picture, clear of its ticks, where something happens to a branch; each kind
+    is named once.
+    """
     marked = False
     for one in datasets:
         name = event_name(one.axis)
@@ -197,39 +238,76 @@ def draw_events(ax: Axes, datasets: Sequence[Shown], scale: Scale) -> None:
                 size, width = (4.5, 0.8) if values.size <= _MANY_EVENTS else (3.0, 0.5)
                 above = np.full(here.size, _EVENTS_AT)
                 if values.size <= _FEW_EVENTS:
-                    stems = ax.vlines(here, 0, _EVENTS_AT, transform=ax.get_xaxis_transform(), color=QUIET, lw=0.5, ls=":", clip_on=False)
+                    stems = ax.vlines(
+                        here,
+                        0,
+                        _EVENTS_AT,
+                        transform=ax.get_xaxis_transform(),
+                        color=QUIET,
+                        lw=0.5,
+                        ls=":",
+                        clip_on=False,
+                    )
                     stems.set(zorder=1, gid=f"line of event {word}")
                 ax.plot(
-                    here, above, transform=ax.get_xaxis_transform(), ls="none", marker=marker, ms=size, mfc="white",
-                    mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False, zorder=5, label=text, gid=f"event {word}",
+                    here, above, transform=ax.get_xaxis_transform(), ls="none", marker=marker,
+                    ms=size, mfc="white",
+                    mec=dataset_color(one) if one.name else QUIET, mew=width, clip_on=False,
+                    zorder=5, label=text, gid=f"event {word}",
                 )  # fmt: skip
     if marked:
         _raise_titles(ax)
 
 
 def _raise_titles(ax: Axes) -> None:
-    """Make room for the marks below a title, which may be given later: titles keep clear of what an axis at the top says."""
+    """Make room for the marks below a title, which may be given later: titles keep clear of what an
+    axis at the top says.
+    """
     if any(one.get_gid() == _ROOM for one in ax.child_axes):
         return
     top = ax.secondary_xaxis("top")
     top.set_gid(_ROOM)
     top.spines[:].set_visible(False)
     top.tick_params(length=0, pad=4, labelsize=8)
-    top.set_xticks([float(np.sqrt(np.prod(ax.get_xlim()))) if ax.get_xscale() == "log" else float(np.mean(ax.get_xlim()))], [" "])
+    top.set_xticks(
+        [
+            float(np.sqrt(np.prod(ax.get_xlim())))
+            if ax.get_xscale() == "log"
+            else float(np.mean(ax.get_xlim()))
+        ],
+        [" "],
+    )
     top.minorticks_off()
 
 
 def legend(ax: Axes, named: Mapping[str, Any], left: float = 1.02) -> None:
-    """Legend of the colours; above it that of the marks; ``left``: how far, in widths of the Axes."""
+    """Legend of the colours; above it that of the marks; ``left``: how far, in widths
+    of the Axes.
+    """
     known = dict(named)
     for handle, text in zip(*ax.get_legend_handles_labels(), strict=True):
         known.setdefault(text, handle)
     if known:
         small = len(known) > _LONG_LEGEND
-        ax.legend(list(known.values()), list(known), loc="upper left", bbox_to_anchor=(left, 1), fontsize=6.5 if small else 8,
-                  labelspacing=0.35 if small else 0.5)  # fmt: skip
+        ax.legend(
+            list(known.values()),
+            list(known),
+            loc="upper left",
+            bbox_to_anchor=(left, 1),
+            fontsize=6.5 if small else 8,
+            labelspacing=0.35 if small else 0.5,
+        )
 
 
 def dot(color: Any, marker: str = "o", hollow: bool = False) -> Line2D:
     """A handle of a legend."""
-    return Line2D([], [], ls="none", marker=marker, ms=4.5, mfc="none" if hollow else color, mec=color, mew=0.8 if hollow else 0.0)
+    return Line2D(
+        [],
+        [],
+        ls="none",
+        marker=marker,
+        ms=4.5,
+        mfc="none" if hollow else color,
+        mec=color,
+        mew=0.8 if hollow else 0.0,
+    )

@@ -1,4 +1,6 @@
-"""What part of a run a picture shows: one trajectory, a window of time, the samples and contacts in it."""
+"""What part of a run a picture shows: one trajectory, a window of time, the samples and contacts in
+it.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,13 @@ import xarray as xr
 
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.plot.picture import caller
-from saltus.results.dataset.schema import contact_name, equations_of, forcing_period, sample_dim, states_of
+from saltus.results.dataset.schema import (
+    contact_name,
+    equations_of,
+    forcing_period,
+    sample_dim,
+    states_of,
+)
 from saltus.units import from_si
 
 Periods = int | float | tuple[float, float] | None
@@ -24,7 +32,7 @@ MOST = 8
 MOST_STATES = 2
 
 
-# -- trajectory ----------------------------------------------------------------------------------------------------------------
+# -- trajectory ------------------------------------------------------------------------------------
 def chosen(run: xr.Dataset, trajectory: Any) -> list[int]:
     """Labels of the trajectories to show; an empty list for a run of a single one.
 
@@ -35,18 +43,29 @@ def chosen(run: xr.Dataset, trajectory: Any) -> list[int]:
     """
     if "trajectory" not in run.dims:
         if trajectory not in (None, 0):
-            raise ParameterError(f"trajectory={shown(trajectory)}, but this run holds a single trajectory. Leave trajectory out.")
+            raise ParameterError(
+                f"trajectory={shown(trajectory)}, but this run holds a single "
+                f"trajectory. Leave trajectory out."
+            )
         return []
     known = run["trajectory"].values.tolist()
     if trajectory is None:
         labels = known
     else:
-        labels = [int(one) if isinstance(one, numbers.Integral) else one for one in np.atleast_1d(trajectory).tolist()]
+        labels = [
+            int(one) if isinstance(one, numbers.Integral) else one
+            for one in np.atleast_1d(trajectory).tolist()
+        ]
     strange = [label for label in labels if label not in known]
     if strange:
-        raise ParameterError(f"there is no trajectory {shown(strange[0])}; this run has {_span(known)}.")
+        raise ParameterError(
+            f"there is no trajectory {shown(strange[0])}; this run has {_span(known)}."
+        )
     if not 0 < len(labels) <= MOST:
-        raise ParameterError(f"{caller()} shows 1 to {MOST} trajectories, not {len(labels)}. Choose, such as trajectory=[{known[0]}].")
+        raise ParameterError(
+            f"{caller()} shows 1 to {MOST} trajectories, not {len(labels)}. "
+            f"Choose, such as trajectory=[{known[0]}]."
+        )
     return labels
 
 
@@ -58,12 +77,16 @@ def single(run: xr.Dataset, label: int | None) -> xr.Dataset:
     """One trajectory of a run, with its own contacts only."""
     ds = run if label is None else run.sel(trajectory=label)
     if "contact_trajectory" in ds and "trajectory" in ds.coords:
-        ds = ds.isel(contact=np.flatnonzero(ds["contact_trajectory"].values == int(ds["trajectory"])))
+        ds = ds.isel(
+            contact=np.flatnonzero(ds["contact_trajectory"].values == int(ds["trajectory"]))
+        )
     return ds
 
 
 def named(run: xr.Dataset, one: xr.Dataset, label: int) -> str:
-    """One trajectory of a batch by what sets it apart: the parameters that vary, else its start if that is known, else its number."""
+    """One trajectory of a batch by what sets it apart: the parameters that vary, else its start if
+    that is known, else its number.
+    """
     varied = json.loads(one.attrs.get("varied_parameters", "[]"))
     known = [one[name] for name in varied if name in one.coords and one[name].ndim == 0]
     if known:
@@ -73,15 +96,22 @@ def named(run: xr.Dataset, one: xr.Dataset, label: int) -> str:
 
 
 def _valued(known: list[xr.DataArray]) -> str:
-    texts = [f"{value.name} = {from_si(float(value), value.attrs.get('units', ''), 4)}" for value in known]
+    texts = [
+        f"{value.name} = {from_si(float(value), value.attrs.get('units', ''), 4)}"
+        for value in known
+    ]
     return ", ".join(text.replace("_", " ") for text in texts)
 
 
 def _start_that_differs(run: xr.Dataset, one: xr.Dataset) -> list[xr.DataArray]:
-    """The states at the start that aren't the same for all trajectories; none if the start wasn't kept, or more than a legend holds."""
+    """The states at the start that aren't the same for all trajectories; none if the start wasn't
+    kept, or more than a legend holds.
+    """
     dim = sample_dim(run)
     sampled = dim in run.dims and all(name in run for name in states_of(run))
-    if not sampled or ("period" in run.coords and float(run["period"].values.min(initial=0.0)) != 0.0):
+    if not sampled or (
+        "period" in run.coords and float(run["period"].values.min(initial=0.0)) != 0.0
+    ):
         return []
     first = {name: run[name].isel({dim: 0}).values for name in states_of(run)}
     differing = [name for name, values in first.items() if np.ptp(values) > 0.0]
@@ -96,7 +126,9 @@ def rate_of(ds: xr.Dataset, state: str) -> str:
 def state_named(run: xr.Dataset, name: str) -> str:
     """The name, if it is that of a state; else a ParameterError with the nearest one."""
     if not among(name, states_of(run)):
-        raise ParameterError(f"this run has no state {shown(name)}. {nearest(name, states_of(run))}")
+        raise ParameterError(
+            f"this run has no state {shown(name)}. {nearest(name, states_of(run))}"
+        )
     return name
 
 
@@ -105,9 +137,10 @@ def units_of_states(run: xr.Dataset, units: Mapping[str, str] | None) -> dict[st
     return {state_named(run, name): unit for name, unit in (units or {}).items()}
 
 
-# -- window --------------------------------------------------------------------------------------------------------------------
+# -- window ----------------------------------------------------------------------------------------
 def window(ds: xr.Dataset, periods: Periods, default_share: float = 1.0) -> tuple[float, float]:
-    """Begin and end of what is shown, in the run's own coordinate: periods if it is forced, else seconds.
+    """Begin and end of what is shown, in the run's own coordinate: periods if it is forced, else
+    seconds.
 
     Parameters
     ----------
@@ -116,7 +149,8 @@ def window(ds: xr.Dataset, periods: Periods, default_share: float = 1.0) -> tupl
     periods : int, float or pair of float, optional
         Number of periods at the end, or (first, last) period.
     default_share : float
-        The last share of the run that is shown without ``periods``; of a forced run a whole number of periods, at least one.
+        The last share of the run that is shown without ``periods``; of a forced run a whole number
+        of periods, at least one.
 
     Raises
     ------
@@ -127,7 +161,8 @@ def window(ds: xr.Dataset, periods: Periods, default_share: float = 1.0) -> tupl
     if not axis.size:
         raise ParameterError("this run holds no samples.")
     there = np.isfinite(np.stack([ds[name].values for name in states_of(ds)])).all(axis=0)
-    first, last = float(axis[0]), float(axis[there][-1] if there.any() else axis[0])  # one that stopped early has no more
+    # one that stopped early has no more
+    first, last = float(axis[0]), float(axis[there][-1] if there.any() else axis[0])
     if there.sum() < 2:
         return first, first
     if periods is None:
@@ -136,10 +171,16 @@ def window(ds: xr.Dataset, periods: Periods, default_share: float = 1.0) -> tupl
             length = max(1.0, math.ceil(length - 1e-9))
         return max(first, last - length), last
     if "period" not in ds:
-        raise ParameterError(f"periods={shown(periods)}, but this system isn't forced. Select by time: run.sel(time=slice(1, 2)).")
+        raise ParameterError(
+            f"periods={shown(periods)}, but this system isn't forced. Select by "
+            f"time: run.sel(time=slice(1, 2))."
+        )
     begin, end = _interval(periods, last)
     if begin >= last or end <= first:
-        raise ParameterError(f"periods={shown(periods)} is outside this run, which holds periods {first:g} to {last:g}.")
+        raise ParameterError(
+            f"periods={shown(periods)} is outside this run, which holds periods "
+            f"{first:g} to {last:g}."
+        )
     return max(begin, first), min(end, last)
 
 
@@ -148,9 +189,16 @@ def _interval(periods: Any, last: float) -> tuple[float, float]:
     if isinstance(periods, numbers.Real) and not isinstance(periods, bool):
         if float(periods) > 0:
             return last - float(periods), last
-    elif isinstance(periods, tuple | list) and len(periods) == 2 and float(periods[0]) < float(periods[1]):
+    elif (
+        isinstance(periods, tuple | list)
+        and len(periods) == 2
+        and float(periods[0]) < float(periods[1])
+    ):
         return float(periods[0]), float(periods[1])
-    raise ParameterError(f"periods={shown(periods)}. Give the number of last periods, such as 5, or begin and end, such as (10, 15).")
+    raise ParameterError(
+        f"periods={shown(periods)}. Give the number of last periods, such as 5, "
+        f"or begin and end, such as (10, 15)."
+    )
 
 
 def sample_axis(ds: xr.Dataset) -> np.ndarray:
@@ -158,10 +206,11 @@ def sample_axis(ds: xr.Dataset) -> np.ndarray:
     return np.asarray(ds["period" if "period" in ds else "time"].values, dtype=float)
 
 
-# -- points --------------------------------------------------------------------------------------------------------------------
+# -- points ----------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Path:
-    """Samples and contacts in the window, in the order of time. A piece of curve has the mode of the point at which it begins.
+    """Samples and contacts in the window, in the order of time. A piece of curve has the mode of
+    the point at which it begins.
 
     Attributes
     ----------
@@ -186,24 +235,40 @@ def contacts_in(ds: xr.Dataset, begin: float, end: float) -> xr.Dataset:
 
 
 def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> Path:
-    """The curve of one trajectory in the window, with the contacts put in, so that colours change exactly there."""
+    """The curve of one trajectory in the window, with the contacts put in, so that colours change
+    exactly there.
+    """
     axis = sample_axis(ds)
     slack = 1e-9 * max(1.0, abs(end))
-    inside = ds.isel({sample_dim(ds): np.flatnonzero((axis >= begin - slack) & (axis <= end + slack))})
+    inside = ds.isel(
+        {sample_dim(ds): np.flatnonzero((axis >= begin - slack) & (axis <= end + slack))}
+    )
     table = contacts_in(ds, begin, end)
     time = np.concatenate([inside["time"].values, table["contact_time"].values])
-    values = np.stack([np.concatenate([inside[name].values, table[contact_name(name)].values]) for name in states], axis=-1)
+    values = np.stack(
+        [
+            np.concatenate([inside[name].values, table[contact_name(name)].values])
+            for name in states
+        ],
+        axis=-1,
+    )
     mode = np.concatenate([inside["mode"].values, table["contact_mode_after"].values])
     is_contact = np.arange(time.size) >= inside["time"].size
-    order = np.lexsort((is_contact, time))  # at equal times the contact comes last: the curve goes on in its mode
+    # at equal times the contact comes last: the curve goes on in its mode
+    order = np.lexsort((is_contact, time))
     return Path(time[order], values[order], mode[order])
 
 
-def stroboscope_points(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> np.ndarray:
-    """The states at whole forcing periods in the window, shape (point, state); none if the system isn't forced."""
+def stroboscope_points(
+    ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float
+) -> np.ndarray:
+    """The states at whole forcing periods in the window, shape (point, state); none if the system
+    isn't forced.
+    """
     if "period" not in ds:
         return np.empty((0, len(states)))
     axis = sample_axis(ds)
-    whole = np.abs(axis - np.round(axis)) < 1e-6  # a millionth of a period is far less than the distance of two samples
+    # a millionth of a period is far less than the distance of two samples
+    whole = np.abs(axis - np.round(axis)) < 1e-6
     index = np.flatnonzero(whole & (axis >= begin - 1e-6) & (axis <= end + 1e-6))
     return np.stack([ds[name].values[index] for name in states], axis=-1)

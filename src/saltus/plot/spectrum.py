@@ -17,8 +17,8 @@ from saltus.plot.picture import picture
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.dataset.schema import SPECTRUM, states_of
 
-#: The picture reaches down to this share of the largest amplitude, and up to the last frequency that has so much; the rest is what
-#: sampling folds back.
+#: The picture reaches down to this share of the largest amplitude, and up to the last frequency
+#: that has so much; the rest is what sampling folds back.
 _SHOWN = 1e-5
 #: The least number of orders shown, so that a harmonic response isn't a single line.
 _ORDERS = 5.0
@@ -35,7 +35,8 @@ def spectrum(
     units: Mapping[str, str] | None = None,
     legend: bool = True,
 ) -> Axes:
-    """Amplitudes of one state by frequency, on a logarithmic scale, with the orders of the forcing at the top.
+    """Amplitudes of one state by frequency, on a logarithmic scale, with the orders of the forcing
+    at the top.
 
     A response that repeats shows as lines, any other as a curve.
 
@@ -50,7 +51,8 @@ def spectrum(
     ax : Axes, optional
         Where to draw; a new figure by default.
     highest : float, optional
-        Highest frequency to show [Hz]; by default the last one with 1e-5 of the largest amplitude, and at least order 5.
+        Highest frequency to show [Hz]; by default the last one with 1e-5 of the largest amplitude,
+        and at least order 5.
     units : mapping of str to str, optional
         Display units, such as ``{"x": "mm"}``; by the size of the numbers by default.
     legend : bool
@@ -73,7 +75,11 @@ def spectrum(
     singles = [ds.sel(trajectory=label) for label in labels] or [ds]
     curves = [np.asarray(one[f"{state}_amplitude"].values, dtype=float) for one in singles]
     largest = max((float(np.nanmax(curve, initial=0.0)) for curve in curves), default=0.0) or 1.0
-    scale = display_scale(ds[f"{state}_amplitude"].attrs.get("units", ""), largest, selection.units_of_states(ds, units).get(state))
+    scale = display_scale(
+        ds[f"{state}_amplitude"].attrs.get("units", ""),
+        largest,
+        selection.units_of_states(ds, units).get(state),
+    )
     with draw.panels(ax, 1, (6.0, 2.8)) as (panel,):
         if not any(np.isfinite(curve).any() for curve in curves):
             draw.say(panel, "There is no spectrum: the motion stopped before its end.", *singles)
@@ -84,7 +90,11 @@ def spectrum(
             _curve(panel, one, curve * scale.factor, floor, CYCLE[i % len(CYCLE)], name)
         panel.set_yscale("log")
         panel.set_ylim(floor, 3 * largest * scale.factor)
-        top = float(highest) if highest is not None else max(_top(one, curve, largest) for one, curve in zip(singles, curves, strict=True))
+        top = (
+            float(highest)
+            if highest is not None
+            else max(_top(one, curve, largest) for one, curve in zip(singles, curves, strict=True))
+        )
         panel.set_xlim(0.0, top)
         panel.set_xlabel("frequency [Hz]")
         panel.set_ylabel(Scale(scale.factor, scale.unit).label(f"amplitude of {state}"))
@@ -94,13 +104,17 @@ def spectrum(
     return panel
 
 
-def _curve(ax: Axes, one: xr.Dataset, values: np.ndarray, floor: float, color: str, name: str | None) -> None:
+def _curve(
+    ax: Axes, one: xr.Dataset, values: np.ndarray, floor: float, color: str, name: str | None
+) -> None:
     """Stems of a response that repeats, a curve of any other."""
     frequency = one["frequency"].values
     if int(one["response_period"]) and one["window"].item() == "none":
         seen = values > floor
         ax.vlines(frequency[seen], floor, values[seen], color=color, lw=0.9, zorder=2)
-        draw.draw_points(ax, frequency[seen], values[seen], marker="o", ms=2.6, color=color, label=name, zorder=3)
+        draw.draw_points(
+            ax, frequency[seen], values[seen], marker="o", ms=2.6, color=color, label=name, zorder=3
+        )
     else:
         ax.plot(frequency, values, color=color, lw=0.4, alpha=0.8, label=name, zorder=2)
 
@@ -116,8 +130,14 @@ def _top(one: xr.Dataset, values: np.ndarray, largest: float) -> float:
 
 
 def _mark_orders(ax: Axes, singles: Sequence[xr.Dataset], top: float) -> None:
-    """Whole orders of the forcing as quiet lines, with an axis at the top; only where all trajectories share a forcing frequency."""
-    forcing = {float(one["frequency"].values[-1] / one["order"].values[-1]) for one in singles if "order" in one}
+    """Whole orders of the forcing as quiet lines, with an axis at the top; only where all
+    trajectories share a forcing frequency.
+    """
+    forcing = {
+        float(one["frequency"].values[-1] / one["order"].values[-1])
+        for one in singles
+        if "order" in one
+    }
     if len(forcing) != 1:
         return
     frequency = forcing.pop()

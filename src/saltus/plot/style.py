@@ -16,7 +16,8 @@ from matplotlib.font_manager import fontManager
 
 from saltus.errors import ParameterError, among, shown
 
-#: Eight colours that colour-blind readers tell apart: M. Okabe and K. Ito, Color universal design (2008).
+#: Eight colours that colour-blind readers tell apart: M. Okabe and K. Ito, Color universal design
+#: (2008).
 OKABE_ITO = {
     "black": "#000000",
     "orange": "#E69F00",
@@ -28,10 +29,14 @@ OKABE_ITO = {
     "purple": "#CC79A7",
 }
 #: Colours for things that have no order of their own, such as trajectories.
-CYCLE = tuple(OKABE_ITO[name] for name in ("blue", "vermillion", "green", "purple", "orange", "sky blue", "black", "yellow"))
+CYCLE = tuple(
+    OKABE_ITO[name]
+    for name in ("blue", "vermillion", "green", "purple", "orange", "sky blue", "black", "yellow")
+)
 #: Lines and texts that stay behind the data.
 QUIET = "#555555"
-#: Above this many points a marker layer is stored as pixels in vector files: they would otherwise grow to megabytes.
+#: Above this many points a marker layer is stored as pixels in vector files: they would otherwise
+#: grow to megabytes.
 RASTERISE_ABOVE = 500
 
 _MARK = "saltus"
@@ -40,14 +45,18 @@ _STYLE_FILE = Path(__file__).with_name("saltus.mplstyle")
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Context in which figures get saltus's style: ``with sl.plot.style(): fig, axes = plt.subplots(2, 2)``.
+    """Context in which figures get saltus's style: ``with sl.plot.style(): fig, axes =
+    plt.subplots(2, 2)``.
 
-    The functions of this package use it themselves when they make the figure. A figure keeps its fonts and sizes when it is drawn or
-    saved after the context has ended.
+    The functions of this package use it themselves when they make the figure. A figure keeps its
+    fonts and sizes when it is drawn or saved after the context has ended.
     """
-    plt.draw_if_interactive()  # loads the backend, which may switch interaction on: inside the context that would be undone at its end
+    # loads the backend, which may switch interaction on: inside the context that would be undone at
+    # its end
+    plt.draw_if_interactive()
     with plt.style.context(_STYLE_FILE):
-        # A generic family is resolved when a figure is saved, by the settings of that moment; a font's own name stays.
+        # A generic family is resolved when a figure is saved, by the settings of that moment; a
+        # font's own name stays.
         plt.rcParams["font.family"] = _fonts(plt.rcParams["font.sans-serif"])
         before = set(plt.get_fignums())
         try:
@@ -60,7 +69,9 @@ def style() -> Iterator[None]:
 
 
 def styled(figure: Figure | None) -> bool:
-    """Whether a figure was made in the style, so that what is drawn into it later should be drawn in the style too."""
+    """Whether a figure was made in the style, so that what is drawn into it later should be drawn
+    in the style too.
+    """
     return figure is not None and figure.get_gid() == _MARK
 
 
@@ -71,26 +82,38 @@ def _fonts(wanted: list[str]) -> list[str]:
 
 
 def _keep_ticks(figure: Figure) -> None:
-    """Ticks are made as they are needed, by the settings of that moment: write the present ones into the axes, but where a picture chose
-    its own.
+    """Ticks are made as they are needed, by the settings of that moment: write the present ones
+    into the axes, but where a picture chose its own.
     """
     now: dict[str, Any] = {str(name): value for name, value in plt.rcParams.items()}
     for ax in figure.axes:
         for one in (ax, *ax.child_axes):
             for direction, axis in (("x", one.xaxis), ("y", one.yaxis)):
                 for which in ("major", "minor"):
-                    settings = {name: now[f"{direction}tick.{name}"] for name in ("labelsize", "direction", "color")}
-                    settings |= {name: now[f"{direction}tick.{which}.{name}"] for name in ("width", "pad")}
-                    settings |= {"length": now[f"{direction}tick.{which}.size"], "labelfontfamily": now["font.family"]}
+                    settings = {
+                        name: now[f"{direction}tick.{name}"]
+                        for name in ("labelsize", "direction", "color")
+                    }
+                    settings |= {
+                        name: now[f"{direction}tick.{which}.{name}"] for name in ("width", "pad")
+                    }
+                    settings |= {
+                        "length": now[f"{direction}tick.{which}.size"],
+                        "labelfontfamily": now["font.family"],
+                    }
                     chosen = axis.get_tick_params(which=which)
-                    axis.set_tick_params(which=which, **{name: value for name, value in settings.items() if name not in chosen})
+                    axis.set_tick_params(
+                        which=which,
+                        **{name: value for name, value in settings.items() if name not in chosen},
+                    )
 
 
-# -- display units -------------------------------------------------------------------------------------------------------------
+# -- display units ---------------------------------------------------------------------------------
 _PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "µ": 1e-6, "n": 1e-9}
 _SCALABLE = re.compile(r"(m|s|Hz|N|Pa|J|W|V|A)(?=$|[*/])")
 _ANGLE = re.compile(r"rad(?=$|[*/])")
-#: The prefix is the largest with which the largest value is at least this: 0.43 m/s stays, 0.03 m/s becomes 30 mm/s.
+#: The prefix is the largest with which the largest value is at least this: 0.43 m/s stays, 0.03 m/s
+#: becomes 30 mm/s.
 _AT_LEAST = 0.1
 
 
@@ -107,7 +130,8 @@ class Scale:
 
     def text(self, value: float) -> str:
         """A value in SI as people write it, such as ``0.4 mm``."""
-        number = f"{value * self.factor + 0.0:.4g}".replace("-", "\N{MINUS SIGN}")  # + 0.0: never minus zero
+        # + 0.0: never minus zero
+        number = f"{value * self.factor + 0.0:.4g}".replace("-", "\N{MINUS SIGN}")
         return f"{number} {self.unit}" if self.unit not in ("", "1") else number
 
 
@@ -119,8 +143,9 @@ def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale
     unit : str
         SI unit of the numbers, ``""`` if unknown.
     largest : float
-        Largest absolute value to show [unit]. Lengths below 1 m are shown in mm, as is the custom of this field; angles in rad, whatever
-        their size, so that one angle has one unit in all pictures.
+        Largest absolute value to show [unit]. Lengths below 1 m are shown in mm, as is the custom
+        of this field; angles in rad, whatever their size, so that one angle has one unit in all
+        pictures.
     wanted : str, optional
         Unit to use instead, such as ``"mm"``; ``"deg"`` or ``"deg/s"`` for an angle or its rate.
 
@@ -143,7 +168,10 @@ def display_scale(unit: str, largest: float, wanted: str | None = None) -> Scale
         if among(wanted, sizes):
             return Scale(1 / sizes[wanted], wanted)
         choice = ", ".join(sizes)
-        raise ParameterError(f"values in {unit or 'an unknown unit'} can't be shown in {shown(wanted)}. Known: {choice}.")
+        raise ParameterError(
+            f"values in {unit or 'an unknown unit'} can't be shown in "
+            f"{shown(wanted)}. Known: {choice}."
+        )
     for prefix, size in known.items():
         limit = 1.0 if prefix + unit == "m" else _AT_LEAST
         if unit in ("m", "s") and size > 1:

@@ -21,15 +21,24 @@ from saltus.results.dataset.schema import RESPONSES, parameters_of, start_name, 
 from saltus.units import from_si
 
 #: Where a start settles to nothing: white and pale greys, as chaos is dark.
-_PALE = {Kind.ESCAPED: "#FFFFFF", Kind.UNCONVERGED: "#D2D2D2", Kind.FAILED: "#B9A9A0", Kind.NOT_COMPUTED: "#F3F3F3"}
-_UNSETTLED: dict[int, tuple[str, str]] = {code: (maps.UNSETTLED[code].label, color) for code, color in _PALE.items()}
+_PALE = {
+    Kind.ESCAPED: "#FFFFFF",
+    Kind.UNCONVERGED: "#D2D2D2",
+    Kind.FAILED: "#B9A9A0",
+    Kind.NOT_COMPUTED: "#F3F3F3",
+}
+_UNSETTLED: dict[int, tuple[str, str]] = {
+    code: (maps.UNSETTLED[code].label, color) for code, color in _PALE.items()
+}
 
 
 @picture(RESPONSES, needs=("type", "period", "response_of"))
 def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = None) -> Axes:
-    """Kind of motion over two parameters: a hue for each period, grey for motion that never repeats, chaos dark.
+    """Kind of motion over two parameters: a hue for each period, grey for motion that never
+    repeats, chaos dark.
 
-    The hues are those of :func:`saltus.plot.bifurcation_diagram`. An axis is logarithmic where its values are even in their logarithms.
+    The hues are those of :func:`saltus.plot.bifurcation_diagram`. An axis is logarithmic where its
+    values are even in their logarithms.
 
     Parameters
     ----------
@@ -54,16 +63,27 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
     pair = parameters_of(ds)
     if len(pair) != 2:
         raise ParameterError(
-            f"{caller()} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See plot.bifurcation_diagram."
+            f"{caller()} draws two parameters, this Dataset has {', '.join(pair) or 'none'}. See "
+            f"plot.bifurcation_diagram."
         )
     one = _of_start(ds, start)
-    code = np.where(one["response_of"].values < 0, one["response_of"].values, kinds.codes(one["type"].values, one["period"].values))
+    code = np.where(
+        one["response_of"].values < 0,
+        one["response_of"].values,
+        kinds.codes(one["type"].values, one["period"].values),
+    )
     with draw.panels(ax, 1, (5.8, 3.9)) as (panel,):
         _cells(panel, ds, (pair[0], pair[1]), code)
         panel.set_title(_title(ds, start))
         if legend:
             handles = [_handle(key, code, one["period"].values) for key in _order(code)]
-            panel.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1), handlelength=1.0, handleheight=0.9)
+            panel.legend(
+                handles=handles,
+                loc="upper left",
+                bbox_to_anchor=(1.02, 1),
+                handlelength=1.0,
+                handleheight=0.9,
+            )
     return panel
 
 
@@ -71,19 +91,28 @@ def _of_start(ds: xr.Dataset, start: int) -> xr.Dataset:
     if "start" not in ds.dims:
         return ds
     if start not in ds["start"].values.tolist():
-        raise ParameterError(f"there is no start {shown(start)}; this Dataset has {ds.sizes['start']}, counted from 0.")
+        raise ParameterError(
+            f"there is no start {shown(start)}; this Dataset has "
+            f"{ds.sizes['start']}, counted from 0."
+        )
     return ds.sel(start=start)
 
 
 def _cells(ax: Axes, ds: xr.Dataset, pair: tuple[str, str], code: np.ndarray) -> None:
     """Colour every cell; log axes get cells of even width there."""
     logs = [points.is_log(ds[name].values) for name in pair]
-    scales = [points.parameter_scale(ds[name].values, ds[name].attrs.get("units", ""), log) for name, log in zip(pair, logs, strict=True)]
+    scales = [
+        points.parameter_scale(ds[name].values, ds[name].attrs.get("units", ""), log)
+        for name, log in zip(pair, logs, strict=True)
+    ]
     colors = np.zeros((*code.shape, 3), dtype=np.uint8)
     for key in _order(code):
         colors[code == key] = maps.as_bytes(_color(key))
     if any(logs):
-        x, y = (_edges(ds[name].values * scale.factor, log) for name, scale, log in zip(pair, scales, logs, strict=True))
+        x, y = (
+            _edges(ds[name].values * scale.factor, log)
+            for name, scale, log in zip(pair, scales, logs, strict=True)
+        )
         ax.pcolormesh(x, y, np.ascontiguousarray(colors.swapaxes(0, 1)), zorder=0, rasterized=True)
         for set_scale, log in zip((ax.set_xscale, ax.set_yscale), logs, strict=True):
             set_scale("log" if log else "linear")
@@ -105,7 +134,9 @@ def _name(ax: Axes, pair: tuple[str, str], scales: list[Scale]) -> None:
 
 
 def _order(code: np.ndarray) -> list[int]:
-    """Kinds in the order of the legend: by period, then what never repeats, then what never settles."""
+    """Kinds in the order of the legend: by period, then what never repeats, then what never
+    settles.
+    """
     found = np.unique(code).tolist()
     return [key for key in found if key > 0] + [key for key in found[::-1] if key < 0]
 
@@ -116,7 +147,12 @@ def _color(key: int) -> np.ndarray:
 
 def _handle(key: int, code: np.ndarray, period: np.ndarray) -> Patch:
     name = kinds.label(key, period) if key > 0 else _UNSETTLED[key][0]
-    return Patch(fc=_color(key), ec="#999999", lw=0.4, label=f"{name}, {maps.share_text(float((code == key).mean()))}")
+    return Patch(
+        fc=_color(key),
+        ec="#999999",
+        lw=0.4,
+        label=f"{name}, {maps.share_text(float((code == key).mean()))}",
+    )
 
 
 def _title(ds: xr.Dataset, start: int) -> str:
@@ -125,4 +161,8 @@ def _title(ds: xr.Dataset, start: int) -> str:
     if "start_direction" in one.coords:
         return f"swept {one['start_direction'].item()}"
     names = [name for name in states_of(ds) if start_name(name) in one.coords]
-    return ", ".join(f"{name} = {from_si(float(one[start_name(name)]), one[start_name(name)].attrs.get('units', ''), 4)}" for name in names)
+    return ", ".join(
+        f"{name} = "
+        f"{from_si(float(one[start_name(name)]), one[start_name(name)].attrs.get('units', ''), 4)}"
+        for name in names
+    )

@@ -1,7 +1,9 @@
-"""Replications: a published paper's figures drawn again, and each of its claims held against the data, by one command.
+"""Replications: a published paper's figures drawn again, and each of its claims held against the
+data, by one command.
 
-A paper is a folder of study files, *jobs* (each gives one Dataset, kept as a study keeps its results), *pictures* drawn from them, and
-*claims*: rows with the quantities that decide them, rules and limits. Nothing here knows a result in advance.
+A paper is a folder of study files, *jobs* (each gives one Dataset, kept as a study keeps its
+results), *pictures* drawn from them, and *claims*: rows with the quantities that decide them, rules
+and limits. Nothing here knows a result in advance.
 """
 
 from saltus.replication.job import Job

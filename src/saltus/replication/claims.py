@@ -1,4 +1,6 @@
-"""Claims as rows: a statement of a paper, the quantities that decide it, the rules with their limits, and the sentences that tell it."""
+"""Claims as rows: a statement of a paper, the quantities that decide it, the rules with their
+limits, and the sentences that tell it.
+"""
 
 from __future__ import annotations
 
@@ -55,8 +57,14 @@ def filled(template: str, quantities: Quantities) -> str:
 
 
 def _each(row: Mapping[str, Any], quantities: Quantities) -> Iterator[Quantities]:
-    """The quantities that a row is for: all, or once for each table of the list that it names by ``each``."""
-    yield from ({**quantities, **one} for one in quantities[row["each"]]) if "each" in row else (quantities,)
+    """The quantities that a row is for: all, or once for each table of the list that it names by
+    ``each``.
+    """
+    yield from (
+        ({**quantities, **one} for one in quantities[row["each"]])
+        if "each" in row
+        else (quantities,)
+    )
 
 
 @dataclass(frozen=True)
@@ -68,8 +76,9 @@ class Row:
     read : callable
         From the Datasets to quantities.
     checks : sequence of mapping
-        Each with ``text``, ``of``, and a rule with its limit; see :func:`saltus.replication.verdict.passed`. ``each`` names a list of
-        tables: then there is a check for each of them.
+        Each with ``text``, ``of``, and a rule with its limit; see
+        :func:`saltus.replication.verdict.passed`. ``each`` names a list of tables: then there is a
+        check for each of them.
     own, exact, sure : str
         Sentences; see :class:`saltus.replication.verdict.Finding`.
     why : tuple of mapping
@@ -90,10 +99,19 @@ class Row:
         """Read the data, apply the rules, and tell what was found."""
         found = {ALWAYS: True, NEVER: False, **self.read(data)}
         for name, line in self.lines.items():
-            found[name] = line.get("between", "; ").join(filled(line["text"], one) for one in _each(line, found))
-        checks = chain.from_iterable(((row, one) for one in _each(row, found)) for row in self.checks)
-        why = (row["text"] for row in self.why if found[row.get("when", ALWAYS)] and not found[row.get("unless", NEVER)])
+            found[name] = line.get("between", "; ").join(
+                filled(line["text"], one) for one in _each(line, found)
+            )
+        checks = chain.from_iterable(
+            ((row, one) for one in _each(row, found)) for row in self.checks
+        )
+        why = (
+            row["text"]
+            for row in self.why
+            if found[row.get("when", ALWAYS)] and not found[row.get("unless", NEVER)]
+        )
         return Finding(
-            filled(self.own, found), filled(self.exact, found), tuple(Check(filled(row["text"], one), passed(row, one)) for row, one in checks),
+            filled(self.own, found), filled(self.exact, found),
+            tuple(Check(filled(row["text"], one), passed(row, one)) for row, one in checks),
             filled(self.sure, found), filled(next(why, ""), found),
         )  # fmt: skip

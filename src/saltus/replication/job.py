@@ -35,8 +35,8 @@ class Job:
     name : str
         ``figure/what``; claims and pictures ask for the Dataset under this name.
     compute : callable
-        An analysis of saltus, or a function beside the study files. Called with the system, the Datasets of ``needs``, and ``method``,
-        ``threads``, ``progress`` and the arguments by name.
+        An analysis of saltus, or a function beside the study files. Called with the system, the
+        Datasets of ``needs``, and ``method``, ``threads``, ``progress`` and the arguments by name.
     system : System
         With the values of this job.
     method : Method
@@ -56,11 +56,19 @@ class Job:
 
     def identity(self, inputs: Mapping[str, xr.Dataset]) -> dict[str, str]:
         """What must be equal for a kept result to be this job's."""
-        given = {"arguments": dict(self.arguments), "inputs": {name: content_hash(inputs[name]) for name in self.needs}}
-        return {**identity(self.system, self.method, given), "analysis": f"{self.compute.__name__} {_own_code(self.compute.__module__)}"}
+        given = {
+            "arguments": dict(self.arguments),
+            "inputs": {name: content_hash(inputs[name]) for name in self.needs},
+        }
+        return {
+            **identity(self.system, self.method, given),
+            "analysis": f"{self.compute.__name__} {_own_code(self.compute.__module__)}",
+        }
 
     def result(self, inputs: Mapping[str, xr.Dataset], at: Running) -> tuple[xr.Dataset, bool]:
-        """The Dataset, and whether it was computed now: else it was in the folder, whole, from the same settings and code."""
+        """The Dataset, and whether it was computed now: else it was in the folder, whole, from the
+        same settings and code.
+        """
         new: list[bool] = []
 
         def compute(show: Callable[[float], None]) -> xr.Dataset:
@@ -71,10 +79,18 @@ class Job:
             new.append(True)
             return ds.assign_attrs({SECONDS: time.perf_counter() - begin})
 
-        return load_or_compute(slug(self.name), self.name, self.identity(inputs), compute, at), bool(new)
+        return load_or_compute(
+            slug(self.name), self.name, self.identity(inputs), compute, at
+        ), bool(new)
 
 
 @cache
 def _own_code(module: str) -> str:
-    """Hash of the statements of a module that isn't saltus's; the code of saltus counts in every identity."""
-    return "" if module.startswith("saltus.") else statement_hash(Path(str(sys.modules[module].__file__)).read_bytes())
+    """Hash of the statements of a module that isn't saltus's; the code of saltus counts in every
+    identity.
+    """
+    return (
+        ""
+        if module.startswith("saltus.")
+        else statement_hash(Path(str(sys.modules[module].__file__)).read_bytes())
+    )

@@ -1,4 +1,6 @@
-"""The papers that can be reproduced: rows beside their study files, and the few functions that can't be rows."""
+"""The papers that can be reproduced: rows beside their study files, and the few functions that
+can't be rows.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ if TYPE_CHECKING:
 
 #: Name of each paper: what it is. Its folder is replications/NAME.
 _PAPERS = {
-    "saunders2021": "Contact force strength and numerical inaccuracies in piecewise-smooth systems: ode45 with and without event location",
+    "saunders2021": "Contact force strength and numerical inaccuracies in piecewise-smooth "
+    "systems: ode45 with and without event location",
 }
 
 
@@ -122,7 +125,8 @@ class Paper:
     figures : mapping of str to str
         Number of each figure: its title.
     jobs : callable
-        From the folder of the study files and whether sizes are small to the jobs, each after those that it needs.
+        From the folder of the study files and whether sizes are small to the jobs, each after those
+        that it needs.
     pictures : tuple of Picture
         In the order of the report.
     claims : tuple of Claim
@@ -157,7 +161,10 @@ def find(name: str) -> Paper:
         If there is none of this name; the message offers the nearest.
     """
     folder = folder_of(name)
-    paper, claims = (tomllib.loads((folder / file).read_text(encoding="utf-8")) for file in ("paper.toml", "claims.toml"))
+    paper, claims = (
+        tomllib.loads((folder / file).read_text(encoding="utf-8"))
+        for file in ("paper.toml", "claims.toml")
+    )
     sets, pictures, tables = (paper.pop(key) for key in ("sets", "picture", "table"))
     return Paper(
         name=name, jobs=code(name, "jobs").jobs, **paper,
@@ -167,13 +174,23 @@ def find(name: str) -> Paper:
     )  # fmt: skip
 
 
-def _part(paper: str, row: Mapping[str, Any], sets: Mapping[str, Sequence[str]], function: str) -> dict[str, Any]:
-    """What a row says, with names of jobs in place of their patterns, and the function in place of its name."""
+def _part(
+    paper: str, row: Mapping[str, Any], sets: Mapping[str, Sequence[str]], function: str
+) -> dict[str, Any]:
+    """What a row says, with names of jobs in place of their patterns, and the function in place of
+    its name.
+    """
     said = {key: value for key, value in row.items() if key not in ("data", "with")}
-    return {**said, "needs": tuple(_expanded(row["data"], sets)), function: _function(paper, row[function], row.get("with", {}))}
+    return {
+        **said,
+        "needs": tuple(_expanded(row["data"], sets)),
+        function: _function(paper, row[function], row.get("with", {})),
+    }
 
 
-def _claim(paper: str, row: Mapping[str, Any], sets: Mapping[str, Sequence[str]], texts: Mapping[str, str]) -> Claim:
+def _claim(
+    paper: str, row: Mapping[str, Any], sets: Mapping[str, Sequence[str]], texts: Mapping[str, str]
+) -> Claim:
     """A claim from its row."""
     said = _part(paper, row, sets, "read")
     claim = {name: said.pop(name) for name in ("id", "figure", "says", "where", "rule", "needs")}
@@ -204,9 +221,10 @@ def _function(paper: str, place: str, arguments: Mapping[str, Any]) -> Callable[
     return partial(getattr(code(paper, module), name), **arguments)
 
 
-# -- files that come with saltus ---------------------------------------------------------------------------------------------------
+# -- files that come with saltus -------------------------------------------------------------------
 def folder_of(name: str) -> Path:
-    """The folder of a paper: in an installed package beside its modules, in the repository beside ``src``.
+    """The folder of a paper: in an installed package beside its modules, in the repository beside
+    ``src``.
 
     Raises
     ------
@@ -216,18 +234,32 @@ def folder_of(name: str) -> Path:
     if name not in _PAPERS:
         raise ParameterError(f"no paper {name!r} can be reproduced. {nearest(name, _PAPERS)}")
     beside = PACKAGE.parents[1] if PACKAGE.parent.name == "src" else PACKAGE
-    place = next((one for one in (PACKAGE / "replications" / name, beside / "replications" / name) if one.is_dir()), None)
+    place = next(
+        (
+            one
+            for one in (PACKAGE / "replications" / name, beside / "replications" / name)
+            if one.is_dir()
+        ),
+        None,
+    )
     if place is None:
-        raise ParameterError(f"the study files of {name} are missing: no folder {PACKAGE / 'replications' / name}. Install saltus again.")
+        raise ParameterError(
+            f"the study files of {name} are missing: no folder "
+            f"{PACKAGE / 'replications' / name}. Install saltus again."
+        )
     return place
 
 
 def code(name: str, module: str) -> ModuleType:
-    """A module of a paper's folder, which comes with saltus. Nothing is ever imported from a folder that a user names."""
+    """A module of a paper's folder, which comes with saltus. Nothing is ever imported from a folder
+    that a user names.
+    """
     package = f"saltus_{name}"
     if package not in sys.modules:
         folder = folder_of(name)
-        spec = importlib.util.spec_from_file_location(package, folder / "__init__.py", submodule_search_locations=[str(folder)])
+        spec = importlib.util.spec_from_file_location(
+            package, folder / "__init__.py", submodule_search_locations=[str(folder)]
+        )
         assert spec is not None
         assert spec.loader is not None
         sys.modules[package] = importlib.util.module_from_spec(spec)

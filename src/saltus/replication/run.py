@@ -1,4 +1,6 @@
-"""Reproduce a paper: compute or fetch every job, draw the pictures, judge the claims, write the report."""
+"""Reproduce a paper: compute or fetch every job, draw the pictures, judge the claims, write the
+report.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,8 @@ _Made = TypeVar("_Made")
 
 #: Dots per inch of the pictures: sharp on a phone, and the report stays small enough to mail.
 DPI = 130
-#: Folders beside the report: of the Datasets, of the pictures, of the lock that keeps a second run out.
+#: Folders beside the report: of the Datasets, of the pictures, of the lock that keeps a second run
+#: out.
 DATA, PICTURES, LOCKS = "data", "pictures", "locks"
 
 
@@ -60,7 +63,8 @@ class Replication:
     tables : list of (Numbers, TextTable)
         In the order of the report.
     failures : dict of str to str
-        What could not be made, such as ``"fig4/exact"`` (a job), ``"picture fig4"``, ``"claim fig4-periods"``: why not.
+        What could not be made, such as ``"fig4/exact"`` (a job), ``"picture fig4"``, ``"claim
+        fig4-periods"``: why not.
     seconds : float
         Wall-clock time of this run [s].
     """
@@ -80,17 +84,25 @@ class Replication:
 
     @property
     def report(self) -> Path:
-        """The report: ``report.html``, of some figures only ``report-fig8.html``, which leaves that of all figures alone."""
+        """The report: ``report.html``, of some figures only ``report-fig8.html``, which leaves that
+        of all figures alone.
+        """
         return self.folder / f"report{self._some}.html"
 
     @property
     def claims_file(self) -> Path:
-        """The claims with their answers and verdicts: ``claims.csv``, of some figures only ``claims-fig8.csv``."""
+        """The claims with their answers and verdicts: ``claims.csv``, of some figures only
+        ``claims-fig8.csv``.
+        """
         return self.folder / f"claims{self._some}.csv"
 
     @property
     def _some(self) -> str:
-        return "" if len(self.figures) == len(self.paper.figures) else "".join(f"-fig{figure}" for figure in self.figures)
+        return (
+            ""
+            if len(self.figures) == len(self.paper.figures)
+            else "".join(f"-fig{figure}" for figure in self.figures)
+        )
 
     @property
     def seconds_in_all(self) -> float:
@@ -107,9 +119,11 @@ def reproduce(
     report: Callable[[Report], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Replication:
-    """Reproduce a paper, or some figures of it. What is in the folder already, from the same settings and code, isn't computed again.
+    """Reproduce a paper, or some figures of it. What is in the folder already, from the same
+    settings and code, isn't computed again.
 
-    A job, picture, table or judge that fails costs only what needs it: the rest is finished, and the report says what is missing and why.
+    A job, picture, table or judge that fails costs only what needs it: the rest is finished, and
+    the report says what is missing and why.
 
     Parameters
     ----------
@@ -156,22 +170,37 @@ def _chosen(paper: Paper, figures: Sequence[str]) -> tuple[str, ...]:
     wanted = {re.sub(r"(?i)^fig(ure)?[. ]*", "", figure.strip()): figure for figure in figures}
     for number, text in wanted.items():
         if number not in paper.figures:
-            raise ParameterError(f"{paper.name} has no figure {text!r} to reproduce. Its figures: {', '.join(paper.figures)}.")
+            raise ParameterError(
+                f"{paper.name} has no figure {text!r} to reproduce. Its figures: "
+                f"{', '.join(paper.figures)}."
+            )
     return tuple(figure for figure in paper.figures if figure in wanted or not wanted)
 
 
-def _make(result: Replication, report: Callable[[Report], None], say: Callable[[str], None]) -> None:
+def _make(
+    result: Replication, report: Callable[[Report], None], say: Callable[[str], None]
+) -> None:
     """Compute, draw, judge and write."""
     from saltus.replication.page import write_page
 
     begin = time.perf_counter()
     jobs = {job.name: job for job in result.paper.jobs(folder_of(result.paper.name), result.quick)}
-    at = Running(result.folder / DATA, f"saltus reproduce {result.paper.name}", Resources(result.threads), report, say)
+    at = Running(
+        result.folder / DATA,
+        f"saltus reproduce {result.paper.name}",
+        Resources(result.threads),
+        report,
+        say,
+    )
     for figure in result.figures:
         names = closure(jobs, wanted_by(result.paper, figure))
         for number, name in enumerate(names, 1):
             if name not in result.data and name not in result.failures:
-                _compute(result, jobs[name], replace(at, report=partial(_counted, report, f"{number} of {len(names)}")))
+                _compute(
+                    result,
+                    jobs[name],
+                    replace(at, report=partial(_counted, report, f"{number} of {len(names)}")),
+                )
         say(_finish(result, figure))
     result.seconds = time.perf_counter() - begin
     claims_table(result).write_csv(result.claims_file)
@@ -211,7 +240,8 @@ def _compute(result: Replication, job: Job, at: Running) -> None:
         raise
     except Exception as error:
         result.failures[job.name] = (
-            f"{job.name} could not be computed: {_cause(error)}. What is computed is kept in {at.folder}: run the same command again, "
+            f"{job.name} could not be computed: {_cause(error)}. What is computed is kept in "
+            f"{at.folder}: run the same command again, "
             "and only what is missing is tried again. If it fails again, report this message."
         )
         return
@@ -220,17 +250,24 @@ def _compute(result: Replication, job: Job, at: Running) -> None:
 
 
 def _cause(error: Exception) -> str:
-    """What went wrong, in a sentence without its full stop; of an error that nobody foresaw also where."""
+    """What went wrong, in a sentence without its full stop; of an error that nobody foresaw also
+    where.
+    """
     text = str(error).rstrip(". ")
     if isinstance(error, SaltusError):
         return text
     last = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{type(error).__name__} in {Path(last.filename).name}, line {last.lineno}{f': {text}' if text else ''}"
+    return (
+        f"{type(error).__name__} in {Path(last.filename).name}, line "
+        f"{last.lineno}{f': {text}' if text else ''}"
+    )
 
 
-# -- what stands in the report ---------------------------------------------------------------------------------------------------
+# -- what stands in the report ---------------------------------------------------------------------
 def _finish(result: Replication, figure: str) -> str:
-    """Draw a figure's pictures, make its tables and judge its claims, as far as its data are there; returns a sentence that says so."""
+    """Draw a figure's pictures, make its tables and judge its claims, as far as its data are there;
+    returns a sentence that says so.
+    """
     paper, folder, before = result.paper, result.folder / PICTURES, len(result.failures)
     for picture in (one for one in paper.pictures if one.figure == figure):
         file = folder / f"{picture.name}.png"
@@ -246,11 +283,21 @@ def _finish(result: Replication, figure: str) -> str:
         finding = _attempt(result, f"claim {claim.id}", claim, claim.judge)
         result.findings.append((claim, finding or undecided(result.failures[f"claim {claim.id}"])))
     state = "done" if len(result.failures) == before else "not complete"
-    return f"figure {figure} {state}: {paper.figures[figure]}; {len(claims)} {'claim' if len(claims) == 1 else 'claims'}"
+    return (
+        f"figure {figure} {state}: {paper.figures[figure]}; {len(claims)} "
+        f"{'claim' if len(claims) == 1 else 'claims'}"
+    )
 
 
-def _attempt(result: Replication, what: str, part: Picture | Numbers | Claim, make: Callable[[dict[str, Any]], _Made]) -> _Made | None:
-    """What a part of the report gives; None, with the reason in ``failures``, if it fails or a job that it needs did."""
+def _attempt(
+    result: Replication,
+    what: str,
+    part: Picture | Numbers | Claim,
+    make: Callable[[dict[str, Any]], _Made],
+) -> _Made | None:
+    """What a part of the report gives; None, with the reason in ``failures``, if it fails or a job
+    that it needs did.
+    """
     lost = next((name for name in part.needs if name not in result.data), None)
     if lost is not None:
         result.failures[what] = result.failures[lost]
@@ -260,7 +307,10 @@ def _attempt(result: Replication, what: str, part: Picture | Numbers | Claim, ma
     except ResultFileError:  # the next file couldn't be written either
         raise
     except Exception as error:
-        result.failures[what] = f"{what} failed: {_cause(error)}. Its data are kept in {result.folder / DATA}. Report this message."
+        result.failures[what] = (
+            f"{what} failed: {_cause(error)}. Its data are kept in "
+            f"{result.folder / DATA}. Report this message."
+        )
         return None
 
 

@@ -13,15 +13,38 @@ if TYPE_CHECKING:
 
 def verdict_table(result: Replication) -> TextTable:
     """A row for each claim: figure, claim, verdict."""
-    rows = tuple((claim.figure, claim.id, claim.says, finding.verdict) for claim, finding in result.findings)
-    return TextTable(_title(result), ("fig.", "claim", "what the paper says", "verdict"), rows, (_count(result),))
+    rows = tuple(
+        (claim.figure, claim.id, claim.says, finding.verdict) for claim, finding in result.findings
+    )
+    return TextTable(
+        _title(result), ("fig.", "claim", "what the paper says", "verdict"), rows, (_count(result),)
+    )
 
 
 def claims_table(result: Replication) -> TextTable:
-    """A row for each claim, with both answers: what the paper's own settings give here, and what exact arithmetic gives."""
-    columns = ("figure", "claim", "what the paper says", "where", "its own settings give here", "exact arithmetic gives", "verdict")
+    """A row for each claim, with both answers: what the paper's own settings give here, and what
+    exact arithmetic gives.
+    """
+    columns = (
+        "figure",
+        "claim",
+        "what the paper says",
+        "where",
+        "its own settings give here",
+        "exact arithmetic gives",
+        "verdict",
+    )
     rows = tuple(
-        (claim.figure, claim.id, claim.says, claim.where, finding.own, finding.exact, finding.verdict) for claim, finding in result.findings
+        (
+            claim.figure,
+            claim.id,
+            claim.says,
+            claim.where,
+            finding.own,
+            finding.exact,
+            finding.verdict,
+        )
+        for claim, finding in result.findings
     )
     return TextTable(_title(result), columns, rows, (_count(result),))
 
@@ -31,5 +54,7 @@ def _title(result: Replication) -> str:
 
 
 def _count(result: Replication) -> str:
-    counts = [(one, sum(finding.verdict == one for _, finding in result.findings)) for one in VERDICTS]
+    counts = [
+        (one, sum(finding.verdict == one for _, finding in result.findings)) for one in VERDICTS
+    ]
     return f"{', '.join(f'{count} {one}' for one, count in counts if count)}."

@@ -1,4 +1,6 @@
-"""Verdicts: the rules that hold a number of a claim against its limit, and what follows when checks pass or fail."""
+"""Verdicts: the rules that hold a number of a claim against its limit, and what follows when checks
+pass or fail.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ HOLDS, IN_PART, FAILS, UNDECIDED = "holds", "holds in part", "does not hold", "n
 VERDICTS = (HOLDS, IN_PART, FAILS, UNDECIDED)
 #: How the checks of any claim make its verdict; the report prints it.
 RULE_OF_ALL = (
-    "A claim holds if all of its checks pass, doesn't hold if none does, and holds in part if some do, or if some pass and others can't be "
+    "A claim holds if all of its checks pass, doesn't hold if none does, and holds in part if some "
+    "do, or if some pass and others can't be "
     "decided. It is not decidable if no check can be decided."
 )
 
@@ -64,7 +67,8 @@ class Finding:
     sure : str
         How sure that is: starts, intervals, error estimates.
     why : str
-        Where we differ from the paper: which setting might explain it. Where nothing is decided: why not.
+        Where we differ from the paper: which setting might explain it. Where nothing is decided:
+        why not.
     """
 
     own: str
@@ -85,8 +89,9 @@ def passed(row: Mapping[str, Any], quantities: Mapping[str, Any]) -> bool | None
     Parameters
     ----------
     row : mapping
-        ``of``: name of a quantity. One of :data:`RULES`: the limit, or the name of the quantity that is the limit. Without a rule the
-        quantity itself says whether it is so. ``given``: name of a quantity that must be true for the data to decide.
+        ``of``: name of a quantity. One of :data:`RULES`: the limit, or the name of the quantity
+        that is the limit. Without a rule the quantity itself says whether it is so. ``given``: name
+        of a quantity that must be true for the data to decide.
     quantities : mapping
         What was read from the data, by name.
 
@@ -123,5 +128,9 @@ def verdict_of(checks: Sequence[Check]) -> str:
 def undecided(why: str) -> Finding:
     """The finding on a claim that couldn't be judged."""
     return Finding(
-        "not known", "not known", (Check("The data are there, and the rule can be applied to them.", None),), "Nothing is known.", why
+        "not known",
+        "not known",
+        (Check("The data are there, and the rule can be applied to them.", None),),
+        "Nothing is known.",
+        why,
     )

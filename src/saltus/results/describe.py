@@ -25,7 +25,8 @@ def describe(ds: xr.Dataset) -> str:
     Returns
     -------
     str
-        System, parameters, method, extent, contacts, status and hash, a line each; of attractors and basins what was found.
+        System, parameters, method, extent, contacts, status and hash, a line each; of attractors
+        and basins what was found.
 
     Raises
     ------
@@ -43,13 +44,18 @@ def describe(ds: xr.Dataset) -> str:
     check(ds, caller="describe", kinds=list(TABLES))
     lines = [f"{ds.attrs.get('system', 'system without a name')}: {_parameters(ds)}"]
     if "method" in ds.attrs or kind_of(ds) in (TRAJECTORY, STROBOSCOPE):
-        lines.append(f"method   {ds.attrs.get('method', 'unknown')}{_options(ds)}, saltus {ds.attrs.get('saltus_version', 'unknown')}")
+        lines.append(
+            f"method   {ds.attrs.get('method', 'unknown')}{_options(ds)}, saltus "
+            f"{ds.attrs.get('saltus_version', 'unknown')}"
+        )
     if kind_of(ds) in (TRAJECTORY, STROBOSCOPE):
         lines += [f"extent   {_extent(ds)}", f"status   {_tally(ds['status'].values)}"]
     else:
         lines += summary(ds)
     if "contact_kind" in ds:
-        lines.append(f"contacts {_tally(ds['contact_kind'].values) if ds.sizes['contact'] else 'none'}")
+        lines.append(
+            f"contacts {_tally(ds['contact_kind'].values) if ds.sizes['contact'] else 'none'}"
+        )
     return "\n".join([*lines, f"hash     {ds.attrs.get('result_hash', 'none')[:16]}"])
 
 
@@ -57,7 +63,9 @@ def _parameters(ds: xr.Dataset) -> str:
     units = json.loads(ds.attrs.get("units", "{}"))
     values = json.loads(ds.attrs.get("parameters", "{}"))
     fixed = [f"{name} = {from_si(value, units.get(name, ''))}" for name, value in values.items()]
-    return ", ".join(fixed + [f"{name} varies" for name in json.loads(ds.attrs.get("varied_parameters", "[]"))])
+    return ", ".join(
+        fixed + [f"{name} varies" for name in json.loads(ds.attrs.get("varied_parameters", "[]"))]
+    )
 
 
 def _options(ds: xr.Dataset) -> str:
@@ -69,7 +77,10 @@ def _extent(ds: xr.Dataset) -> str:
     trajectories = ds.sizes.get("trajectory", 1)
     parts = [f"{trajectories} {'trajectory' if trajectories == 1 else 'trajectories'}"]
     if "time" in ds and ds["time"].size:
-        parts.append(f"{ds['time'].shape[-1]} samples from {float(ds['time'].min()):g} to {float(ds['time'].max()):g} s")
+        parts.append(
+            f"{ds['time'].shape[-1]} samples from {float(ds['time'].min()):g} to "
+            f"{float(ds['time'].max()):g} s"
+        )
     if "period" in ds and ds["period"].size:
         parts.append(f"periods {float(ds['period'].min()):g} to {float(ds['period'].max()):g}")
     return ", ".join(parts)

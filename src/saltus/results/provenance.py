@@ -1,6 +1,8 @@
-"""Where a result comes from: attributes that are enough to compute it again, and a hash of its numbers.
+"""Where a result comes from: attributes that are enough to compute it again, and a hash of its
+numbers.
 
-Nothing here depends on the clock, the host or the user: the same computation gives the same attributes, so files compare bit by bit.
+Nothing here depends on the clock, the host or the user: the same computation gives the same
+attributes, so files compare bit by bit.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ def attributes(
     equations : iterable of str
         Its equations, one text per line.
     parameters : mapping of str to float
-        Parameter values [SI]; those of ``varied`` are left out, their values are coordinates along ``trajectory``.
+        Parameter values [SI]; those of ``varied`` are left out, their values are coordinates along
+        ``trajectory``.
     units : mapping of str to str
         Units of states and parameters.
     method, method_options : str, mapping
@@ -56,8 +59,9 @@ def attributes(
     Returns
     -------
     dict of str to str
-        ``saltus_version``, ``system``, ``source``, ``fingerprint``, ``method``, and as JSON text ``equations``, ``parameters``,
-        ``varied_parameters``, ``units``, ``method_options``, ``versions``.
+        ``saltus_version``, ``system``, ``source``, ``fingerprint``, ``method``, and as JSON text
+        ``equations``, ``parameters``, ``varied_parameters``, ``units``, ``method_options``,
+        ``versions``.
     """
     varied = list(varied)
     return {
@@ -66,7 +70,9 @@ def attributes(
         "source": source,
         "fingerprint": fingerprint,
         "equations": to_json(list(equations)),
-        "parameters": to_json({name: float(value) for name, value in parameters.items() if name not in varied}),
+        "parameters": to_json(
+            {name: float(value) for name, value in parameters.items() if name not in varied}
+        ),
         "varied_parameters": to_json(varied),
         "units": to_json(dict(units)),
         "method": method,
@@ -82,7 +88,9 @@ def to_json(value: Any) -> str:
 
 @cache  # reading it takes a millisecond, and what this process runs doesn't change
 def version(package: str) -> str:
-    """Version of an installed package, ``"not installed"`` for one that isn't (a source tree on the path)."""
+    """Version of an installed package, ``"not installed"`` for one that isn't (a source tree on the
+    path).
+    """
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
@@ -96,17 +104,25 @@ def _versions() -> str:
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that a result rests on."""
-    return {"python": platform.python_version()} | {package: version(package) for package in _PACKAGES}
+    return {"python": platform.python_version()} | {
+        package: version(package) for package in _PACKAGES
+    }
 
 
-# -- hash of the numbers -------------------------------------------------------------------------------------------------------
+# -- hash of the numbers ---------------------------------------------------------------------------
 def content_hash(ds: xr.Dataset) -> str:
     """SHA-256 of every variable's name, dims, shape and values, in hexadecimal.
 
-    Attributes are left out, and so is the width in which a file format keeps an integer or a text: the same numbers have the same hash,
-    whichever file they went through. Every bit of a float counts, the sign of a zero included.
+    Attributes are left out, and so is the width in which a file format keeps an integer or a text:
+    the same numbers have the same hash, whichever file they went through. Every bit of a float
+    counts, the sign of a zero included.
     """
-    return hash_of({str(name): (variable.dims, np.asarray(variable.values)) for name, variable in ds.variables.items()})
+    return hash_of(
+        {
+            str(name): (variable.dims, np.asarray(variable.values))
+            for name, variable in ds.variables.items()
+        }
+    )
 
 
 def hash_of(variables: Mapping[str, tuple[tuple[Hashable, ...], np.ndarray]]) -> str:
@@ -119,10 +135,17 @@ def hash_of(variables: Mapping[str, tuple[tuple[Hashable, ...], np.ndarray]]) ->
 
 
 def file_hash(ds: xr.Dataset) -> str:
-    """SHA-256 of the numbers and of every attribute, in hexadecimal: what must come back from a file."""
+    """SHA-256 of the numbers and of every attribute, in hexadecimal: what must come back from a
+    file.
+    """
     owners = {"": ds.attrs} | {str(name): variable.attrs for name, variable in ds.variables.items()}
-    attrs = {owner: {key: value for key, value in values.items() if key != "file_hash"} for owner, values in owners.items()}
-    return hashlib.sha256((content_hash(ds) + json.dumps(attrs, sort_keys=True, default=str)).encode()).hexdigest()
+    attrs = {
+        owner: {key: value for key, value in values.items() if key != "file_hash"}
+        for owner, values in owners.items()
+    }
+    return hashlib.sha256(
+        (content_hash(ds) + json.dumps(attrs, sort_keys=True, default=str)).encode()
+    ).hexdigest()
 
 
 def _canonical(values: np.ndarray) -> bytes | memoryview:

@@ -38,7 +38,11 @@ def summary(ds: xr.Dataset) -> list[str]:
     if kind_of(ds) in WRITERS:
         return WRITERS[kind_of(ds)](ds)
     if kind_of(ds) == RESPONSES:
-        return [f"extent   {_span(ds, parameters_of(ds), 'values')}, {_count(ds.sizes['start'], 'start')} at each", *_responses(ds)]
+        return [
+            f"extent   {_span(ds, parameters_of(ds), 'values')}, "
+            f"{_count(ds.sizes['start'], 'start')} at each",
+            *_responses(ds),
+        ]
     if kind_of(ds) == AGREEMENT:
         return [f"extent   {_axes(ds)}", *_agreement(ds)]
     if kind_of(ds) == EXPONENTS:
@@ -54,16 +58,24 @@ def summary(ds: xr.Dataset) -> list[str]:
 
 
 def own_errors(attrs: Mapping[Any, Any]) -> str:
-    """What errors of ode45 have to do with starts that never settled, in a sentence or two; "" for another method."""
+    """What errors of ode45 have to do with starts that never settled, in a sentence or two; "" for
+    another method.
+    """
     if str(attrs.get("method", "")) != "ODE45":
         return ""
     if "unconverged_exactly" not in attrs:
-        return "Errors of ode45 itself can keep a motion from settling. A smaller rtol, or Taylor, tells."
+        return (
+            "Errors of ode45 itself can keep a motion from settling. A smaller rtol, or "
+            "Taylor, "
+            "tells."
+        )
     if not attrs["unconverged_exactly"]:
         return "By exact integration from where they stand they settle to no orbit either."
     return (
-        "Errors of ode45 itself keep them from having a type: exact integration from where they stand settles to "
-        f"{attrs['unconverged_exactly']}, and ode45 strays from there by up to {float(attrs['unconverged_stray']):.0%} of the range of a "
+        "Errors of ode45 itself keep them from having a type: exact integration from where they "
+        "stand settles to "
+        f"{attrs['unconverged_exactly']}, and ode45 strays from there by up to "
+        f"{float(attrs['unconverged_stray']):.0%} of the range of a "
         "state. Take a smaller rtol, or Taylor."
     )
 
@@ -77,12 +89,20 @@ def _span(ds: xr.Dataset, names: tuple[str, ...], what: str) -> str:
     parts = []
     for name in names:
         values, unit = ds[name].values, ds[name].attrs.get("units", "")
-        parts.append(f"{name} from {values.min():g} to {values.max():g} {unit}".rstrip() if values.size else f"{name} empty")
+        parts.append(
+            f"{name} from {values.min():g} to {values.max():g} {unit}".rstrip()
+            if values.size
+            else f"{name} empty"
+        )
     return f"{' x '.join(str(ds.sizes[name]) for name in names)} {what}, {', '.join(parts)}"
 
 
 def _starts(ds: xr.Dataset) -> str:
-    return f"{ds.sizes['trajectory']} starts" if "trajectory" in ds.dims else "attractors without their starts"
+    return (
+        f"{ds.sizes['trajectory']} starts"
+        if "trajectory" in ds.dims
+        else ("attractors without their starts")
+    )
 
 
 def _attractors(ds: xr.Dataset) -> list[str]:
@@ -104,17 +124,27 @@ def _attractors(ds: xr.Dataset) -> list[str]:
     for i, text in enumerate(words[:_LINES]):
         one = ds.isel(attractor=i)
         through = _through(one) if words.count(text) > 1 else ""
-        share = f", {float(one['attractor_fraction']):.2%} of the starts" if "attractor_fraction" in one else ""
+        share = (
+            f", {float(one['attractor_fraction']):.2%} of the starts"
+            if "attractor_fraction" in one
+            else ""
+        )
         lines.append(f"  {i}: {text}{through}{share}")
     return lines + ([f"  and {count - _LINES} more"] if count > _LINES else [])
 
 
 def _through(one: xr.Dataset) -> str:
-    """The first point that an attractor is known by: it tells mirror images apart, whose sizes are the same."""
+    """The first point that an attractor is known by: it tells mirror images apart, whose sizes are
+    the same.
+    """
     names = [name for name in states_of(one) if f"attractor_{name}" in one]
     points = {name: float(np.ravel(one[f"attractor_{name}"].values)[0]) for name in names}
     units = {name: one[f"attractor_{name}"].attrs.get("units", "") for name in names}
-    place = ", ".join(f"{name} = {value:.4g} {units[name]}".rstrip() for name, value in points.items() if np.isfinite(value))
+    place = ", ".join(
+        f"{name} = {value:.4g} {units[name]}".rstrip()
+        for name, value in points.items()
+        if np.isfinite(value)
+    )
     return f", through {place}" if place else ""
 
 
@@ -122,13 +152,22 @@ def _unsettled(basin: xr.DataArray) -> str:
     """How many starts lead to an attractor, and what became of the others."""
     meanings = _meanings(basin)
     codes, counts = np.unique(basin.values, return_counts=True)
-    others = [f"{count} {meanings[int(code)]}" for code, count in zip(codes, counts, strict=True) if code < 0]
+    others = [
+        f"{count} {meanings[int(code)]}"
+        for code, count in zip(codes, counts, strict=True)
+        if code < 0
+    ]
     return ", ".join([f"{int(counts[codes >= 0].sum())} of {basin.size} starts", *others])
 
 
 def _responses(ds: xr.Dataset) -> list[str]:
     """What was found: branches, kinds of motion, events; and what became of the starts."""
-    kinds = [kind_text(kind, n) for kind, n in zip(ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True)]
+    kinds = [
+        kind_text(kind, n)
+        for kind, n in zip(
+            ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True
+        )
+    ]
     found = f"found    {_count(len(kinds), 'response')}"
     if len(parameters_of(ds)) == 1:
         found += f" on {_count(np.unique(ds['response_branch'].values).size, 'branch')}"
@@ -142,18 +181,29 @@ def _tally(words: list[str]) -> str:
     """``212 T, 31 3T``, the most frequent first."""
     found = sorted(set(words), key=lambda word: (-words.count(word), word))
     more = f" and {len(found) - _LINES} other kinds" if len(found) > _LINES else ""
-    return ", ".join(f"{words.count(word)} {word}" for word in found[:_LINES]).replace("_", " ") + more
+    return (
+        ", ".join(f"{words.count(word)} {word}" for word in found[:_LINES]).replace("_", " ") + more
+    )
 
 
 def _count(number: int, word: str) -> str:
     """``1 branch``, ``2 branches``."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}{'es' if word.endswith('ch') else 's'}"
+    return (
+        f"{number} {word}"
+        if number == 1
+        else (f"{number} {word}{'es' if word.endswith('ch') else 's'}")
+    )
 
 
 def _exponents(ds: xr.Dataset) -> list[str]:
-    """A line on each trajectory: the kind of motion, and its exponents with the half-width of the 95 % interval of the largest."""
+    """A line on each trajectory: the kind of motion, and its exponents with the half-width of the
+    95 % interval of the largest.
+    """
     count, unit = ds.sizes["trajectory"], ds["lyapunov_exponent"].attrs.get("units", "")
-    lines = [f"measured {ds.attrs.get('algorithm', 'unknown')}, {count} {'trajectory' if count == 1 else 'trajectories'}"]
+    lines = [
+        f"measured {ds.attrs.get('algorithm', 'unknown')}, {count} "
+        f"{'trajectory' if count == 1 else 'trajectories'}"
+    ]
     for i in range(min(count, _LINES)):
         one = ds.isel(trajectory=i)
         values = ", ".join(f"{value:.6g}" for value in one["lyapunov_exponent"].values)
@@ -166,13 +216,17 @@ def _exponents(ds: xr.Dataset) -> list[str]:
 
 def _agreement(ds: xr.Dataset) -> list[str]:
     meanings = _meanings(ds["agreement"])
-    counts = {meanings[code]: int((ds["agreement"].values == code).sum()) for code in sorted(meanings, reverse=True)}
+    counts = {
+        meanings[code]: int((ds["agreement"].values == code).sum())
+        for code in sorted(meanings, reverse=True)
+    }
     a, b = ds["match_a"].values, ds["match_b"].values
     alone = f"{int((b < 0).sum())} only in the first map, {int((a < 0).sum())} only in the second"
     share = ds.attrs.get("agreement", np.nan)
     return [
         f"maps     {ds.attrs.get('method_a', 'unknown')} and {ds.attrs.get('method_b', 'unknown')}",
-        f"agree    {share:.2%} of the settled starts ({', '.join(f'{count} {word}' for word, count in counts.items())})",
+        f"agree    {share:.2%} of the settled starts "
+        f"({', '.join(f'{count} {word}' for word, count in counts.items())})",
         f"matched  {int(((a >= 0) & (b >= 0)).sum())} attractors, {alone}",
     ]
 

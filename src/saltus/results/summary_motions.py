@@ -1,4 +1,6 @@
-"""What sections, spectra, impact statistics and energy balances say in a few lines, for ``describe``."""
+"""What sections, spectra, impact statistics and energy balances say in a few lines, for
+``describe``.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +19,30 @@ def _section(ds: xr.Dataset) -> list[str]:
     directions = {0: "both ways", 1: "upwards", -1: "downwards"}[int(ds.attrs["direction"])]
     return [
         f"surface  {ds.attrs['surface']}, {directions}",
-        f"found    {ds.sizes['crossing']} crossings, {int(ds['tangencies'].sum())} tangencies, {int(ds['contacts'].sum())} contacts",
+        f"found    {ds.sizes['crossing']} crossings, {int(ds['tangencies'].sum())} tangencies, "
+        f"{int(ds['contacts'].sum())} contacts",
     ]
 
 
 def _spectrum(ds: xr.Dataset) -> list[str]:
     one = ds.isel(trajectory=0) if "trajectory" in ds.dims else ds
     frequency = one["frequency"].values
-    lines = [f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {one['window'].item()}"]
+    lines = [
+        f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {one['window'].item()}"
+    ]
     for name in states_of(ds):
-        amplitude, unit = one[f"{name}_amplitude"].values, one[f"{name}_amplitude"].attrs.get("units", "")
+        amplitude, unit = (
+            one[f"{name}_amplitude"].values,
+            one[f"{name}_amplitude"].attrs.get("units", ""),
+        )
         largest = np.argsort(amplitude)[::-1][:_LINES]
-        lines.append(f"  {name}: " + ", ".join(f"{amplitude[i]:.4g} {unit}".rstrip() + f" at {frequency[i]:.6g} Hz" for i in largest))
+        lines.append(
+            f"  {name}: "
+            + ", ".join(
+                f"{amplitude[i]:.4g} {unit}".rstrip() + f" at {frequency[i]:.6g} Hz"
+                for i in largest
+            )
+        )
     return lines
 
 
@@ -36,9 +50,15 @@ def _impacts(ds: xr.Dataset) -> list[str]:
     lines = [f"found    {ds.sizes['contact']} contacts"]
     for i, name in enumerate(ds["guard"].values.tolist()):
         one = ds.isel(guard=i)
-        rate, speed, share = (float(one[key].mean()) for key in ("contacts_per_second", "speed_mean", "share_in_contact"))
+        rate, speed, share = (
+            float(one[key].mean())
+            for key in ("contacts_per_second", "speed_mean", "share_in_contact")
+        )
         unit = one["speed_mean"].attrs.get("units", "")
-        lines.append(f"  {name}: {rate:.4g} a second, at {speed:.4g} {unit}".rstrip() + f" on average, in contact {share:.2%} of the time")
+        lines.append(
+            f"  {name}: {rate:.4g} a second, at {speed:.4g} {unit}".rstrip() + f" on average, "
+            f"in contact {share:.2%} of the time"
+        )
     return lines
 
 
@@ -53,4 +73,9 @@ def _energy(ds: xr.Dataset) -> list[str]:
 
 
 #: For each kind, what writes its lines.
-WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {SECTION: _section, SPECTRUM: _spectrum, IMPACTS: _impacts, ENERGY: _energy}
+WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
+    SECTION: _section,
+    SPECTRUM: _spectrum,
+    IMPACTS: _impacts,
+    ENERGY: _energy,
+}

@@ -20,15 +20,17 @@ Columns = dict[str, tuple[str, np.ndarray]]
 
 def sample_columns(ds: xr.Dataset) -> Columns:
     """One row a sample: trajectory (of a batch), time, period, states, mode."""
-    names = [name for name in ("trajectory", "time", "period", *states_of(ds), "mode") if name in ds]
+    names = [
+        name for name in ("trajectory", "time", "period", *states_of(ds), "mode") if name in ds
+    ]
     dims = [dim for dim in ("trajectory", sample_dim(ds)) if dim in ds.dims]
     shape = xr.Variable(dims, np.empty([ds.sizes[dim] for dim in dims]))
     return {name: (name, _spread(ds[name].variable, shape)) for name in names}
 
 
 def contact_columns(ds: xr.Dataset) -> Columns:
-    """One row a contact, of the trajectories that the Dataset (still) has. The prefix ``contact_`` is dropped; empty for a result without
-    contacts.
+    """One row a contact, of the trajectories that the Dataset (still) has. The prefix ``contact_``
+    is dropped; empty for a result without contacts.
     """
     names = [str(name) for name in ds.data_vars if ds[name].dims == ("contact",)]
     names.sort(key=lambda name: name != "contact_trajectory")
@@ -45,7 +47,10 @@ def samples(ds: xr.Dataset) -> Table:
 
 def contacts(ds: xr.Dataset) -> Table:
     """As :func:`contact_columns`, with headers that carry the units."""
-    return {_header(ds, name).removeprefix("contact_"): values for name, values in contact_columns(ds).values()}
+    return {
+        _header(ds, name).removeprefix("contact_"): values
+        for name, values in contact_columns(ds).values()
+    }
 
 
 def trajectories(ds: xr.Dataset) -> Table:
@@ -56,11 +61,15 @@ def trajectories(ds: xr.Dataset) -> Table:
 
 
 def responses(ds: xr.Dataset) -> Table:
-    """One row a response: its parameters, branch, kind, size, stability. The prefix ``response_`` is dropped."""
+    """One row a response: its parameters, branch, kind, size, stability. The prefix ``response_``
+    is dropped.
+    """
     names = [str(name) for name in ds.variables if ds[name].dims == ("response",)]
     first = ["response", *(response_name(name) for name in parameters_of(ds))]
     names.sort(key=lambda name: first.index(name) if name in first else len(first))
-    return {_header(ds, name).removeprefix("response_"): ds[name].values for name in names} | _outputs(ds)
+    return {
+        _header(ds, name).removeprefix("response_"): ds[name].values for name in names
+    } | _outputs(ds)
 
 
 def _outputs(ds: xr.Dataset) -> Table:
@@ -75,8 +84,14 @@ def _outputs(ds: xr.Dataset) -> Table:
 
 
 def events(ds: xr.Dataset) -> Table:
-    """One row for what happens to a branch. The prefix ``event_`` is dropped; empty for a result without events."""
-    names = [str(name) for name in ds.variables if ds[name].dims == ("event",)] if ds.sizes.get("event") else []
+    """One row for what happens to a branch. The prefix ``event_`` is dropped; empty for a result
+    without events.
+    """
+    names = (
+        [str(name) for name in ds.variables if ds[name].dims == ("event",)]
+        if ds.sizes.get("event")
+        else []
+    )
     return {_header(ds, name).removeprefix("event_"): ds[name].values for name in names}
 
 
@@ -109,5 +124,6 @@ def _spread(variable: xr.Variable, shape: xr.Variable) -> np.ndarray:
 def notes(ds: xr.Dataset) -> Iterable[str]:
     """Provenance, guards and scalars as lines ``name: value``; no line holds a line break."""
     for name, value in {**ds.attrs, **scalars(ds)}.items():
-        yield f"{name}: {json.dumps(value, ensure_ascii=False) if isinstance(value, str) and chr(10) in value else value}"
+        several_lines = isinstance(value, str) and "\n" in value
+        yield f"{name}: {json.dumps(value, ensure_ascii=False) if several_lines else value}"
     yield from (f"guard {line}" for line in guards(ds))

@@ -1,4 +1,6 @@
-"""The hash of code: of its statements, whatever stands in comments and docstrings, and whichever Python reads it."""
+"""The hash of code: of its statements, whatever stands in comments and docstrings, and whichever
+Python reads it.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,12 @@ from saltus import cache as disk_cache
 
 #: The folder of saltus.
 PACKAGE = Path(__file__).parents[1]
-#: All code that takes part in the way from equations, values and arguments to a Dataset: these packages and modules import nothing else of
-#: saltus, but for messages. Models and the reading of study files stand in the equations, values and arguments themselves.
+#: All code that takes part in the way from equations, values and arguments to a Dataset: these
+#: packages and modules import nothing else of saltus, but for messages. Models and the reading of
+#: study files stand in the equations, values and arguments themselves.
 COMPUTING = (
-    "fence", "intervals", "interrupt", "unit_table", "units", "cache", "system", "kernels", "codegen", "flow", "results", "analysis",
+    "fence", "intervals", "interrupt", "unit_table", "units", "cache", "system", "kernels",
+    "codegen", "flow", "results", "analysis",
 )  # fmt: skip
 #: Fields of Python's syntax tree without effect on the code.
 _IDLE = ("kind", "type_comment", "ctx")
@@ -32,7 +36,9 @@ def code_hash(*places: str) -> str:
     key = hash_of({**sources, "": Path(__file__).read_bytes()})
     found = disk_cache.read(key, disk_cache.HASH)
     if found is None:
-        found = hash_of({name: statement_hash(source).encode() for name, source in sources.items()}).encode()
+        found = hash_of(
+            {name: statement_hash(source).encode() for name, source in sources.items()}
+        ).encode()
         disk_cache.keep(key, "code of saltus", found, disk_cache.HASH)
     return found.decode()
 
@@ -47,7 +53,9 @@ def hash_of(texts: Mapping[str, bytes]) -> str:
 
 @cache
 def statement_hash(source: bytes) -> str:
-    """SHA-256 of what code says without its comments and docstrings; versions of Python agree on it."""
+    """SHA-256 of what code says without its comments and docstrings; versions of Python agree on
+    it.
+    """
     return hashlib.sha256(_written(ast.parse(source)).encode("utf-8", "surrogatepass")).hexdigest()
 
 
@@ -57,22 +65,34 @@ def _written(value: Any) -> str:
     if not isinstance(value, ast.AST):
         return repr(value)
     fields = {name: one for name, one in ast.iter_fields(value) if name not in _IDLE}
-    if isinstance(value, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and _is_text(value.body[:1]):
+    if isinstance(
+        value, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+    ) and _is_text(value.body[:1]):
         fields["body"] = value.body[1:]
     if isinstance(value, ast.JoinedStr):
-        fields["values"] = [one for one in value.values if not (isinstance(one, ast.Constant) and one.value == "")]  # 3.12 has such
-    said = sorted((name, one) for name, one in fields.items() if one is not None and one != [])  # Python versions differ in empty fields
+        # 3.12 has such
+        fields["values"] = [
+            one for one in value.values if not (isinstance(one, ast.Constant) and one.value == "")
+        ]
+    # Python versions differ in empty fields
+    said = sorted((name, one) for name, one in fields.items() if one is not None and one != [])
     return f"{type(value).__name__}({' '.join(f'{name}={_written(one)}' for name, one in said)})"
 
 
 def _is_text(body: list[ast.stmt]) -> bool:
     """Whether a body begins with a docstring."""
     first = body[0] if body else None
-    return isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
+    return (
+        isinstance(first, ast.Expr)
+        and isinstance(first.value, ast.Constant)
+        and isinstance(first.value.value, str)
+    )
 
 
 def _sources(place: str) -> Iterator[tuple[str, bytes]]:
-    """Name and text of the modules of a package of saltus, such as ``study.answers``, rooms in it too, or of one module alone."""
+    """Name and text of the modules of a package of saltus, such as ``study.answers``, rooms in it
+    too, or of one module alone.
+    """
     alone = PACKAGE / f"{place.replace('.', '/')}.py"
     for file in [alone] if alone.is_file() else sorted(alone.with_suffix("").rglob("*.py")):
         yield file.relative_to(PACKAGE).as_posix(), file.read_bytes()

@@ -34,7 +34,8 @@ class TextTable:
     notes : tuple of str
         Sentences that belong under the table.
     data : tuple of tuple of str
-        Columns of the CSV file by heading: plain numbers in SI, the unit in the heading. Default: the text shown.
+        Columns of the CSV file by heading: plain numbers in SI, the unit in the heading. Default:
+        the text shown.
     """
 
     title: str
@@ -49,11 +50,13 @@ class TextTable:
 
         with replacing(path) as (part,), part.open("w", newline="", encoding="utf-8") as file:
             file.writelines(f"# {' '.join(note.split())}\n" for note in (self.title, *self.notes))
-            csv.writer(file).writerows([map(csv_cell, row) for row in self.data or (self.columns, *self.rows)])
+            csv.writer(file).writerows(
+                [map(csv_cell, row) for row in self.data or (self.columns, *self.rows)]
+            )
         return path
 
 
-# -- tables of numbers ---------------------------------------------------------------------------------------------------------
+# -- tables of numbers -----------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Column:
     """A column as it is shown, and the columns of numbers behind it.
@@ -65,7 +68,8 @@ class Column:
     text : callable
         The text of a row on the screen, by the number of the row.
     data : mapping of str to sequence
-        By heading, with the unit: numbers in SI, or words. A number that isn't there is None or NaN, and an empty cell.
+        By heading, with the unit: numbers in SI, or words. A number that isn't there is None or
+        NaN, and an empty cell.
     """
 
     heading: str
@@ -73,7 +77,9 @@ class Column:
     data: Mapping[str, Sequence[Any]]
 
 
-def quantity(heading: str, values: Any, unit: str, digits: int = 4, name: str | None = None) -> Column:
+def quantity(
+    heading: str, values: Any, unit: str, digits: int = 4, name: str | None = None
+) -> Column:
     """Numbers with a unit, each shown as people write it: ``0.4 mm``; ``-`` where there is none.
 
     ``name`` is the heading in the file, if it is another.
@@ -86,18 +92,31 @@ def quantity(heading: str, values: Any, unit: str, digits: int = 4, name: str | 
     return Column(heading, shown, {titled(name or heading, unit): numbers})
 
 
-def interval(heading: str, low: Any, high: Any, text: Callable[[float], str], unit: str = "") -> Column:
-    """A range, shown as ``2 to 4``, or as ``4`` where both ends have the same text; ``-`` where there is none."""
+def interval(
+    heading: str, low: Any, high: Any, text: Callable[[float], str], unit: str = ""
+) -> Column:
+    """A range, shown as ``2 to 4``, or as ``4`` where both ends have the same text; ``-`` where
+    there is none.
+    """
     ends = _floats(low), _floats(high)
 
     def shown(i: int) -> str:
         found = [text(end[i]) for end in ends if math.isfinite(end[i])]
         return " to ".join(dict.fromkeys(found)) or "-"
 
-    return Column(heading, shown, {titled(f"{heading} {side}", unit): end for side, end in zip(("from", "to"), ends, strict=True)})
+    return Column(
+        heading,
+        shown,
+        {
+            titled(f"{heading} {side}", unit): end
+            for side, end in zip(("from", "to"), ends, strict=True)
+        },
+    )
 
 
-def number(heading: str, values: Any, form: str = "", unit: str = "", name: str | None = None) -> Column:
+def number(
+    heading: str, values: Any, form: str = "", unit: str = "", name: str | None = None
+) -> Column:
     """Numbers in one form, the unit in the heading; ``-`` where there is none."""
     found = [None if value is None or value != value else value for value in _items(values)]
 
@@ -114,10 +133,19 @@ def words(heading: str, values: Any, name: str | None = None) -> Column:
 
 
 def varied(ds: xr.Dataset, trajectories: Any) -> list[Column]:
-    """A column for each parameter that differs from trajectory to trajectory, at the rows of these trajectories."""
-    names = [name for name in json.loads(ds.attrs.get("varied_parameters", "[]")) if name in ds.coords and ds[name].dims == ("trajectory",)]
+    """A column for each parameter that differs from trajectory to trajectory, at the rows of these
+    trajectories.
+    """
+    names = [
+        name
+        for name in json.loads(ds.attrs.get("varied_parameters", "[]"))
+        if name in ds.coords and ds[name].dims == ("trajectory",)
+    ]
     own = [ds[name].sel(trajectory=trajectories) for name in names]
-    return [quantity(name.replace("_", " "), one.values, one.attrs.get("units", "")) for name, one in zip(names, own, strict=True)]
+    return [
+        quantity(name.replace("_", " "), one.values, one.attrs.get("units", ""))
+        for name, one in zip(names, own, strict=True)
+    ]
 
 
 def with_error(heading: str, values: Any, errors: Any, form: str = ".4g", unit: str = "") -> Column:
@@ -127,13 +155,26 @@ def with_error(heading: str, values: Any, errors: Any, form: str = ".4g", unit: 
     def shown(i: int) -> str:
         if not math.isfinite(found[i]):
             return "-"
-        return f"{found[i]:{form}} ± {off[i]:.1g}" if math.isfinite(off[i]) else f"{found[i]:{form}}"
+        return (
+            f"{found[i]:{form}} ± {off[i]:.1g}" if math.isfinite(off[i]) else f"{found[i]:{form}}"
+        )
 
-    return Column(titled(heading, unit), shown, {titled(heading, unit): found, titled(f"{heading} error", unit): off})
+    return Column(
+        titled(heading, unit),
+        shown,
+        {titled(heading, unit): found, titled(f"{heading} error", unit): off},
+    )
 
 
-def table(title: str, columns: Sequence[Column], notes: Sequence[str] = (), shown: Sequence[int] | None = None) -> TextTable:
-    """A table from its columns; ``shown`` are the numbers of the rows for the screen, by default the first :data:`ROWS`."""
+def table(
+    title: str,
+    columns: Sequence[Column],
+    notes: Sequence[str] = (),
+    shown: Sequence[int] | None = None,
+) -> TextTable:
+    """A table from its columns; ``shown`` are the numbers of the rows for the screen, by default
+    the first :data:`ROWS`.
+    """
     data = {heading: values for column in columns for heading, values in column.data.items()}
     rows = list(zip(*data.values(), strict=True))
     chosen = range(min(len(rows), ROWS)) if shown is None else shown
@@ -153,7 +194,13 @@ def titled(heading: str, unit: str) -> str:
 
 def _cell(value: Any) -> str:
     """A value as a program reads it, with every digit."""
-    return "" if value is None or value != value else repr(value) if isinstance(value, float) else str(value)
+    return (
+        ""
+        if value is None or value != value
+        else repr(value)
+        if isinstance(value, float)
+        else str(value)
+    )
 
 
 def _items(values: Any) -> list[Any]:

@@ -12,8 +12,33 @@ import sys
 from types import ModuleType
 
 from saltus.system.clocks import mod
-from saltus.system.compositions import acos, asin, atan2, clip, cosh, heaviside, hypot, sign, sinh, where
-from saltus.system.functions import abs, atan, cos, exp, log, max, min, pi, piecewise, sin, sqrt, tan, tanh
+from saltus.system.compositions import (
+    acos,
+    asin,
+    atan2,
+    clip,
+    cosh,
+    heaviside,
+    hypot,
+    sign,
+    sinh,
+    where,
+)
+from saltus.system.functions import (
+    abs,
+    atan,
+    cos,
+    exp,
+    log,
+    max,
+    min,
+    pi,
+    piecewise,
+    sin,
+    sqrt,
+    tan,
+    tanh,
+)
 from saltus.system.guards import Guard
 from saltus.system.laws import freeplay
 from saltus.system.system import System
@@ -21,13 +46,17 @@ from saltus.system.tables import table
 from saltus.system.trace import system
 
 __all__ = [
-    "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp", "freeplay", "heaviside", "hypot", "log", "max",
-    "min", "mod", "pi", "piecewise", "sign", "sin", "sinh", "sqrt", "system", "table", "tan", "tanh", "where",
+    "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp",
+    "freeplay", "heaviside", "hypot", "log", "max",
+    "min", "mod", "pi", "piecewise", "sign", "sin", "sinh", "sqrt", "system", "table", "tan",
+    "tanh", "where",
 ]  # fmt: skip
 
 
 class _CallableModule(ModuleType):
-    """Lets ``saltus.system`` be the decorator, although importing this folder binds that name to the module."""
+    """Lets ``saltus.system`` be the decorator, although importing this folder binds that name to
+    the module.
+    """
 
     __call__ = staticmethod(system)
 

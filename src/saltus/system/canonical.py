@@ -1,7 +1,8 @@
 """A normal form of expressions, only to find out whether two of them are the same boundary.
 
-An expression is expanded to a sum of monomials over atoms (states, parameters, functions of normal forms), with rational
-coefficients. Nothing that is computed with a normal form reaches a trajectory.
+An expression is expanded to a sum of monomials over atoms (states, parameters, functions of normal
+forms), with rational coefficients. Nothing that is computed with a normal form reaches a
+trajectory.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ Polynomial = dict[Monomial, Fraction]
 ONE: Monomial = frozenset()
 _MOST_TERMS = 200  # beyond this an expanded product stays one atom
 _MOST_POWER = 12
-_SAME = Fraction(1, 10**14)  # two ratios of coefficients that differ by less are equal: 0.1*x > g/10 is x > g
+# two ratios of coefficients that differ by less are equal: 0.1*x > g/10 is x > g
+_SAME = Fraction(1, 10**14)
 
 
 class Canonical:
@@ -37,20 +39,30 @@ class Canonical:
         return self._memo[root]
 
     def kinds(self, polynomial: Polynomial) -> frozenset[str]:
-        """What the value depends on: ``state``, ``time``, ``param``, ``select``. A condition counts as ``select`` only."""
-        return frozenset().union(*(self._kinds[atom] for monomial in polynomial for atom, _ in monomial))
+        """What the value depends on: ``state``, ``time``, ``param``, ``select``. A condition counts
+        as ``select`` only.
+        """
+        return frozenset().union(
+            *(self._kinds[atom] for monomial in polynomial for atom, _ in monomial)
+        )
 
     def level_of(self, root: Expr) -> tuple[str | None, float]:
-        """``(state, c)`` if the value is ``c*state`` and something that depends on parameters only; else ``(None, 0.0)``."""
+        """``(state, c)`` if the value is ``c*state`` and something that depends on parameters only;
+        else ``(None, 0.0)``.
+        """
         polynomial = self.polynomial(root)
-        moving = [monomial for monomial in polynomial if self.kinds({monomial: polynomial[monomial]}) - {"param"}]
+        moving = [
+            monomial
+            for monomial in polynomial
+            if self.kinds({monomial: polynomial[monomial]}) - {"param"}
+        ]
         if len(moving) == 1:
             for key, number in self._atoms.items():
                 if key[0] == "state" and moving[0] == frozenset([(number, 1)]):
                     return key[1], float(polynomial[moving[0]])
         return None, 0.0
 
-    # -- one node ---------------------------------------------------------------------------------------------------------------
+    # -- one node ----------------------------------------------------------------------------------
     def _normal(self, node: Expr) -> Polynomial:
         parts = [self._memo[child] for child in node.args]
         match node.op:
@@ -79,7 +91,9 @@ class Canonical:
             self._kinds.append(kinds)
         return {frozenset([(number, 1)]): Fraction(1)}
 
-    def _function(self, name: tuple, parts: list[Polynomial], extra: frozenset[str] = frozenset()) -> Polynomial:
+    def _function(
+        self, name: tuple, parts: list[Polynomial], extra: frozenset[str] = frozenset()
+    ) -> Polynomial:
         """An atom that is a function of normal forms."""
         key = (name, *(frozenset(part.items()) for part in parts))
         return self._atom(key, extra.union(*(self.kinds(part) for part in parts)))
@@ -141,7 +155,9 @@ def proportion(a: Polynomial, b: Polynomial) -> int:
 
 
 def is_multiple(a: Polynomial, b: Polynomial) -> bool:
-    """Whether ``a = m b`` with a monomial m: a gap times, or over, quantities that it doesn't hold."""
+    """Whether ``a = m b`` with a monomial m: a gap times, or over, quantities that it
+    doesn't hold.
+    """
     if len(a) != len(b) or not a:
         return False
     own = {atom for monomial in b for atom, _ in monomial}
@@ -150,6 +166,8 @@ def is_multiple(a: Polynomial, b: Polynomial) -> bool:
     for candidate in a:
         factor = _merged(candidate, inverse)
         multiple = {_merged(monomial, factor): coefficient for monomial, coefficient in b.items()}
-        if all(exponent > 0 or atom not in own for atom, exponent in factor) and proportion(a, multiple):
+        if all(exponent > 0 or atom not in own for atom, exponent in factor) and proportion(
+            a, multiple
+        ):
             return True
     return False

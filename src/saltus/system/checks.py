@@ -21,29 +21,42 @@ def check_guards(system: str, count: int) -> None:
     """Raise a TraceError if a system has more boundaries than its mode has bits."""
     if count > MOST_GUARDS:
         raise TraceError(
-            f"{system} has {count} boundaries, and at most {MOST_GUARDS} can be followed at once, those of a section or of turning points "
+            f"{system} has {count} boundaries, and at most {MOST_GUARDS} can be followed at once, "
+            f"those of a section or of turning points "
             "and each knot of a table in a state among them. Take fewer stops, or coarser tables."
         )
 
 
 def check_range(name: str, value: Any, forced_at: str | None) -> None:
-    """Raise a ParameterError unless a value, or each of an array, is finite and in the range that the parameter's name implies."""
+    """Raise a ParameterError unless a value, or each of an array, is finite and in the range that
+    the parameter's name implies.
+    """
     numbers = np.asarray(value, dtype=np.float64)
 
     def refuse(bad: np.ndarray, what: str) -> None:
         if bad.any():
-            where = "" if numbers.ndim == 0 else f" (entry {int(np.flatnonzero(bad.ravel())[0])} of {numbers.size})"
+            where = (
+                ""
+                if numbers.ndim == 0
+                else (f" (entry {int(np.flatnonzero(bad.ravel())[0])} of {numbers.size})")
+            )
             raise ParameterError(f"{name} = {numbers[bad].ravel()[0]:g}{where} {what}")
 
     refuse(~np.isfinite(numbers), "is not a finite number.")
     if "mass" in name:
         refuse(numbers <= 0, "must be positive: the equation divides by the mass.")
     if name == forced_at:
-        refuse(numbers <= 0, "must be positive: it is the forcing frequency. Set the force to zero for free vibration.")
+        refuse(
+            numbers <= 0,
+            "must be positive: it is the forcing frequency. Set the force to zero "
+            "for free vibration.",
+        )
 
 
 def resolve(name: str, value: Any, unit: str, forced_at: str | None) -> Any:
-    """A value of a parameter, text or number or a list of either, as float or float64 array in SI, checked."""
+    """A value of a parameter, text or number or a list of either, as float or float64 array in SI,
+    checked.
+    """
     if isinstance(value, np.ndarray) and value.ndim and value.dtype.kind in "fiu":
         result: Any = value.astype(np.float64)
     elif isinstance(value, list | tuple) or getattr(value, "ndim", 0) != 0:
@@ -58,7 +71,10 @@ def resolve_one(name: str, value: Any, unit: str, forced_at: str | None) -> floa
     """As :func:`resolve`, for the single value that a system holds."""
     result = resolve(name, value, unit, forced_at)
     if not isinstance(result, float):
-        raise ParameterError(f"{name} got {result.size} values, but a system holds one. Give many by values= of the analysis.")
+        raise ParameterError(
+            f"{name} got {result.size} values, but a system holds one. Give many "
+            f"by values= of the analysis."
+        )
     return result
 
 
@@ -74,14 +90,20 @@ def point(system: System, t: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
     try:
         time, states = (np.asarray(given, dtype=np.float64) for given in (t, y))
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"t must be a time [s] and y the states {known} [SI], as numbers or arrays of them.") from None
+        raise ParameterError(
+            f"t must be a time [s] and y the states {known} [SI], as numbers or arrays of them."
+        ) from None
     if states.ndim == 0 or len(states) != len(system.states):
         count = len(states) if states.ndim else "no row"
-        raise ParameterError(f"{system.name} has the states {known}, but y holds {count} of them. Give one entry or row for each.")
+        raise ParameterError(
+            f"{system.name} has the states {known}, but y holds {count} of them. "
+            f"Give one entry or row for each."
+        )
     try:
         np.broadcast_shapes(time.shape, states.shape[1:])
     except ValueError:
         raise ParameterError(
-            f"t of the shape {time.shape} and y of the shape {states.shape} don't fit: t is one time, or one for each column of y."
+            f"t of the shape {time.shape} and y of the shape {states.shape} don't fit: t is one "
+            f"time, or one for each column of y."
         ) from None
     return time, states

@@ -1,7 +1,9 @@
-"""What the clock alone decides: comparisons of time and parameters, and remainders of time. Their instants are solved, never searched for.
+"""What the clock alone decides: comparisons of time and parameters, and remainders of time. Their
+instants are solved, never searched for.
 
-A comparison of time only is a *switch*: it flips at *breaks*, which follow from the parameters by a formula. No motion has to reach a
-boundary, so it is no guard, and nothing is recorded as a contact. Steps end at breaks exactly.
+A comparison of time only is a *switch*: it flips at *breaks*, which follow from the parameters by a
+formula. No motion has to reach a boundary, so it is no guard, and nothing is recorded as a contact.
+Steps end at breaks exactly.
 """
 
 from __future__ import annotations
@@ -34,7 +36,9 @@ class Level:
 
 @dataclass(frozen=True)
 class Wave:
-    """``factor*sin(rate*t + offset) + shift > 0`` (a cosine is a sine a quarter turn on): two breaks in each turn, or none."""
+    """``factor*sin(rate*t + offset) + shift > 0`` (a cosine is a sine a quarter turn on): two
+    breaks in each turn, or none.
+    """
 
     rate: Expr
     offset: Expr
@@ -74,7 +78,11 @@ def switch_of(gap: Expr) -> Level | Wave | Pulse | None:
     """When ``gap > 0`` flips, by a formula; None if there is none. The gap holds no conditions."""
     if line := affine(gap):
         return Level(*line)
-    inner = {node for node in ex.walk(gap) if node.op in ("sin", "cos", "mod") and ex.depends_on(node, ("time",))}
+    inner = {
+        node
+        for node in ex.walk(gap)
+        if node.op in ("sin", "cos", "mod") and ex.depends_on(node, ("time",))
+    }
     if len(inner) != 1:
         return None
     (wave,) = inner
@@ -86,11 +94,15 @@ def switch_of(gap: Expr) -> Level | Wave | Pulse | None:
         return None
     if wave.op == "mod":
         return Pulse(*line, wave.args[1], factor, shift)
-    return Wave(line[0], ex.add(line[1], math.pi / 2) if wave.op == "cos" else line[1], factor, shift)
+    return Wave(
+        line[0], ex.add(line[1], math.pi / 2) if wave.op == "cos" else line[1], factor, shift
+    )
 
 
 def cycles_of(node: Expr) -> tuple[Expr, bool]:
-    """(rate, whether it counts cycles) of a switch (its gap), a remainder or a table; a level and a table that ends don't repeat."""
+    """(rate, whether it counts cycles) of a switch (its gap), a remainder or a table; a level and a
+    table that ends don't repeat.
+    """
     if node.op in ("mod", "table"):
         line = affine(node.args[0])
         assert line is not None, "a system holds remainders and tables of rate*t + offset only"
@@ -109,7 +121,8 @@ def cycles_of(node: Expr) -> tuple[Expr, bool]:
 
 
 def switch(gap: Expr) -> Condition | bool:
-    """The condition ``gap > 0`` of a gap that depends on time and parameters only; pieces inside the gap become cases of the condition.
+    """The condition ``gap > 0`` of a gap that depends on time and parameters only; pieces inside
+    the gap become cases of the condition.
 
     Raises
     ------
@@ -120,7 +133,9 @@ def switch(gap: Expr) -> Condition | bool:
 
 
 def _cases(gap: Expr, whole: Expr, left: list[int]) -> Condition | bool:
-    """Or of (this piece and its comparison); ``left`` counts the comparisons that may still come."""
+    """Or of (this piece and its comparison); ``left`` counts the comparisons that may
+    still come.
+    """
     piece = next((node for node in ex.walk(gap) if node.op == "select"), None)
     if piece is None:
         if gap.op == "const" and gap.payload:
@@ -147,25 +162,31 @@ def _either(a: Condition | bool, b: Condition | bool) -> Condition | bool:
 
 def _unsolvable(gap: Expr) -> str:
     return (
-        f"the comparison {gap!r} > 0 depends on time only, and its times can't be solved for in advance. What can: a*t + b > 0, "
-        f"a*sl.sin(w*t + b) + c > 0, a*sl.mod(t, T) + b > 0, joined by & | ~, with numbers or parameters for the rest. "
+        f"the comparison {gap!r} > 0 depends on time only, and its times can't be solved for in "
+        f"advance. What can: a*t + b > 0, "
+        f"a*sl.sin(w*t + b) + c > 0, a*sl.mod(t, T) + b > 0, joined by & | ~, with numbers or "
+        f"parameters for the rest. "
         f"Anything else is data: sl.table(t, points, values)."
     )
 
 
 def of_time_only(gap: Expr) -> bool:
-    """Whether a gap depends on time, and on no state (pieces in it that time decides are time too)."""
+    """Whether a gap depends on time, and on no state (pieces in it that time decides
+    are time too).
+    """
     return ex.depends_on(gap, ("time",)) and not ex.depends_on(gap, ("state",))
 
 
 def mod(a: Operand, cycle: Operand) -> Any:
-    """The remainder of ``a`` by ``cycle``, in [0, cycle): time within the present cycle, for drives that repeat.
+    """The remainder of ``a`` by ``cycle``, in [0, cycle): time within the present cycle, for drives
+    that repeat.
 
     Parameters
     ----------
     a : Expr or float
-        Time, or ``rate*t + offset`` with a rate and an offset of numbers and parameters. It is back at zero at each whole multiple of the
-        cycle; these times follow by a formula, and steps end there.
+        Time, or ``rate*t + offset`` with a rate and an offset of numbers and parameters. It is back
+        at zero at each whole multiple of the cycle; these times follow by a formula, and steps end
+        there.
     cycle : Expr or float
         Its length: a number or a parameter, not zero.
 
@@ -188,14 +209,17 @@ def mod(a: Operand, cycle: Operand) -> Any:
         return of_numbers("mod", operator.mod, a, cycle)
     value, length = ex.as_expr(a), ex.as_expr(cycle)
     if ex.varies(length):
-        raise TraceError(f"the cycle of sl.mod must be a number or a parameter, not {shown(length)}.")
+        raise TraceError(
+            f"the cycle of sl.mod must be a number or a parameter, not {shown(length)}."
+        )
     if length.op == "const" and length.payload == 0:
         raise TraceError("the cycle of sl.mod is zero.")
     with ex.observed(None):
         line = affine(value)
     if line is None or not ex.depends_on(value, ("time",)):
         raise TraceError(
-            f"sl.mod of {value!r}: a remainder is for rate*t + offset with numbers and parameters. Of a state it has no end of boundaries; "
+            f"sl.mod of {value!r}: a remainder is for rate*t + offset with numbers and parameters. "
+            f"Of a state it has no end of boundaries; "
             f"write a law that repeats in x with sl.sin and sl.cos."
         )
     return Expr("mod", (value, length))

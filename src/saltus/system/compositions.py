@@ -1,6 +1,8 @@
-"""Functions made of others: each is a composition of elementary functions and pieces, chosen so that no digit is lost near special points.
+"""Functions made of others: each is a composition of elementary functions and pieces, chosen so
+that no digit is lost near special points.
 
-Derivatives and Taylor series follow from the parts. A function with a kink or a jump has its boundaries there, as `sl.piecewise` would.
+Derivatives and Taylor series follow from the parts. A function with a kink or a jump has its
+boundaries there, as `sl.piecewise` would.
 """
 
 from __future__ import annotations
@@ -17,15 +19,17 @@ def _traced(*values: object) -> bool:
 
 
 def where(condition: Condition | bool, value: Operand, otherwise: Operand) -> Any:
-    """``value`` where the condition holds, ``otherwise`` elsewhere: short for ``sl.piecewise((value, condition), otherwise=otherwise)``."""
+    """``value`` where the condition holds, ``otherwise`` elsewhere: short for
+    ``sl.piecewise((value, condition), otherwise=otherwise)``.
+    """
     return piecewise((value, condition), otherwise=otherwise)
 
 
 def sign(a: Operand) -> Any:
     """1 where ``a > 0``, -1 where ``a < 0``; a boundary at ``a = 0``. Of the number 0 it is 0.
 
-    As the direction of friction it makes the motion stick where both sides push onto ``a = 0``; saltus stops there with status `sliding`.
-    ``sl.tanh(a/width)`` is its smooth stand-in.
+    As the direction of friction it makes the motion stick where both sides push onto ``a = 0``;
+    saltus stops there with status `sliding`. ``sl.tanh(a/width)`` is its smooth stand-in.
     """
     if _traced(a):
         return piecewise((1.0, a > 0), otherwise=-1.0)
@@ -33,14 +37,23 @@ def sign(a: Operand) -> Any:
 
 
 def heaviside(a: Operand, at_zero: float = 0.5) -> Any:
-    """1 where ``a > 0``, 0 where ``a < 0``; a boundary at ``a = 0``. Of the number 0 it is ``at_zero``."""
+    """1 where ``a > 0``, 0 where ``a < 0``; a boundary at ``a = 0``. Of the number 0 it is
+    ``at_zero``.
+    """
     if _traced(a):
         return piecewise((1.0, a > 0), otherwise=0.0)
-    return of_numbers("heaviside", lambda a, at_zero: 1.0 if a > 0 else float(at_zero) if a == 0 else 0.0, a, at_zero)
+    return of_numbers(
+        "heaviside",
+        lambda a, at_zero: 1.0 if a > 0 else float(at_zero) if a == 0 else 0.0,
+        a,
+        at_zero,
+    )
 
 
 def clip(a: Operand, low: Operand, high: Operand) -> Any:
-    """``a`` held between ``low`` and ``high``: ``sl.min(sl.max(a, low), high)``, with a boundary at each end."""
+    """``a`` held between ``low`` and ``high``: ``sl.min(sl.max(a, low), high)``, with a boundary at
+    each end.
+    """
     return min(max(a, low), high)
 
 
@@ -50,20 +63,28 @@ def cosh(a: Operand) -> Any:
 
 
 def sinh(a: Operand) -> Any:
-    """Hyperbolic sine, to a few ulp of its value near zero too (the difference of two exponentials has no digits there)."""
+    """Hyperbolic sine, to a few ulp of its value near zero too (the difference of two exponentials
+    has no digits there).
+    """
     return tanh(a) * cosh(a) if _traced(a) else of_numbers("sinh", math.sinh, a)
 
 
 def asin(a: Operand) -> Any:
-    """Inverse sine [rad], in [-pi/2, pi/2]. Its rate is infinite at -1 and 1; beyond them it isn't a number."""
+    """Inverse sine [rad], in [-pi/2, pi/2]. Its rate is infinite at -1 and 1; beyond them it isn't
+    a number.
+    """
     if not _traced(a):
         return of_numbers("asin", math.asin, a)
     return 2.0 * atan(a / (1.0 + sqrt((1.0 - a) * (1.0 + a))))
 
 
 def acos(a: Operand) -> Any:
-    """Inverse cosine [rad], in [0, pi]. Its rate is infinite at -1 and 1; beyond them it isn't a number."""
-    return 2.0 * atan(sqrt((1.0 - a) / (1.0 + a))) if _traced(a) else of_numbers("acos", math.acos, a)
+    """Inverse cosine [rad], in [0, pi]. Its rate is infinite at -1 and 1; beyond them it isn't a
+    number.
+    """
+    return (
+        2.0 * atan(sqrt((1.0 - a) / (1.0 + a))) if _traced(a) else of_numbers("acos", math.acos, a)
+    )
 
 
 def hypot(a: Operand, b: Operand) -> Any:
@@ -74,8 +95,8 @@ def hypot(a: Operand, b: Operand) -> Any:
 def atan2(y: Operand, x: Operand) -> Any:
     """Angle of the point (x, y) from the x axis [rad], in (-pi, pi].
 
-    Boundaries at ``x = 0``, where it is smooth, and at ``y = 0``, where it jumps by 2 pi if x is negative. It is half-angle formulas
-    inside, for which no two terms cancel.
+    Boundaries at ``x = 0``, where it is smooth, and at ``y = 0``, where it jumps by 2 pi if x is
+    negative. It is half-angle formulas inside, for which no two terms cancel.
     """
     if not _traced(y, x):
         return of_numbers("atan2", math.atan2, y, x)

@@ -1,14 +1,29 @@
 """Derivatives of expressions, taken on the graph.
 
-The mode is frozen: the derivative of a ``select`` is the select of the derivatives. What happens at the boundary itself (the saltation) is
-the business of whoever crosses it.
+The mode is frozen: the derivative of a ``select`` is the select of the derivatives. What happens at
+the boundary itself (the saltation) is the business of whoever crosses it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from saltus.system.expression import TIME, Expr, add, constant, depends_on, div, elementary, mul, neg, power, select, state, sub, walk
+from saltus.system.expression import (
+    TIME,
+    Expr,
+    add,
+    constant,
+    depends_on,
+    div,
+    elementary,
+    mul,
+    neg,
+    power,
+    select,
+    state,
+    sub,
+    walk,
+)
 
 _ZERO = constant(0.0)
 
@@ -34,7 +49,10 @@ def differentiate(expression: Expr, with_respect_to: Expr) -> Expr:
         If ``with_respect_to`` isn't a leaf.
     """
     if with_respect_to.op not in ("state", "param", "time"):
-        raise ValueError(f"derivatives are taken with respect to a state, a parameter or t, not {with_respect_to!r}")
+        raise ValueError(
+            f"derivatives are taken with respect to a state, a parameter or t, not "
+            f"{with_respect_to!r}"
+        )
     derivatives: dict[Expr, Expr] = {}
     for node in walk(expression):
         inner = [derivatives[child] for child in node.args]
@@ -62,7 +80,9 @@ def _rule(node: Expr, inner: list[Expr]) -> Expr:
             return div(sub(da, mul(node, db)), b)
         case "pow", (a, n), (da, dn):
             by_base = mul(mul(n, power(a, sub(n, 1.0))), da)
-            return by_base if dn is _ZERO else add(by_base, mul(mul(node, elementary("log", a)), dn))
+            return (
+                by_base if dn is _ZERO else add(by_base, mul(mul(node, elementary("log", a)), dn))
+            )
         case "select", _, (da, db):
             return select(node.payload, da, db)
         case "mod", _, (da, _):
@@ -99,7 +119,9 @@ def _outer(op: str, value: Expr, u: Expr) -> Expr:
 def gradient(expression: Expr, states: Sequence[str]) -> tuple[Expr, ...]:
     """Derivatives with respect to each state, in a frozen mode."""
     present = {node.payload for node in walk(expression) if node.op == "state"}
-    return tuple(differentiate(expression, state(name)) if name in present else _ZERO for name in states)
+    return tuple(
+        differentiate(expression, state(name)) if name in present else _ZERO for name in states
+    )
 
 
 def time_derivative(expression: Expr) -> Expr:

@@ -1,9 +1,10 @@
-"""Dimensions of an equation, checked while it is traced: terms of a sum or comparison have one unit, and rates that of their state
-per second.
+"""Dimensions of an equation, checked while it is traced: terms of a sum or comparison have one
+unit, and rates that of their state per second.
 
-Numbers written into an equation are in SI and may have any unit. Alone in a sum, a comparison or a piece they take the unit of the other
-terms (``x > 1e-3``). A product with one has no known unit (``-4000*x``), except with the numbers of formulas (2, 1/2, 2 pi). Unknown units
-are not checked. Angles count as plain numbers.
+Numbers written into an equation are in SI and may have any unit. Alone in a sum, a comparison or a
+piece they take the unit of the other terms (``x > 1e-3``). A product with one has no known unit
+(``-4000*x``), except with the numbers of formulas (2, 1/2, 2 pi). Unknown units are not checked.
+Angles count as plain numbers.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ class DimensionCheck:
     states : sequence of str
         Names of the states.
     units : mapping of str to str
-        Unit of each state and parameter; ``""`` where it isn't known. The time is in seconds if a state has a dimension: a system whose
-        states are all plain numbers has a plain time as well.
+        Unit of each state and parameter; ``""`` where it isn't known. The time is in seconds if a
+        state has a dimension: a system whose states are all plain numbers has a plain time as well.
     """
 
     def __init__(self, states: Sequence[str], units: Mapping[str, str]) -> None:
@@ -50,7 +51,8 @@ class DimensionCheck:
         self._known: dict[Expr, Dimension | None] = {}
 
     def __call__(self, node: Expr) -> None:
-        """Note the dimension of a new node; the observer of :func:`saltus.system.expression.observed`.
+        """Note the dimension of a new node; the observer of
+        :func:`saltus.system.expression.observed`.
 
         Raises
         ------
@@ -65,7 +67,9 @@ class DimensionCheck:
         self._known[node] = None
 
     def check_rates(self, rates: Sequence[Expr]) -> None:
-        """Raise a UnitError unless each rate is in the unit of its state per second, where both are known."""
+        """Raise a UnitError unless each rate is in the unit of its state per second, where both are
+        known.
+        """
         for name, rate in zip(self._states, rates, strict=True):
             own, found = self._units[name], self._dimension(rate)
             if own is None or self._time is None or found is None or isinstance(found, _Number):
@@ -74,16 +78,21 @@ class DimensionCheck:
             if found != wanted:
                 term = _first_term(rate)
                 raise UnitError(
-                    f"d{name}/dt is a rate in {unit_text(wanted)}, but {_brief(term)} is {_in(found)}: "
+                    f"d{name}/dt is a rate in {unit_text(wanted)}, but {_brief(term)} is "
+                    f"{_in(found)}: "
                     f"{_missing(found, wanted)}. {_WAY_OUT}"
                 )
 
     def unit(self, node: Expr) -> str:
         """Coherent SI unit of a node, ``""`` if it isn't known, or may be that of an angle."""
         found = self._dimension(node)
-        return "" if found is None or isinstance(found, _Number) or not found.keys() - {"s"} else unit_text(found)
+        return (
+            ""
+            if found is None or isinstance(found, _Number) or not found.keys() - {"s"}
+            else unit_text(found)
+        )
 
-    # -- one node ---------------------------------------------------------------------------------------------------------------
+    # -- one node ----------------------------------------------------------------------------------
     def _dimension(self, node: Expr) -> Dimension | None:
         self(node)
         return self._known[node]
@@ -107,7 +116,11 @@ class DimensionCheck:
             case "pow":
                 return self._power(node, args[0], args[1])
             case "sqrt":
-                return args[0] if not args[0] else {base: exponent / 2 for base, exponent in args[0].items()}
+                return (
+                    args[0]
+                    if not args[0]
+                    else {base: exponent / 2 for base, exponent in args[0].items()}
+                )
             case op if op in ELEMENTARY:
                 return self._plain(node, args[0])
         return None
@@ -124,12 +137,16 @@ class DimensionCheck:
             return a
         left, right = _first_term(node.args[0]), _first_term(node.args[1])
         what = "are pieces of one value" if node.op == "select" else "are added or compared"
+        second = b.get("kg", 0) > a.get("kg", 0)
+        missing = _missing(b, a, " in the second") if second else _missing(a, b, " in the first")
         raise UnitError(
-            f"{_brief(left)} [{unit_text(a)}] and {_brief(right)} [{unit_text(b)}] {what}, which needs one unit: "
-            f"{_missing(b, a, ' in the second') if b.get('kg', 0) > a.get('kg', 0) else _missing(a, b, ' in the first')}. {_WAY_OUT}"
+            f"{_brief(left)} [{unit_text(a)}] and {_brief(right)} [{unit_text(b)}] {what}, which "
+            f"needs one unit: {missing}. {_WAY_OUT}"
         )
 
-    def _power(self, node: Expr, base: Dimension | None, exponent: Dimension | None) -> Dimension | None:
+    def _power(
+        self, node: Expr, base: Dimension | None, exponent: Dimension | None
+    ) -> Dimension | None:
         """Of a power, whose exponent must be a plain number."""
         self._plain(node, exponent, "as the exponent of")
         if base is None or isinstance(base, _Number) or not base:
@@ -143,11 +160,14 @@ class DimensionCheck:
     def _plain(self, node: Expr, argument: Dimension | None, where: str = "in") -> Dimension | None:
         """Of a function of a plain number or an angle."""
         inner = node.args[-1]
-        if argument and any(abs(number) != 1 and abs(number) not in PI_MULTIPLES for number in _factors(inner)):
+        if argument and any(
+            abs(number) != 1 and abs(number) not in PI_MULTIPLES for number in _factors(inner)
+        ):
             return None  # cos(3*t): the number is a frequency
         if argument:
             raise UnitError(
-                f"{_brief(inner)} is in {unit_text(argument)}, but stands {where} {_brief(node)}, which takes a plain number or an "
+                f"{_brief(inner)} is in {unit_text(argument)}, but stands {where} {_brief(node)}, "
+                f"which takes a plain number or an "
                 f"angle. {_WAY_OUT}"
             )
         return None if argument is None else _PLAIN
@@ -164,20 +184,28 @@ def _joined(a: Dimension | None, b: Dimension | None, sign: int) -> Dimension | 
 
 
 def _product(a: Dimension, b: Dimension, power: int) -> Dimension:
-    total = {base: a.get(base, Fraction(0)) + power * b.get(base, Fraction(0)) for base in {**a, **b}}
+    total = {
+        base: a.get(base, Fraction(0)) + power * b.get(base, Fraction(0)) for base in {**a, **b}
+    }
     return {base: exponent for base, exponent in total.items() if exponent}
 
 
 def _is_plain(number: float) -> bool:
-    """Whether a number is one of those that formulas are made of: a small multiple of 1, 1/2, 1/3 or 1/6, or one of pi."""
+    """Whether a number is one of those that formulas are made of: a small multiple of 1, 1/2, 1/3
+    or 1/6, or one of pi.
+    """
     size = abs(number)
     return size in PI_MULTIPLES or (size < 10 and abs(6 * size - round(6 * size)) < 1e-12)
 
 
-def units_of(states: Sequence[str], units: Mapping[str, str], rates: Sequence[Expr], formulas: Sequence[Expr]) -> list[str]:
-    """Coherent SI unit of each formula of a system's states and parameters, ``""`` where it isn't known.
+def units_of(
+    states: Sequence[str], units: Mapping[str, str], rates: Sequence[Expr], formulas: Sequence[Expr]
+) -> list[str]:
+    """Coherent SI unit of each formula of a system's states and parameters, ``""`` where it isn't
+    known.
 
-    None is known of a system whose own equations don't have one unit in a sum: it was traced with ``check_units=False``.
+    None is known of a system whose own equations don't have one unit in a sum: it was traced with
+    ``check_units=False``.
     """
     check = DimensionCheck(states, units)
     try:
@@ -198,7 +226,7 @@ def _unit(check: DimensionCheck, formula: Expr) -> str:
     return check.unit(formula)
 
 
-# -- words ---------------------------------------------------------------------------------------------------------------------
+# -- words -----------------------------------------------------------------------------------------
 def _first_term(node: Expr) -> Expr:
     """The first summand of a sum."""
     while node.op in ("add", "sub"):

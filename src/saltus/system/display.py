@@ -16,24 +16,68 @@ if TYPE_CHECKING:
     from saltus.system.system import System
 
 _GREEK = frozenset(
-    "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau phi chi psi omega "  # noqa: SIM905
-    "Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega".split()
+    [
+        "alpha",
+        "beta",
+        "gamma",
+        "delta",
+        "epsilon",
+        "zeta",
+        "eta",
+        "theta",
+        "iota",
+        "kappa",
+        "lambda",
+        "mu",
+        "nu",
+        "xi",
+        "pi",
+        "rho",
+        "sigma",
+        "tau",
+        "phi",
+        "chi",
+        "psi",
+        "omega",
+        "Gamma",
+        "Delta",
+        "Theta",
+        "Lambda",
+        "Xi",
+        "Pi",
+        "Sigma",
+        "Phi",
+        "Psi",
+        "Omega",
+    ]
 )
 
 
-# -- text ----------------------------------------------------------------------------------------------------------------------
+# -- text ------------------------------------------------------------------------------------------
 def equation_lines(system: System) -> list[str]:
     """The equations, one line each, named parts first."""
     writer = _writer(Writer, system)
-    lines = [f"d{name}/dt = {writer.text(entry)}" for name, entry in zip(system.states, system.field, strict=True)]
+    lines = [
+        f"d{name}/dt = {writer.text(entry)}"
+        for name, entry in zip(system.states, system.field, strict=True)
+    ]
     return writer.lines + lines
 
 
 def system_text(system: System) -> str:
     """The block that ``repr`` shows: equations, guards, parameters."""
-    head = f"System {system.name}: {_counted(len(system.states), 'state')}, {_counted(len(system.guards), 'guard')}{_forcing(system)}"
-    states = [f"{name} [{system.units[name]}]" if system.units[name] else name for name in system.states]
-    blocks = [[head], [f"states      {', '.join(states)}"], _labelled("equations", equation_lines(system))]
+    head = (
+        f"System {system.name}: {_counted(len(system.states), 'state')}, "
+        f"{_counted(len(system.guards), 'guard')}{_forcing(system)}"
+    )
+    states = [
+        f"{name} [{system.units[name]}]" if system.units[name] else name for name in system.states
+    ]
+    blocks = [
+        [head],
+        [f"states      {', '.join(states)}"],
+        _labelled("equations", equation_lines(system)),
+    ]
     if system.guards:
         blocks.append(_labelled("guards", _aligned(_guard_rows(system))))
     if system.values:
@@ -46,7 +90,10 @@ def system_text(system: System) -> str:
 def _forcing(system: System) -> str:
     if system.forced_at is None:
         return ", not forced"
-    return f", forced at {system.forced_at} = {system.parameter_text(system.forced_at)} (T = {from_si(system.period(), 's')})"
+    return (
+        f", forced at {system.forced_at} = {system.parameter_text(system.forced_at)} (T = "
+        f"{from_si(system.period(), 's')})"
+    )
 
 
 def _guard_rows(system: System) -> list[tuple[str, str]]:
@@ -59,7 +106,11 @@ def _guard_rows(system: System) -> list[tuple[str, str]]:
         place = writer.side(number).replace(" > ", " = ", 1)
         if guard.boundary is not None and guard.state is not None:
             (value,) = evaluate([guard.boundary], values=system.values)
-            place += f"  ({from_si(float(value) + 0.0, system.units[guard.state])})" if guard.boundary.op != "const" else ""
+            place += (
+                f"  ({from_si(float(value) + 0.0, system.units[guard.state])})"
+                if guard.boundary.op != "const"
+                else ""
+            )
         rows.append((guard.name, place))
     return rows
 
@@ -67,8 +118,15 @@ def _guard_rows(system: System) -> list[tuple[str, str]]:
 def _parameter_rows(system: System) -> list[tuple[str, str]]:
     """Name and value of each parameter; an angle in degrees too."""
     texts = {name: system.parameter_text(name) for name in system.values}
-    degrees = {name: from_si(math.degrees(value), "") for name, value in system.values.items() if system.units[name] == "rad"}
-    return [(name, f"{text} ({degrees[name]} deg)" if name in degrees else text) for name, text in texts.items()]
+    degrees = {
+        name: from_si(math.degrees(value), "")
+        for name, value in system.values.items()
+        if system.units[name] == "rad"
+    }
+    return [
+        (name, f"{text} ({degrees[name]} deg)" if name in degrees else text)
+        for name, text in texts.items()
+    ]
 
 
 def _writer(kind: type, system: System) -> Writer:
@@ -89,7 +147,7 @@ def _counted(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-# -- formulas ------------------------------------------------------------------------------------------------------------------
+# -- formulas --------------------------------------------------------------------------------------
 class LatexWriter(Writer):
     """Writes expressions as LaTeX math."""
 
@@ -107,23 +165,37 @@ class LatexWriter(Writer):
     def number(self, value: float) -> tuple[str, int]:
         """A constant, powers of ten written out."""
         if value in PI_MULTIPLES:
-            return {"pi": r"\pi", "2*pi": r"2 \pi", "4*pi": r"4 \pi", "pi/2": r"\frac{\pi}{2}"}[PI_MULTIPLES[value]], _ATOM
+            return {"pi": r"\pi", "2*pi": r"2 \pi", "4*pi": r"4 \pi", "pi/2": r"\frac{\pi}{2}"}[
+                PI_MULTIPLES[value]
+            ], _ATOM
         text, strength = super().number(value)
         mantissa, _, exponent = text.partition("e")
-        return (text, strength) if not exponent else (rf"{mantissa} \cdot 10^{{{exponent}}}", min(strength, _PRODUCT))
+        return (
+            (text, strength)
+            if not exponent
+            else (
+                rf"{mantissa} \cdot "
+                rf"10^{{{exponent}}}",
+                min(strength, _PRODUCT),
+            )
+        )
 
     def infix(self, op: str, left: Expr, right: Expr) -> tuple[str, int]:
         """Quotients as fractions, products without a sign."""
         if op == "div":
             return rf"\frac{{{self.text(left)}}}{{{self.text(right)}}}", _ATOM
         if op == "mul":
-            return rf"{self.part(left, _PRODUCT)} \, {self.part(right, _PRODUCT, after_sign=True)}", _PRODUCT
+            return (
+                rf"{self.part(left, _PRODUCT)} \, "
+                rf"{self.part(right, _PRODUCT, after_sign=True)}"
+            ), _PRODUCT
         return super().infix(op, left, right)
 
     def power(self, base: Expr, exponent: Expr) -> str:
         """A superscript."""
         text = self.part(base, _ATOM)
-        return rf"{text if base.op in ('state', 'param', 'time') else '{' + text + '}'}^{{{self.text(exponent)}}}"
+        braced = text if base.op in ("state", "param", "time") else f"{{{text}}}"
+        return f"{braced}^{{{self.text(exponent)}}}"
 
     def call(self, function: str, *arguments: Expr) -> str:
         """A function or a root."""
@@ -140,7 +212,10 @@ class LatexWriter(Writer):
 
     def piecewise(self, pieces: list[str], otherwise: Expr) -> str:
         """Cases."""
-        return rf"\begin{{cases}} {' '.join(pieces)} {self.text(otherwise)} & \text{{otherwise}} \end{{cases}}"
+        return (
+            rf"\begin{{cases}} {' '.join(pieces)} {self.text(otherwise)} & \text{{otherwise}} "
+            rf"\end{{cases}}"
+        )
 
     def parentheses(self, text: str) -> str:
         """Parentheses that grow."""
@@ -152,11 +227,20 @@ class LatexWriter(Writer):
 
 
 def latex_name(name: str) -> str:
-    r"""A name as LaTeX: one letter in italics, Greek letters by name, ``m_1`` with a subscript, words upright."""
+    r"""A name as LaTeX: one letter in italics, Greek letters by name, ``m_1`` with a subscript,
+    words upright.
+    """
     head, _, rest = name.partition("_")
     letters = re.fullmatch(r"([A-Za-z]+?)(\d*)", head)
     if letters is None or not (len(letters[1]) == 1 or letters[1] in _GREEK) or "_" in rest:
-        return r"\mathrm{" + "".join(c if c.isalnum() and c.isascii() else r"\_" if c == "_" else rf"\text{{{c}}}" for c in name) + "}"
+        return (
+            r"\mathrm{"
+            + "".join(
+                c if c.isalnum() and c.isascii() else r"\_" if c == "_" else rf"\text{{{c}}}"
+                for c in name
+            )
+            + "}"
+        )
     symbol = letters[1] if len(letters[1]) == 1 else "\\" + letters[1]
     below = rest or letters[2]
     if letters[2] and rest:  # m2_b
@@ -169,14 +253,20 @@ def latex_name(name: str) -> str:
 def latex_lines(system: System) -> list[str]:
     """The equations as LaTeX, aligned at ``&=``."""
     writer = _writer(LatexWriter, system)
-    lines = [f"\\dot{{{latex_name(name)}}} &= {writer.text(entry)}" for name, entry in zip(system.states, system.field, strict=True)]
+    lines = [
+        f"\\dot{{{latex_name(name)}}} &= {writer.text(entry)}"
+        for name, entry in zip(system.states, system.field, strict=True)
+    ]
     return writer.lines + lines
 
 
 def system_html(system: System) -> str:
     """The notebook view: formulas, guards and parameters."""
     formulas = " \\\\ ".join(latex_lines(system))
-    parts = [f"<b>{html.escape(system.name)}</b> <span>{html.escape(_forcing(system).lstrip(', '))}</span>"]
+    parts = [
+        f"<b>{html.escape(system.name)}</b> "
+        f"<span>{html.escape(_forcing(system).lstrip(', '))}</span>"
+    ]
     if system.description:
         parts.append(f"<p>{html.escape(system.description.splitlines()[0])}</p>")
     parts.append(f"$$\\begin{{aligned}} {html.escape(formulas)} \\end{{aligned}}$$")
@@ -189,5 +279,7 @@ def system_html(system: System) -> str:
 
 def _table(head: tuple[str, str], rows: Iterable[tuple[str, str]]) -> str:
     top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
-    body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
     return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"

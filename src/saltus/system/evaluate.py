@@ -1,4 +1,6 @@
-"""Numbers from expressions, by NumPy: for tests, checks and pictures. Trajectories are computed by generated code, not here."""
+"""Numbers from expressions, by NumPy: for tests, checks and pictures. Trajectories are computed by
+generated code, not here.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,10 @@ if TYPE_CHECKING:
     from saltus.system.system import System
 
 _OPERATIONS: dict[str, Any] = {
-    "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative, "pow": np.power, "mod": np.mod,
-    "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan, "atan": np.arctan, "tanh": np.tanh,
+    "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "neg": np.negative,
+    "pow": np.power, "mod": np.mod,
+    "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
+    "atan": np.arctan, "tanh": np.tanh,
 }  # fmt: skip
 
 
@@ -37,12 +41,14 @@ def evaluate(
     states, values : mapping of str to float or array
         States and parameters [SI]. All arrays must broadcast.
     bits : sequence of bool or array of bool
-        Side of each guard: True where its gap is positive. May be shorter than the list of guards if the rest isn't used.
+        Side of each guard: True where its gap is positive. May be shorter than the list of guards
+        if the rest isn't used.
 
     Returns
     -------
     list of float64 scalars or arrays
-        One for each expression. Where an operation isn't defined the value is nan or inf, without a warning.
+        One for each expression. Where an operation isn't defined the value is nan or inf, without a
+        warning.
     """
     expressions = list(expressions)
     known: dict[Expr, Any] = {}
@@ -81,7 +87,8 @@ def evaluate(
 def sides(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = None) -> list[Any]:
     """Side of each guard where the state is: True if the gap is positive.
 
-    On a boundary itself (gap exactly 0) this says False; which side the motion enters is decided by derivatives, in the flow.
+    On a boundary itself (gap exactly 0) this says False; which side the motion enters is decided by
+    derivatives, in the flow.
 
     Parameters
     ----------
@@ -109,10 +116,18 @@ def sides(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = Non
 
 def mode_number(bits: Sequence[Any]) -> Any:
     """Bits as one integer: bit i is guard i."""
-    return sum((np.asarray(bit, dtype=np.int64) << i for i, bit in enumerate(bits)), start=np.int64(0))
+    return sum(
+        (np.asarray(bit, dtype=np.int64) << i for i, bit in enumerate(bits)), start=np.int64(0)
+    )
 
 
-def field(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = None, bits: Sequence[Any] | None = None) -> np.ndarray:
+def field(
+    system: System,
+    t: Any,
+    y: Any,
+    values: Mapping[str, Any] | None = None,
+    bits: Sequence[Any] | None = None,
+) -> np.ndarray:
     """Time derivatives of the states.
 
     Parameters
@@ -140,6 +155,8 @@ def field(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = Non
     return np.array(np.broadcast_arrays(*derivatives))
 
 
-def _arguments(system: System, y: Any, values: Mapping[str, Any] | None) -> tuple[dict[str, Any], dict[str, Any]]:
+def _arguments(
+    system: System, y: Any, values: Mapping[str, Any] | None
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """States by name and all parameter values."""
     return dict(zip(system.states, y, strict=True)), {**system.values, **(values or {})}

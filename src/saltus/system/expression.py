@@ -1,11 +1,13 @@
 """Expressions: what a traced equation is made of.
 
-An :class:`Expr` is one node of a directed acyclic graph. Nodes are interned: the same operation on the same operands is the same
-object, so common subexpressions are shared from the start, and the order of operations is the order in which the user wrote them (a
-computer algebra system would sort the terms; MATLAB's digits depend on that order, see docs/decisions/0002).
+An :class:`Expr` is one node of a directed acyclic graph. Nodes are interned: the same operation on
+the same operands is the same object, so common subexpressions are shared from the start, and the
+order of operations is the order in which the user wrote them (a computer algebra system would sort
+the terms; MATLAB's digits depend on that order, see docs/decisions/0002).
 
-Conditions (:class:`Relation`, :class:`And`, :class:`Or`, :class:`Not`) never become Python booleans: asking for their truth raises a
-:class:`~saltus.errors.TraceError` that says what to write instead.
+Conditions (:class:`Relation`, :class:`And`, :class:`Or`, :class:`Not`) never become Python
+booleans: asking for their truth raises a :class:`~saltus.errors.TraceError` that says what to write
+instead.
 """
 
 from __future__ import annotations
@@ -38,12 +40,14 @@ class Expr:
     Attributes
     ----------
     op : str
-        ``const``, ``param``, ``state``, ``time``, ``add``, ``sub``, ``mul``, ``div``, ``neg``, ``pow``, ``select``, ``mod``, ``table`` or
-        one of :data:`ELEMENTARY`.
+        ``const``, ``param``, ``state``, ``time``, ``add``, ``sub``, ``mul``, ``div``, ``neg``,
+        ``pow``, ``select``, ``mod``, ``table`` or one of :data:`ELEMENTARY`.
     args : tuple of Expr
-        Operands in the order written. ``pow`` holds base and exponent, ``select`` the value where its condition holds and the other.
+        Operands in the order written. ``pow`` holds base and exponent, ``select`` the value where
+        its condition holds and the other.
     payload : object
-        The number of a ``const``, the name of a ``param`` or ``state``, the condition of a ``select``, the data of a ``table``; else None.
+        The number of a ``const``, the name of a ``param`` or ``state``, the condition of a
+        ``select``, the data of a ``table``; else None.
     """
 
     __slots__ = ("__weakref__", "args", "op", "payload")
@@ -67,7 +71,7 @@ class Expr:
             observer(node)
         return node
 
-    # -- arithmetic -------------------------------------------------------------------------------------------------------------
+    # -- arithmetic --------------------------------------------------------------------------------
     def __add__(self, other: Operand) -> Expr:
         return add(self, other)
 
@@ -113,18 +117,22 @@ class Expr:
 
         return traced_ufunc(ufunc, method, inputs, keywords)
 
-    # -- what has no meaning here -----------------------------------------------------------------------------------------------
+    # -- what has no meaning here ------------------------------------------------------------------
     def __mod__(self, other: Operand) -> Expr:
         from saltus.system.clocks import mod  # clocks.py builds on this module
 
         return mod(self, other)
 
     def __rmod__(self, other: Operand) -> Expr:
-        raise TraceError(f"an equation took the remainder {other!r} % {self!r}: the divisor must be a number or a parameter.")
+        raise TraceError(
+            f"an equation took the remainder {other!r} % {self!r}: the divisor must "
+            f"be a number or a parameter."
+        )
 
     def __floordiv__(self, other: Operand) -> Expr:
         raise TraceError(
-            f"an equation took the whole part {self!r} // {other!r}. Of a time it is (t - sl.mod(t, T))/T; of a state there is none."
+            f"an equation took the whole part {self!r} // {other!r}. Of a time it is (t - "
+            f"sl.mod(t, T))/T; of a state there is none."
         )
 
     __rfloordiv__ = __floordiv__
@@ -132,11 +140,12 @@ class Expr:
     def __call__(self, *_arguments: object) -> Expr:
         """Refused: the value of a state at another time."""
         raise TraceError(
-            f"an equation called {self!r} as a function. There are no delays, x(t - tau): a rate depends on the states at the time t only. "
+            f"an equation called {self!r} as a function. There are no delays, x(t - tau): a rate "
+            f"depends on the states at the time t only. "
             f"A product is written with *."
         )
 
-    # -- comparisons make guards ------------------------------------------------------------------------------------------------
+    # -- comparisons make guards -------------------------------------------------------------------
     def __lt__(self, other: Operand) -> Relation:
         return Relation(sub(other, self))
 
@@ -153,14 +162,15 @@ class Expr:
         if self is other:
             return True
         raise TraceError(
-            "an equation compared a traced value with ==, which holds only on a set of measure zero. "
+            "an equation compared a traced value with ==, which holds only on a set of measure "
+            "zero. "
             "Write the two sides of the boundary with < or > inside sl.piecewise(...)."
         )
 
     def __hash__(self) -> int:
         return id(self)
 
-    # -- everything that would need a number ------------------------------------------------------------------------------------
+    # -- everything that would need a number -------------------------------------------------------
     def __bool__(self) -> bool:
         raise TraceError(
             "an equation asked whether a traced value is true. It is a symbol here, not a number: "
@@ -169,15 +179,20 @@ class Expr:
 
     def __float__(self) -> float:
         raise TraceError(
-            "an equation passed a traced value to a function that needs a plain number (math.cos, float, int, np.interp, a spline, ...). "
-            "Write sl.cos in place of math.cos, sl.atan2 in place of math.atan2, and so on. " + _no_number()
+            "an equation passed a traced value to a function that needs a plain number (math.cos, "
+            "float, int, np.interp, a spline, ...). "
+            "Write sl.cos in place of math.cos, sl.atan2 in place of math.atan2, and "
+            "so on. " + _no_number()
         )
 
     __int__ = __float__
     __index__ = None
 
     def __iter__(self) -> Iterator[Expr]:
-        raise TraceError("an equation iterated over a traced value, which is a single number. List every state in states=.")
+        raise TraceError(
+            "an equation iterated over a traced value, which is a single number. List "
+            "every state in states=."
+        )
 
     def __repr__(self) -> str:
         from saltus.system.text import to_text  # text.py builds on this module
@@ -205,7 +220,9 @@ def _rebound() -> str:
 
 @contextmanager
 def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
-    """Every node that is asked for inside is shown to the observer, which may raise: the error then has the line of the user's function."""
+    """Every node that is asked for inside is shown to the observer, which may raise: the error then
+    has the line of the user's function.
+    """
     token = _OBSERVER.set(observer)
     try:
         yield
@@ -214,7 +231,9 @@ def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
 
 
 def with_own_unit(make: Callable[[], Any]) -> Any:
-    """What ``make`` returns, made unobserved and of a unit that the observer can't know: numbers in it carry units of their own."""
+    """What ``make`` returns, made unobserved and of a unit that the observer can't know: numbers in
+    it carry units of their own.
+    """
     observer = _OBSERVER.get()
     with observed(None):
         made = make()
@@ -231,9 +250,11 @@ class _LeavesOpen(Protocol):
         """Take the node as it is."""
 
 
-# -- conditions ----------------------------------------------------------------------------------------------------------------
+# -- conditions ------------------------------------------------------------------------------------
 class Condition:
-    """A truth value that depends on the state: sides of guards, joined by ``&``, ``|`` and ``~``."""
+    """A truth value that depends on the state: sides of guards, joined by ``&``,
+    ``|`` and ``~``.
+    """
 
     def __and__(self, other: Condition) -> Condition:
         return And(self, _condition(other))
@@ -246,16 +267,19 @@ class Condition:
 
     def __bool__(self) -> bool:
         raise TraceError(
-            "an equation used a comparison of traced values as a Python truth value (`if x > gap:`, `a < x < b`, `and`, `or`, "
-            "`not`, min(), max()). Write the branches as sl.piecewise((value, x > gap), ..., otherwise=...); join conditions with "
+            "an equation used a comparison of traced values as a Python truth value (`if x > "
+            "gap:`, `a < x < b`, `and`, `or`, "
+            "`not`, min(), max()). Write the branches as sl.piecewise((value, x > gap), ..., "
+            "otherwise=...); join conditions with "
             "& | ~; use sl.min and sl.max."
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Relation(Condition):
-    """``gap > 0``. While tracing, any comparison; in a system's conditions, one of time and parameters only: no guard, but a switch whose
-    times are known. What a state decides is a :class:`Bit` there.
+    """``gap > 0``. While tracing, any comparison; in a system's conditions, one of time and
+    parameters only: no guard, but a switch whose times are known. What a state decides is a
+    :class:`Bit` there.
     """
 
     gap: Expr
@@ -297,12 +321,14 @@ def _condition(value: object) -> Condition:
     return value
 
 
-# -- leaves --------------------------------------------------------------------------------------------------------------------
+# -- leaves ----------------------------------------------------------------------------------------
 def constant(value: Number) -> Expr:
     """A literal number; it must be finite. Zero has no sign."""
     value = float(value) + 0.0
     if not math.isfinite(value):
-        raise TraceError(f"an equation holds the constant {value}; every number in it must be finite.")
+        raise TraceError(
+            f"an equation holds the constant {value}; every number in it must be finite."
+        )
     return Expr("const", (), value)
 
 
@@ -325,22 +351,34 @@ def as_expr(value: Operand) -> Expr:
     if isinstance(value, Expr):
         return value
     if isinstance(value, Condition):
-        raise TraceError("a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0).")
+        raise TraceError(
+            "a comparison was used as a number. Write sl.piecewise((1, x > gap), otherwise=0)."
+        )
     if isinstance(value, str | bytes):
         raise TraceError(
-            f"an equation holds the text {shown(value)}. Text with units is for parameter values; inside an equation write SI numbers."
+            f"an equation holds the text {shown(value)}. Text with units is for parameter values; "
+            f"inside an equation write SI numbers."
         )
-    if getattr(getattr(value, "dtype", None), "kind", "f") in "mM":  # dates and spans of time of NumPy, which turn into numbers of ticks
-        raise TraceError(f"an equation holds the date or span {shown(value)}. Inside an equation write SI numbers.")
+    # dates and spans of time of NumPy, which turn into numbers of ticks
+    if getattr(getattr(value, "dtype", None), "kind", "f") in "mM":
+        raise TraceError(
+            f"an equation holds the date or span {shown(value)}. Inside an equation "
+            f"write SI numbers."
+        )
     if getattr(value, "shape", ()) != ():
-        raise TraceError("an equation holds an array. A traced value is a single number: write out the components.")
+        raise TraceError(
+            "an equation holds an array. A traced value is a single number: write out "
+            "the components."
+        )
     try:
         return constant(value)
     except (TypeError, ValueError, OverflowError):
-        raise TraceError(f"an equation holds {shown(value)}, which is neither a number nor a traced value.") from None
+        raise TraceError(
+            f"an equation holds {shown(value)}, which is neither a number nor a traced value."
+        ) from None
 
 
-# -- operations: constants are folded, nothing else is rearranged --------------------------------------------------------------
+# -- operations: constants are folded, nothing else is rearranged ----------------------------------
 def add(a: Operand, b: Operand) -> Expr:
     """``a + b``"""
     a, b = as_expr(a), as_expr(b)
@@ -415,7 +453,9 @@ def power(base: Operand, exponent: Operand) -> Expr:
         except (ZeroDivisionError, OverflowError):
             value = math.inf
         if isinstance(value, complex):
-            raise TraceError(f"an equation holds {base.payload} ** {exponent.payload}, which is not real.")
+            raise TraceError(
+                f"an equation holds {base.payload} ** {exponent.payload}, which is not real."
+            )
         return constant(value)
     if exponent.op == "const" and exponent.payload == 0:
         return constant(1.0)
@@ -431,7 +471,9 @@ def elementary(name: str, a: Operand) -> Expr:
         try:
             return constant(_MATH[name](a.payload))
         except (ValueError, OverflowError):
-            raise TraceError(f"an equation holds {name}({a.payload}), which is not a finite real number.") from None
+            raise TraceError(
+                f"an equation holds {name}({a.payload}), which is not a finite real number."
+            ) from None
     return Expr(name, (a,))
 
 
@@ -449,7 +491,7 @@ def absolute(a: Operand) -> Expr:
     return select(Relation(a), a, neg(a)) if varies(a) else elementary("sqrt", mul(a, a))
 
 
-# -- walking -------------------------------------------------------------------------------------------------------------------
+# -- walking ---------------------------------------------------------------------------------------
 def relations_in(condition: Condition) -> Iterator[Relation]:
     """Every relation in a condition, left to right."""
     if isinstance(condition, Relation):
@@ -469,7 +511,8 @@ def operands(node: Expr) -> tuple[Expr, ...]:
 
 
 def walk(*roots: Expr, conditions: bool = True) -> Iterator[Expr]:
-    """Every node below the roots once, operands before the nodes that use them (iterative: deep sums don't overflow the stack).
+    """Every node below the roots once, operands before the nodes that use them (iterative: deep
+    sums don't overflow the stack).
 
     Those that only comparisons in conditions use are left out if ``conditions`` is False.
     """
@@ -487,8 +530,12 @@ def walk(*roots: Expr, conditions: bool = True) -> Iterator[Expr]:
 
 
 def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
-    """The same operation on other operands, constants folded; the node itself if nothing differs."""
-    if payload is node.payload and all(new is old for new, old in zip(args, node.args, strict=True)):
+    """The same operation on other operands, constants folded; the node itself if
+    nothing differs.
+    """
+    if payload is node.payload and all(
+        new is old for new, old in zip(args, node.args, strict=True)
+    ):
         return node
     if node.op == "select":
         return select(payload, *args)
@@ -503,7 +550,11 @@ def substituted(root: Expr, old: Expr, new: Expr) -> Expr:
     """The expression with another node in the place of ``old``; conditions stay as they are."""
     memo: dict[Expr, Expr] = {}
     for node in walk(root):
-        memo[node] = new if node is old else rebuild(node, tuple(memo[child] for child in node.args), node.payload)
+        memo[node] = (
+            new
+            if node is old
+            else rebuild(node, tuple(memo[child] for child in node.args), node.payload)
+        )
     return memo[root]
 
 
@@ -517,4 +568,11 @@ def varies(node: Expr) -> bool:
     return depends_on(node, ("time", "state", "select"))
 
 
-_OPERATIONS: dict[str, Callable[..., Expr]] = {"add": add, "sub": sub, "mul": mul, "div": div, "neg": neg, "pow": power}
+_OPERATIONS: dict[str, Callable[..., Expr]] = {
+    "add": add,
+    "sub": sub,
+    "mul": mul,
+    "div": div,
+    "neg": neg,
+    "pow": power,
+}

@@ -1,4 +1,6 @@
-"""Functions of other packages in an equation: what saltus calls them, and what to write for those that it hasn't."""
+"""Functions of other packages in an equation: what saltus calls them, and what to write for those
+that it hasn't.
+"""
 
 from __future__ import annotations
 
@@ -12,50 +14,81 @@ from saltus.system import functions as own
 from saltus.system.clocks import mod
 from saltus.system.expression import as_expr
 
-#: NumPy's ufuncs that an equation may call, by their names: the traced function that each stands for.
+#: NumPy's ufuncs that an equation may call, by their names: the traced function that each stands
+#: for.
 UFUNCS: dict[str, Callable[..., Any]] = {
-    "add": operator.add, "subtract": operator.sub, "multiply": operator.mul, "divide": operator.truediv, "power": operator.pow,
-    "float_power": operator.pow, "negative": operator.neg, "positive": operator.pos, "absolute": abs, "fabs": abs,
+    "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
+    "divide": operator.truediv, "power": operator.pow,
+    "float_power": operator.pow, "negative": operator.neg, "positive": operator.pos,
+    "absolute": abs, "fabs": abs,
     "square": lambda a: a * a, "reciprocal": lambda a: 1.0 / a,
-    "greater": operator.gt, "greater_equal": operator.ge, "less": operator.lt, "less_equal": operator.le,
-    "equal": operator.eq, "not_equal": operator.ne, "maximum": own.max, "minimum": own.min, "fmax": own.max, "fmin": own.min,
-    "sqrt": own.sqrt, "exp": own.exp, "log": own.log, "sin": own.sin, "cos": own.cos, "tan": own.tan, "tanh": own.tanh,
-    "arctan": own.atan, "arcsin": made.asin, "arccos": made.acos, "arctan2": made.atan2, "sinh": made.sinh, "cosh": made.cosh,
-    "hypot": made.hypot, "remainder": mod, "sign": made.sign, "heaviside": made.heaviside, "deg2rad": lambda a: a * (own.pi / 180),
-    "radians": lambda a: a * (own.pi / 180), "rad2deg": lambda a: a * (180 / own.pi), "degrees": lambda a: a * (180 / own.pi),
+    "greater": operator.gt, "greater_equal": operator.ge, "less": operator.lt,
+    "less_equal": operator.le,
+    "equal": operator.eq, "not_equal": operator.ne, "maximum": own.max, "minimum": own.min,
+    "fmax": own.max, "fmin": own.min,
+    "sqrt": own.sqrt, "exp": own.exp, "log": own.log, "sin": own.sin, "cos": own.cos,
+    "tan": own.tan, "tanh": own.tanh,
+    "arctan": own.atan, "arcsin": made.asin, "arccos": made.acos, "arctan2": made.atan2,
+    "sinh": made.sinh, "cosh": made.cosh,
+    "hypot": made.hypot, "remainder": mod, "sign": made.sign, "heaviside": made.heaviside,
+    "deg2rad": lambda a: a * (own.pi / 180),
+    "radians": lambda a: a * (own.pi / 180), "rad2deg": lambda a: a * (180 / own.pi),
+    "degrees": lambda a: a * (180 / own.pi),
 }  # fmt: skip
 
 _STOP = (
-    "a stiff spring and damper, stop = sl.piecewise((k*(x - gap) + c*v, x > gap), otherwise=0), with c = 2*z*sqrt(k*mass) and "
+    "a stiff spring and damper, stop = sl.piecewise((k*(x - gap) + c*v, x > gap), otherwise=0), "
+    "with c = 2*z*sqrt(k*mass) and "
     "z = -log(e)/sqrt(pi**2 + log(e)**2) rebounds with e"
 )
 #: Names of other packages, and their equivalents here.
 ADVICE: dict[str, str] = {
-    "arctan2": "Write sl.atan2(y, x).", "arctan": "Write sl.atan.", "arcsin": "Write sl.asin.", "arccos": "Write sl.acos.",
-    "absolute": "Write sl.abs or abs.", "fabs": "Write sl.abs or abs.", "maximum": "Write sl.max.", "minimum": "Write sl.min.",
-    "square": "Write x**2.", "pow": "Write x**2.", "power": "Write x**2.", "signum": "Write sl.sign.",
+    "arctan2": "Write sl.atan2(y, x).", "arctan": "Write sl.atan.", "arcsin": "Write sl.asin.",
+    "arccos": "Write sl.acos.",
+    "absolute": "Write sl.abs or abs.", "fabs": "Write sl.abs or abs.", "maximum": "Write sl.max.",
+    "minimum": "Write sl.min.",
+    "square": "Write x**2.", "pow": "Write x**2.", "power": "Write x**2.",
+    "signum": "Write sl.sign.",
     "step": "Write sl.heaviside(t - t0).",
-    "select": "Write sl.where or sl.piecewise.", "Piecewise": "Write sl.piecewise((value, condition), otherwise=...).",
-    "interp": "Write sl.table(x, points, values).", "CubicSpline": "Write sl.table(x, points, values, kind='spline').",
-    "remainder": "Write sl.mod(t, T).", "fmod": "Write sl.mod(t, T).", "floor": "Of a time it is (t - sl.mod(t, T))/T.",
-    "erf": "There is none; sl.tanh is the nearest smooth step.", "log10": "Write sl.log(x)/math.log(10).",
+    "select": "Write sl.where or sl.piecewise.", "Piecewise": "Write sl.piecewise((value, "
+        "condition), otherwise=...).",
+    "interp": "Write sl.table(x, points, values).", "CubicSpline": "Write sl.table(x, points, "
+        "values, kind='spline').",
+    "remainder": "Write sl.mod(t, T).", "fmod": "Write sl.mod(t, T).", "floor": "Of a time it is "
+        "(t - sl.mod(t, T))/T.",
+    "erf": "There is none; sl.tanh is the nearest smooth step.",
+    "log10": "Write sl.log(x)/math.log(10).",
     "expm1": "Write sl.exp(x) - 1.", "log1p": "Write sl.log(1 + x).",
     "impact": f"An instantaneous impact isn't supported yet: {_STOP}.",
     "restitution": f"An instantaneous impact isn't supported yet: {_STOP}.",
     "delay": "There are no delays: a rate depends on the states at the time t only.",
-    "friction": "Write mu*normal*sl.tanh(v/eps), with eps small against the sliding speed: it sticks by creeping.",
-    "continuation": "There is no continuation by arc length; sl.frequency_response and sl.bifurcation_diagram follow branches.",
-    "solve": "Write sl.simulate(system, start, t_end=...).", "solve_ivp": "Write sl.simulate(system, start, t_end=...).",
-    **dict.fromkeys(("sim", "simulation", "integrate", "odeint", "run", "solve_ode"), "Write sl.simulate(system, start, t_end=...)."),
-    **dict.fromkeys(("ode45", "RK45", "ode23", "ode15s", "DOP853"), "Write sl.simulate(system, start, t_end=..., method=sl.ODE45())."),
-    **dict.fromkeys(("transmission", "transmissibilities"), "Write sl.transmissibility(response, output, input)."),
+    "friction": "Write mu*normal*sl.tanh(v/eps), with eps small against the sliding speed: it "
+                "sticks by creeping.",
+    "continuation": "There is no continuation by arc length; sl.frequency_response and "
+                    "sl.bifurcation_diagram follow branches.",
+    "solve": "Write sl.simulate(system, start, t_end=...).",
+    "solve_ivp": "Write sl.simulate(system, "
+        "start, t_end=...).",
+    **dict.fromkeys(("sim", "simulation", "integrate", "odeint", "run", "solve_ode"),
+        "Write sl.simulate(system, "
+        "start, t_end=...)."),
+    **dict.fromkeys(("ode45", "RK45", "ode23", "ode15s", "DOP853"), "Write sl.simulate(system, "
+        "start, t_end=..., method=sl.ODE45())."),
+    **dict.fromkeys(("transmission", "transmissibilities"), "Write sl.transmissibility(response, "
+        "output, input)."),
     **dict.fromkeys(("interp1d", "interp1", "lookup"), "Write sl.table(x, points, values)."),
     **dict.fromkeys(("fft", "psd", "periodogram", "welch"), "Write sl.spectrum(run)."),
-    **dict.fromkeys(("frf", "FRF", "bode", "sweep"), "Write sl.frequency_response(system, (first, last, number))."),
-    "backbone": "Write sl.frequency_response for each of several forces: the backbone joins the peaks.",
+    **dict.fromkeys(("frf", "FRF", "bode", "sweep"), "Write sl.frequency_response(system, (first, "
+                                                     "last, number))."),
+    "backbone": "Write sl.frequency_response for each of several forces: the backbone joins the "
+                "peaks.",
     "chirp": "Write sl.sin(2*sl.pi*(f0*t + rate*t**2/2)) in the equation.",
-    **dict.fromkeys(("orbit_diagram", "orbitdiagram", "bifurcation"), "Write sl.bifurcation_diagram(system, {name: (low, high, number)})."),
-    **dict.fromkeys(("lyapunovspectrum", "lyapunov_spectrum", "lyapunov_exponent"), "Write sl.lyapunov(system, start, periods=...)."),
+    **dict.fromkeys(("orbit_diagram", "orbitdiagram", "bifurcation"),
+        "Write sl.bifurcation_diagram(system, "
+        "{name: (low, high, number)})."),
+    **dict.fromkeys(("lyapunovspectrum", "lyapunov_spectrum", "lyapunov_exponent"),
+        "Write sl.lyapunov(system, "
+        "start, periods=...)."),
 }  # fmt: skip
 
 
@@ -70,7 +103,8 @@ def traced_ufunc(ufunc: Any, method: str, inputs: tuple[Any, ...], keywords: dic
     name = ufunc.__name__
     if method != "__call__" or keywords or name not in UFUNCS:
         raise TraceError(
-            f"an equation called np.{name}{'' if method == '__call__' else '.' + method} on a traced value, which can't be traced. "
+            f"an equation called np.{name}{'' if method == '__call__' else '.' + method} on a "
+            f"traced value, which can't be traced. "
             f"{ADVICE.get(name, OWN_FUNCTIONS)}"
         )
     if name == "heaviside":
@@ -80,7 +114,9 @@ def traced_ufunc(ufunc: Any, method: str, inputs: tuple[Any, ...], keywords: dic
 
 #: The functions that an equation may call, as a sentence.
 OWN_FUNCTIONS = (
-    "Use saltus's own: sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.asin, sl.acos, sl.atan, sl.atan2, sl.sinh, sl.cosh, sl.tanh, "
+    "Use saltus's own: sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.asin, sl.acos, sl.atan, "
+    "sl.atan2, sl.sinh, sl.cosh, sl.tanh, "
     "sl.hypot, sl.abs, sl.sign, sl.heaviside, sl.min, sl.max, sl.clip, sl.where, sl.piecewise; "
-    "sl.mod(t, T) for a time that repeats; sl.table(x, points, values) for measured points, in place of np.interp or a spline."
+    "sl.mod(t, T) for a time that repeats; sl.table(x, points, values) for measured points, in "
+    "place of np.interp or a spline."
 )

@@ -1,7 +1,8 @@
 """Formulas: equations written as text, for files that must not hold code.
 
-Text is parsed into Python's syntax tree and read node by node; nothing of it is ever run. A node that has no meaning here is refused, so a
-formula can do arithmetic, compare, and call the functions in :data:`FUNCTIONS`. What it gives is what the same line of an equation would.
+Text is parsed into Python's syntax tree and read node by node; nothing of it is ever run. A node
+that has no meaning here is refused, so a formula can do arithmetic, compare, and call the functions
+in :data:`FUNCTIONS`. What it gives is what the same line of an equation would.
 """
 
 from __future__ import annotations
@@ -27,42 +28,62 @@ from saltus.system.tables import Table, look_up
 LONGEST = 1000
 #: Deepest nesting of a formula: each level takes a few of Python's thousand nested calls.
 DEPTH = 200
-_SIMPLE = ("abs", "atan", "cos", "exp", "log", "max", "min", "piecewise", "sin", "sqrt", "tan", "tanh")
+_SIMPLE = (
+    "abs",
+    "atan",
+    "cos",
+    "exp",
+    "log",
+    "max",
+    "min",
+    "piecewise",
+    "sin",
+    "sqrt",
+    "tan",
+    "tanh",
+)
 _COMPOSED = ("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "sign", "sinh", "where")
 #: Functions of formulas.
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **{name: getattr(functions, name) for name in _SIMPLE}, **{name: getattr(compositions, name) for name in _COMPOSED},
+    **{name: getattr(functions, name) for name in _SIMPLE},
+    **{name: getattr(compositions, name) for name in _COMPOSED},
     "freeplay": freeplay, "mod": mod,
 }  # fmt: skip
 _CONSTANTS = {"pi": functions.pi}
 _BINARY: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv, ast.Pow: operator.pow,
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
     ast.Mod: operator.mod, ast.BitAnd: operator.and_, ast.BitOr: operator.or_,
 }  # fmt: skip
 _COMPARED: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
 }  # fmt: skip
 _NODES = (
-    ast.Name, ast.Load, ast.Constant, ast.UnaryOp, ast.USub, ast.UAdd, ast.Not, ast.Invert, ast.BinOp, *_BINARY, ast.BoolOp, ast.And,
+    ast.Name, ast.Load, ast.Constant, ast.UnaryOp, ast.USub, ast.UAdd, ast.Not, ast.Invert,
+    ast.BinOp, *_BINARY, ast.BoolOp, ast.And,
     ast.Or, ast.Compare, *_COMPARED, ast.IfExp, ast.Tuple, ast.Call, ast.keyword,
 )  # fmt: skip
 _MEANINGS = "a formula holds numbers, names, + - * / **, comparisons, functions"
 _INSTEAD: dict[type[ast.AST], str] = {
-    ast.BitXor: "a power is written x**2", ast.FloorDiv: "of a time the whole part is (t - mod(t, T))/T",
-    ast.Attribute: "functions stand without a name before them: write sin(x)", ast.Eq: "write the two sides of a boundary with < or >",
+    ast.BitXor: "a power is written x**2", ast.FloorDiv: "of a time the whole part is (t - mod(t, "
+                                                         "T))/T",
+    ast.Attribute: "functions stand without a name before them: write sin(x)", ast.Eq: "write the "
+        "two sides of a boundary with < or >",
     ast.NotEq: "write the two sides of a boundary with < or >",
 }  # fmt: skip
 
 
 class Formula:
-    """A function of time, states and parameters that was written as text. It is called with them by name.
+    """A function of time, states and parameters that was written as text. It is called with them by
+    name.
 
     Attributes
     ----------
     text : str
         As it was written.
     names : tuple of str
-        What it needs, in the order of their first mention: the terms that it uses are looked through.
+        What it needs, in the order of their first mention: the terms that it uses are looked
+        through.
     """
 
     def __init__(self, text: str, book: Formulas):
@@ -70,32 +91,52 @@ class Formula:
         named = list(dict.fromkeys(_names(self._tree)))
         self._terms = [name for name in named if name in book.terms]
         inner = [name for term in self._terms for name in book.terms[term].names]
-        self.names: tuple[str, ...] = tuple(dict.fromkeys([*(name for name in named if name not in book.terms), *inner]))
+        self.names: tuple[str, ...] = tuple(
+            dict.fromkeys([*(name for name in named if name not in book.terms), *inner])
+        )
         self.place = f"the formula {shown(text)}"
-        self.__signature__ = inspect.Signature([inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in self.names])
+        self.__signature__ = inspect.Signature(
+            [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY) for name in self.names]
+        )
 
     def __call__(self, **values: Any) -> Any:
         """The value, of symbols or of numbers. Raises TraceError if it has none."""
-        own = {term: self.book.terms[term](**{name: values[name] for name in self.book.terms[term].names}) for term in self._terms}
+        own = {
+            term: self.book.terms[term](
+                **{name: values[name] for name in self.book.terms[term].names}
+            )
+            for term in self._terms
+        }
         try:
             return self._value(self._tree, {**_CONSTANTS, **values, **own})
         except SaltusError:
             raise
         except (ArithmeticError, TypeError, ValueError) as error:
             if isinstance(error, TypeError) and re.search(r"'(Relation|And|Or|Not)'", str(error)):
-                raise TraceError(f"{self.place}: a comparison is no number. Write 1 if x > gap else 0.") from None
+                raise TraceError(
+                    f"{self.place}: a comparison is no number. Write 1 if x > gap else 0."
+                ) from None
             raise TraceError(f"{self.place} has no value: {error}.") from error
 
     def data(self) -> list[Any]:
-        """All that it depends on, as JSON-able data: its text, those of its terms, and the fingerprints of the tables."""
-        tables = {node.func.id for node in ast.walk(self._tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+        """All that it depends on, as JSON-able data: its text, those of its terms, and the
+        fingerprints of the tables.
+        """
+        tables = {
+            node.func.id
+            for node in ast.walk(self._tree)
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+        }
         return [
             self.text,
             {term: self.book.terms[term].data() for term in self._terms},
-            {name: self.book.tables[name].fingerprint for name in sorted(tables & self.book.tables.keys())},
+            {
+                name: self.book.tables[name].fingerprint
+                for name in sorted(tables & self.book.tables.keys())
+            },
         ]
 
-    # -- reading ----------------------------------------------------------------------------------------------------------------
+    # -- reading -----------------------------------------------------------------------------------
     def _value(self, node: ast.AST, scope: Mapping[str, Any]) -> Any:
         match node:
             case ast.Constant(value=number):
@@ -125,13 +166,18 @@ class Formula:
                 return tuple(self._value(part, scope) for part in parts)
             case ast.Call(func=ast.Name(id=name), args=given, keywords=named):
                 arguments = [self._value(one, scope) for one in given]
-                return self._called(name)(*arguments, **{str(one.arg): self._value(one.value, scope) for one in named})
+                return self._called(name)(
+                    *arguments, **{str(one.arg): self._value(one.value, scope) for one in named}
+                )
         raise TypeError(node)
 
     def _condition(self, node: ast.AST, scope: Mapping[str, Any]) -> Any:
         found = self._value(node, scope)
         if not isinstance(found, Condition | bool):
-            raise TraceError(f"{self.place}: {_written(node)} is no condition. Write a comparison, such as x > gap.")
+            raise TraceError(
+                f"{self.place}: {_written(node)} is no condition. Write a comparison, "
+                f"such as x > gap."
+            )
         return found
 
     def _called(self, name: str) -> Callable[..., Any]:
@@ -140,7 +186,9 @@ class Formula:
             **{table: partial(look_up, data=data) for table, data in self.book.tables.items()},
         }
         if name not in known:
-            raise TraceError(f"{self.place}: there is no function {shown(name)}. {nearest(name, known)}")
+            raise TraceError(
+                f"{self.place}: there is no function {shown(name)}. {nearest(name, known)}"
+            )
         return known[name]
 
 
@@ -160,12 +208,21 @@ class Formulas:
         If a name is taken or can't be one, or a formula can't be read.
     """
 
-    def __init__(self, terms: Mapping[str, str] | None = None, tables: Mapping[str, Table] | None = None):
+    def __init__(
+        self, terms: Mapping[str, str] | None = None, tables: Mapping[str, Table] | None = None
+    ):
         self.tables, self.terms = dict(tables or {}), dict[str, Formula]()
         for name in (*self.tables, *(terms or {})):
-            why = why_no_name(name) or ("a formula calls a function by this name" if name in FUNCTIONS or name in _CONSTANTS else None)
+            why = why_no_name(name) or (
+                "a formula calls a function by this name"
+                if name in FUNCTIONS or name in _CONSTANTS
+                else None
+            )
             if why or (name in self.tables and name in (terms or {})):
-                raise TraceError(f"{shown(name)} can't be the name of a term or a table: {why or 'it is one of both'}.")
+                raise TraceError(
+                    f"{shown(name)} can't be the name of a term or a table: "
+                    f"{why or 'it is one of both'}."
+                )
         for name, text in (terms or {}).items():
             self.terms[name] = Formula(text, self)
 
@@ -192,16 +249,37 @@ class Equations:
         If a parameter or a state has the name of a term, or a parameter is used by no formula.
     """
 
-    def __init__(self, rates: Mapping[str, Formula], parameters: Mapping[str, Any], description: str = ""):
-        self._rates, self.place, self.__doc__ = dict(rates), "the formulas of its rates", description
+    def __init__(
+        self, rates: Mapping[str, Formula], parameters: Mapping[str, Any], description: str = ""
+    ):
+        self._rates, self.place, self.__doc__ = (
+            dict(rates),
+            ("the formulas of its rates"),
+            description,
+        )
         for name in (*rates, *parameters):
             if why := why_no_name(name):
-                raise TraceError(f"{shown(name)} can't be the name of a state or a parameter: {why}.")
-        both = [name for name in (*rates, *parameters) if name in _CONSTANTS or any(name in rate.book.terms for rate in rates.values())]
+                raise TraceError(
+                    f"{shown(name)} can't be the name of a state or a parameter: {why}."
+                )
+        both = [
+            name
+            for name in (*rates, *parameters)
+            if name in _CONSTANTS or any(name in rate.book.terms for rate in rates.values())
+        ]
         if both:
-            raise TraceError(f"{shown(both[0])} is the name of a term or a constant, so it can't be a state or a parameter too.")
-        positional = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in ("t", *rates)]
-        named = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=value) for name, value in parameters.items()]
+            raise TraceError(
+                f"{shown(both[0])} is the name of a term or a constant, so it can't "
+                f"be a state or a parameter too."
+            )
+        positional = [
+            inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+            for name in ("t", *rates)
+        ]
+        named = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=value)
+            for name, value in parameters.items()
+        ]
         self.__signature__ = inspect.Signature([*positional, *named])
 
     def __call__(self, t: Any, *y: Any, **parameters: Any) -> list[Any]:
@@ -210,26 +288,38 @@ class Equations:
         for rate in self._rates.values():
             if unknown := [name for name in rate.names if name not in known]:
                 raise TraceError(
-                    f"{rate.place}: {shown(unknown[0])} is no state, parameter, term or table. {nearest(unknown[0], known)} "
+                    f"{rate.place}: {shown(unknown[0])} is no state, parameter, term or table. "
+                    f"{nearest(unknown[0], known)} "
                     f"A parameter is declared by its value."
                 )
         return [rate(**{name: known[name] for name in rate.names}) for rate in self._rates.values()]
 
 
-# -- text ----------------------------------------------------------------------------------------------------------------------
+# -- text ------------------------------------------------------------------------------------------
 def _parsed(text: str) -> ast.expr:
     """The syntax tree of a formula."""
     if not isinstance(text, str) or not text.strip() or len(text) > LONGEST:
-        raise TraceError(f"a formula is text of 1 to {LONGEST} characters, such as k*(x - gap), not {shown(text)}.")
+        raise TraceError(
+            f"a formula is text of 1 to {LONGEST} characters, such as k*(x - gap), "
+            f"not {shown(text)}."
+        )
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of numbers that touch words: the tree gives the better message
+            # of numbers that touch words: the tree gives the better message
+            warnings.simplefilter("ignore")
             tree = ast.parse(f"({text.strip()}\n)", mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        fault = error.msg.split(".")[0] if isinstance(error, SyntaxError) else "it is nested too deeply"
-        raise TraceError(f"the formula {shown(text)} can't be read: {fault}. Write it like k*(x - gap).") from None
+        fault = (
+            error.msg.split(".")[0] if isinstance(error, SyntaxError) else "it is nested too deeply"
+        )
+        raise TraceError(
+            f"the formula {shown(text)} can't be read: {fault}. Write it like k*(x - gap)."
+        ) from None
     if _depth(tree) > DEPTH:
-        raise TraceError(f"the formula {shown(text)} can't be read: it is nested too deeply. Give a part of it a name, as a term.")
+        raise TraceError(
+            f"the formula {shown(text)} can't be read: it is nested too deeply. Give "
+            f"a part of it a name, as a term."
+        )
     _check(tree, text)
     return tree
 
@@ -244,9 +334,15 @@ def _depth(tree: ast.AST) -> int:
 
 
 def _names(tree: ast.AST) -> Iterator[str]:
-    """Names of values in a formula, in its order; those of functions that it calls aren't among them."""
+    """Names of values in a formula, in its order; those of functions that it calls aren't among
+    them.
+    """
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    found = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in called and node.id not in _CONSTANTS]
+    found = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Name) and id(node) not in called and node.id not in _CONSTANTS
+    ]
     yield from (node.id for node in sorted(found, key=lambda node: (node.lineno, node.col_offset)))
 
 
@@ -266,5 +362,11 @@ def _check(tree: ast.AST, text: str) -> None:
                 fits = isinstance(node, _NODES)
         strange = [child for child in ast.iter_child_nodes(node) if not isinstance(child, _NODES)]
         if not fits or any(isinstance(child, ast.operator | ast.cmpop) for child in strange):
-            advice = next((_INSTEAD[type(one)] for one in (node, *strange) if type(one) in _INSTEAD), _MEANINGS)
-            raise TraceError(f"the formula {shown(text)}: {_written(node)} has no meaning in a formula; {advice}.")
+            advice = next(
+                (_INSTEAD[type(one)] for one in (node, *strange) if type(one) in _INSTEAD),
+                _MEANINGS,
+            )
+            raise TraceError(
+                f"the formula {shown(text)}: {_written(node)} has no meaning in a "
+                f"formula; {advice}."
+            )

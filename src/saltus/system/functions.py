@@ -1,4 +1,6 @@
-"""The functions that an equation may call. Each takes traced values or plain numbers; plain numbers give a plain number."""
+"""The functions that an equation may call. Each takes traced values or plain numbers; plain numbers
+give a plain number.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,16 @@ from collections.abc import Callable
 from typing import Any
 
 from saltus.errors import TraceError, shown
-from saltus.system.expression import Condition, Expr, Operand, Relation, absolute, as_expr, elementary, select
+from saltus.system.expression import (
+    Condition,
+    Expr,
+    Operand,
+    Relation,
+    absolute,
+    as_expr,
+    elementary,
+    select,
+)
 from saltus.system.expression import sub as _difference
 
 pi = math.pi
@@ -28,7 +39,9 @@ def of_numbers(name: str, function: Callable[..., Any], *numbers: Any) -> Any:
         return function(*numbers)
     except (TypeError, ValueError, ArithmeticError):
         given = ", ".join(map(shown, numbers))
-        raise TraceError(f"sl.{name}({given}) has no finite real value. Keep to the numbers where it has one.") from None
+        raise TraceError(
+            f"sl.{name}({given}) has no finite real value. Keep to the numbers where it has one."
+        ) from None
 
 
 def _elementary(name: str, what: str) -> Callable[[Operand], Any]:
@@ -67,7 +80,9 @@ def max(first: Operand, /, *others: Operand) -> Any:
     return _extreme("max", (first, *others), builtins.max, lambda a, b: (a, b))
 
 
-def _extreme(name: str, values: tuple[Operand, ...], on_numbers: Callable, larger_first: Callable) -> Any:
+def _extreme(
+    name: str, values: tuple[Operand, ...], on_numbers: Callable, larger_first: Callable
+) -> Any:
     if not any(isinstance(value, Expr) for value in values):
         return of_numbers(name, lambda *numbers: on_numbers(numbers), *values)
     result = as_expr(values[0])
@@ -80,13 +95,15 @@ def _extreme(name: str, values: tuple[Operand, ...], on_numbers: Callable, large
 
 
 def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand | None = None) -> Any:
-    """A value that differs from region to region: each comparison in a condition is a boundary where a contact can begin or end.
+    """A value that differs from region to region: each comparison in a condition is a boundary
+    where a contact can begin or end.
 
     Parameters
     ----------
     *pieces : (value, condition)
-        The first piece whose condition holds gives the value. A condition is a comparison of traced values such as ``x > gap``; join
-        conditions with ``&``, ``|`` and ``~``. ``<`` and ``<=`` mean the same: on the boundary itself the motion decides.
+        The first piece whose condition holds gives the value. A condition is a comparison of traced
+        values such as ``x > gap``; join conditions with ``&``, ``|`` and ``~``. ``<`` and ``<=``
+        mean the same: on the boundary itself the motion decides.
     otherwise : value
         The value where none holds.
 
@@ -107,7 +124,8 @@ def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand | No
     """
     if otherwise is None:
         raise TraceError(
-            "sl.piecewise needs otherwise=, the value where no condition holds: sl.piecewise((k*(x - gap), x > gap), otherwise=0)."
+            "sl.piecewise needs otherwise=, the value where no condition holds: sl.piecewise((k*(x "
+            "- gap), x > gap), otherwise=0)."
         )
     result: Any = otherwise
     for piece in reversed(pieces):
@@ -122,12 +140,20 @@ def piecewise(*pieces: tuple[Operand, Condition | bool], otherwise: Operand | No
 def _pair(piece: Any) -> tuple[Operand, Condition | bool]:
     """A piece, checked."""
     if not (isinstance(piece, tuple | list) and len(piece) == 2):
-        raise TraceError(f"a piece of sl.piecewise is a pair (value, condition), not {shown(piece)}.")
+        raise TraceError(
+            f"a piece of sl.piecewise is a pair (value, condition), not {shown(piece)}."
+        )
     value, condition = piece
     if isinstance(value, Condition):
-        raise TraceError("a piece of sl.piecewise begins with its value: write (value, condition), such as (k*(x - gap), x > gap).")
+        raise TraceError(
+            "a piece of sl.piecewise begins with its value: write (value, condition), "
+            "such as (k*(x - gap), x > gap)."
+        )
     if isinstance(condition, Condition):
         return value, condition
     if isinstance(condition, bool) or str(getattr(condition, "dtype", "")) == "bool":
         return value, bool(condition)
-    raise TraceError(f"the condition of a piece of sl.piecewise must be a comparison such as x > gap, not {shown(condition)}.")
+    raise TraceError(
+        f"the condition of a piece of sl.piecewise must be a comparison such as x > "
+        f"gap, not {shown(condition)}."
+    )

@@ -21,8 +21,9 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
     system : System
         Whose guards are named.
     names : mapping of str to callable
-        By the new name, a function of (t, states, parameters), each argument by its name, that returns a comparison. It may be written in
-        any way that means the boundary: ``lambda x, gap: x > gap``, ``lambda x, gap: gap - x > 0``.
+        By the new name, a function of (t, states, parameters), each argument by its name, that
+        returns a comparison. It may be written in any way that means the boundary: ``lambda x, gap:
+        x > gap``, ``lambda x, gap: gap - x > 0``.
 
     Returns
     -------
@@ -32,7 +33,8 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
     Raises
     ------
     TraceError
-        If a function isn't a comparison, means no guard of the system, or two names are the same or mean the same guard.
+        If a function isn't a comparison, means no guard of the system, or two names are the same or
+        mean the same guard.
     """
     new: dict[int, str] = {}
     for name, function in names.items():
@@ -40,14 +42,26 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
             raise TraceError(f"{system.name}: {shown(name)} can't be the name of a guard: {why}.")
         number = _meant(system, name, function)
         if number in new:
-            raise TraceError(f"{system.name}: one boundary is called both {new[number]!r} and {shown(name)}. Keep one of the two.")
+            raise TraceError(
+                f"{system.name}: one boundary is called both {new[number]!r} and "
+                f"{shown(name)}. Keep one of the two."
+            )
         new[number] = name
-    guards = [replace(guard, name=new.get(number, guard.name)) for number, guard in enumerate(system.guards)]
+    guards = [
+        replace(guard, name=new.get(number, guard.name))
+        for number, guard in enumerate(system.guards)
+    ]
     taken = {*system.states, *(f"{state} turns" for state in system.states)}
     for number, guard in enumerate(guards):
         if guard.name in taken:
-            what = "another guard" if guard.name in [other.name for other in guards[:number]] else "a state or of its turning points"
-            raise TraceError(f"{system.name}: {shown(guard.name)} is the name of {what}. Choose another one.")
+            what = (
+                "another guard"
+                if guard.name in [other.name for other in guards[:number]]
+                else ("a state or of its turning points")
+            )
+            raise TraceError(
+                f"{system.name}: {shown(guard.name)} is the name of {what}. Choose another one."
+            )
         taken.add(guard.name)
     return replace(system, guards=tuple(guards))
 
@@ -58,9 +72,16 @@ def _meant(system: System, name: str, function: Quantity) -> int:
     condition = called(system, function, what)
     if not isinstance(condition, Relation):
         given = "several joined" if isinstance(condition, Condition) else shown(condition)
-        raise TraceError(f"{system.name}: {what} must be one comparison, such as x > gap, not {given}.")
+        raise TraceError(
+            f"{system.name}: {what} must be one comparison, such as x > gap, not {given}."
+        )
     number = number_of(condition, system.guards)
     if number is None:
-        have = ", ".join(equation_of(each, system.guards) for each in range(len(system.guards))) or "none"
-        raise TraceError(f"{system.name}: {what} means no boundary of the equations. They have: {have}.")
+        have = (
+            ", ".join(equation_of(each, system.guards) for each in range(len(system.guards)))
+            or "none"
+        )
+        raise TraceError(
+            f"{system.name}: {what} means no boundary of the equations. They have: {have}."
+        )
     return number

@@ -1,8 +1,8 @@
 """Guards: the boundaries found in a system's equations.
 
-Every comparison in a condition is a boundary ``gap = 0``. Comparisons that mean the same boundary - equal up to a non-zero number, however
-they are written - become one guard; conditions then hold bits (:class:`~saltus.system.expression.Bit`), and equations are smooth where
-the bits don't change.
+Every comparison in a condition is a boundary ``gap = 0``. Comparisons that mean the same boundary -
+equal up to a non-zero number, however they are written - become one guard; conditions then hold
+bits (:class:`~saltus.system.expression.Bit`), and equations are smooth where the bits don't change.
 """
 
 from __future__ import annotations
@@ -26,11 +26,14 @@ class Guard:
     Attributes
     ----------
     name : str
-        The parameter that sets the boundary, if there is just one; else the equation of the boundary.
+        The parameter that sets the boundary, if there is just one; else the equation of the
+        boundary.
     gap : Expr
-        Distance from the boundary, signed. It may hold bits of guards earlier in the list (``abs(x) - gap``).
+        Distance from the boundary, signed. It may hold bits of guards earlier in the list (``abs(x)
+        - gap``).
     state : str or None
-        The state that the boundary is a level of: ``gap = state - boundary``. None for any other boundary.
+        The state that the boundary is a level of: ``gap = state - boundary``. None for any other
+        boundary.
     boundary : Expr or None
         That level, an expression of parameters.
     """
@@ -44,19 +47,23 @@ class Guard:
 def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
     """The guards of a traced field, and the field with bits in place of comparisons.
 
-    Guards are listed in the order in which the equations name them first, a boundary inside a gap before that gap. A boundary on which
-    nothing depends (equal values on both sides) is left out.
+    Guards are listed in the order in which the equations name them first, a boundary inside a gap
+    before that gap. A boundary on which nothing depends (equal values on both sides) is left out.
 
     Raises
     ------
     TraceError
-        If a comparison depends on parameters only, compares equal things, or depends on time in a way that can't be solved.
+        If a comparison depends on parameters only, compares equal things, or depends on time in a
+        way that can't be solved.
     """
     return join_guards(field, ())
 
 
-def join_guards(roots: Iterable[Expr], known: Sequence[Guard]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """As :func:`find_guards`, for expressions that join a system: its guards don't change, and new ones follow them.
+def join_guards(
+    roots: Iterable[Expr], known: Sequence[Guard]
+) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
+    """As :func:`find_guards`, for expressions that join a system: its guards don't change, and new
+    ones follow them.
 
     Raises
     ------
@@ -71,7 +78,8 @@ def join_guards(roots: Iterable[Expr], known: Sequence[Guard]) -> tuple[tuple[Ex
 
 
 def surface_guard(gap: Expr, name: str) -> Guard:
-    """The guard of a surface: its gap is the expression as it stands, sign and scale included; conditions in it hold bits.
+    """The guard of a surface: its gap is the expression as it stands, sign and scale included;
+    conditions in it hold bits.
 
     Raises
     ------
@@ -81,11 +89,14 @@ def surface_guard(gap: Expr, name: str) -> Guard:
     canonical = Canonical()
     _check_moves(gap, canonical.kinds(canonical.polynomial(gap)))
     level, positive = _guard(gap, canonical)
-    return replace(level if positive and canonical.level_of(gap)[1] == 1.0 else Guard("", gap), name=name)
+    return replace(
+        level if positive and canonical.level_of(gap)[1] == 1.0 else Guard("", gap), name=name
+    )
 
 
 def number_of(condition: Relation, guards: Sequence[Guard]) -> int | None:
-    """Which of some guards a comparison means, however it is written; None if it means none of them.
+    """Which of some guards a comparison means, however it is written; None if it means none of
+    them.
 
     ``x > gap`` also means ``k*(x - gap) = 0``, if that is the only multiple of it.
 
@@ -104,12 +115,18 @@ def number_of(condition: Relation, guards: Sequence[Guard]) -> int | None:
     if found.guard < len(guards):
         return found.guard
     meant = finder.polynomials[found.guard]
-    multiples = [number for number, known in enumerate(finder.polynomials[: len(guards)]) if is_multiple(known, meant)]
+    multiples = [
+        number
+        for number, known in enumerate(finder.polynomials[: len(guards)])
+        if is_multiple(known, meant)
+    ]
     return multiples[0] if len(multiples) == 1 else None
 
 
 def relations(roots: Sequence[Expr]) -> Iterator[Relation]:
-    """Every relation below the roots in the order of reading, those inside a gap before it; a relation may come more than once."""
+    """Every relation below the roots in the order of reading, those inside a gap before it; a
+    relation may come more than once.
+    """
     seen: set[Expr] = set()
     stack: list[Expr | Relation] = list(reversed(roots))
     while stack:
@@ -130,7 +147,9 @@ class _Finder:
     def __init__(self, known: Sequence[Guard] = ()) -> None:
         self.guards: list[Guard] = list(known)
         self._canonical = Canonical()
-        self.polynomials: list[Polynomial] = [self._canonical.polynomial(guard.gap) for guard in known]
+        self.polynomials: list[Polynomial] = [
+            self._canonical.polynomial(guard.gap) for guard in known
+        ]
         self.outcome: dict[Relation, Condition | bool] = {}
         self._rewritten: dict[Expr, Expr] = {}
 
@@ -145,7 +164,10 @@ class _Finder:
         polynomial = self._canonical.polynomial(gap)
         if polynomial.keys() <= {ONE}:
             if not polynomial:
-                raise TraceError(f"an equation compares equal things: {gap!r} is always zero. Remove the comparison.")
+                raise TraceError(
+                    f"an equation compares equal things: {gap!r} is always zero. "
+                    f"Remove the comparison."
+                )
             self.outcome[relation] = polynomial[ONE] > 0
             return
         for number, known in enumerate(self.polynomials):
@@ -169,7 +191,11 @@ class _Finder:
                     memo[node] = ex.rebuild(node, args, node.payload)
                 else:
                     condition = self._condition(node.payload)
-                    memo[node] = args[not condition] if isinstance(condition, bool) else ex.rebuild(node, args, condition)
+                    memo[node] = (
+                        args[not condition]
+                        if isinstance(condition, bool)
+                        else ex.rebuild(node, args, condition)
+                    )
         return memo[root]
 
     def _condition(self, condition: Condition) -> Condition | bool:
@@ -202,19 +228,24 @@ def _check_moves(gap: Expr, kinds: frozenset[str]) -> None:
         return
     what = f"the boundary {gap!r} = 0"
     if "time" in kinds and "select" not in kinds:
-        raise TraceError(f"{what} depends on time only, not on a state: no motion crosses it. A surface is a function of the states.")
+        raise TraceError(
+            f"{what} depends on time only, not on a state: no motion crosses it. A "
+            f"surface is a function of the states."
+        )
     if "select" in kinds:
         raise TraceError(
-            f"{what} depends on a state only through another condition: it jumps and is never crossed. Join the conditions with & or |, "
+            f"{what} depends on a state only through another condition: it jumps and is never "
+            f"crossed. Join the conditions with & or |, "
             f"or write one piecewise inside the other."
         )
     raise TraceError(
-        f"{what} depends on parameters only, not on a state, so it is no contact. Make the choice before: pass its result as a parameter, "
+        f"{what} depends on parameters only, not on a state, so it is no contact. Make the choice "
+        f"before: pass its result as a parameter, "
         f"or trace two systems."
     )
 
 
-# -- the form of a guard -------------------------------------------------------------------------------------------------------
+# -- the form of a guard ---------------------------------------------------------------------------
 def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
     """The guard of a gap, and whether both have the same sign. Guards get their names later."""
     gap, positive = _without_factor(gap)
@@ -255,16 +286,23 @@ def _negated(a: Expr) -> Expr:
     return ex.neg(a)
 
 
-# -- numbering and names -------------------------------------------------------------------------------------------------------
-def _used_only(field: tuple[Expr, ...], guards: Sequence[Guard], known: int) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
-    """Drop guards on which nothing depends, renumber and name the rest; the first ``known`` don't change."""
+# -- numbering and names ---------------------------------------------------------------------------
+def _used_only(
+    field: tuple[Expr, ...], guards: Sequence[Guard], known: int
+) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
+    """Drop guards on which nothing depends, renumber and name the rest; the first ``known`` don't
+    change.
+    """
     used = bits_in(field) | set(range(known))
     for number in reversed(range(len(guards))):
         if number in used:
             used |= bits_in([guards[number].gap])
     new = {old: number for number, old in enumerate(sorted(used))}
     field = tuple(_renumbered(root, new) for root in field)
-    used_guards = [guards[old] if old < known else replace(guards[old], gap=_renumbered(guards[old].gap, new)) for old in new]
+    used_guards = [
+        guards[old] if old < known else replace(guards[old], gap=_renumbered(guards[old].gap, new))
+        for old in new
+    ]
     return field, tuple(_with_names(used_guards, known))
 
 
@@ -314,7 +352,9 @@ def equation_of(number: int, guards: Sequence[Guard]) -> str:
 
 
 def _with_names(guards: Sequence[Guard], known: int) -> list[Guard]:
-    """Guards named after their only parameter; after the boundary's equation if that isn't unique. The first ``known`` keep their names."""
+    """Guards named after their only parameter; after the boundary's equation if that isn't unique.
+    The first ``known`` keep their names.
+    """
     single: list[str | None] = []
     for guard in guards:
         where = guard.gap if guard.boundary is None else guard.boundary

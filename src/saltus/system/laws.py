@@ -27,8 +27,8 @@ def freeplay(
         0                                               between
         + preload                                       everywhere
 
-    It is what the moving part exerts on the springs: it has the sign of ``x``, and stands with a minus in the equation of motion,
-    ``mass*dv/dt = drive - freeplay(x, ...)``.
+    It is what the moving part exerts on the springs: it has the sign of ``x``, and stands with a
+    minus in the equation of motion, ``mass*dv/dt = drive - freeplay(x, ...)``.
 
     Parameters
     ----------
@@ -39,12 +39,13 @@ def freeplay(
     gap : Expr or float, optional
         Clearance on either side [as x], >= 0. In place of ``lower_gap`` and ``upper_gap``.
     lower_gap, upper_gap : Expr or float, optional
-        Clearance below and above [as x]; contact begins at ``x = -lower_gap`` and ``x = upper_gap``. A side that isn't given has no
-        contact. One of them may be negative, as that of a preloaded stop is; their sum may not: springs that touch on both sides at once
-        are the sum of two one-sided contacts.
+        Clearance below and above [as x]; contact begins at ``x = -lower_gap`` and ``x =
+        upper_gap``. A side that isn't given has no contact. One of them may be negative, as that of
+        a preloaded stop is; their sum may not: springs that touch on both sides at once are the sum
+        of two one-sided contacts.
     damping : Expr or float, optional
-        Viscous damping in contact only [N*s/m, or N*m*s/rad]. The force then jumps at the boundary, and may pull shortly before contact
-        ends.
+        Viscous damping in contact only [N*s/m, or N*m*s/rad]. The force then jumps at the boundary,
+        and may pull shortly before contact ends.
     velocity : Expr or float, optional
         Time derivative of ``x`` [m/s, or rad/s]; needed with damping.
     preload : Expr or float, optional
@@ -69,15 +70,22 @@ def freeplay(
     """
     if gap is not None:
         if lower_gap is not None or upper_gap is not None:
-            raise TraceError("sl.freeplay got gap= besides lower_gap= or upper_gap=. gap= means the same clearance on both sides.")
+            raise TraceError(
+                "sl.freeplay got gap= besides lower_gap= or upper_gap=. gap= means "
+                "the same clearance on both sides."
+            )
         lower_gap = upper_gap = gap
     if lower_gap is None and upper_gap is None:
         raise TraceError("sl.freeplay needs gap=, or lower_gap= or upper_gap= or both.")
     x, stiffness, damping, preload = map(_number, (x, stiffness, damping, preload))
-    lower_gap, upper_gap, velocity = (None if one is None else _number(one) for one in (lower_gap, upper_gap, velocity))
+    lower_gap, upper_gap, velocity = (
+        None if one is None else _number(one) for one in (lower_gap, upper_gap, velocity)
+    )
     damped = isinstance(damping, Expr) or damping != 0
     if damped and velocity is None:
-        raise TraceError("sl.freeplay got damping= but no velocity=. Give the time derivative of x.")
+        raise TraceError(
+            "sl.freeplay got damping= but no velocity=. Give the time derivative of x."
+        )
 
     def spring(deflection: Operand) -> Any:
         force = stiffness * deflection
@@ -93,6 +101,8 @@ def freeplay(
 
 
 def _number(operand: Operand) -> Operand:
-    """An expression as it is, any other number as a plain one. Raises TraceError for anything else."""
+    """An expression as it is, any other number as a plain one. Raises TraceError for
+    anything else.
+    """
     found = as_expr(operand)
     return operand if isinstance(operand, Expr) else float(found.payload)

@@ -14,11 +14,15 @@ LONGEST = 200
 #: Prefixes of a state's name in a result, and the place that each stands for.
 _PLACES = {"end_": "the end", "contact_": "a contact"}
 #: Names with another meaning in equations or in the generated code.
-RESERVED = frozenset({"t", "np", "numpy", "math", "numba", "njit", "saltus", "kept", "kernel", "inner", "entry"})
+RESERVED = frozenset(
+    {"t", "np", "numpy", "math", "numba", "njit", "saltus", "kept", "kernel", "inner", "entry"}
+)
 
 
 def why_no_name(name: Any) -> str | None:
-    """Why this can't be the name of a state or parameter, as the end of a sentence; None if it can."""
+    """Why this can't be the name of a state or parameter, as the end of a sentence;
+    None if it can.
+    """
     if not isinstance(name, str) or not name.isidentifier():
         return "use letters, digits and _"
     if keyword.iskeyword(name):
@@ -60,5 +64,11 @@ def why_no_text(text: Any) -> str | None:
 
 
 def _controls(text: str) -> set[str]:
-    """Letters that a terminal or a parser may obey: control characters, line ends, halves of surrogate pairs, turns of the direction."""
-    return {letter for letter in set(text) if unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") or has_control(letter)}
+    """Letters that a terminal or a parser may obey: control characters, line ends, halves of
+    surrogate pairs, turns of the direction.
+    """
+    return {
+        letter
+        for letter in set(text)
+        if unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") or has_control(letter)
+    }

@@ -1,8 +1,10 @@
-"""Pieces that hide one another: two stops whose boundaries have changed places, as a clearance with a negative gap would have them.
+"""Pieces that hide one another: two stops whose boundaries have changed places, as a clearance with
+a negative gap would have them.
 
-`sl.piecewise` takes the first piece whose condition holds. Of ``(k*(x + gap), x < -gap), (k*(x - gap), x > gap)`` at most one holds while
-``gap >= 0``. Beyond that both do between the boundaries, and the second spring would be missing there. A gap of one stop alone may have any
-sign: a preloaded stop has a negative one.
+`sl.piecewise` takes the first piece whose condition holds. Of ``(k*(x + gap), x < -gap), (k*(x -
+gap), x > gap)`` at most one holds while ``gap >= 0``. Beyond that both do between the boundaries,
+and the second spring would be missing there. A gap of one stop alone may have any sign: a preloaded
+stop has a negative one.
 """
 
 from __future__ import annotations
@@ -39,24 +41,35 @@ def check_overlaps(system: System, values: Mapping[str, Any]) -> None:
         With the boundaries and the values of their parameters.
     """
     for first, second, width in _opposed(system.field, system.guards):
-        (overlap,) = evaluate([width], states=dict.fromkeys(system.states, 0.0), values=values)  # states cancel in it
+        # states cancel in it
+        (overlap,) = evaluate([width], states=dict.fromkeys(system.states, 0.0), values=values)
         if not np.any(overlap > 0):
             continue
         worst = int(np.argmax(np.ravel(overlap > 0)))
         names = sorted({node.payload for node in walk(width) if node.op == "param"})
-        given = ", ".join(f"{name} = {np.ravel(values[name])[worst if np.size(values[name]) > 1 else 0]:g}" for name in names)
+        given = ", ".join(
+            f"{name} = {np.ravel(values[name])[worst if np.size(values[name]) > 1 else 0]:g}"
+            for name in names
+        )
         entry = f" (trajectory {worst} of {np.size(overlap)})" if np.ndim(overlap) else ""
         places = " and ".join(equation_of(number, system.guards) for number in (first, second))
         raise ParameterError(
-            f"{system.name}: with {given}{entry} the contacts at {places} overlap, and the first piece would hide the second. A "
-            f"clearance can't be negative. Springs that touch on both sides at once are the sum of two one-sided contacts: "
-            f"sl.freeplay(x, stiffness=k, lower_gap=gap) + sl.freeplay(x, stiffness=k, upper_gap=gap)."
+            f"{system.name}: with {given}{entry} the contacts at {places} overlap, and the first "
+            f"piece would hide the second. A "
+            f"clearance can't be negative. Springs that touch on both sides at once are the sum of "
+            f"two one-sided contacts: "
+            f"sl.freeplay(x, stiffness=k, lower_gap=gap) + sl.freeplay(x, stiffness=k, "
+            f"upper_gap=gap)."
         )
 
 
 @functools.lru_cache(maxsize=256)
-def _opposed(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> tuple[tuple[int, int, Expr], ...]:
-    """Guards of a piece and of the next one, and how far they overlap: the sum of their gaps, where it depends on parameters only."""
+def _opposed(
+    field: tuple[Expr, ...], guards: tuple[Guard, ...]
+) -> tuple[tuple[int, int, Expr], ...]:
+    """Guards of a piece and of the next one, and how far they overlap: the sum of their gaps, where
+    it depends on parameters only.
+    """
     return tuple(_pairs(field, guards))
 
 
@@ -70,7 +83,12 @@ def _pairs(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> Iterator[tuple
         if first is None or second is None or (first, second) in seen:
             continue
         seen.add((first, second))
-        width = add(*(guards[number].gap if positive else neg(guards[number].gap) for number, positive in (first, second)))
+        width = add(
+            *(
+                guards[number].gap if positive else neg(guards[number].gap)
+                for number, positive in (first, second)
+            )
+        )
         if canonical.kinds(canonical.polynomial(width)) == {"param"}:
             yield first[0], second[0], width
 

@@ -1,4 +1,6 @@
-"""Whether a forced system repeats after the period of its forcing: by formula where time enters as a phase or a clock, else by samples."""
+"""Whether a forced system repeats after the period of its forcing: by formula where time enters as
+a phase or a clock, else by samples.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ from saltus.system.expression import TIME, Expr, depends_on, div, operands, rela
 if TYPE_CHECKING:
     from saltus.system.system import System
 
-#: Rounding allowed in the number of cycles in a period: relative, and absolute for a phase [cycles].
+#: Rounding allowed in the number of cycles in a period: relative, and absolute for a phase
+#: [cycles].
 CLOCK_MISS, PHASE_MISS = 1e-9, 1e-9
 #: Difference after a period that exceeds rounding, relative to the values at one state.
 DIFFERENCE = 1e-7
@@ -31,11 +34,13 @@ class Timing:
     Attributes
     ----------
     clocks : tuple of (Expr, bool)
-        Cycles per second of switches, remainders and tables, and whether they count cycles at all; a level and a table that ends don't.
+        Cycles per second of switches, remainders and tables, and whether they count cycles at all;
+        a level and a table that ends don't.
     phases : tuple of Expr
         Cycles per second of sines and cosines of ``rate*t + ...``, the rest of it free of time.
     complete : bool
-        Whether time enters in no other way. Then an expression all of whose clocks and phases repeat repeats itself.
+        Whether time enters in no other way. Then an expression all of whose clocks and phases
+        repeat repeats itself.
     """
 
     clocks: tuple[tuple[Expr, bool], ...]
@@ -64,7 +69,9 @@ def timing_of(entry: Expr) -> Timing:
         elif node.op in ("mod", "table"):
             clocks[node], below = cycles_of(node), []
         elif node.op == "select":
-            clocks |= {relation.gap: cycles_of(relation.gap) for relation in relations_in(node.payload)}
+            clocks |= {
+                relation.gap: cycles_of(relation.gap) for relation in relations_in(node.payload)
+            }
         elif node.op in ("sin", "cos") and (rate := _rate(node.args[0])) is not None:
             phases[node], below = div(rate, 2 * math.pi), []
         waiting += below
@@ -72,7 +79,9 @@ def timing_of(entry: Expr) -> Timing:
 
 
 def _rate(angle: Expr) -> Expr | None:
-    """The rate of ``rate*t + (anything without time)``, of parameters only; None for any other angle."""
+    """The rate of ``rate*t + (anything without time)``, of parameters only; None for any other
+    angle.
+    """
     if depends_on(angle, ("select", "mod", "table")):
         return None
     rate = differentiate(angle, TIME)
@@ -80,10 +89,11 @@ def _rate(angle: Expr) -> Expr | None:
 
 
 def check_periodic(system: System) -> None:
-    """Raise a TraceError if the equations of a forced system differ after one period of the forcing.
+    """Raise a TraceError if the equations of a forced system differ after one period of the
+    forcing.
 
-    Finds the forgotten 2 pi in ``cos(frequency*t)``, ramps, and a second frequency that isn't a multiple of the first. Other
-    expressions are evaluated at samples.
+    Finds the forgotten 2 pi in ``cos(frequency*t)``, ramps, and a second frequency that isn't a
+    multiple of the first. Other expressions are evaluated at samples.
     """
     period = system.period()
     if period is None:
@@ -105,8 +115,13 @@ def _entries(system: System) -> list[Expr]:
 
 
 def _clocks_repeat(timing: Timing, system: System, period: float) -> bool:
-    """Whether every clock has a whole number of cycles in a period: by formula, since samples miss pulses."""
-    cycles = [abs(rate * period) for rate in evaluate([rate for rate, _ in timing.clocks], values=system.values)]
+    """Whether every clock has a whole number of cycles in a period: by formula, since samples miss
+    pulses.
+    """
+    cycles = [
+        abs(rate * period)
+        for rate in evaluate([rate for rate, _ in timing.clocks], values=system.values)
+    ]
     counts = [counts for _, counts in timing.clocks]
     return all(
         not number or (repeats and abs(number - np.round(number)) <= CLOCK_MISS * number)
@@ -121,9 +136,11 @@ def _phases_repeat(timing: Timing, system: System, period: float) -> bool:
 
 
 def _check_samples(system: System, period: float, unsure: list[int]) -> None:
-    """Raise a TraceError if one of these entries, or its derivative with respect to t, differs after a period.
+    """Raise a TraceError if one of these entries, or its derivative with respect to t, differs
+    after a period.
 
-    They are evaluated at a handful of states, times and modes and one period later. In the derivatives stiff terms can't hide a weak drive.
+    They are evaluated at a handful of states, times and modes and one period later. In the
+    derivatives stiff terms can't hide a weak drive.
     """
     entries = [entry for number, entry in enumerate(_entries(system)) if number in unsure]
     expressions = entries + [time_derivative(entry) for entry in entries]
@@ -134,7 +151,10 @@ def _check_samples(system: System, period: float, unsure: list[int]) -> None:
     for bit, at_rest in zip(bits, sides(system, 0.0, np.zeros(len(system.states))), strict=True):
         bit[0] = at_rest
     t = period * random.uniform(0, 3, (1, 8))
-    now, later = (evaluate(expressions, t=when, states=states, values=system.values, bits=bits) for when in (t, t + period))
+    now, later = (
+        evaluate(expressions, t=when, states=states, values=system.values, bits=bits)
+        for when in (t, t + period)
+    )
     for place, (a, b) in enumerate(zip(now, later, strict=True)):
         a, b = np.broadcast_to(a, (6, 8)), np.broadcast_to(b, (6, 8))
         with np.errstate(invalid="ignore"):
@@ -147,13 +167,19 @@ def _check_samples(system: System, period: float, unsure: list[int]) -> None:
 def _not_periodic(system: System, entry: int, period: float) -> str:
     """The message about the entry of the field or the guard that doesn't repeat."""
     count = len(system.states)
-    what = f"d{system.states[entry]}/dt" if entry < count else f"the boundary {system.guards[entry - count].name!r}"
+    what = (
+        f"d{system.states[entry]}/dt"
+        if entry < count
+        else (f"the boundary {system.guards[entry - count].name!r}")
+    )
     name = system.forced_at or ""
     unit = system.units[name]
     hertz, radians = f"cos(2*pi*{name}*t)", f"cos({name}*t)"
     drive, another, other = (radians, hertz, "Hz") if unit == "rad/s" else (hertz, radians, "rad/s")
     return (
-        f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by forced_at={name!r} [{unit}]. "
-        f"Write the drive as {drive}, or as {another} with units={{{name!r}: {other!r}}}; let every other forcing "
+        f"{system.name}: {what} doesn't repeat after the forcing period T = {period:.6g} s set by "
+        f"forced_at={name!r} [{unit}]. "
+        f"Write the drive as {drive}, or as {another} with units={{{name!r}: {other!r}}}; let "
+        f"every other forcing "
         f"frequency be a multiple of it; or leave forced_at= out for a system without a period."
     )

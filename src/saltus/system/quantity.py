@@ -1,8 +1,10 @@
-"""Quantities: functions of time, states and parameters that a user adds to a system - a surface to cross, a power to integrate.
+"""Quantities: functions of time, states and parameters that a user adds to a system - a surface to
+cross, a power to integrate.
 
-A quantity is traced as an equation is. Comparisons in it that mean a guard of the system read that guard's side; others become guards of
-their own, behind those of the system. With it the flow needs nothing new: a surface is one more guard, an integral one more state, and both
-come with the flow's own precision.
+A quantity is traced as an equation is. Comparisons in it that mean a guard of the system read that
+guard's side; others become guards of their own, behind those of the system. With it the flow needs
+nothing new: a surface is one more guard, an integral one more state, and both come with the flow's
+own precision.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ from saltus.units import check_declared, to_si
 Quantity = Callable[..., Any]
 
 
-def quantity(system: System, function: Quantity, what: str = "a quantity") -> tuple[Expr, tuple[Guard, ...]]:
+def quantity(
+    system: System, function: Quantity, what: str = "a quantity"
+) -> tuple[Expr, tuple[Guard, ...]]:
     """Trace a function of time, states and parameters of a system.
 
     Parameters
@@ -33,15 +37,17 @@ def quantity(system: System, function: Quantity, what: str = "a quantity") -> tu
     system : System
         Whose states and parameters the arguments are.
     function : callable
-        Its arguments are found by name: ``t`` (the time), states, parameters, as many as it needs, in any order; ``**rest`` takes all other
-        parameters. So the signature of the equation itself will do. Default values aren't used. It returns one number.
+        Its arguments are found by name: ``t`` (the time), states, parameters, as many as it needs,
+        in any order; ``**rest`` takes all other parameters. So the signature of the equation itself
+        will do. Default values aren't used. It returns one number.
     what : str
         What the function is, for messages: ``"the surface"``.
 
     Returns
     -------
     Expr, tuple of Guard
-        The expression, with bits in its conditions; the guards that these number: those of the system, then new ones.
+        The expression, with bits in its conditions; the guards that these number: those of the
+        system, then new ones.
 
     Raises
     ------
@@ -63,11 +69,14 @@ def quantity(system: System, function: Quantity, what: str = "a quantity") -> tu
 
 
 def called(system: System, function: Quantity, what: str) -> Any:
-    """What a function of time, states and parameters of a system returns for symbols. Raises as :func:`quantity` does."""
+    """What a function of time, states and parameters of a system returns for symbols. Raises as
+    :func:`quantity` does.
+    """
     if not callable(function) or isinstance(function, System):
         names = ", ".join(("t", *_own_states(system)))
         raise TraceError(
-            f"{what} must be a function such as `lambda {names}: ...`, not {shown(function)}. Parameters are further arguments, by name."
+            f"{what} must be a function such as `lambda {names}: ...`, not {shown(function)}. "
+            f"Parameters are further arguments, by name."
         )
     title = f"{what} of {system.name}"
     positional, named = _arguments(system, function, title)
@@ -85,14 +94,23 @@ def _own_states(system: System) -> tuple[str, ...]:
     return (system.tangent_of or system).states
 
 
-def _arguments(system: System, function: Quantity, title: str) -> tuple[list[Expr], dict[str, Expr]]:
+def _arguments(
+    system: System, function: Quantity, title: str
+) -> tuple[list[Expr], dict[str, Expr]]:
     """Symbols for the arguments of a function, by their names."""
     states = _own_states(system)
-    known = {"t": TIME, **{name: parameter(name) for name in system.values}, **{name: state(name) for name in states}}
+    known = {
+        "t": TIME,
+        **{name: parameter(name) for name in system.values},
+        **{name: state(name) for name in states},
+    }
     try:
         arguments = list(inspect.signature(function).parameters.values())
     except ValueError:  # of a class or function of C
-        raise TraceError(f"{title}: Python doesn't know the arguments of {function!r:.80}. Write a function of names, such as x.") from None
+        raise TraceError(
+            f"{title}: Python doesn't know the arguments of {function!r:.80}. Write a "
+            f"function of names, such as x."
+        ) from None
     plain = [a.name for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)]
     if tuple(plain[1:]) == states:
         known[plain[0]] = TIME  # written as an equation, whatever the time is called there
@@ -104,7 +122,8 @@ def _arguments(system: System, function: Quantity, title: str) -> tuple[list[Exp
             named.update((name, known[name]) for name in system.values if name in rest)
         elif argument.kind == argument.VAR_POSITIONAL or argument.name not in known:
             raise TraceError(
-                f"{title} ({place(function)}) asks for {argument.name!r}, which is neither t nor a state or parameter of {system.name}. "
+                f"{title} ({place(function)}) asks for {argument.name!r}, which is neither t nor a "
+                f"state or parameter of {system.name}. "
                 f"{nearest(argument.name, known)} Constants of its own belong in its body."
             )
         elif argument.kind == argument.KEYWORD_ONLY:
@@ -114,25 +133,27 @@ def _arguments(system: System, function: Quantity, title: str) -> tuple[list[Exp
     return positional, named
 
 
-# -- surfaces ------------------------------------------------------------------------------------------------------------------
+# -- surfaces --------------------------------------------------------------------------------------
 def with_surface(system: System, surface: Quantity | str, name: str = "surface") -> System:
-    """The system with one more guard, on whose side nothing depends: the flow locates its crossings as it locates contacts.
+    """The system with one more guard, on whose side nothing depends: the flow locates its crossings
+    as it locates contacts.
 
     Parameters
     ----------
     system : System
         What moves.
     surface : callable or str
-        The motion is on the surface where this function of (t, states, parameters) is zero (see :func:`quantity`); or the name of a state,
-        for the surface on which that state is zero.
+        The motion is on the surface where this function of (t, states, parameters) is zero (see
+        :func:`quantity`); or the name of a state, for the surface on which that state is zero.
     name : str
         Name of the guard; it gets primes if the system has one of that name.
 
     Returns
     -------
     System
-        The new guard is the last: ``len(guards) - 1``. Its gap is the function as it stands, so direction +1 is where the function rises.
-        Guards that the function needs for its own conditions stand before it.
+        The new guard is the last: ``len(guards) - 1``. Its gap is the function as it stands, so
+        direction +1 is where the function rises. Guards that the function needs for its own
+        conditions stand before it.
 
     Raises
     ------
@@ -149,7 +170,8 @@ def with_surface(system: System, surface: Quantity | str, name: str = "surface")
 
 
 def with_level(system: System, name: str, level: float | str) -> System:
-    """The system with a surface at a level of one state. The level is a new parameter, so another one recompiles nothing.
+    """The system with a surface at a level of one state. The level is a new parameter, so another
+    one recompiles nothing.
 
     Parameters
     ----------
@@ -158,7 +180,8 @@ def with_level(system: System, name: str, level: float | str) -> System:
     name : str
         A state.
     level : float or str
-        Its value on the surface: a number in SI, or text with a unit. It becomes the parameter ``surface_level``.
+        Its value on the surface: a number in SI, or text with a unit. It becomes the parameter
+        ``surface_level``.
 
     Returns
     -------
@@ -172,12 +195,15 @@ def with_level(system: System, name: str, level: float | str) -> System:
     """
     unit, key = system.state_unit(name), _free("surface_level", system)
     value = to_si(level, unit, f"the level of {name}")
-    extended = replace(system, values={**system.values, key: value}, units={**system.units, key: unit})
+    extended = replace(
+        system, values={**system.values, key: value}, units={**system.units, key: unit}
+    )
     return _with_guard(extended, sub(state(name), parameter(key)), system.guards, key)
 
 
 def turning_surface(system: System, name: str) -> System:
-    """The system with a surface on which a state turns: its rate is zero, from + to - (direction -1) at a maximum.
+    """The system with a surface on which a state turns: its rate is zero, from + to - (direction
+    -1) at a maximum.
 
     Parameters
     ----------
@@ -199,11 +225,15 @@ def turning_surface(system: System, name: str) -> System:
         If the rate depends on no state, so that the state turns at given times.
     """
     system.state_unit(name)
-    return _with_guard(system, system.field[system.states.index(name)], system.guards, f"{name} turns")
+    return _with_guard(
+        system, system.field[system.states.index(name)], system.guards, f"{name} turns"
+    )
 
 
 def acting_guards(system: System) -> tuple[int, ...]:
-    """Numbers of the guards on whose side the equations depend: all but the surfaces that were added."""
+    """Numbers of the guards on whose side the equations depend: all but the surfaces that were
+    added.
+    """
     acting = bits_in(system.field)
     for number in reversed(range(len(system.guards))):
         if number in acting:
@@ -218,24 +248,28 @@ def _with_guard(system: System, gap: Expr, guards: tuple[Guard, ...], name: str)
     return replace(system, guards=(*guards, surface_guard(gap, name)))
 
 
-# -- integrals -----------------------------------------------------------------------------------------------------------------
-def with_integrals(system: System, integrands: Mapping[str, Quantity], units: Mapping[str, str] | None = None) -> System:
-    """The system with more states, each the integral of a function along the motion; their starts are given, as a rule zero.
+# -- integrals -------------------------------------------------------------------------------------
+def with_integrals(
+    system: System, integrands: Mapping[str, Quantity], units: Mapping[str, str] | None = None
+) -> System:
+    """The system with more states, each the integral of a function along the motion; their starts
+    are given, as a rule zero.
 
     Parameters
     ----------
     system : System
         What moves.
     integrands : mapping of str to callable
-        Integrands by the name of the new state: functions of (t, states, parameters), see :func:`quantity`. They can't use the
-        other integrals.
+        Integrands by the name of the new state: functions of (t, states, parameters), see
+        :func:`quantity`. They can't use the other integrals.
     units : mapping of str to str, optional
         Coherent SI unit of each integral.
 
     Returns
     -------
     System
-        The new states are the last, in this order. Guards that the functions need for conditions of their own are appended.
+        The new states are the last, in this order. Guards that the functions need for conditions of
+        their own are appended.
 
     Raises
     ------
@@ -250,7 +284,8 @@ def with_integrals(system: System, integrands: Mapping[str, Quantity], units: Ma
     for name, function in integrands.items():
         if why_no_name(name) is not None or name in system.units:
             raise ParameterError(
-                f"an integral of {system.name} can't be called {shown(name)}: use letters, digits and _, and no name it has."
+                f"an integral of {system.name} can't be called {shown(name)}: use letters, digits "
+                f"and _, and no name it has."
             )
         rate, guards = quantity(extended, function, f"the integrand {shown(name)}")
         extended = replace(extended, guards=guards)

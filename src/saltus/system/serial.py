@@ -9,7 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import SaltusError, among, shown
 from saltus.system.clocks import affine, switch
-from saltus.system.expression import ELEMENTARY, And, Bit, Condition, Expr, Not, Or, Relation, constant, varies, walk
+from saltus.system.expression import (
+    ELEMENTARY,
+    And,
+    Bit,
+    Condition,
+    Expr,
+    Not,
+    Or,
+    Relation,
+    constant,
+    varies,
+    walk,
+)
 from saltus.system.guards import Guard, bits_in
 from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
 from saltus.system.tables import Table
@@ -21,7 +33,19 @@ if TYPE_CHECKING:
 #: Changes whenever the meaning of the data does.
 FORMAT = "saltus-system/1"
 
-_OPERANDS = {"const": 0, "param": 0, "state": 0, "time": 0, "add": 2, "sub": 2, "mul": 2, "div": 2, "neg": 1, "pow": 2, "select": 2}
+_OPERANDS = {
+    "const": 0,
+    "param": 0,
+    "state": 0,
+    "time": 0,
+    "add": 2,
+    "sub": 2,
+    "mul": 2,
+    "div": 2,
+    "neg": 1,
+    "pow": 2,
+    "select": 2,
+}
 _OPERANDS |= {"mod": 2, "table": 1}
 _OPERANDS |= dict.fromkeys(ELEMENTARY, 1)
 
@@ -59,18 +83,30 @@ def _equations(system: System) -> dict[str, Any]:
         "nodes": nodes,
         "field": [index[root] for root in system.field],
         "guards": [
-            [guard.name, index[guard.gap], guard.state, None if guard.boundary is None else index[guard.boundary]]
+            [
+                guard.name,
+                index[guard.gap],
+                guard.state,
+                None if guard.boundary is None else index[guard.boundary],
+            ]
             for guard in system.guards
         ],
     }
 
 
 def fingerprint(system: System) -> str:
-    """SHA-256 of the equations: field, guards, names of states and parameters, and what sets the period. Not of values, name or source."""
+    """SHA-256 of the equations: field, guards, names of states and parameters, and what sets the
+    period. Not of values, name or source.
+    """
     data = {"format": FORMAT, **_equations(system)}
     data["forced_at_unit"] = system.units[system.forced_at] if system.forced_at else None
-    data["nodes"] = [[op, args, payload.hex() if isinstance(payload, float) else payload] for op, args, payload in data["nodes"]]
-    return hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    data["nodes"] = [
+        [op, args, payload.hex() if isinstance(payload, float) else payload]
+        for op, args, payload in data["nodes"]
+    ]
+    return hashlib.sha256(
+        json.dumps(data, sort_keys=True, separators=(",", ":")).encode()
+    ).hexdigest()
 
 
 def _condition_data(condition: Condition, index: Mapping[Expr, int]) -> list[Any]:
@@ -88,69 +124,117 @@ def _condition_data(condition: Condition, index: Mapping[Expr, int]) -> list[Any
     raise TypeError(condition)
 
 
-# -- reading -------------------------------------------------------------------------------------------------------------------
+# -- reading ---------------------------------------------------------------------------------------
 def arguments(data: Mapping[str, Any]) -> dict[str, Any]:
     """The arguments of System from :func:`to_dict`'s data.
 
     Raises
     ------
     SaltusError
-        If the data isn't a system of this format: every node, name and number is checked, because code is generated from it.
+        If the data isn't a system of this format: every node, name and number is checked, because
+        code is generated from it.
     """
     if not isinstance(data, Mapping) or not among(data.get("format"), (FORMAT,)):
         found = data.get("format") if isinstance(data, Mapping) else type(data).__name__
         raise SaltusError(
-            f"this isn't a system written by this version of saltus (format {shown(found)}, expected {FORMAT!r}). Trace it again."
+            f"this isn't a system written by this version of saltus (format {shown(found)}, "
+            f"expected {FORMAT!r}). Trace it again."
         )
     try:
         return _read(data)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
+    except (
+        KeyError,
+        IndexError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        ArithmeticError,
+        RecursionError,
+    ) as error:
         why = " ".join(str(error).split())[:300]
-        raise SaltusError(f"the data of a system is damaged ({type(error).__name__}: {why}). Trace the system again.") from error
+        raise SaltusError(
+            f"the data of a system is damaged ({type(error).__name__}: {why}). Trace "
+            f"the system again."
+        ) from error
 
 
 def _read(data: Mapping[str, Any]) -> dict[str, Any]:
     states, parameters = tuple(data["states"]), list(data["parameters"])
     for name in (*states, *parameters):
         _require(why_no_name(name) is None, f"{shown(name)} is no name: {why_no_name(name)}")
-    _require(why_no_title(data["name"]) is None, f"{shown(data['name'])} is no name of a system: {why_no_title(data['name'])}")
+    _require(
+        why_no_title(data["name"]) is None,
+        f"{shown(data['name'])} is no name of a system: {why_no_title(data['name'])}",
+    )
     for name in ("description", "source"):
-        _require(why_no_text(data[name]) is None, f"its {name} can't be used: {why_no_text(data[name])}")
-    _require(why_not_together(states) is None, f"its states have ambiguous names: {why_not_together(states)}")
+        _require(
+            why_no_text(data[name]) is None, f"its {name} can't be used: {why_no_text(data[name])}"
+        )
+    _require(
+        why_not_together(states) is None,
+        f"its states have ambiguous names: {why_not_together(states)}",
+    )
     _require(len({*states, *parameters}) == len(states) + len(parameters), "a name stands twice")
     names = {"state": set(states), "param": set(parameters)}
     nodes: list[Expr] = []
     for op, args, payload in data["nodes"]:
-        _require(len(args) == _OPERANDS[op] and all(0 <= i < len(nodes) for i in args), f"wrong operands of {op!r}")
+        _require(
+            len(args) == _OPERANDS[op] and all(0 <= i < len(nodes) for i in args),
+            f"wrong operands of {op!r}",
+        )
         nodes.append(_node(op, tuple(nodes[i] for i in args), payload, names, nodes))
-    places = [*data["field"], *(gap for _, gap, _, _ in data["guards"]), *(level for *_, level in data["guards"] if level is not None)]
-    _require(all(0 <= place < len(nodes) for place in places), "a derivative or a boundary stands in no node")
+    places = [
+        *data["field"],
+        *(gap for _, gap, _, _ in data["guards"]),
+        *(level for *_, level in data["guards"] if level is not None),
+    ]
+    _require(
+        all(0 <= place < len(nodes) for place in places),
+        "a derivative or a boundary stands in no node",
+    )
     guards = tuple(
-        Guard(name, nodes[gap], state, None if boundary is None else nodes[boundary]) for name, gap, state, boundary in data["guards"]
+        Guard(name, nodes[gap], state, None if boundary is None else nodes[boundary])
+        for name, gap, state, boundary in data["guards"]
     )
     field = tuple(nodes[i] for i in data["field"])
     _require(len(field) == len(states), "the number of derivatives and of states differ")
     for guard in guards:
-        _require(why_no_text(guard.name) is None, f"{shown(guard.name)} is no name of a boundary: {why_no_text(guard.name)}")
-    _require(all(guard.state is None or guard.state in states for guard in guards), "a guard names an unknown state")
+        _require(
+            why_no_text(guard.name) is None,
+            f"{shown(guard.name)} is no name of a boundary: {why_no_text(guard.name)}",
+        )
+    _require(
+        all(guard.state is None or guard.state in states for guard in guards),
+        "a guard names an unknown state",
+    )
     for number, guard in enumerate(guards):
         _require(bits_in([guard.gap]) <= set(range(number)), "a gap depends on a later guard")
     _require(bits_in(field) <= set(range(len(guards))), "a condition names an unknown guard")
-    _require(data["forced_at"] is None or data["forced_at"] in parameters, "forced_at is no parameter")
+    _require(
+        data["forced_at"] is None or data["forced_at"] in parameters, "forced_at is no parameter"
+    )
     return {
         "name": data["name"],
         "description": data["description"],
         "source": data["source"],
         "states": states,
         "values": {name: float(data["values"][name]) for name in parameters},
-        "units": {name: check_declared(data["units"][name], name) for name in (*states, *parameters)},
+        "units": {
+            name: check_declared(data["units"][name], name) for name in (*states, *parameters)
+        },
         "forced_at": data["forced_at"],
         "field": field,
         "guards": guards,
     }
 
 
-def _node(op: str, args: tuple[Expr, ...], payload: Any, names: Mapping[str, set[str]], nodes: Sequence[Expr]) -> Expr:
+def _node(
+    op: str,
+    args: tuple[Expr, ...],
+    payload: Any,
+    names: Mapping[str, set[str]],
+    nodes: Sequence[Expr],
+) -> Expr:
     if op == "const":
         return constant(payload)
     if op in names:
@@ -170,7 +254,12 @@ def _condition(data: Sequence[Any], nodes: Sequence[Expr]) -> Condition:
     kind, *parts = data
     if kind == "bit" and len(parts) == 1 and isinstance(parts[0], int) and parts[0] >= 0:
         return Bit(parts[0])
-    if kind == "switch" and len(parts) == 1 and isinstance(parts[0], int) and 0 <= parts[0] < len(nodes):
+    if (
+        kind == "switch"
+        and len(parts) == 1
+        and isinstance(parts[0], int)
+        and 0 <= parts[0] < len(nodes)
+    ):
         condition = switch(nodes[parts[0]])
         if isinstance(condition, Relation):
             return condition

@@ -1,9 +1,11 @@
-"""Laws that have no Taylor series on a boundary: ``d**1.5``, ``sqrt(d)``, ``d*log(d)`` where the gap d is zero.
+"""Laws that have no Taylor series on a boundary: ``d**1.5``, ``sqrt(d)``, ``d*log(d)`` where the
+gap d is zero.
 
-Such a term is analytic on either side of its boundary, and small near it. :func:`set_aside` finds these terms and gives each a bit that
-switches it off: a step off the boundary, or onto it, uses the rest of the equations only (kernels/taylor_singular.py).
-:func:`check_finite` refuses terms that are infinite there. Both use the *order* of an expression on a boundary: the power of the gap with
-which it goes to zero.
+Such a term is analytic on either side of its boundary, and small near it. :func:`set_aside` finds
+these terms and gives each a bit that switches it off: a step off the boundary, or onto it, uses the
+rest of the equations only (kernels/taylor_singular.py). :func:`check_finite` refuses terms that are
+infinite there. Both use the *order* of an expression on a boundary: the power of the gap with which
+it goes to zero.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ _LOG = -1e-9
 
 
 class Order(NamedTuple):
-    """How an expression behaves on a boundary: like gap**order, or smaller; ``singular`` if it has no Taylor series there."""
+    """How an expression behaves on a boundary: like gap**order, or smaller; ``singular`` if it has
+    no Taylor series there.
+    """
 
     order: float
     singular: bool
@@ -54,10 +58,16 @@ class SetAside(NamedTuple):
 
 
 def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
-    """Find the terms of a field and its gaps that have no Taylor series on a boundary; a bit for each such boundary switches them off."""
+    """Find the terms of a field and its gaps that have no Taylor series on a boundary; a bit for
+    each such boundary switches them off.
+    """
     boundaries = _Boundaries(guards)
     roots = (*field, *(guard.gap for guard in guards))
-    broken = {number: nodes for number in range(len(guards)) if (nodes := boundaries.singular_terms(roots, number))}
+    broken = {
+        number: nodes
+        for number in range(len(guards))
+        if (nodes := boundaries.singular_terms(roots, number))
+    }
     terms: dict[Expr, list[int]] = {}
     for j, nodes in enumerate(broken.values()):
         for node in nodes:
@@ -67,35 +77,56 @@ def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
 
 
 def check_finite(field: Sequence[Expr], guards: Sequence[Guard], states: Sequence[str]) -> None:
-    """Raise a TraceError if a piece of the field is infinite on its own boundary: nothing can be said of a motion that meets it."""
+    """Raise a TraceError if a piece of the field is infinite on its own boundary: nothing can be
+    said of a motion that meets it.
+    """
     boundaries = _Boundaries(guards)
     for number, guard in enumerate(guards):
         orders = boundaries.orders(field, number)
         for name, entry in zip(states, field, strict=True):
             if orders[entry].singular and orders[entry].order < 0 and number in bits_in([entry]):
-                worst = next(node for node in ex.walk(entry) if orders[node].singular and orders[node].order < 0)
+                worst = next(
+                    node
+                    for node in ex.walk(entry)
+                    if orders[node].singular and orders[node].order < 0
+                )
                 raise TraceError(
-                    f"d{name}/dt is infinite on the boundary {guard.name!r}, where its piece begins: {worst!r}. Write a law that is finite "
-                    f"there, such as one of the depth plus a small length, or begin the piece a little further in."
+                    f"d{name}/dt is infinite on the boundary {guard.name!r}, where its piece "
+                    f"begins: {worst!r}. Write a law that is finite "
+                    f"there, such as one of the depth plus a small length, or begin the piece a "
+                    f"little further in."
                 )
 
 
 def check_gaps(guards: Sequence[Guard]) -> None:
-    """Raise a TraceError if a gap has a power, root or logarithm of a piece that vanishes: there the gap is zero, and on no side."""
+    """Raise a TraceError if a gap has a power, root or logarithm of a piece that vanishes: there
+    the gap is zero, and on no side.
+    """
     boundaries = _Boundaries(guards)
     for guard in guards:
         for node in ex.walk(guard.gap):
-            whole = node.op == "pow" and node.args[1].op == "const" and float(node.args[1].payload).is_integer()
-            if node.op in ("pow", "sqrt", "log") and not whole and boundaries.lifted(node) is not node:
+            whole = (
+                node.op == "pow"
+                and node.args[1].op == "const"
+                and float(node.args[1].payload).is_integer()
+            )
+            if (
+                node.op in ("pow", "sqrt", "log")
+                and not whole
+                and boundaries.lifted(node) is not node
+            ):
                 raise TraceError(
-                    f"the guard {guard.name!r} asks for the sign of a law that has no Taylor series where its own piece begins. Write it "
-                    f"as one piece with all of its conditions: for a contact without tension, d = x - gap and "
+                    f"the guard {guard.name!r} asks for the sign of a law that has no Taylor "
+                    f"series where its own piece begins. Write it "
+                    f"as one piece with all of its conditions: for a contact without tension, d = "
+                    f"x - gap and "
                     f"sl.piecewise((K*d**1.5*(1 + c*v), (d > 0) & (1 + c*v > 0)), otherwise=0)."
                 )
 
 
 def lifted(field: Iterable[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
-    """The same field with powers, roots and logarithms of pieces, ``sl.max(d, 0)**1.5``, as pieces of powers.
+    """The same field with powers, roots and logarithms of pieces, ``sl.max(d, 0)**1.5``, as pieces
+    of powers.
 
     Only where a piece is zero on a boundary: the rest stays as it was written.
     """
@@ -109,7 +140,9 @@ def lifted(field: Iterable[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
 
 
 def assuming(root: Expr, bit: int, value: bool) -> Expr:
-    """The expression with one bit known. What it rules out isn't looked at: it may divide by zero."""
+    """The expression with one bit known. What it rules out isn't looked at: it may
+    divide by zero.
+    """
     memo: dict[Expr, Expr] = {}
     stack = [root]
     while stack:
@@ -122,7 +155,11 @@ def assuming(root: Expr, bit: int, value: bool) -> Expr:
             continue
         stack.pop()
         new = tuple(memo[child] for child in args)
-        memo[node] = new[0] if decided else ex.rebuild(node, new, node.payload if condition is None else condition)
+        memo[node] = (
+            new[0]
+            if decided
+            else ex.rebuild(node, new, node.payload if condition is None else condition)
+        )
     return memo[root]
 
 
@@ -134,7 +171,11 @@ def _knowing(condition: Condition, bit: int, value: bool) -> Condition | bool:
             return condition
         case Not(inner):
             inside = _knowing(inner, bit, value)
-            return not inside if isinstance(inside, bool) else (condition if inside is inner else Not(inside))
+            return (
+                not inside
+                if isinstance(inside, bool)
+                else (condition if inside is inner else Not(inside))
+            )
         case And(left, right) | Or(left, right):
             neutral = isinstance(condition, And)
             a, b = _knowing(left, bit, value), _knowing(right, bit, value)
@@ -168,7 +209,9 @@ class _Boundaries:
         self._states = [_states_in(guard.gap) for guard in guards]
 
     def singular_terms(self, field: Sequence[Expr], number: int) -> list[Expr]:
-        """The nodes at which a series ends to exist on a boundary: powers, roots, logarithms and quotients of what vanishes there."""
+        """The nodes at which a series ends to exist on a boundary: powers, roots, logarithms and
+        quotients of what vanishes there.
+        """
         orders = self.orders(field, number)
         return [node for node in ex.walk(*field) if self._breaks(node, orders)]
 
@@ -213,7 +256,11 @@ class _Boundaries:
                 return Order(first + parts[1].order, singular)
             case "div":
                 below = parts[1].order
-                return Order(math.inf, False) if first == math.inf else Order(first - below, singular or below > 0)
+                return (
+                    Order(math.inf, False)
+                    if first == math.inf
+                    else Order(first - below, singular or below > 0)
+                )
             case "pow":
                 return _order_of_power(parts[0], node.args[1])
             case "exp" if _exponent_of_power(node, known):
@@ -221,7 +268,9 @@ class _Boundaries:
         return _order_of_function(node.op, parts[0])
 
     def _vanishes(self, node: Expr, number: int) -> bool:
-        """Whether a node is zero on a boundary: the gap times a factor, or zero once the state is put there."""
+        """Whether a node is zero on a boundary: the gap times a factor, or zero once the state is
+        put there.
+        """
         guard = self._guards[number]
         if not self._states[number] & _states_in(node):
             return False
@@ -246,9 +295,17 @@ class _Boundaries:
             return node
         for number in range(len(self._gaps)):
             orders = self.orders([new], number)
-            if any(below.op == node.op and orders[below.args[0]].order > 0 for below in ex.walk(new) if below.args):
+            if any(
+                below.op == node.op and orders[below.args[0]].order > 0
+                for below in ex.walk(new)
+                if below.args
+            ):
                 return new
-        return new if any(below.op == "const" and below.payload == 0 for below in ex.walk(new)) else node
+        return (
+            new
+            if any(below.op == "const" and below.payload == 0 for below in ex.walk(new))
+            else node
+        )
 
     def _spread(self, node: Expr) -> Expr:
         operand = node.args[0]
@@ -270,7 +327,9 @@ def _outermost_bit(node: Expr) -> int | None:
     stack = [node]
     while stack:
         top = stack.pop(0)
-        if top.op == "select" and (bits := bits_in([ex.Expr("select", (ex.constant(0.0), ex.constant(1.0)), top.payload)])):
+        if top.op == "select" and (
+            bits := bits_in([ex.Expr("select", (ex.constant(0.0), ex.constant(1.0)), top.payload)])
+        ):
             return min(bits)
         stack.extend(top.args)
     return None
@@ -281,7 +340,9 @@ def _states_in(node: Expr) -> set[str]:
 
 
 def _order_of_power(base: Order, exponent: Expr) -> Order:
-    """Of ``base**exponent``; an exponent that is a parameter is taken to be positive, and not whole."""
+    """Of ``base**exponent``; an exponent that is a parameter is taken to be positive, and not
+    whole.
+    """
     if base.order == math.inf:
         return Order(math.inf, False)
     if exponent.op != "const":

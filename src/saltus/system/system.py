@@ -22,7 +22,8 @@ from saltus.system.periodic import check_periodic
 
 @dataclass(frozen=True, eq=False, repr=False)
 class System:
-    """Equations of motion with contacts. Made by :func:`saltus.system`, not by hand; never changed, only copied.
+    """Equations of motion with contacts. Made by :func:`saltus.system`, not by hand; never changed,
+    only copied.
 
     Attributes
     ----------
@@ -37,11 +38,14 @@ class System:
     values : mapping of str to float
         Parameter values [SI]; read-only.
     units : mapping of str to str
-        Coherent SI unit of each state and parameter; ``""`` if not declared, ``"1"`` for a plain number; read-only.
+        Coherent SI unit of each state and parameter; ``""`` if not declared, ``"1"`` for a plain
+        number; read-only.
     forced_at : str or None
-        The parameter that holds the forcing frequency, in Hz or rad/s as its unit says. None for a system without a period.
+        The parameter that holds the forcing frequency, in Hz or rad/s as its unit says. None for a
+        system without a period.
     tangent_of : System or None
-        The system whose variational equations this one carries (see tangent.py); None for any other.
+        The system whose variational equations this one carries (see tangent.py); None for any
+        other.
     """
 
     name: str
@@ -64,7 +68,7 @@ class System:
         check_overlaps(self, self.values)
         check_periodic(self)
 
-    # -- values -----------------------------------------------------------------------------------------------------------------
+    # -- values ------------------------------------------------------------------------------------
     def with_values(self, *unnamed: Any, **values: Any) -> System:
         """The same equations with other parameter values. Nothing is traced or compiled again.
 
@@ -73,19 +77,27 @@ class System:
         *unnamed
             None: what stands here is answered by how to write it.
         **values : float or str
-            By parameter name: a number in SI, or text with a unit, such as ``contact_stiffness="70 kN/m"``.
+            By parameter name: a number in SI, or text with a unit, such as ``contact_stiffness="70
+            kN/m"``.
 
         Raises
         ------
         ParameterError
-            If a name is unknown, a value has none, or it isn't a finite number in the parameter's range.
+            If a name is unknown, a value has none, or it isn't a finite number in the parameter's
+            range.
         UnitError
             If a text value has the wrong unit.
         """
         if unnamed:
             name = next(iter(self.values), "name")
-            raise ParameterError(f"with_values takes values by name, and {shown(unnamed[0])} has none. Write with_values({name}=...).")
-        new = {name: checks.resolve_one(self._known(name), value, self.units[name], self.forced_at) for name, value in values.items()}
+            raise ParameterError(
+                f"with_values takes values by name, and {shown(unnamed[0])} has "
+                f"none. Write with_values({name}=...)."
+            )
+        new = {
+            name: checks.resolve_one(self._known(name), value, self.units[name], self.forced_at)
+            for name, value in values.items()
+        }
         if not new:
             return self
         copy = replace(self, values={**self.values, **new})
@@ -94,7 +106,9 @@ class System:
 
     @property
     def origin(self) -> System:
-        """The system that this one copies with other values, or itself; it holds all that depends on the equations alone."""
+        """The system that this one copies with other values, or itself; it holds all that depends
+        on the equations alone.
+        """
         return vars(self).get("_origin", self)
 
     def resolve(self, name: str, value: Any) -> Any:
@@ -121,7 +135,9 @@ class System:
     def _known(self, name: str) -> str:
         """The name of a parameter, checked."""
         if not among(name, self.values):
-            raise ParameterError(f"{self.name} has no parameter {shown(name)}. {nearest(name, self.values)}")
+            raise ParameterError(
+                f"{self.name} has no parameter {shown(name)}. {nearest(name, self.values)}"
+            )
         return name
 
     def period(self, values: Mapping[str, Any] | None = None) -> Any:
@@ -130,22 +146,31 @@ class System:
         Parameters
         ----------
         values : mapping of str to float or array, optional
-            Values [SI] that replace the system's own; with an array of frequencies the result is an array.
+            Values [SI] that replace the system's own; with an array of frequencies the result is an
+            array.
         """
         if self.forced_at is None:
             return None
         if values is not None and not isinstance(values, Mapping):
-            raise ParameterError(f"values must be a mapping, such as {{{self.forced_at!r}: 15.0}}, not {shown(values)}.")
+            raise ParameterError(
+                f"values must be a mapping, such as {{{self.forced_at!r}: 15.0}}, "
+                f"not {shown(values)}."
+            )
         frequency = (values or {}).get(self.forced_at, self.values[self.forced_at])
         try:
             return (2 * math.pi if self.units[self.forced_at] == "rad/s" else 1.0) / frequency
         except (TypeError, ArithmeticError):
-            raise ParameterError(f"{self.forced_at} must be a positive number or an array of them, not {shown(frequency)}.") from None
+            raise ParameterError(
+                f"{self.forced_at} must be a positive number or an array of them, "
+                f"not {shown(frequency)}."
+            ) from None
 
-    # -- equations --------------------------------------------------------------------------------------------------------------
+    # -- equations ---------------------------------------------------------------------------------
     @functools.cached_property
     def jacobian(self) -> tuple[tuple[Expr, ...], ...]:
-        """Derivative of each entry of the field (row) with respect to each state (column), in a frozen mode."""
+        """Derivative of each entry of the field (row) with respect to each state (column), in a
+        frozen mode.
+        """
         return tuple(gradient(entry, self.states) for entry in self.field)
 
     @functools.cached_property
@@ -156,8 +181,9 @@ class System:
     def rhs(self, t: Any, y: Any) -> np.ndarray:
         """The right-hand side as a plain function: time derivatives of the states, by NumPy.
 
-        For other integrators to be held against: ``scipy.integrate.solve_ivp(rig.rhs, (0, 1), y0)``. It knows no modes: which piece holds
-        is read off the state, and no contact is located. Trajectories of saltus are computed by generated code, some thousand times faster.
+        For other integrators to be held against: ``scipy.integrate.solve_ivp(rig.rhs, (0, 1),
+        y0)``. It knows no modes: which piece holds is read off the state, and no contact is
+        located. Trajectories of saltus are computed by generated code, some thousand times faster.
 
         Parameters
         ----------
@@ -174,14 +200,17 @@ class System:
         Raises
         ------
         ParameterError
-            If ``t`` or ``y`` holds something else than numbers, their shapes don't fit, or ``y`` has another number of states.
+            If ``t`` or ``y`` holds something else than numbers, their shapes don't fit, or ``y``
+            has another number of states.
         """
         from saltus.system.evaluate import field
 
         return field(self, *checks.point(self, t, y))
 
     def equations(self) -> list[str]:
-        """The equations as text, one line each; long parts that are used twice come first, named."""
+        """The equations as text, one line each; long parts that are used twice come
+        first, named.
+        """
         return list(self.origin._lines)
 
     @functools.cached_property
@@ -191,22 +220,28 @@ class System:
         return equation_lines(self)
 
     def fingerprint(self) -> str:
-        """Hash of the equations (64 hexadecimal digits): the same for other values, another name and in another process."""
+        """Hash of the equations (64 hexadecimal digits): the same for other values, another name
+        and in another process.
+        """
         return self.origin._fingerprint
 
     @functools.cached_property
     def _fingerprint(self) -> str:
         return serial.fingerprint(self)
 
-    # -- units and display -----------------------------------------------------------------------------------------------------
+    # -- units and display -------------------------------------------------------------------------
     def state_unit(self, name: str) -> str:
         """Unit of a state; ``""`` if not declared. Raises ParameterError for an unknown state."""
         if not among(name, self.states):
-            raise ParameterError(f"{self.name} has no state {shown(name)}. {nearest(name, self.states)}")
+            raise ParameterError(
+                f"{self.name} has no state {shown(name)}. {nearest(name, self.states)}"
+            )
         return self.units[name]
 
     def parameter_text(self, name: str) -> str:
-        """A parameter's value as people write it, such as ``0.4 mm``. Raises ParameterError for an unknown parameter."""
+        """A parameter's value as people write it, such as ``0.4 mm``. Raises ParameterError for an
+        unknown parameter.
+        """
         from saltus.units import from_si
 
         return from_si(self.values[self._known(name)], self.units[name])
@@ -221,20 +256,22 @@ class System:
 
         return system_html(self)
 
-    # -- data -------------------------------------------------------------------------------------------------------------------
+    # -- data --------------------------------------------------------------------------------------
     def to_dict(self) -> dict[str, Any]:
         """The system as JSON-able data, which :meth:`from_dict` reads back to the last bit."""
         return serial.to_dict(self)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> System:
-        """A system from :meth:`to_dict`'s data. No code is run. Raises SaltusError if the data is damaged or of another version."""
+        """A system from :meth:`to_dict`'s data. No code is run. Raises SaltusError if the data is
+        damaged or of another version.
+        """
         return cls(**serial.arguments(data))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return System.from_dict, (self.to_dict(),)
 
-    # -- misuse ----------------------------------------------------------------------------------------------------------------
+    # -- misuse ------------------------------------------------------------------------------------
     def __call__(self, *_: Any, **__: Any) -> Any:
         """Refuse: a System is no function. Raises ParameterError."""
         raise ParameterError(
@@ -259,15 +296,25 @@ class System:
     def _instead(self, name: Any) -> str:
         """What to write for a parameter or a state by its name."""
         if among(name, self.values):
-            return f"{self.name}.values[{name!r}] is the value of a parameter, {self.name}.with_values({name}=...) a copy with another one."
+            return (
+                f"{self.name}.values[{name!r}] is the value of a parameter, "
+                f"{self.name}.with_values({name}=...) a copy with another one."
+            )
         if among(name, self.states):
-            return f"{shown(name)} is a state. Its motion is sl.simulate({self.name}, ...)[{name!r}]."
-        return f"its parameters are in {self.name}.values, its states in {self.name}.states. {nearest(name, [*self.values, *self.states])}"
+            return (
+                f"{shown(name)} is a state. Its motion is sl.simulate({self.name}, ...)[{name!r}]."
+            )
+        return (
+            f"its parameters are in {self.name}.values, its states in {self.name}.states. "
+            f"{nearest(name, [*self.values, *self.states])}"
+        )
 
 
 def _refuse_change(self: System, name: str, _value: Any) -> None:
     change = f"system.with_values({name}=...)" if name in self.values else "system.with_values(...)"
-    raise ParameterError(f"a System is never changed. Write system = {change}, a copy with other values.")
+    raise ParameterError(
+        f"a System is never changed. Write system = {change}, a copy with other values."
+    )
 
 
 System.__setattr__ = _refuse_change  # type: ignore[assignment]  # in place of dataclass's own refusal, which doesn't say what to do

@@ -1,7 +1,9 @@
-"""Tables: measured points as part of an equation - a recorded drive in time, a measured stiffness curve in a state.
+"""Tables: measured points as part of an equation - a recorded drive in time, a measured stiffness
+curve in a state.
 
-A table is piecewise polynomials. In time its pieces change at instants that follow by a formula, and the numbers are data to the compiled
-kernel: a hundred thousand points compile as quickly as three. In a state every knot is a boundary of the motion.
+A table is piecewise polynomials. In time its pieces change at instants that follow by a formula,
+and the numbers are data to the compiled kernel: a hundred thousand points compile as quickly as
+three. In a state every knot is a boundary of the motion.
 """
 
 from __future__ import annotations
@@ -36,15 +38,17 @@ class Table:
     points : float64[n]
         Knots, ascending.
     pieces : float64[m, 5]
-        Reference point r and coefficients c of each piece, sum(c_k (x - r)**k). Periodic: between knots, m = n - 1. Else also before the
-        first and after the last, m = n + 1.
+        Reference point r and coefficients c of each piece, sum(c_k (x - r)**k). Periodic: between
+        knots, m = n - 1. Else also before the first and after the last, m = n + 1.
     periodic : bool
         Whether it repeats after points[-1] - points[0].
     """
 
     def __init__(self, points: np.ndarray, pieces: np.ndarray, periodic: bool, name: str = "table"):
         self.points, self.pieces, self.periodic, self.name = points, pieces, bool(periodic), name
-        digest = hashlib.sha256(self.points.tobytes() + self.pieces.tobytes() + bytes([self.periodic]) + name.encode())
+        digest = hashlib.sha256(
+            self.points.tobytes() + self.pieces.tobytes() + bytes([self.periodic]) + name.encode()
+        )
         self.fingerprint = digest.hexdigest()
 
     def __eq__(self, other: object) -> bool:
@@ -63,11 +67,16 @@ class Table:
         try:
             x = np.asarray(x, dtype=np.float64)
         except (TypeError, ValueError):
-            raise TraceError(f"sl.table: it is looked up at {shown(x)}, which is no number. Write sl.table(x, points, values).") from None
+            raise TraceError(
+                f"sl.table: it is looked up at {shown(x)}, which is no number. Write "
+                f"sl.table(x, points, values)."
+            ) from None
         first, last = self.points[0], self.points[-1]
         if self.periodic:
             x = first + np.mod(x - first, last - first)
-            piece = np.clip(np.searchsorted(self.points, x, side="right") - 1, 0, len(self.pieces) - 1)
+            piece = np.clip(
+                np.searchsorted(self.points, x, side="right") - 1, 0, len(self.pieces) - 1
+            )
         else:
             piece = np.searchsorted(self.points, x, side="right")
         r, c0, c1, c2, c3 = np.moveaxis(self.pieces[piece], -1, 0)
@@ -77,12 +86,19 @@ class Table:
     @functools.cache  # noqa: B019  (a table lives as long as its equation)
     def derivative(self) -> Table:
         """The table of its derivative."""
-        pieces = np.column_stack([self.pieces[:, 0], self.pieces[:, 2:] * [1.0, 2.0, 3.0], np.zeros(len(self.pieces))])
+        pieces = np.column_stack(
+            [self.pieces[:, 0], self.pieces[:, 2:] * [1.0, 2.0, 3.0], np.zeros(len(self.pieces))]
+        )
         return Table(self.points, pieces, self.periodic, f"{self.name}_rate")
 
     def to_data(self) -> dict[str, Any]:
         """The table as JSON-able data, to the last bit."""
-        return {"name": self.name, "periodic": self.periodic, "points": self.points.tolist(), "pieces": self.pieces.tolist()}
+        return {
+            "name": self.name,
+            "periodic": self.periodic,
+            "points": self.points.tolist(),
+            "pieces": self.pieces.tolist(),
+        }
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Table:
@@ -90,33 +106,53 @@ class Table:
         points, pieces = (np.array(data[key], dtype=np.float64) for key in ("points", "pieces"))
         periodic, name = data["periodic"], data["name"]
         count = len(points) - 1 if periodic is True else len(points) + 1
-        fits = points.ndim == 1 and len(points) > 1 and pieces.shape == (count, 5) and isinstance(periodic, bool)
-        sound = fits and np.isfinite(points).all() and np.isfinite(pieces).all() and (np.diff(points) > 0).all()
+        fits = (
+            points.ndim == 1
+            and len(points) > 1
+            and pieces.shape == (count, 5)
+            and isinstance(periodic, bool)
+        )
+        sound = (
+            fits
+            and np.isfinite(points).all()
+            and np.isfinite(pieces).all()
+            and (np.diff(points) > 0).all()
+        )
         if not (sound and isinstance(name, str) and name.isidentifier()):
             raise ValueError("the numbers of a table don't fit together")
         return cls(points, pieces, periodic, name)
 
 
 def table(
-    x: Operand, points: Sequence[float], values: Sequence[float], kind: str = "linear", *, outside: str = "hold", name: str = "table"
+    x: Operand,
+    points: Sequence[float],
+    values: Sequence[float],
+    kind: str = "linear",
+    *,
+    outside: str = "hold",
+    name: str = "table",
 ) -> Any:
-    """The value at ``x`` of a curve through given points: a recorded drive ``sl.table(t, ...)``, a measured law ``sl.table(x, ...)``.
+    """The value at ``x`` of a curve through given points: a recorded drive ``sl.table(t, ...)``, a
+    measured law ``sl.table(x, ...)``.
 
     Parameters
     ----------
     x : Expr or float
-        Argument of the curve. ``t``, or ``rate*t + offset`` with numbers and parameters: a drive of any number of points. Or anything that
-        depends on states: a law of 32 points at most, with a boundary at each knot.
+        Argument of the curve. ``t``, or ``rate*t + offset`` with numbers and parameters: a drive of
+        any number of points. Or anything that depends on states: a law of 32 points at most, with a
+        boundary at each knot.
     points : sequence of float
         Where the curve is known, ascending [unit of x].
     values : sequence of float
         Its values there [SI]. An amplitude stays a parameter: ``amplitude*sl.table(...)``.
     kind : str
-        ``"linear"``: straight between the points. ``"pchip"``: cubics that keep the shape, no overshoot (Fritsch & Carlson 1980), with a
-        continuous slope. ``"spline"``: cubic spline, not-a-knot at its ends, or periodic; with a continuous curvature.
+        ``"linear"``: straight between the points. ``"pchip"``: cubics that keep the shape, no
+        overshoot (Fritsch & Carlson 1980), with a continuous slope. ``"spline"``: cubic spline,
+        not-a-knot at its ends, or periodic; with a continuous curvature.
     outside : str
-        ``"hold"``: the first value before the points and the last one after them. ``"extend"``: the polynomials at the ends go on.
-        ``"periodic"``: the curve repeats after ``points[-1] - points[0]``; first and last value must be equal. In time only.
+        ``"hold"``: the first value before the points and the last one after them. ``"extend"``: the
+        polynomials at the ends go on. ``"periodic"``: the curve repeats after ``points[-1] -
+        points[0]``; first and last value must be equal. In time only.
     name : str
         What printed equations call it.
 
@@ -128,7 +164,8 @@ def table(
     Raises
     ------
     TraceError
-        If the points aren't ascending, numbers are missing or not finite, or a table in a state has too many knots.
+        If the points aren't ascending, numbers are missing or not finite, or a table in a state has
+        too many knots.
 
     Examples
     --------
@@ -139,7 +176,9 @@ def table(
 
 
 def look_up(x: Operand, data: Table) -> Any:
-    """The value of a table at ``x``, as :func:`table` gives it. Raises TraceError if it can't be looked up there."""
+    """The value of a table at ``x``, as :func:`table` gives it. Raises TraceError if it can't be
+    looked up there.
+    """
     if not isinstance(x, Expr):
         return float(data(x))
     if ex.depends_on(x, ("state",)):
@@ -147,7 +186,10 @@ def look_up(x: Operand, data: Table) -> Any:
     with ex.observed(None):
         line = affine(x)
     if line is None or not ex.depends_on(x, ("time",)):
-        raise TraceError(f"sl.table in {x!r}: write a state, or rate*t + offset with numbers and parameters for the rest.")
+        raise TraceError(
+            f"sl.table in {x!r}: write a state, or rate*t + offset with numbers and "
+            f"parameters for the rest."
+        )
     return Expr("table", (x,), data)
 
 
@@ -159,21 +201,38 @@ def curve(points: Any, values: Any, kind: str, outside: str, name: str) -> Table
     if not (isinstance(name, str) and name.isidentifier()):
         raise TraceError(f"sl.table: name={shown(name)} is no name. Use letters, digits and _.")
     if has_mask([points, values]):
-        raise TraceError("sl.table: points or values are masked, and masks aren't supported. Leave them out of both.")
+        raise TraceError(
+            "sl.table: points or values are masked, and masks aren't supported. Leave "
+            "them out of both."
+        )
     try:
         x, y = (np.array(data, dtype=np.float64) for data in (points, values))
     except (TypeError, ValueError, OverflowError):
-        raise TraceError("sl.table: points and values must be numbers [SI], as lists or arrays.") from None
+        raise TraceError(
+            "sl.table: points and values must be numbers [SI], as lists or arrays."
+        ) from None
     if x.ndim != 1 or x.shape != y.shape or len(x) < 2:
-        raise TraceError(f"sl.table: points and values must be lists of one length, at least 2; theirs are {x.shape} and {y.shape}.")
+        raise TraceError(
+            f"sl.table: points and values must be lists of one length, at least 2; "
+            f"theirs are {x.shape} and {y.shape}."
+        )
     for what, numbers in (("points", x), ("values", y)):
         if not np.isfinite(numbers).all():
-            raise TraceError(f"sl.table: {what}[{int(np.flatnonzero(~np.isfinite(numbers))[0])}] is not a finite number.")
+            raise TraceError(
+                f"sl.table: {what}[{int(np.flatnonzero(~np.isfinite(numbers))[0])}] "
+                f"is not a finite number."
+            )
     if not (np.diff(x) > 0).all():
         i = int(np.flatnonzero(np.diff(x) <= 0)[0]) + 1
-        raise TraceError(f"sl.table: points must ascend, but points[{i}] = {x[i]:g} follows {x[i - 1]:g}. Sort them, and drop repeats.")
+        raise TraceError(
+            f"sl.table: points must ascend, but points[{i}] = {x[i]:g} follows "
+            f"{x[i - 1]:g}. Sort them, and drop repeats."
+        )
     if outside == "periodic" and y[0] != y[-1]:
-        raise TraceError(f"sl.table: outside='periodic' needs the same first and last value, not {y[0]:g} and {y[-1]:g}.")
+        raise TraceError(
+            f"sl.table: outside='periodic' needs the same first and last value, not "
+            f"{y[0]:g} and {y[-1]:g}."
+        )
     return Table(x, _pieces(x, y, kind, outside), outside == "periodic", name)
 
 
@@ -206,11 +265,17 @@ def _coefficients(x: np.ndarray, y: np.ndarray, kind: str, periodic: bool) -> np
 def _of_state(x: Expr, data: Table) -> Any:
     """A table in a state, as pieces with a boundary at every knot where the polynomial changes."""
     if data.periodic:
-        raise TraceError("sl.table: outside='periodic' is for tables in time. Of a state it would have no end of boundaries.")
-    differs = [i for i in range(len(data.points)) if not np.array_equal(data.pieces[i], data.pieces[i + 1])]
+        raise TraceError(
+            "sl.table: outside='periodic' is for tables in time. Of a state it would "
+            "have no end of boundaries."
+        )
+    differs = [
+        i for i in range(len(data.points)) if not np.array_equal(data.pieces[i], data.pieces[i + 1])
+    ]
     if len(differs) > MOST_KNOTS:
         raise TraceError(
-            f"sl.table in a state has {len(differs)} knots, each a boundary of the motion: {MOST_KNOTS} at most. Take fewer points with "
+            f"sl.table in a state has {len(differs)} knots, each a boundary of the motion: "
+            f"{MOST_KNOTS} at most. Take fewer points with "
             f"kind='spline' or 'pchip', or fit a formula. A table in time may have any number."
         )
     last = data.pieces[-1]

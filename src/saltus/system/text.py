@@ -1,7 +1,8 @@
 """Expressions as text: the way Python would write them, order of operations included.
 
-Text is written bottom-up without recursion. A part that is used more than once and is long gets a name and a line of its own, so the text
-of a system grows with its graph, not with the tree that the graph unfolds to.
+Text is written bottom-up without recursion. A part that is used more than once and is long gets a
+name and a line of its own, so the text of a system grows with its graph, not with the tree that the
+graph unfolds to.
 """
 
 from __future__ import annotations
@@ -15,7 +16,12 @@ from typing import Protocol
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation, operands, walk
 
 _ATOM, _POWER, _NEGATIVE, _PRODUCT, _SUM = 5, 4, 3, 2, 1
-_INFIX = {"add": (" + ", _SUM), "sub": (" - ", _SUM), "mul": ("*", _PRODUCT), "div": ("/", _PRODUCT)}
+_INFIX = {
+    "add": (" + ", _SUM),
+    "sub": (" - ", _SUM),
+    "mul": ("*", _PRODUCT),
+    "div": ("/", _PRODUCT),
+}
 #: Constants that people write with pi.
 PI_MULTIPLES = {math.pi: "pi", 2 * math.pi: "2*pi", 4 * math.pi: "4*pi", math.pi / 2: "pi/2"}
 
@@ -44,7 +50,8 @@ class Writer:
     guards : sequence of Guard
         Guards of the bits in the conditions.
     shared : iterable of Expr
-        Roots that will be written; parts that they use more than once and that are long get lines of their own in :attr:`lines`.
+        Roots that will be written; parts that they use more than once and that are long get lines
+        of their own in :attr:`lines`.
     taken : iterable of str
         Names that such parts may not have.
     limit : int or None
@@ -55,13 +62,21 @@ class Writer:
     name_from = 60
 
     def __init__(
-        self, guards: Sequence[Boundary] = (), shared: Iterable[Expr] = (), taken: Iterable[str] = (), limit: int | None = None
+        self,
+        guards: Sequence[Boundary] = (),
+        shared: Iterable[Expr] = (),
+        taken: Iterable[str] = (),
+        limit: int | None = None,
     ) -> None:
         self.lines: list[str] = []
         self.limit = limit
         roots = tuple(shared)
         self._naming = bool(roots)
-        self._uses = Counter(child for node in walk(*roots) for child in operands(node)) if roots else Counter()
+        self._uses = (
+            Counter(child for node in walk(*roots) for child in operands(node))
+            if roots
+            else Counter()
+        )
         self._taken = set(taken)
         self._texts: dict[Expr, tuple[str, int]] = {}
         self._pieces: dict[Expr, list[str]] = {}
@@ -69,7 +84,7 @@ class Writer:
         for guard in guards:
             self._sides.append(self._guard_sides(guard))
 
-    # -- asked from outside -----------------------------------------------------------------------------------------------------
+    # -- asked from outside ------------------------------------------------------------------------
     def text(self, root: Expr) -> str:
         """The text of an expression."""
         for node in walk(root):
@@ -81,7 +96,11 @@ class Writer:
         """The text of a condition, or of its opposite."""
         match condition:
             case Bit(guard):
-                sides = self._sides[guard] if guard < len(self._sides) else (f"guard{guard} > 0", f"guard{guard} < 0")
+                sides = (
+                    self._sides[guard]
+                    if guard < len(self._sides)
+                    else (f"guard{guard} > 0", f"guard{guard} < 0")
+                )
                 return sides[0 if positive else 1]
             case Relation(gap):
                 return self._compare(gap, positive)
@@ -89,14 +108,18 @@ class Writer:
                 return self.condition(inner, not positive)
             case And(left, right) | Or(left, right):
                 joint = self.joint(isinstance(condition, And) == positive)
-                return self._group(self.condition(left, positive)) + joint + self._group(self.condition(right, positive))
+                return (
+                    self._group(self.condition(left, positive))
+                    + joint
+                    + self._group(self.condition(right, positive))
+                )
         raise TypeError(condition)
 
     def side(self, guard: int, positive: bool = True) -> str:
         """The text of one side of a guard, such as ``x > upper_gap``."""
         return self._sides[guard][0 if positive else 1]
 
-    # -- notation, which a subclass may override --------------------------------------------------------------------------------
+    # -- notation, which a subclass may override ---------------------------------------------------
     greater, less = " > ", " < "
 
     def joint(self, both: bool) -> str:
@@ -112,13 +135,19 @@ class Writer:
         if value in PI_MULTIPLES:
             return PI_MULTIPLES[value], _ATOM if value == math.pi else _PRODUCT
         short = f"{value:.6g}"
-        text = re.sub(r"e([+-])0*", lambda match: "e" + match[1].strip("+"), short if float(short) == value else repr(value))
+        text = re.sub(
+            r"e([+-])0*",
+            lambda match: "e" + match[1].strip("+"),
+            short if float(short) == value else repr(value),
+        )
         return text, _NEGATIVE if text.startswith("-") else _ATOM
 
     def infix(self, op: str, left: Expr, right: Expr) -> tuple[str, int]:
         """A sum, difference, product or quotient and its binding strength."""
         sign, strength = _INFIX[op]
-        return self.part(left, strength) + sign + self.part(right, strength + 1, after_sign=True), strength
+        return self.part(left, strength) + sign + self.part(
+            right, strength + 1, after_sign=True
+        ), strength
 
     def power(self, base: Expr, exponent: Expr) -> str:
         """A power."""
@@ -144,11 +173,15 @@ class Writer:
         """The line that names a part."""
         return f"{name} = {text}"
 
-    # -- inner working ----------------------------------------------------------------------------------------------------------
+    # -- inner working -----------------------------------------------------------------------------
     def part(self, node: Expr, strength: int, after_sign: bool = False) -> str:
         """The text of an operand, in parentheses if it binds more weakly than ``strength``."""
         text, own = self._texts[node]
-        return self.parentheses(text) if own < strength or (after_sign and text.startswith("-")) else text
+        return (
+            self.parentheses(text)
+            if own < strength or (after_sign and text.startswith("-"))
+            else text
+        )
 
     def _write(self, node: Expr) -> tuple[str, int]:
         match node.op:
@@ -185,7 +218,9 @@ class Writer:
             self._pieces.pop(node, None)
             return "...", _ATOM
         long = len(text) > self.name_from
-        if not (self._naming and long and (self._uses[node] > 1 or len(text) > 10 * self.name_from)):
+        if not (
+            self._naming and long and (self._uses[node] > 1 or len(text) > 10 * self.name_from)
+        ):
             return text, strength
         number = len(self.lines) + 1
         while f"s{number}" in self._taken:
@@ -204,12 +239,18 @@ class Writer:
 
     def _compare(self, gap: Expr, positive: bool) -> str:
         left, right = gap.args if gap.op == "sub" else (gap, None)
-        return self.text(left) + (self.greater if positive else self.less) + (self.text(right) if right is not None else "0")
+        return (
+            self.text(left)
+            + (self.greater if positive else self.less)
+            + (self.text(right) if right is not None else "0")
+        )
 
     def _group(self, text: str) -> str:
         return self.parentheses(text)
 
 
 def to_text(node: Expr, limit: int = 300) -> str:
-    """An expression as Python would write it; parts longer than ``limit`` characters become ``...``."""
+    """An expression as Python would write it; parts longer than ``limit`` characters become
+    ``...``.
+    """
     return Writer(limit=limit).text(node)

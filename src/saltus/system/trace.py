@@ -1,6 +1,7 @@
 """Tracing: the user's function is called once, with symbols, and its operations are recorded.
 
-Whatever goes wrong inside the function becomes a TraceError that names its file and line and says what to write instead.
+Whatever goes wrong inside the function becomes a TraceError that names its file and line and says
+what to write instead.
 """
 
 from __future__ import annotations
@@ -16,7 +17,14 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from saltus.errors import ParameterError, TraceError, UnitError, UnusedParameterWarning, nearest, shown
+from saltus.errors import (
+    ParameterError,
+    TraceError,
+    UnitError,
+    UnusedParameterWarning,
+    nearest,
+    shown,
+)
 from saltus.system import checks
 from saltus.system.dimensions import DimensionCheck
 from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
@@ -32,14 +40,21 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _HERE = str(Path(__file__).parent.parent)
-_LIBRARIES = tuple({sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None})
+_LIBRARIES = tuple(
+    {sysconfig.get_path(key) for key in ("stdlib", "platstdlib", "purelib", "platlib")} - {None}
+)
 #: Calls of functions that are often called with positional arguments.
 _CALLS = {
-    "freeplay": "sl.freeplay(x, stiffness=..., gap=...), or lower_gap= and upper_gap=, damping= with velocity=, preload=",
+    "freeplay": "sl.freeplay(x, stiffness=..., gap=...), or lower_gap= and upper_gap=, damping= "
+    "with velocity=, preload=",
     "piecewise": "sl.piecewise((value, condition), ..., otherwise=value)",
     "table": 'sl.table(t, points, values, kind="linear", outside="hold")',
 }
-_HOW_TO = "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and functions that can be traced. " + OWN_FUNCTIONS
+_HOW_TO = (
+    "Write the equation with + - * / **, comparisons inside sl.piecewise(...), and "
+    "functions "
+    "that can be traced. "
+) + OWN_FUNCTIONS
 
 
 def _known_words(function: Callable[P, R]) -> Callable[P, R]:
@@ -52,8 +67,17 @@ def _known_words(function: Callable[P, R]) -> Callable[P, R]:
         for word in kwargs:
             if word not in known:
                 there = elsewhere.get(word)
-                advice = f'Write {there}=, the name of the parameter with the forcing frequency: {there}="frequency".' if there else ""
-                raise TraceError(f"sl.system has no argument {word!r}. {advice or nearest(word, known)}")
+                advice = (
+                    (
+                        f"Write {there}=, the name of the parameter with the forcing frequency: "
+                        f'{there}="frequency".'
+                    )
+                    if there
+                    else ""
+                )
+                raise TraceError(
+                    f"sl.system has no argument {word!r}. {advice or nearest(word, known)}"
+                )
         return function(*args, **kwargs)
 
     return called
@@ -72,30 +96,33 @@ def system(
 ) -> Callable[[Callable[..., Any]], System]:
     """Decorator that turns an equation of motion into a :class:`System`.
 
-    The function takes the time, the states, and after a ``*`` the parameters with their default values; it returns the time derivative of
-    each state. Where the states are many, ``*y`` after the time takes them all, in their order. The function is called once, with symbols.
-    Comparisons inside :func:`piecewise` become the contacts.
+    The function takes the time, the states, and after a ``*`` the parameters with their default
+    values; it returns the time derivative of each state. Where the states are many, ``*y`` after
+    the time takes them all, in their order. The function is called once, with symbols. Comparisons
+    inside :func:`piecewise` become the contacts.
 
     Parameters
     ----------
     states : str or sequence of str
         Names of the states: ``"x v"``.
     forced_at : str, optional
-        The parameter that holds the forcing frequency. It is in Hz (T = 1/f) unless its default, such as ``"94.2 rad/s"``, or ``units``
-        says ``rad/s``. The equations must repeat after T. Leave out for a system without a period.
+        The parameter that holds the forcing frequency. It is in Hz (T = 1/f) unless its default,
+        such as ``"94.2 rad/s"``, or ``units`` says ``rad/s``. The equations must repeat after T.
+        Leave out for a system without a period.
     units : mapping of str to str, optional
-        Coherent SI unit of states and parameters: ``{"x": "m", "mass": "kg", "damping_ratio": "1"}``. The unit of a parameter whose
-        default is text (``mass="3 kg"``) is known already.
+        Coherent SI unit of states and parameters: ``{"x": "m", "mass": "kg", "damping_ratio":
+        "1"}``. The unit of a parameter whose default is text (``mass="3 kg"``) is known already.
     guards : mapping of str to callable, optional
         Names for guards, each with its comparison, as a function of states and parameters by name:
-        ``{"teeth": lambda x1, x2, gap: x2 - x1 > gap}``. A guard without one is named after the parameter that sets it, or by its equation.
+        ``{"teeth": lambda x1, x2, gap: x2 - x1 > gap}``. A guard without one is named after the
+        parameter that sets it, or by its equation.
     name : str, optional
         Name of the system; default: that of the function.
     source : str, optional
         Where the equations were published.
     check_units : bool, optional
-        Whether to check known units: terms of a sum or comparison have one unit, and each rate has that of its state per second.
-        False for equations whose numbers have units of their own.
+        Whether to check known units: terms of a sum or comparison have one unit, and each rate has
+        that of its state per second. False for equations whose numbers have units of their own.
 
     Returns
     -------
@@ -107,20 +134,26 @@ def system(
     TraceError
         If the function can't be traced; the message names file and line.
     ParameterError, UnitError
-        If a default value is out of range or a unit is wrong, or terms of different units are added.
+        If a default value is out of range or a unit is wrong, or terms of different units are
+        added.
 
     Examples
     --------
     >>> from saltus.system import cos, pi, piecewise
     >>> @system(states="x v", forced_at="frequency", units={"x": "m", "v": "m/s"})
-    ... def rig(t, x, v, *, mass="3 kg", stiffness="14 kN/m", gap="0.4 mm", force="4 N", frequency="15 Hz"):
+    ... def rig(
+    ...     t, x, v, *, mass="3 kg", stiffness="14 kN/m", gap="0.4 mm", force="4 N",
+    ...     frequency="15 Hz",
+    ... ):
     ...     contact = piecewise((stiffness * (x - gap), x > gap), otherwise=0)
     ...     return v, (force * cos(2 * pi * frequency * t) - contact) / mass
     >>> rig.guards[0].name, rig.values["gap"], rig.units["stiffness"]
     ('gap', 0.0004, 'N/m')
     """
     if callable(states):
-        raise TraceError('write @sl.system(states="x v"), with the names of the states, not bare @sl.system.')
+        raise TraceError(
+            'write @sl.system(states="x v"), with the names of the states, not bare @sl.system.'
+        )
     if not isinstance(states, str | list | tuple):
         raise TraceError(f'states must be names, such as states="x v", not {shown(states)}.')
     names = tuple(states.replace(",", " ").split()) if isinstance(states, str) else tuple(states)
@@ -132,19 +165,31 @@ def system(
 
         if not callable(function):
             raise TraceError(
-                f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, ...), not {shown(function)}."
+                f"@sl.system stands above a function, def rig(t, {', '.join(map(str, names))}, *, "
+                f"...), not {shown(function)}."
             )
-        title, description = name or getattr(function, "__name__", "system").strip("<>"), inspect.getdoc(function) or ""
-        for what, text, why in (("name", title, why_no_title), ("source", source, why_no_text), ("docstring", description, why_no_text)):
+        title, description = (
+            name or getattr(function, "__name__", "system").strip("<>"),
+            inspect.getdoc(function) or "",
+        )
+        for what, text, why in (
+            ("name", title, why_no_title),
+            ("source", source, why_no_text),
+            ("docstring", description, why_no_text),
+        ):
             if why(text) is not None:
                 raise TraceError(f"the {what} of a system can't be {shown(text)}: {why(text)}.")
         defaults = _parameters(function, names, title)
         known_units = _units(names, defaults, forced_at, dict(units or {}), title)
         if forced_at is not None and known_units[forced_at] not in ("Hz", "rad/s"):
             raise UnitError(
-                f"{title}: forced_at={shown(forced_at)} is in {known_units[forced_at]!r}, but a forcing frequency is in 'Hz' or 'rad/s'."
+                f"{title}: forced_at={shown(forced_at)} is in {known_units[forced_at]!r}, but a "
+                f"forcing frequency is in 'Hz' or 'rad/s'."
             )
-        values = {key: checks.resolve_one(key, value, known_units[key], forced_at) for key, value in defaults.items()}
+        values = {
+            key: checks.resolve_one(key, value, known_units[key], forced_at)
+            for key, value in defaults.items()
+        }
         dimensions = DimensionCheck(names, known_units) if check_units else None
         field, found = _traced(function, names, tuple(defaults), title, dimensions)
         _warn_of_unused(field, found, defaults, forced_at, title)
@@ -167,21 +212,30 @@ def system(
 def _check_arguments(units: Any, guards: Any, forced_at: Any, name: Any, check_units: Any) -> None:
     """Raise a TraceError for an argument of :func:`system` of a wrong kind."""
     if units is not None and not isinstance(units, Mapping):
-        raise TraceError(f'units must be a mapping of names to units, such as units={{"x": "m"}}, not {shown(units)}.')
+        raise TraceError(
+            f'units must be a mapping of names to units, such as units={{"x": "m"}}, '
+            f"not {shown(units)}."
+        )
     if guards is not None and not isinstance(guards, Mapping):
         raise TraceError(
-            f'guards must be a mapping of names to comparisons, such as guards={{"stop": lambda x, gap: x > gap}}, not {shown(guards)}.'
+            f'guards must be a mapping of names to comparisons, such as guards={{"stop": lambda x, '
+            f"gap: x > gap}}, not {shown(guards)}."
         )
     if forced_at is not None and not isinstance(forced_at, str):
-        raise TraceError(f'forced_at must be the name of a parameter, such as forced_at="frequency", not {shown(forced_at)}.')
+        raise TraceError(
+            f"forced_at must be the name of a parameter, such as "
+            f'forced_at="frequency", not {shown(forced_at)}.'
+        )
     if not isinstance(check_units, bool | np.bool_):
         raise TraceError(f"check_units must be True or False, not {shown(check_units)}.")
     if name is not None and not isinstance(name, str):
         raise TraceError(f"the name of a system can't be {shown(name)}: {why_no_title(name)}.")
 
 
-# -- the signature -------------------------------------------------------------------------------------------------------------
-def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: str) -> dict[str, Any]:
+# -- the signature ---------------------------------------------------------------------------------
+def _parameters(
+    function: Callable[..., Any], states: tuple[str, ...], title: str
+) -> dict[str, Any]:
     """Names and defaults of the parameters; checks the signature."""
     _check_states(states, title)
     wanted = f"def {title}(t, {', '.join(states)}, *, ...)"
@@ -191,17 +245,23 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
     try:
         signature = inspect.signature(function)
     except ValueError:  # of a class or function of C
-        raise TraceError(f"{title}: Python doesn't know the arguments of {shown(function)}. Write a function, {wanted}.") from None
+        raise TraceError(
+            f"{title}: Python doesn't know the arguments of {shown(function)}. Write "
+            f"a function, {wanted}."
+        ) from None
     for argument in signature.parameters.values():
         if argument.kind == argument.VAR_POSITIONAL and len(positional) == 1:
             together = True
         elif argument.kind in (argument.VAR_POSITIONAL, argument.VAR_KEYWORD):
-            raise TraceError(f"{title}: name every parameter; *{argument.name} can't be traced. Write {wanted}.")
+            raise TraceError(
+                f"{title}: name every parameter; *{argument.name} can't be traced. Write {wanted}."
+            )
         elif argument.kind != argument.KEYWORD_ONLY:
             positional.append(argument)
         elif argument.default is argument.empty:
             raise TraceError(
-                f"{title}: parameter {argument.name!r} has no default. Give it a value: {argument.name}=1.0, or text with a unit."
+                f"{title}: parameter {argument.name!r} has no default. Give it a value: "
+                f"{argument.name}=1.0, or text with a unit."
             )
         elif (why := why_no_name(argument.name)) is not None:
             raise TraceError(f"{title}: {argument.name!r} can't be the name of a parameter: {why}.")
@@ -211,10 +271,18 @@ def _parameters(function: Callable[..., Any], states: tuple[str, ...], title: st
     if names[1:] == list(states) or together:
         return parameters
     if names[: len(states)] == list(states):
-        raise TraceError(f"{title}: the time is the first argument, before the states. Write {wanted}.")
+        raise TraceError(
+            f"{title}: the time is the first argument, before the states. Write {wanted}."
+        )
     if names[1 : len(states) + 1] == list(states):
-        raise TraceError(f"{title}: put a * between the states and the parameters, so that parameters are given by name. Write {wanted}.")
-    raise TraceError(f"{title}: states={' '.join(states)!r}, but the function takes ({', '.join(names)}). Write {wanted}.")
+        raise TraceError(
+            f"{title}: put a * between the states and the parameters, so that "
+            f"parameters are given by name. Write {wanted}."
+        )
+    raise TraceError(
+        f"{title}: states={' '.join(states)!r}, but the function takes "
+        f"({', '.join(names)}). Write {wanted}."
+    )
 
 
 def _check_states(states: tuple[str, ...], title: str) -> None:
@@ -228,16 +296,23 @@ def _check_states(states: tuple[str, ...], title: str) -> None:
 
 
 def _units(
-    states: tuple[str, ...], defaults: Mapping[str, Any], forced_at: str | None, declared: dict[str, str], title: str
+    states: tuple[str, ...],
+    defaults: Mapping[str, Any],
+    forced_at: str | None,
+    declared: dict[str, str],
+    title: str,
 ) -> dict[str, str]:
     """Unit of every state and parameter."""
     for name in declared:
         if name not in states and name not in defaults:
             raise ParameterError(
-                f"{title}: units= names {shown(name)}, which is neither a state nor a parameter. {nearest(name, (*states, *defaults))}"
+                f"{title}: units= names {shown(name)}, which is neither a state nor a parameter. "
+                f"{nearest(name, (*states, *defaults))}"
             )
     if forced_at is not None and forced_at not in defaults:
-        raise ParameterError(f"{title}: forced_at={shown(forced_at)} is no parameter. {nearest(forced_at, defaults)}")
+        raise ParameterError(
+            f"{title}: forced_at={shown(forced_at)} is no parameter. {nearest(forced_at, defaults)}"
+        )
     units = {}
     for name in (*states, *defaults):
         if name in declared:
@@ -251,18 +326,26 @@ def _units(
 
 
 def _is_angular(default: Any, name: str) -> bool:
-    """Whether a forcing frequency is written in radians, as ``"94.2 rad/s"``; turns and rpm are counted in Hz."""
+    """Whether a forcing frequency is written in radians, as ``"94.2 rad/s"``; turns and rpm are
+    counted in Hz.
+    """
     return isinstance(default, str) and "rad" in default and coherent_unit(default, name) == "rad/s"
 
 
-# -- the call ------------------------------------------------------------------------------------------------------------------
+# -- the call --------------------------------------------------------------------------------------
 def _traced(
-    function: Callable[..., Any], states: tuple[str, ...], parameters: tuple[str, ...], title: str, dimensions: DimensionCheck | None
+    function: Callable[..., Any],
+    states: tuple[str, ...],
+    parameters: tuple[str, ...],
+    title: str,
+    dimensions: DimensionCheck | None,
 ) -> tuple[Any, Any]:
     """Field and guards."""
     try:
         with observed(dimensions):
-            returned = function(TIME, *map(state, states), **{name: parameter(name) for name in parameters})
+            returned = function(
+                TIME, *map(state, states), **{name: parameter(name) for name in parameters}
+            )
             derivatives = _as_derivatives(returned, states)
         if dimensions is not None:
             dimensions.check_rates(derivatives)
@@ -279,14 +362,22 @@ def _traced(
         raise TraceError(f"{title} ({place(function)}): {error}") from error
 
 
-def _warn_of_unused(field: Any, guards: Any, parameters: Iterable[str], forced_at: str | None, title: str) -> None:
+def _warn_of_unused(
+    field: Any, guards: Any, parameters: Iterable[str], forced_at: str | None, title: str
+) -> None:
     """Warn of parameters on which nothing depends: a name forgotten in the equation."""
-    used = {node.payload for node in walk(*field, *(guard.gap for guard in guards)) if node.op == "param"} | {forced_at}
+    used = {
+        node.payload
+        for node in walk(*field, *(guard.gap for guard in guards))
+        if node.op == "param"
+    } | {forced_at}
     if unused := [name for name in parameters if name not in used]:
         one = len(unused) == 1
         warnings.warn(
-            f"{title}: {', '.join(unused)} {'is' if one else 'are'} declared but the equations don't use {'it' if one else 'them'}: "
-            f"another value changes nothing. Use {'it' if one else 'them'}, or leave {'it' if one else 'them'} out.",
+            f"{title}: {', '.join(unused)} {'is' if one else 'are'} declared but the equations "
+            f"don't use {'it' if one else 'them'}: "
+            f"another value changes nothing. Use {'it' if one else 'them'}, or leave "
+            f"{'it' if one else 'them'} out.",
             UnusedParameterWarning,
             stacklevel=3,
         )
@@ -295,23 +386,30 @@ def _warn_of_unused(field: Any, guards: Any, parameters: Iterable[str], forced_a
 def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
     """What the function returned, as one expression per state."""
     if returned is None:
-        raise TraceError("it returns nothing. End it with: return " + ", ".join(f"d{name}/dt" for name in states))
+        raise TraceError(
+            "it returns nothing. End it with: return " + ", ".join(f"d{name}/dt" for name in states)
+        )
     if isinstance(returned, Expr | int | float):
         returned = (returned,)
     try:
         derivatives = [as_expr(value) for value in returned]
     except TypeError:
-        raise TraceError(f"it returns {shown(returned)} in place of the time derivatives of {', '.join(states)}.") from None
+        raise TraceError(
+            f"it returns {shown(returned)} in place of the time derivatives of {', '.join(states)}."
+        ) from None
     if len(derivatives) != len(states):
         raise TraceError(
-            f"it returns {len(derivatives)} value{'s' * (len(derivatives) != 1)}, but there are {len(states)} states "
+            f"it returns {len(derivatives)} value{'s' * (len(derivatives) != 1)}, but there are "
+            f"{len(states)} states "
             f"({', '.join(states)}): one time derivative for each, in this order."
         )
     return derivatives
 
 
 def explained(error: Exception, function: Callable[..., Any], title: str) -> str:
-    """The message for an error inside the user's function: where, what, and what to write instead."""
+    """The message for an error inside the user's function: where, what, and what to
+    write instead.
+    """
     if isinstance(function, Formula | Equations) and isinstance(error, TraceError | UnitError):
         return f"{title}: {error}"
     code = getattr(inspect.unwrap(function), "__code__", None)
@@ -331,13 +429,19 @@ def explained(error: Exception, function: Callable[..., Any], title: str) -> str
         return f"{title} ({where}): {error}"
     if isinstance(error, NameError) and error.name:
         known = inspect.signature(function).parameters
-        return f"{title} ({where}): {error.name!r} is no state, no parameter, and not defined outside either. {nearest(error.name, known)}"
+        return (
+            f"{title} ({where}): {error.name!r} is no state, no parameter, and not defined "
+            f"outside either. {nearest(error.name, known)}"
+        )
     for name, call in _CALLS.items():
         if isinstance(error, TypeError) and str(error).startswith(f"{name}() "):
             return f"{title} ({where}): sl.{str(error).rstrip('.')}. Write {call}."
     if isinstance(error, TypeError) and "for ^" in str(error):
         return f"{title} ({where}): a power is written x**2; ^ is something else in Python."
-    return f"{title} ({where}) can't be traced: {type(error).__name__}: {str(error).rstrip('.?! ')}. {_HOW_TO}"
+    return (
+        f"{title} ({where}) can't be traced: {type(error).__name__}: "
+        f"{str(error).rstrip('.?! ')}. {_HOW_TO}"
+    )
 
 
 def place(function: Callable[..., Any]) -> str:

@@ -26,7 +26,11 @@ WING = sl.models.find("aeroelastic")()
         (RIG, {"start": ("1 s", 0)}, "x is measured in m"),
         (WING, {}, "has no forcing period: give every="),
         (WING, {"every": -1.0}, "every must be a positive time"),
-        (WING, {"every": 0.2, "unit": "bit/period"}, "has no forcing period, so 'bit/period'.*Take unit='bit/s'"),
+        (
+            WING,
+            {"every": 0.2, "unit": "bit/period"},
+            "has no forcing period, so 'bit/period'.*Take unit='bit/s'",
+        ),
         ("rig", {}, "must be a System"),
     ],
 )

@@ -1,4 +1,6 @@
-"""What is said of a trajectory that used up its steps: how long the whole would take, or that no number of steps leads on."""
+"""What is said of a trajectory that used up its steps: how long the whole would take, or that no
+number of steps leads on.
+"""
 
 import numpy as np
 import xarray as xr
@@ -10,14 +12,19 @@ from saltus.analysis.starts import ensemble, span
 
 @sl.system(states="h", units={"h": "m"})
 def tank(t, h, *, c=1.0):
-    """A tank that runs empty: h = (1 - c*t/2)**2 until t = 2/c; at h = 0 the rate has no derivative."""
+    """A tank that runs empty: h = (1 - c*t/2)**2 until t = 2/c; at h = 0 the rate has no
+    derivative.
+    """
     return -c * sl.sqrt(h)
 
 
 def stopped(level, time):
     """A run of it that used up its steps there."""
     end = xr.Variable((), level, {"units": "m"})
-    return xr.Dataset({"status": "budget_steps", "steps": 10**6, "end_time": time, "end_h": end}, attrs={"states": "h"})
+    return xr.Dataset(
+        {"status": "budget_steps", "steps": 10**6, "end_time": time, "end_h": end},
+        attrs={"states": "h"},
+    )
 
 
 def told(level, time):

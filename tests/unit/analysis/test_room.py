@@ -1,4 +1,6 @@
-"""Memory: what doesn't fit is refused with an estimate, and contacts without end stop where half of what is free is used."""
+"""Memory: what doesn't fit is refused with an estimate, and contacts without end stop where half of
+what is free is used.
+"""
 
 import numpy as np
 import pytest
@@ -20,11 +22,29 @@ def small(monkeypatch):
 @pytest.mark.parametrize(
     ("call", "teaches"),
     [
-        (lambda: sl.simulate(rig, START, periods=1000), r"12 trajectories with 200001 samples each .* need about 0\.115 GB .* keep="),
-        (lambda: sl.stroboscope(rig, START, 10**6), r"12 trajectories with 1000001 periods each .* need about 0\.576 GB .* keep="),
-        (lambda: sl.basins(rig, x=(-1e-3, 1e-3, 1000), v=(-1.0, 1.0, 1000)), "1000 x 1000 cells are more than .* 0.418 GB .* coarser grid"),
-        (lambda: sl.basin_fractions(rig, x=(-1e-3, 1e-3), samples=10**10), r"10000000000 random starts .* 1\.68e\+03 GB .* samples="),
-        (lambda: sl.frequency_response(rig, (2.0, 30.0, 100_000)), "100000 values with 1 starts each .* coarser grid"),
+        (
+            lambda: sl.simulate(rig, START, periods=1000),
+            r"12 trajectories with 200001 samples each "
+            r".* need about 0\.115 GB .* keep=",
+        ),
+        (
+            lambda: sl.stroboscope(rig, START, 10**6),
+            r"12 trajectories with 1000001 periods each .* "
+            r"need about 0\.576 GB .* keep=",
+        ),
+        (
+            lambda: sl.basins(rig, x=(-1e-3, 1e-3, 1000), v=(-1.0, 1.0, 1000)),
+            "1000 x 1000 cells are more than .* 0.418 GB .* coarser grid",
+        ),
+        (
+            lambda: sl.basin_fractions(rig, x=(-1e-3, 1e-3), samples=10**10),
+            r"10000000000 random "
+            r"starts .* 1\.68e\+03 GB .* samples=",
+        ),
+        (
+            lambda: sl.frequency_response(rig, (2.0, 30.0, 100_000)),
+            "100000 values with 1 starts each .* coarser grid",
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused_with_its_size(small, call, teaches):
@@ -50,7 +70,9 @@ def test_contacts_without_end_stop_in_time_with_what_came_before(monkeypatch):
     options = {"samples": 1, "time_errors": "local", "threads": 2}
     whole = sl.simulate(rig, START, periods=1500, **options)
     assert whole.sizes["contact"] > 30_000
-    monkeypatch.setattr(room, "free", lambda: 2 * 20_000 * (room.CONTACT + 2 * room.CONTACT_OF_A_STATE))
+    monkeypatch.setattr(
+        room, "free", lambda: 2 * 20_000 * (room.CONTACT + 2 * room.CONTACT_OF_A_STATE)
+    )
     with pytest.warns(SaltusWarning, match="filled half of the free memory.*keep="):
         part = sl.simulate(rig, START, periods=1500, **options)
     assert 20_000 <= part.sizes["contact"] < whole.sizes["contact"]
@@ -58,4 +80,6 @@ def test_contacts_without_end_stop_in_time_with_what_came_before(monkeypatch):
     assert "budget_events" in part.status.values
     for row in range(len(START["x"])):
         mine = part.contact_time.values[part.contact_trajectory.values == row]
-        np.testing.assert_array_equal(mine, whole.contact_time.values[whole.contact_trajectory.values == row][: len(mine)])
+        np.testing.assert_array_equal(
+            mine, whole.contact_time.values[whole.contact_trajectory.values == row][: len(mine)]
+        )

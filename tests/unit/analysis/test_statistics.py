@@ -1,4 +1,6 @@
-"""Means of correlated series: errors with known values, and whether the intervals hold the mean as often as they say."""
+"""Means of correlated series: errors with known values, and whether the intervals hold the mean as
+often as they say.
+"""
 
 import math
 
@@ -9,7 +11,9 @@ from saltus.analysis.statistics import LEAST, batch_means
 
 
 def autoregressive(factor, count, length, seed=0):
-    """x_i = factor x_(i-1) + noise of variance 1: the mean of n has the standard error 1 / (1 - factor) / sqrt(n)."""
+    """x_i = factor x_(i-1) + noise of variance 1: the mean of n has the standard error 1 / (1 -
+    factor) / sqrt(n).
+    """
     noise = np.random.default_rng(seed).standard_normal((count, length + 1000))
     series = np.zeros_like(noise)
     for i in range(1, series.shape[1]):
@@ -19,7 +23,9 @@ def autoregressive(factor, count, length, seed=0):
 
 @pytest.mark.parametrize(("factor", "low"), [(0.0, 0.92), (0.5, 0.92), (0.9, 0.90), (-0.5, 0.92)])
 def test_errors_of_correlated_series(factor, low):
-    """Of 95 % intervals at least so many hold the mean; with 500 series 92 % is 3 standard deviations below."""
+    """Of 95 % intervals at least so many hold the mean; with 500 series 92 % is 3 standard
+    deviations below.
+    """
     means = batch_means(autoregressive(factor, 500, 4000), np.array([4000]))
     exact = 1 / (1 - factor) / math.sqrt(4000)
     assert means.error.mean() == pytest.approx(exact, rel=0.06)

@@ -14,7 +14,11 @@ rig = sl.models.delangre("b")
 @pytest.mark.parametrize(
     ("keywords", "teaches"),
     [
-        ({"lower_gap": 1}, r"parameter of delangre: give it by values={'lower_gap': \.\.\.} or system.with_values\(lower_gap=\.\.\.\)"),
+        (
+            {"lower_gap": 1},
+            r"parameter of delangre: give it by values={'lower_gap': \.\.\.} or "
+            r"system.with_values\(lower_gap=\.\.\.\)",
+        ),
         ({"v": 1}, r"state of delangre: give it by start={'x': \.\.\., 'v': \.\.\.}"),
         ({"tend": 1}, "Write t_end="),
         ({"t_eval": [1]}, "Write samples="),
@@ -34,14 +38,32 @@ WING = sl.models.aeroelastic()
 @pytest.mark.parametrize(
     ("call", "teaches"),
     [
-        (lambda: sl.lyapunov(rig, (0, 0), t_end=4), r"periods= \(forcing periods, or samples every= seconds of a system without"),
-        (lambda: sl.frequency_response(rig, (1, 2, 3), every=4), r"is periods= \(forcing periods\)\."),
-        (lambda: sl.simulate(rig, (0, 0), every=4), r"is t_end= \[s\] or periods= \(forcing periods\)\."),
+        (
+            lambda: sl.lyapunov(rig, (0, 0), t_end=4),
+            r"periods= \(forcing periods, or samples "
+            r"every= seconds of a system without",
+        ),
+        (
+            lambda: sl.frequency_response(rig, (1, 2, 3), every=4),
+            r"is periods= \(forcing "
+            r"periods\)\.",
+        ),
+        (
+            lambda: sl.simulate(rig, (0, 0), every=4),
+            r"is t_end= \[s\] or periods= \(forcing "
+            r"periods\)\.",
+        ),
         (lambda: sl.poincare(WING, (0, 0, 0, 0), ("plunge", 0)), "no forcing period: give t_end="),
         (lambda: sl.simulate(WING, (0, 0, 0, 0), periods=4), "Give t_end= in place of periods="),
-        (lambda: sl.stroboscope(WING), "no forcing period to be seen once in. Take sl.simulate with t_end="),
+        (
+            lambda: sl.stroboscope(WING),
+            "no forcing period to be seen once in. Take sl.simulate with t_end=",
+        ),
         (lambda: sl.attractors(WING, (0, 0, 0, 0)), "no forcing period: give every="),
-        (lambda: sl.bifurcation_diagram(WING, {"airspeed": (9.0, 12.0, 4)}), "no forcing period: give every="),
+        (
+            lambda: sl.bifurcation_diagram(WING, {"airspeed": (9.0, 12.0, 4)}),
+            "no forcing period: give every=",
+        ),
     ],
 )
 def test_each_verb_names_what_tells_it_how_long_to_go_on(call, teaches):
@@ -50,19 +72,31 @@ def test_each_verb_names_what_tells_it_how_long_to_go_on(call, teaches):
 
 
 def test_ranges_of_states_are_shown_where_they_are_forgotten():
-    with pytest.raises(sl.SaltusError, match=r'Write sl.basins\(system, x=\("-5 mm", "5 mm", 400\)'):
+    with pytest.raises(
+        sl.SaltusError,
+        match=r'Write sl.basins\(system, x=\("-5 mm", "5 mm", '
+        r"400\)",
+    ):
         sl.basins(rig, {"x": ("-1 mm", "1 mm", 5)})
 
 
 def test_too_few_and_too_many():
-    with pytest.raises(sl.SaltusError, match=r"missing a required argument: 'system'. Write sl.simulate\(system, "):
+    with pytest.raises(
+        sl.SaltusError,
+        match=r"missing a required argument: 'system'. Write "
+        r"sl.simulate\(system, ",
+    ):
         sl.simulate()
     with pytest.raises(sl.SaltusError, match="too many positional arguments"):
         sl.simulate(rig, (0, 0), 1, None, 1, 1)
 
 
 def test_the_order_of_scipy_is_answered_by_that_of_saltus():
-    with pytest.raises(sl.SaltusError, match=r"the start comes second, and the time is one number: sl.simulate\(system, start"):
+    with pytest.raises(
+        sl.SaltusError,
+        match=r"the start comes second, and the time is one number: "
+        r"sl.simulate\(system, start",
+    ):
         sl.simulate(rig, (0, 10), (1e-3, 0))
 
 
@@ -76,7 +110,10 @@ def test_every_public_verb_is_one():
     assert len(verbs) >= 17
     for name in verbs:
         with pytest.raises(sl.SaltusError, match=f"sl.{name}"):
-            getattr(sl, name)(**{"no such argument": 1}) if name not in ("basins", "basin_fractions") else getattr(sl, name)()
+            getattr(sl, name)(**{"no such argument": 1}) if name not in (
+                "basins",
+                "basin_fractions",
+            ) else getattr(sl, name)()
 
 
 def test_ctrl_c_before_anything_is_finished_is_told_in_a_sentence():
@@ -119,7 +156,7 @@ def test_options_that_a_method_has_not_are_answered_by_those_that_it_has(call, t
         call()
 
 
-# -- what a System isn't -----------------------------------------------------------------------------------------------------------
+# -- what a System isn't ---------------------------------------------------------------------------
 def test_a_system_says_what_to_do_in_place_of_calling_or_changing_it():
     with pytest.raises(sl.SaltusError, match=r"sl.simulate\(delangre, \.\.\.\)"):
         rig(0.0, (0.0, 0.0))
@@ -135,7 +172,7 @@ def test_a_model_that_is_not_there_is_answered_by_those_that_are():
         sl.models.duffing  # noqa: B018
 
 
-# -- progress in logs --------------------------------------------------------------------------------------------------------------
+# -- progress in logs ------------------------------------------------------------------------------
 def told(shares_at):
     """Lines of a work whose share done is so much at such a time [s]."""
     now, lines = [0.0], []
@@ -161,7 +198,9 @@ def test_short_work_says_nothing_and_slow_work_says_that_it_lives():
 
 def test_the_time_left_does_not_count_what_came_before_the_work():
     compiled = 100.0
-    assert told([(compiled, 0.0), (compiled + 10, 0.25), (compiled + 20, 0.5)])[-1] == "50% done in 120 s, about 20 s left"
+    assert told([(compiled, 0.0), (compiled + 10, 0.25), (compiled + 20, 0.5)])[-1] == (
+        "50% done in 120 s, about 20 s left"
+    )
     assert told([(compiled, 0.3)]) == ["30% done in 100 s"]
 
 

@@ -1,4 +1,6 @@
-"""The command line: quick to help, teaches by example, ends every fault with a message and the right exit code."""
+"""The command line: quick to help, teaches by example, ends every fault with a message and the
+right exit code.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,20 @@ from saltus.cli import commands
 from saltus.cli.commands import app
 from saltus.results.files import known
 
-COMMANDS = ["demo", "run", "status", "resume", "plot", "reproduce", "models", "doctor", "schema", "cache", "cache show", "cache clear"]
+COMMANDS = [
+    "demo",
+    "run",
+    "status",
+    "resume",
+    "plot",
+    "reproduce",
+    "models",
+    "doctor",
+    "schema",
+    "cache",
+    "cache show",
+    "cache clear",
+]
 
 
 def saltus(*arguments: str):
@@ -24,15 +39,20 @@ def saltus(*arguments: str):
 
 
 def test_help_imports_nothing_heavy():
-    """What makes `saltus --help` take less than 0.5 s; measured by the modules, since a clock would depend on the load."""
+    """What makes `saltus --help` take less than 0.5 s; measured by the modules, since a clock would
+    depend on the load.
+    """
     code = (
         "import sys; from saltus.cli import main\n"
         "sys.argv = ['saltus', '--help']\n"
         "try: main()\n"
         "except SystemExit: pass\n"
-        "print('HEAVY', sorted({'numpy', 'llvmlite', 'xarray', 'pandas', 'scipy', 'matplotlib', 'pint', 'pydantic'} & set(sys.modules)))"
+        "print('HEAVY', sorted({'numpy', 'llvmlite', 'xarray', 'pandas', 'scipy', 'matplotlib', "
+        "'pint', 'pydantic'} & set(sys.modules)))"
     )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    out = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
     assert "demo" in out
     assert out.splitlines()[-1] == "HEAVY []"
 
@@ -88,7 +108,9 @@ def test_a_fault_has_no_traceback(tmp_path):
 
 def test_brackets_in_messages_stay(tmp_path):
     """rich reads [simulate] as markup unless told not to."""
-    (tmp_path / "a.toml").write_text('[study]\nname = "a"\n[simulate]\nstart = { x = "0 mm" }\nperiods = true\n')
+    (tmp_path / "a.toml").write_text(
+        '[study]\nname = "a"\n[simulate]\nstart = { x = "0 mm" }\nperiods = true\n'
+    )
     assert "[simulate] periods = true" in saltus("run", str(tmp_path / "a.toml")).output
 
 
@@ -108,10 +130,17 @@ def test_ctrl_c_tells_the_command_that_goes_on(monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("saltus.study.run.study.run_study", stopped)
-    (tmp_path / "rig.py").write_text('import saltus as sl\n\n@sl.system(states="x v")\ndef rig(t, x, v, *, k=2.0):\n    return v, -k * x\n')
-    (tmp_path / "a.toml").write_text('[study]\nname = "a"\n[system]\n[poincare]\nsurface = "x turns"\nt_end = "1 s"\n')
+    (tmp_path / "rig.py").write_text(
+        'import saltus as sl\n\n@sl.system(states="x v")\ndef rig(t, '
+        "x, v, *, k=2.0):\n    return v, -k * x\n"
+    )
+    (tmp_path / "a.toml").write_text(
+        '[study]\nname = "a"\n[system]\n[poincare]\nsurface = "x turns"\nt_end = "1 s"\n'
+    )
     own, out = f"{tmp_path / 'rig.py'}:rig", tmp_path / "an answer"
-    said = " ".join(saltus("run", str(tmp_path / "a.toml"), "--system", own, "--out", str(out)).output.split())
+    said = " ".join(
+        saltus("run", str(tmp_path / "a.toml"), "--system", own, "--out", str(out)).output.split()
+    )
     assert f"saltus resume '{out}' --system {own}" in said
 
 
@@ -190,14 +219,29 @@ def test_a_wrong_figure_gets_those_that_there_are(tmp_path):
 @pytest.mark.parametrize("command", [["models"], ["schema"], ["models", "delangre"]])
 @pytest.mark.parametrize("how", ["nobody reads on", "closed from the start", "closed on the way"])
 def test_a_closed_output_ends_quietly(command, how):
-    """``saltus models | head``, ``saltus models >&-``: nothing is wrong with a file, so nothing is said about one."""
-    close = {"nobody reads on": "", "closed from the start": "os.close(1); ", "closed on the way": "os.close(1); "}[how]
+    """``saltus models | head``, ``saltus models >&-``: nothing is wrong with a file, so nothing is
+    said about one.
+    """
+    close = {
+        "nobody reads on": "",
+        "closed from the start": "os.close(1); ",
+        "closed on the way": "os.close(1); ",
+    }[how]
     call = "cli.commands.app(prog_name='saltus')" if how == "closed on the way" else "cli.main()"
-    code = f"import os, sys; import saltus.cli.commands; from saltus import cli; sys.argv = ['saltus', *{command!r}]; {close}{call}"
+    code = (
+        f"import os, sys; import saltus.cli.commands; from saltus import cli; sys.argv = "
+        f"['saltus', *{command!r}]; {close}{call}"
+    )
     read, write = os.pipe()
     os.close(read)
     try:
-        done = subprocess.run([sys.executable, "-c", code], stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            stdout=write,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
     finally:
         os.close(write)
     assert done.stderr == ""

@@ -1,4 +1,6 @@
-"""Studies of basins on the command line: run, status, resume, plot; what can go wrong is told in a sentence, with the right exit code."""
+"""Studies of basins on the command line: run, status, resume, plot; what can go wrong is told in a
+sentence, with the right exit code.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +65,9 @@ def finished(small, tmp_path_factory):
 
 @pytest.fixture
 def empty_pictures(finished, monkeypatch):
-    """Frames instead of pictures, where nobody looks at them: drawing takes longer than the rest of such a study."""
+    """Frames instead of pictures, where nobody looks at them: drawing takes longer than the rest of
+    such a study.
+    """
     import matplotlib.pyplot as plt
 
     from saltus import plot
@@ -95,7 +99,7 @@ def stopped(finished, tmp_path):
     return folder
 
 
-# -- run -------------------------------------------------------------------------------------------------------------------------
+# -- run -------------------------------------------------------------------------------------------
 def test_run_prints_a_table_and_writes_files_that_open(finished):
     folder, result = finished
     assert "share of starts" in result.stdout
@@ -117,11 +121,16 @@ def test_run_prints_a_table_and_writes_files_that_open(finished):
 
 @pytest.mark.usefixtures("empty_pictures")
 def test_progress_in_json(study, tmp_path):
-    """Every line of standard error is JSON, the last one says that all is done; nothing but tables on standard output."""
+    """Every line of standard error is JSON, the last one says that all is done; nothing but tables
+    on standard output.
+    """
     result = saltus("run", study(), "--out", tmp_path / "out", "--progress", "json", "--threads", 1)
-    lines = [line for line in map(json.loads, result.stderr.splitlines()) if "note" not in line]  # notes: what is being compiled
+    # notes: what is being compiled
+    lines = [line for line in map(json.loads, result.stderr.splitlines()) if "note" not in line]
     assert lines
-    assert all(set(line) == {"question", "done", "total", "seconds", "seconds_left"} for line in lines)
+    assert all(
+        set(line) == {"question", "done", "total", "seconds", "seconds_left"} for line in lines
+    )
     assert {(line["question"], line["total"]) for line in lines} == {("small", 8)}
     assert [line["done"] for line in lines] == sorted(line["done"] for line in lines)
     assert lines[-1]["done"] == 8
@@ -145,18 +154,29 @@ def test_progress_none_is_quiet(study, tmp_path):
 @pytest.mark.usefixtures("empty_pictures")
 def test_shards(study, tmp_path, finished):
     file, out = study(), tmp_path / "out"
-    first = saltus("run", file, "--out", out, "--shard", "1/2", "--progress", "none", "--threads", 1)
+    first = saltus(
+        "run", file, "--out", out, "--shard", "1/2", "--progress", "none", "--threads", 1
+    )
     assert first.exit_code == 0
-    assert f"small: other shards aren't done yet. When they are: saltus resume {out}" in first.stdout
+    assert (
+        f"small: other shards aren't done yet. When they are: saltus resume {out}"
+    ) in first.stdout
     assert "4 of 8" in saltus("status", out).stdout
-    second = saltus("run", file, "--out", out, "--shard", "0/2", "--progress", "none", "--threads", 1)
+    second = saltus(
+        "run", file, "--out", out, "--shard", "0/2", "--progress", "none", "--threads", 1
+    )
     assert "share of starts" in second.stdout
-    np.testing.assert_array_equal(load(out / "basins.nc").basin, load(finished[0] / "basins.nc").basin)
+    np.testing.assert_array_equal(
+        load(out / "basins.nc").basin, load(finished[0] / "basins.nc").basin
+    )
 
 
-# -- status ----------------------------------------------------------------------------------------------------------------------
+# -- status ----------------------------------------------------------------------------------------
 def test_status_before_during_and_after(finished, stopped, tmp_path):
-    refused(saltus("status", tmp_path / "nowhere"), "holds no store and no study. Give the output folder of a study")
+    refused(
+        saltus("status", tmp_path / "nowhere"),
+        "holds no store and no study. Give the output folder of a study",
+    )
     assert "5 of 8" in saltus("status", stopped).stdout
     assert "62 %" in saltus("status", stopped).stdout
     after = saltus("status", finished[0])
@@ -179,7 +199,11 @@ def test_status_of_a_store_without_chunks(finished, tmp_path):
 def test_status_shows_damage_and_who_is_at_work(stopped):
     (stopped / "stores" / "basins" / "chunks" / "0.chunk").write_bytes(b"short")
     with Store.open(stopped / "stores" / "basins").lock():
-        (row,) = [line for line in saltus("status", stopped).stdout.splitlines() if line.startswith("small")]
+        (row,) = [
+            line
+            for line in saltus("status", stopped).stdout.splitlines()
+            if line.startswith("small")
+        ]
     assert row.split()[:7] == ["small", "5", "of", "8", "62", "%", "1"]
     assert "process" in row
 
@@ -192,14 +216,18 @@ def test_status_of_a_damaged_head(stopped):
     assert "is damaged. Go on with the study that made it" in " ".join(result.output.split())
 
 
-# -- resume ----------------------------------------------------------------------------------------------------------------------
+# -- resume ----------------------------------------------------------------------------------------
 @pytest.mark.usefixtures("empty_pictures")
 def test_resume_of_a_stopped_study(stopped, finished):
     result = saltus("resume", stopped, "--progress", "json", "--threads", 1)
     assert result.exit_code == 0
     last = json.loads(result.stderr.splitlines()[-1])
     assert (last["done"], last["total"]) == (8, 8)
-    assert load(stopped / "basins.nc").drop_attrs().identical(load(finished[0] / "basins.nc").drop_attrs())
+    assert (
+        load(stopped / "basins.nc")
+        .drop_attrs()
+        .identical(load(finished[0] / "basins.nc").drop_attrs())
+    )
     assert "8 of 8" in saltus("status", stopped).stdout
 
 
@@ -247,10 +275,13 @@ def test_run_with_another_study_is_refused(stopped, study):
 def test_a_second_process_is_refused(stopped):
     """It's told who works there, and the exit code is that of a refusal."""
     with Store.open(stopped / "stores" / "basins").lock():
-        refused(saltus("resume", stopped, "--threads", 1, "--progress", "none"), "is being written by process")
+        refused(
+            saltus("resume", stopped, "--threads", 1, "--progress", "none"),
+            "is being written by process",
+        )
 
 
-# -- plot ------------------------------------------------------------------------------------------------------------------------
+# -- plot ------------------------------------------------------------------------------------------
 def test_plot_of_a_map(finished, tmp_path):
     result = saltus("plot", finished[0] / "basins.nc", "-o", tmp_path / "map.png")
     assert result.exit_code == 0
@@ -259,7 +290,10 @@ def test_plot_of_a_map(finished, tmp_path):
 
 @pytest.mark.parametrize("kind", ["history", "phase", "agreement"])
 def test_plot_of_a_map_as_something_else(finished, tmp_path, kind):
-    refused(saltus("plot", finished[0] / "basins.nc", "--kind", kind, "-o", tmp_path / "map.png"), "basins")
+    refused(
+        saltus("plot", finished[0] / "basins.nc", "--kind", kind, "-o", tmp_path / "map.png"),
+        "basins",
+    )
 
 
 @pytest.mark.parametrize("kind", ["basins", "agreement"])
@@ -268,15 +302,27 @@ def test_plot_of_a_motion_as_a_map(study, tmp_path, kind):
     refused(saltus("plot", tmp_path / "out" / "run.nc", "--kind", kind), kind)
 
 
-# -- what may be written wrong ---------------------------------------------------------------------------------------------------
+# -- what may be written wrong ---------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("[basins]", "[basins]\nperiod = 3", "[basins] has no key 'period'. Did you mean 'periods'?"),
+        (
+            "[basins]",
+            "[basins]\nperiod = 3",
+            "[basins] has no key 'period'. Did you mean 'periods'?",
+        ),
         ("axes.v", "axes.w", "[basins.axes] 'w' is unknown to delangre. Known: v, x."),
         ('"-5 mm"', "-5", "[basins.axes] x.first = -5 has no unit."),
-        ("\n[basins]", '\n[[basins.map]]\nname = "a"\n[[basins.map]]\nname = "a"\n[basins]', "two maps have the same name"),
-        ("\n[basins]", '\n[[basins.map]]\nname = "a"\ncompare = "b"\n[basins]', "map 'a' is compared with 'b', which is no other map"),
+        (
+            "\n[basins]",
+            '\n[[basins.map]]\nname = "a"\n[[basins.map]]\nname = "a"\n[basins]',
+            "two maps have the same name",
+        ),
+        (
+            "\n[basins]",
+            '\n[[basins.map]]\nname = "a"\ncompare = "b"\n[basins]',
+            "map 'a' is compared with 'b', which is no other map",
+        ),
         (STUDY[STUDY.index("[basins]") :], "", "a study asks something"),
     ],
 )
@@ -288,7 +334,10 @@ def test_faults_of_the_file(study, tmp_path, old, new, told):
 
 @pytest.mark.parametrize("shard", ["2/2", "x", "1", "1/0", "-1/2"])
 def test_nonsense_for_a_shard(study, tmp_path, finished, shard):
-    refused(saltus("run", study(), "--out", tmp_path / "out", "--shard", shard), "write K/N with K from 0 to N - 1, such as 0/4.")
+    refused(
+        saltus("run", study(), "--out", tmp_path / "out", "--shard", shard),
+        "write K/N with K from 0 to N - 1, such as 0/4.",
+    )
     refused(saltus("resume", finished[0], "--shard", shard), "write K/N")
     assert not (tmp_path / "out" / "stores").exists()
 
@@ -312,28 +361,54 @@ def dead_port():
 def test_a_dead_scheduler_is_told_at_once(stopped, dead_port):
     pytest.importorskip("distributed")
     begin = time.perf_counter()
-    refused(saltus("resume", stopped, "--scheduler", dead_port, "--progress", "none"), f"the scheduler {dead_port} doesn't answer")
+    refused(
+        saltus("resume", stopped, "--scheduler", dead_port, "--progress", "none"),
+        f"the scheduler {dead_port} doesn't answer",
+    )
     assert time.perf_counter() - begin < 6.0
 
 
 @pytest.mark.parametrize("address", ["nonsense", "foo://bar:1"])
 def test_nonsense_for_a_scheduler(stopped, address):
     pytest.importorskip("distributed")
-    refused(saltus("resume", stopped, "--scheduler", address, "--progress", "none"), f"the scheduler {address} doesn't answer")
+    refused(
+        saltus("resume", stopped, "--scheduler", address, "--progress", "none"),
+        f"the scheduler {address} doesn't answer",
+    )
 
 
 def test_a_scheduler_is_asked_for_before_anything_is_computed(study, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr(pipeline.BasinPlan, "scout", lambda *_: pytest.fail("attractors are looked for"))
-    refused(saltus("run", study(), "--out", tmp_path / "out", "--scheduler", "nonsense", "--progress", "none"), "doesn't answer")
+    monkeypatch.setattr(
+        pipeline.BasinPlan, "scout", lambda *_: pytest.fail("attractors are looked for")
+    )
+    refused(
+        saltus(
+            "run",
+            study(),
+            "--out",
+            tmp_path / "out",
+            "--scheduler",
+            "nonsense",
+            "--progress",
+            "none",
+        ),
+        "doesn't answer",
+    )
 
 
 def test_a_cluster_without_dask(stopped, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         address = f"tcp://127.0.0.1:{listening.getsockname()[1]}"
-        refused(saltus("resume", stopped, "--scheduler", address, "--progress", "none"), 'Install "saltus[cluster]"')
+        refused(
+            saltus("resume", stopped, "--scheduler", address, "--progress", "none"),
+            'Install "saltus[cluster]"',
+        )
 
 
 def test_options_of_basins_for_a_study_of_motions(study, tmp_path):
-    assert saltus("run", study(MOTION), "--out", tmp_path / "out", "--shard", "nonsense").exit_code == 2
+    assert (
+        saltus("run", study(MOTION), "--out", tmp_path / "out", "--shard", "nonsense").exit_code
+        == 2
+    )

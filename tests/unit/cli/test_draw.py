@@ -10,7 +10,9 @@ from saltus.results.dataset.schema import TABLES
 
 
 def test_every_kind_of_result_is_known():
-    """Attractors alone have no picture; a new kind needs a line in the table, and a word for messages."""
+    """Attractors alone have no picture; a new kind needs a line in the table, and a word for
+    messages.
+    """
     assert set(TABLES) == set(PICTURES) | {"attractors"}
     assert set(draw._WORDS) == set(PICTURES)
 

@@ -34,7 +34,9 @@ def test_by_name_and_alone(file):
 
 def test_it_may_import_its_neighbours(file, tmp_path):
     (tmp_path / "my_constants.py").write_text("SPRING = 9.0\n")
-    path = file("from my_constants import SPRING\n" + RIG.format(name="rig").replace("4.0", "SPRING"))
+    path = file(
+        "from my_constants import SPRING\n" + RIG.format(name="rig").replace("4.0", "SPRING")
+    )
     assert own_system(f"{path}:rig").values == {"stiffness": 9.0}
 
 

@@ -1,4 +1,6 @@
-"""The folder of compiled kernels: shared by processes that start at once, damaged, unwritable, cleared. One line stands for a kernel."""
+"""The folder of compiled kernels: shared by processes that start at once, damaged, unwritable,
+cleared. One line stands for a kernel.
+"""
 
 from __future__ import annotations
 
@@ -87,7 +89,9 @@ def reopened(file):
 
 def test_an_entry_is_made_once_and_then_loaded(folder, long, capfd):
     assert load().propagate(1) == 2
-    assert capfd.readouterr().err == "saltus: compiling one line: once for each new equation, about 20 s\n"
+    assert capfd.readouterr().err == (
+        "saltus: compiling one line: once for each new equation, about 20 s\n"
+    )
     before = stamp(folder)
     assert load().propagate(2) == 3
     assert stamp(folder) == before
@@ -131,9 +135,15 @@ DAMAGES = {
     "lost": lambda file: file.unlink(),
     "emptied": lambda file: file.write_bytes(b""),
     "no header": lambda file: file.write_bytes(b"\n"),
-    "a header of another kind": lambda file: file.write_bytes(b"[1]\n" + file.read_bytes().partition(b"\n")[2]),
-    "of another format": lambda file: file.write_bytes(file.read_bytes().replace(b"saltus-kernel/1", b"saltus-kernel/9", 1)),
-    "that of another key": lambda file: file.write_bytes(file.read_bytes().replace(KEY.encode(), KEY[::-1].encode(), 1)),
+    "a header of another kind": lambda file: file.write_bytes(
+        b"[1]\n" + file.read_bytes().partition(b"\n")[2]
+    ),
+    "of another format": lambda file: file.write_bytes(
+        file.read_bytes().replace(b"saltus-kernel/1", b"saltus-kernel/9", 1)
+    ),
+    "that of another key": lambda file: file.write_bytes(
+        file.read_bytes().replace(KEY.encode(), KEY[::-1].encode(), 1)
+    ),
     "a folder": lambda file: (file.unlink(), file.mkdir(mode=0o700)),
 }
 
@@ -159,7 +169,7 @@ def test_a_damaged_entry_is_built_again(folder, damage):
     assert not list(folder.glob(".building-*"))
 
 
-# -- what others could have written ----------------------------------------------------------------------------------------------
+# -- what others could have written ----------------------------------------------------------------
 WRONG = SOURCE.replace(", 1", ", 40")
 
 
@@ -187,7 +197,10 @@ def linked(path):
 
 
 OPENINGS = {
-    "writable by its group": lambda file: (os.chmod(file, 0o620), os.chown(file, -1, other_group())),
+    "writable by its group": lambda file: (
+        os.chmod(file, 0o620),
+        os.chown(file, -1, other_group()),
+    ),
     "writable by all": lambda file: os.chmod(file, 0o602),
     "somebody else's": given_to_somebody,
     "a link": linked,
@@ -253,11 +266,12 @@ def test_folder_and_entry_are_closed_whatever_the_umask(folder):
     assert kernel(folder).stat().st_mode & 0o777 == 0o400
 
 
-# -- several at once ---------------------------------------------------------------------------------------------------------------
+# -- several at once -------------------------------------------------------------------------------
 CHILD = """
 import ctypes, sys
 from saltus.codegen import building, machine
-data = building.built(building.Order("", (sys.stdin.read(),), ("next",), "one line", "one line: once for each new equation"))
+words = "one line", "one line: once for each new equation"
+data = building.built(building.Order("", (sys.stdin.read(),), ("next",), *words))
 loaded = machine.loaded([data], "next")
 print(ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(loaded.address)(1))
 """
@@ -267,14 +281,20 @@ def test_four_processes_that_start_cold_at_once(folder):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-W", "error", "-c", CHILD]
     pipe = subprocess.PIPE
-    processes = [subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, env=environment) for _ in range(4)]
+    processes = [
+        subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, env=environment)
+        for _ in range(4)
+    ]
     for process in processes:  # each waits for its source: they all reach the empty folder together
         process.stdin.write(SOURCE)
     for process in processes:
         process.stdin.close()
         process.stdin = None
     answers = [process.communicate(timeout=120) for process in processes]
-    assert [(out.strip(), process.returncode) for (out, _), process in zip(answers, processes, strict=True)] == [("2", 0)] * 4, answers
+    assert [
+        (out.strip(), process.returncode)
+        for (out, _), process in zip(answers, processes, strict=True)
+    ] == [("2", 0)] * 4, answers
     assert [one.name for one in cache.kernels()] == [KEY]
     assert [path.name for path in folder.iterdir()] == [kernel(folder).name]
     before = stamp(folder)
@@ -286,7 +306,10 @@ def in_threads(*sources):
     """What threads get that each load an entry of their own, or the exceptions."""
     forget()
     with ThreadPoolExecutor(len(sources)) as pool:
-        futures = [pool.submit(lambda source=source: Loaded(building.built(order(source)))) for source in sources]
+        futures = [
+            pool.submit(lambda source=source: Loaded(building.built(order(source))))
+            for source in sources
+        ]
     return [future.exception() or future.result() for future in futures]
 
 
@@ -318,7 +341,7 @@ def test_a_process_that_is_killed_is_told(folder, long, monkeypatch):
     assert list(folder.iterdir()) == []
 
 
-# -- Ctrl-C ------------------------------------------------------------------------------------------------------------------------
+# -- Ctrl-C ----------------------------------------------------------------------------------------
 @pytest.fixture
 def slow(long, monkeypatch, tmp_path):
     """The process that compiles doesn't end."""
@@ -342,7 +365,9 @@ def wait_for(condition):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 def test_ctrl_c_while_it_compiles_ends_at_once_and_leaves_no_process(folder, slow):
-    """The main thread waits for a process: Ctrl-C reaches it, and cannot be lost in the compiler."""
+    """The main thread waits for a process: Ctrl-C reaches it, and cannot be lost in
+    the compiler.
+    """
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     started = []
 
@@ -365,7 +390,9 @@ def test_ctrl_c_while_it_compiles_ends_at_once_and_leaves_no_process(folder, slo
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the slow process is a script")
 def test_threads_that_wait_for_a_kernel_stop_when_they_are_told(folder, slow):
-    """Both the one that compiles and the one that waits for it: they are part of work that Ctrl-C has ended."""
+    """Both the one that compiles and the one that waits for it: they are part of work that Ctrl-C
+    has ended.
+    """
     stop = Stop()
 
     def one():
@@ -380,7 +407,7 @@ def test_threads_that_wait_for_a_kernel_stop_when_they_are_told(folder, slow):
     assert not compiling()
 
 
-# -- a folder that can't be used ---------------------------------------------------------------------------------------------------
+# -- a folder that can't be used -------------------------------------------------------------------
 def test_a_folder_that_cannot_be_written_costs_time_not_the_run(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("SALTUS_CACHE", str(tmp_path / "file" / "kernels"))
@@ -433,7 +460,7 @@ def test_the_folder_is_the_users_cache_by_default(monkeypatch):
     assert cache.folder().is_absolute()
 
 
-# -- what somebody else put there, with right checksums ----------------------------------------------------------------------------
+# -- what somebody else put there, with right checksums --------------------------------------------
 @pytest.mark.parametrize("data", [b"", b"no object" * 100])
 def test_an_entry_that_is_no_object_is_told(folder, data):
     load()
@@ -462,14 +489,28 @@ def test_an_entry_of_many_gigabytes_is_not_read(folder):
         assert load().propagate(1) == 2
 
 
-@pytest.mark.parametrize("damage", [None, b"", b"[]", b'{"bitcode": 5}', b'{"bitcode": {"taylor_16": {"sha256": 5}}}', b"[" * 100_000])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        None,
+        b"",
+        b"[]",
+        b'{"bitcode": 5}',
+        b'{"bitcode": {"taylor_16": {"sha256": 5}}}',
+        b"[" * 100_000,
+    ],
+)
 def test_damaged_bitcode_is_told(monkeypatch, tmp_path, damage):
     (tmp_path / "bitcode").mkdir()
     if damage is not None:
         (tmp_path / "bitcode" / "manifest.json").write_bytes(damage)
     monkeypatch.setattr(templates.resources, "files", lambda _: tmp_path)
     for read in (templates.manifest.__wrapped__, lambda: templates._brought("ode45.bc.xz")):
-        with pytest.raises(CacheError, match=r"bitcode/\S+ (is damaged|can't be read: .*): install saltus again|nstall saltus again"):
+        with pytest.raises(
+            CacheError,
+            match=r"bitcode/\S+ (is damaged|can't be read: .*): install "
+            r"saltus again|nstall saltus again",
+        ):
             read()
 
 
@@ -481,7 +522,9 @@ def test_a_tilde_is_the_home_folder(monkeypatch, tmp_path):
     assert cache.folder() == tmp_path / "kernels"
 
 
-@pytest.mark.skipif(os.name != "posix", reason="elsewhere a process keeps the number of a parent that is gone")
+@pytest.mark.skipif(
+    os.name != "posix", reason="elsewhere a process keeps the number of a parent that is gone"
+)
 def test_a_process_that_compiles_ends_with_the_one_that_asked(tmp_path):
     """Killed, the asker can't end it: what it held is free all the same."""
     import fcntl
@@ -497,7 +540,10 @@ def test_a_process_that_compiles_ends_with_the_one_that_asked(tmp_path):
         "file.flush()\n"
         "time.sleep(600)\n"
     )
-    asks = f"from saltus.codegen import building\nbuilding._answer_of('busy', ({str(lock)!r},), b'', 'nothing')\n"
+    asks = (
+        f"from saltus.codegen import building\nbuilding._answer_of('busy', ({str(lock)!r},), "
+        f"b'', 'nothing')\n"
+    )
     path = os.pathsep.join([str(tmp_path), str(Path(building.__file__).parents[2])])
     asker = subprocess.Popen([sys.executable, "-c", asks], env={**os.environ, "PYTHONPATH": path})
     try:

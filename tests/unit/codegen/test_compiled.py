@@ -10,9 +10,16 @@ import saltus as sl
 
 
 def rates(m, t, x, v, a):
-    """Every function once, smooth for x > -2; beyond that another piece, in which these roots are undefined."""
+    """Every function once, smooth for x > -2; beyond that another piece, in which these roots are
+    undefined.
+    """
     turn = m.tanh(v) - a * m.atan(x) + 0.2 * m.sin(x * v) + 0.1 * m.exp(-x * x) * m.cos(2.0 * t)
-    push = 0.1 * m.log(1.0 + x * x) - 0.2 * v / m.sqrt(1.0 + v * v) + 0.05 * m.tan(x / 3.0) + 0.1 * (1.0 + x * x) ** -0.7
+    push = (
+        0.1 * m.log(1.0 + x * x)
+        - 0.2 * v / m.sqrt(1.0 + v * v)
+        + 0.05 * m.tan(x / 3.0)
+        + 0.1 * (1.0 + x * x) ** -0.7
+    )
     return turn, push - x + 0.02 * x**3 + 0.1 * m.sin(t * t) + 0.05 * (2.0 + v) ** a
 
 
@@ -21,7 +28,9 @@ def everything():
     @sl.system(states="x v")
     def everything(t, x, v, *, a=0.3):
         turn, push = rates(sl, t, x, v, a)
-        return turn, push + sl.piecewise((sl.sqrt(x + 2.0) / 10, x > -2), otherwise=(x + 2.0) * sl.log(-2.0 - x))
+        return turn, push + sl.piecewise(
+            (sl.sqrt(x + 2.0) / 10, x > -2), otherwise=(x + 2.0) * sl.log(-2.0 - x)
+        )
 
     return everything
 
@@ -41,7 +50,14 @@ def exact():
                 turn, push = rates(mp, t, *y, a)
                 return [turn, push + mp.sqrt(y[0] + 2) / 10]
 
-            found.append([float(y) for y in mp.odefun(field, 0, [mpf(float(y)) for y in start], tol=mpf(10) ** -18)(END)])
+            found.append(
+                [
+                    float(y)
+                    for y in mp.odefun(
+                        field, 0, [mpf(float(y)) for y in start], tol=mpf(10) ** -18
+                    )(END)
+                ]
+            )
     return np.array(found)
 
 

@@ -1,7 +1,9 @@
-"""Taylor coefficients from generated code, for every function that an equation may hold, against mpmath's derivatives.
+"""Taylor coefficients from generated code, for every function that an equation may hold, against
+mpmath's derivatives.
 
-The generated text runs here as plain Python on NumPy lanes, each lane with a start, a time and parameters of its own. The truth knows
-nothing of recurrences: coefficient k of f(t, y(t)) is mpmath's numerical derivative of f along the polynomial of the coefficients before.
+The generated text runs here as plain Python on NumPy lanes, each lane with a start, a time and
+parameters of its own. The truth knows nothing of recurrences: coefficient k of f(t, y(t)) is
+mpmath's numerical derivative of f along the polynomial of the coefficients before.
 """
 
 from __future__ import annotations
@@ -27,14 +29,32 @@ CLOCK_ROWS = 8
 class SaltusFunctions:
     """What an equation calls while it is traced."""
 
-    sqrt, exp, log, sin, cos, tan, atan, tanh = sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.atan, sl.tanh
+    sqrt, exp, log, sin, cos, tan, atan, tanh = (
+        sl.sqrt,
+        sl.exp,
+        sl.log,
+        sl.sin,
+        sl.cos,
+        sl.tan,
+        sl.atan,
+        sl.tanh,
+    )
     abs, min, max, piecewise = sl.abs, sl.min, sl.max, sl.piecewise
 
 
 class ExactFunctions:
     """The same in mpmath; pieces are picked by the values given to them."""
 
-    sqrt, exp, log, sin, cos, tan, atan, tanh = mp.sqrt, mp.exp, mp.log, mp.sin, mp.cos, mp.tan, mp.atan, mp.tanh
+    sqrt, exp, log, sin, cos, tan, atan, tanh = (
+        mp.sqrt,
+        mp.exp,
+        mp.log,
+        mp.sin,
+        mp.cos,
+        mp.tan,
+        mp.atan,
+        mp.tanh,
+    )
     abs, min, max = abs, min, max
 
     @staticmethod
@@ -44,19 +64,31 @@ class ExactFunctions:
 
 def generated(system: System, order: int = ORDER) -> dict:
     """The head of a Taylor module, run as plain Python."""
-    names = {name: getattr(lane_operations, name) for name in dir(lane_operations) if not name.startswith("_")}
-    names |= {"kernel": lambda f: f, "inner": lambda f: f, "sincos": trigonometry.sincos, "turned": trigonometry.turned}
+    names = {
+        name: getattr(lane_operations, name)
+        for name in dir(lane_operations)
+        if not name.startswith("_")
+    }
+    names |= {
+        "kernel": lambda f: f,
+        "inner": lambda f: f,
+        "sincos": trigonometry.sincos,
+        "turned": trigonometry.turned,
+    }
     exec("import math\nimport numpy as np\n" + taylor_head(system, order, LANES).text, names)
     return names
 
 
 def lane_jets(system: System, states, times, values, order=ORDER, period=1.0):
-    """Everything in the work rows, (rows, LANES). ``states`` (D, LANES), ``times`` (LANES,), ``values`` one row for each lane."""
+    """Everything in the work rows, (rows, LANES). ``states`` (D, LANES), ``times`` (LANES,),
+    ``values`` one row for each lane.
+    """
     head = generated(system, order)
     clock, work = np.zeros((CLOCK_ROWS, LANES)), np.zeros((head["ROWS"], LANES))
     constants = np.zeros((max(head["NCONST"], 1), LANES))
     guards = head["NGUARDS"]
-    side = -np.ones((max(guards + head["NSINGULAR"], 1), LANES))  # behind the guards: nothing is set aside
+    # behind the guards: nothing is set aside
+    side = -np.ones((max(guards + head["NSINGULAR"], 1), LANES))
     for lane in range(LANES):
         count = int(times[lane] // period)
         clock[TAU, lane], clock[BASE, lane] = times[lane] - count * period, count * period
@@ -91,16 +123,22 @@ def exact_jets(field, state, time, order=ORDER):
 
 
 def assert_same(found, exact, condition=200.0):
-    """Coefficients agree to rounding, each on the scale of the series on its circle of convergence (root test)."""
+    """Coefficients agree to rounding, each on the scale of the series on its circle of convergence
+    (root test).
+    """
     exact = np.array([float(c) for c in exact])
     tail = np.abs(exact[1:]) ** (1.0 / np.arange(1, exact.size))
     weights = np.max(tail, initial=1e-3) ** -np.arange(exact.size)
     error = np.abs(found - exact) * weights
     assert np.all(np.isfinite(found))
-    assert np.max(error) < condition * EPS * max(1.0, np.max(np.abs(exact) * weights)), (found, exact)
+    assert np.max(error) < condition * EPS * max(1.0, np.max(np.abs(exact) * weights)), (
+        found,
+        exact,
+    )
 
 
-# x' = f(t, x; a, b): every function alone, inside sums and products, of states, of time, of parameters.
+# x' = f(t, x; a, b): every function alone, inside sums and products, of states, of time, of
+# parameters.
 ONE_STATE = {
     "sum": lambda m, t, x, a, b: a * x - x * t + b - 3.0 * t,
     "time": lambda m, t, x, a, b: t * t * t + a,
@@ -120,17 +158,21 @@ ONE_STATE = {
     "exp": lambda m, t, x, a, b: m.exp(-a * t) + m.exp(0.5 * x - t) + m.exp(b),
     "log": lambda m, t, x, a, b: m.log(x) + m.log(1.0 + x * x) + m.log(t + 3.0) + m.log(a),
     "sin and cos of states": lambda m, t, x, a, b: m.sin(a * x) * m.cos(x) + m.sin(x * t),
-    "forcing": lambda m, t, x, a, b: a * m.cos(2.0 * m.atan(1.0) * 4 * t) + x * m.sin(b * t + 0.3) - m.cos(t),
+    "forcing": lambda m, t, x, a,
+    b: a * m.cos(2.0 * m.atan(1.0) * 4 * t) + x * m.sin(b * t + 0.3) - m.cos(t),
     "sine of a power of time": lambda m, t, x, a, b: m.sin(t * t) + m.cos(a * t * t + t),
     "tan": lambda m, t, x, a, b: m.tan(x / 4) + m.tan(0.2 * t) + m.tan(a / 9),
     "atan": lambda m, t, x, a, b: m.atan(3.0 * x) + m.atan(t) * m.atan(b),
     "tanh": lambda m, t, x, a, b: m.tanh(a * x) + m.tanh(x - t) + m.tanh(b),
-    "nested": lambda m, t, x, a, b: m.exp(m.sin(a * t)) * m.sqrt(1.0 + m.atan(x) ** 2) + m.log(2.0 + m.cos(x)),
+    "nested": lambda m, t, x, a,
+    b: m.exp(m.sin(a * t)) * m.sqrt(1.0 + m.atan(x) ** 2) + m.log(2.0 + m.cos(x)),
     "abs": lambda m, t, x, a, b: m.abs(x - 1.5) + a * m.abs(m.sin(x)),
     "min and max": lambda m, t, x, a, b: m.min(x * x, 3.0, a + t) - m.max(m.exp(-x), b * x),
-    "linear pieces": lambda m, t, x, a, b: m.piecewise((a * (x - 1.5), x > 1.5), (b * (x - 0.7), x < 0.7), otherwise=t) - x,
+    "linear pieces": lambda m, t, x, a,
+    b: m.piecewise((a * (x - 1.5), x > 1.5), (b * (x - 0.7), x < 0.7), otherwise=t) - x,
     "root or logarithm": lambda m, t, x, a, b: m.piecewise(
-        (m.sqrt(m.abs(x - 1.5)), x > 1.5), otherwise=(1.5 - x) * m.log(m.abs(1.5 - x)) + x ** (a - 0.1)
+        (m.sqrt(m.abs(x - 1.5)), x > 1.5),
+        otherwise=(1.5 - x) * m.log(m.abs(1.5 - x)) + x ** (a - 0.1)
     ),
 }  # fmt: skip
 
@@ -156,12 +198,18 @@ def test_jets(name):
     _, work = lane_jets(traced(equation), STATES, TIMES, VALUES)
     for lane in range(LANES):
         a, b = map(mpf, VALUES[lane])
-        (exact,) = exact_jets(lambda t, x, a=a, b=b: (equation(ExactFunctions, t, x, a, b),), STATES[:, lane], TIMES[lane])
+        (exact,) = exact_jets(
+            lambda t, x, a=a, b=b: (equation(ExactFunctions, t, x, a, b),),
+            STATES[:, lane],
+            TIMES[lane],
+        )
         assert_same(work[: ORDER + 1, lane], exact)
 
 
 def test_pieces_that_are_undefined_on_the_other_side_do_not_leak():
-    """sqrt(x - 1.5) and (1.5 - x) log(1.5 - x), written without abs: each lane reads its own piece; the other one is NaN there."""
+    """sqrt(x - 1.5) and (1.5 - x) log(1.5 - x), written without abs: each lane reads its own piece;
+    the other one is NaN there.
+    """
 
     @sl.system(states="x")
     def torn(t, x, *, edge=1.5):
@@ -187,21 +235,35 @@ def test_jets_of_the_rig_in_every_mode():
     p = {name: mpf(value) for name, value in rig.values.items()}
     _, work = lane_jets(rig, states, times, values, order, period=rig.period())
     for lane in range(LANES):
+        outside = states[0, lane] < 0 or states[0, lane] > 0.4e-3
+        side = np.sign(states[0, lane]) if outside else 0
 
-        def field(t, x, v, mode=np.sign(states[0, lane]) if states[0, lane] < 0 or states[0, lane] > 0.4e-3 else 0):  # noqa: B008
+        def field(t, x, v, mode=side):
             wn, w = 2 * mp.pi * p["natural_frequency"], 2 * mp.pi * p["frequency"]
-            contact = 0 if mode == 0 else p["contact_stiffness"] * (x + p["lower_gap"] if mode < 0 else x - p["upper_gap"])
+            contact = (
+                0
+                if mode == 0
+                else p["contact_stiffness"]
+                * (x + p["lower_gap"] if mode < 0 else x - p["upper_gap"])
+            )
             drive = p["force"] * (1 - 18 / w**2) * mp.cos(w * t)
-            return v, (drive - contact) / p["mass"] - 2 * p["damping_ratio"] * wn * v - wn**2 * x - p["cubic"] / p["mass"] * x**3
+            return v, (drive - contact) / p["mass"] - 2 * p[
+                "damping_ratio"
+            ] * wn * v - wn**2 * x - p["cubic"] / p["mass"] * x**3
 
         exact = exact_jets(field, states[:, lane], times[lane], order)
-        # the phase of the drive is exact whole periods plus a remainder; the remainder of 13.9 s is known to an ulp of 13.9
+        # the phase of the drive is exact whole periods plus a remainder; the remainder of 13.9 s is
+        # known to an ulp of 13.9
         for i in range(2):
-            assert_same(work[i * (order + 1) : (i + 1) * (order + 1), lane], exact[i], condition=2000.0)
+            assert_same(
+                work[i * (order + 1) : (i + 1) * (order + 1), lane], exact[i], condition=2000.0
+            )
 
 
 def test_gaps_their_series_and_their_size():
-    """A gap that is no state minus boundary gets a series of its own, its value and the size of its terms."""
+    """A gap that is no state minus boundary gets a series of its own, its value and the size of its
+    terms.
+    """
 
     @sl.system(states="x v")
     def band(t, x, v, *, edge=0.3, slope=0.5):
@@ -244,12 +306,16 @@ def test_lanes_do_not_mix():
     system = traced(ONE_STATE["nested"])
     _, together = lane_jets(system, STATES, TIMES, VALUES)
     for lane in range(LANES):
-        _, alone = lane_jets(system, STATES[:, [lane] * LANES], TIMES[[lane] * LANES], VALUES[[lane] * LANES])
+        _, alone = lane_jets(
+            system, STATES[:, [lane] * LANES], TIMES[[lane] * LANES], VALUES[[lane] * LANES]
+        )
         assert np.array_equal(alone[:, 0], together[:, lane])
 
 
 def test_the_columns_of_a_tangent():
-    """One text serves both columns of Y: its coefficients are those of dY/dt = J Y, with J differentiated by hand."""
+    """One text serves both columns of Y: its coefficients are those of dY/dt = J Y, with J
+    differentiated by hand.
+    """
 
     @sl.system(states="x v")
     def swing(t, x, v, *, a=0.7):
@@ -259,9 +325,21 @@ def test_the_columns_of_a_tangent():
 
     def field(t, x, v, xx, xv, vx, vv):
         by_x, by_v = -3 * mpf(a) * x**2 + v, x - 1 + mp.tanh(v) ** 2
-        return v, mp.cos(2 * t) - mpf(a) * x**3 - mp.tanh(v) + x * v, vx, vv, by_x * xx + by_v * vx, by_x * xv + by_v * vv
+        return (
+            v,
+            mp.cos(2 * t) - mpf(a) * x**3 - mp.tanh(v) + x * v,
+            vx,
+            vv,
+            by_x * xx + by_v * vx,
+            by_x * xv + by_v * vv,
+        )
 
-    head, work = lane_jets(tangent_system(swing), np.tile(np.array(start)[:, None], LANES), np.full(LANES, time), [np.array([a])] * LANES)
+    head, work = lane_jets(
+        tangent_system(swing),
+        np.tile(np.array(start)[:, None], LANES),
+        np.full(LANES, time),
+        [np.array([a])] * LANES,
+    )
     assert "def jets_of_column(" in taylor_head(tangent_system(swing), ORDER, LANES).functions
     for i, exact in enumerate(exact_jets(field, start, time)):
         assert_same(work[i * (ORDER + 1) : (i + 1) * (ORDER + 1), LANES - 1], exact)

@@ -21,7 +21,11 @@ TARGETS = {
     "arm64, Linux": Target("aarch64-unknown-linux-gnu", "generic", "+neon"),
     "arm64, macOS": Target("arm64-apple-macosx", "apple-m1", ""),
 }
-MAGIC = {"x86_64-unknown-linux-gnu": b"\x7fELF", "aarch64-unknown-linux-gnu": b"\x7fELF", "arm64-apple-macosx": b"\xcf\xfa\xed\xfe"}
+MAGIC = {
+    "x86_64-unknown-linux-gnu": b"\x7fELF",
+    "aarch64-unknown-linux-gnu": b"\x7fELF",
+    "arm64-apple-macosx": b"\xcf\xfa\xed\xfe",
+}
 
 
 def equation(system, lanes, order=20):
@@ -32,16 +36,21 @@ def equation(system, lanes, order=20):
 @pytest.mark.parametrize("name", TARGETS)
 @pytest.mark.parametrize("lanes", templates.WIDTHS)
 def test_an_equation_compiles_for_every_processor(name, lanes):
-    short = equation(sl.models.delangre("b"), lanes, order=6)  # a higher order has more of the same instructions
+    # a higher order has more of the same instructions
+    short = equation(sl.models.delangre("b"), lanes, order=6)
     code = machine.object_code(None, [short], ["saltus_jets"], TARGETS[name])
     assert code[:4] == MAGIC[TARGETS[name].triple]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [pytest.param("arm64, Linux", marks=pytest.mark.nightly), "arm64, macOS"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("arm64, Linux", marks=pytest.mark.nightly), "arm64, macOS"]
+)
 def test_the_templates_compile_for_arm(name):
     baked = constants_ir({"ORDER": 20}, TAYLOR)
-    code = machine.object_code(templates.bitcode("taylor_4"), [baked], ["saltus_propagate"], TARGETS[name])
+    code = machine.object_code(
+        templates.bitcode("taylor_4"), [baked], ["saltus_propagate"], TARGETS[name]
+    )
     assert code[:4] == MAGIC[TARGETS[name].triple]
 
 
@@ -70,17 +79,29 @@ def test_a_long_equation_is_cut_into_blocks_with_the_same_operations(monkeypatch
 
 
 def test_wherever_a_function_is_cut_its_numbers_are_the_same(monkeypatch):
-    """Sine and cosine come as one value, twice as wide as others: also where the cut lies between them and who uses them."""
-    calls = [f"s{i}, c{i} = sincos({i + 1}.0 * y)\nstore(out, {2 * i}, s{i})\nstore(out, {2 * i + 1}, c{i})" for i in range(6)]
-    text = "def turns(a, out):\n    y = load(a, 0, LANES)\n" + "".join(f"    {line}\n" for call in calls for line in call.split("\n"))
+    """Sine and cosine come as one value, twice as wide as others: also where the cut lies between
+    them and who uses them.
+    """
+    calls = [
+        f"s{i}, c{i} = sincos({i + 1}.0 * y)\nstore(out, {2 * i}, s{i})\nstore(out, "
+        f"{2 * i + 1}, c{i})"
+        for i in range(6)
+    ]
+    text = "def turns(a, out):\n    y = load(a, 0, LANES)\n" + "".join(
+        f"    {line}\n" for call in calls for line in call.split("\n")
+    )
     angles, wanted = np.array([[0.1, 0.7, -2.0, 30.0]]), np.zeros((12, 4))
-    wanted[::2], wanted[1::2] = (turn(np.arange(1.0, 7.0)[:, None] * angles) for turn in (np.sin, np.cos))
+    wanted[::2], wanted[1::2] = (
+        turn(np.arange(1.0, 7.0)[:, None] * angles) for turn in (np.sin, np.cos)
+    )
     monkeypatch.setattr(blocks, "WHOLE", 10)
     for length in range(2, 12):
         monkeypatch.setattr(blocks, "LENGTH", length)
         out = np.zeros((12, 4))
         compiled(text, (ARRAY, ARRAY), 4)(angles, out)
-        np.testing.assert_allclose(out, wanted, rtol=1e-15, atol=1e-15, err_msg=f"blocks of {length}")
+        np.testing.assert_allclose(
+            out, wanted, rtol=1e-15, atol=1e-15, err_msg=f"blocks of {length}"
+        )
 
 
 def test_an_equation_whose_values_would_overrun_the_stack_is_refused(monkeypatch):
@@ -90,7 +111,9 @@ def test_an_equation_whose_values_would_overrun_the_stack_is_refused(monkeypatch
 
 
 def test_the_code_of_a_tangent_grows_as_that_of_its_equation():
-    """All of its columns are one function: a tangent with sixteen has hardly more code, for its equation, than one with four."""
+    """All of its columns are one function: a tangent with sixteen has hardly more code, for its
+    equation, than one with four.
+    """
     shares = []
     for masses in (2, 8):
         row = row_of_masses(masses)
@@ -101,7 +124,13 @@ def test_the_code_of_a_tangent_grows_as_that_of_its_equation():
 @pytest.mark.parametrize("early", [0.0, 1.0])
 def test_a_long_function_that_may_return_early_returns_from_all_of_it(early):
     """As the jump of a tangent does where no force jumps."""
-    lines = ["a = y[0] + 1.0", "if y[1] > 0.0:", "    return", *["a = a * 1.0 + 1.0"] * (2 * blocks.WHOLE), "y[0] = a"]
+    lines = [
+        "a = y[0] + 1.0",
+        "if y[1] > 0.0:",
+        "    return",
+        *["a = a * 1.0 + 1.0"] * (2 * blocks.WHOLE),
+        "y[0] = a",
+    ]
     y = np.array([3.0, early])
     compiled("def leave(y):\n" + "\n".join(f"    {line}" for line in lines) + "\n", (ARRAY,), 2)(y)
     assert y[0] == (3.0 if early else 4.0 + 2 * blocks.WHOLE)

@@ -17,8 +17,16 @@ SIDE = ex.Bit(0)
 def terms(node):
     """A form as (offset, {state or kind of series: coefficient}), numbers for a = 2, b = 3."""
     form = SeriesBuilder().form(node)
-    offset, *coefficients = evaluate([form.offset, *form.terms.values()], values={"a": 2.0, "b": 3.0})
-    return offset, dict(zip((s.payload if s.kind == "state" else s.kind for s in form.terms), coefficients, strict=True))
+    offset, *coefficients = evaluate(
+        [form.offset, *form.terms.values()], values={"a": 2.0, "b": 3.0}
+    )
+    return offset, dict(
+        zip(
+            (s.payload if s.kind == "state" else s.kind for s in form.terms),
+            coefficients,
+            strict=True,
+        )
+    )
 
 
 @pytest.mark.parametrize(
@@ -49,7 +57,17 @@ def test_pieces_that_are_finite_everywhere_become_coefficients():
     assert {s.kind: c.op for s, c in form.terms.items()} == {"state": "select", "product": "select"}
 
 
-@pytest.mark.parametrize("risky", [ex.elementary("sqrt", x), ex.elementary("log", x), 1.0 / x, x / v, x**1.5, ex.elementary("exp", x)])
+@pytest.mark.parametrize(
+    "risky",
+    [
+        ex.elementary("sqrt", x),
+        ex.elementary("log", x),
+        1.0 / x,
+        x / v,
+        x**1.5,
+        ex.elementary("exp", x),
+    ],
+)
 def test_pieces_that_may_be_undefined_stay_a_selection_of_series(risky):
     form = SeriesBuilder().form(ex.select(SIDE, risky, a * x))
     assert [s.kind for s in form.terms] == ["select"]
@@ -57,7 +75,9 @@ def test_pieces_that_may_be_undefined_stay_a_selection_of_series(risky):
 
 
 def test_a_division_is_pushed_into_the_branches():
-    """(select(a, b) x) / c: the quotients a/c and b/c are worked out once per trajectory, not at every step."""
+    """(select(a, b) x) / c: the quotients a/c and b/c are worked out once per trajectory, not at
+    every step.
+    """
     form = SeriesBuilder().form((ex.select(SIDE, a, b) * x) / ex.parameter("c"))
     (coefficient,) = form.terms.values()
     assert coefficient.op == "select"

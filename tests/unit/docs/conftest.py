@@ -1,4 +1,6 @@
-"""The extensions of the documentation need what builds it: `pip install -e ".[docs]"`. CI runs these tests once that is installed."""
+"""The extensions of the documentation need what builds it: `pip install -e ".[docs]"`. CI runs
+these tests once that is installed.
+"""
 
 import sys
 from pathlib import Path

@@ -12,10 +12,15 @@ def test_every_row_of_the_glossary_becomes_a_term(root):
 
     text = (root / "docs/glossary.md").read_text(encoding="utf-8")
     rows = [line for line in text.splitlines() if line.startswith("| **")]
-    assert len(terms(text)) == len(rows) == sum(line.startswith("|") for line in text.splitlines()) - 2
+    assert (
+        len(terms(text)) == len(rows) == sum(line.startswith("|") for line in text.splitlines()) - 2
+    )
     words = [word for names, _ in terms(text) for word in names]
     assert len(words) == len(set(words))
-    made = as_glossary("# T\n\n| word | meaning |\n|---|---|\n| **a**, **b c** | `x` is *one*. |\n| **d** (of e) | f |\n")
+    made = as_glossary(
+        "# T\n\n| word | meaning |\n|---|---|\n| **a**, **b c** | `x` is *one*. "
+        "|\n| **d** (of e) | f |\n"
+    )
     assert made == "# T\n\n```{glossary}\na\nb c\n  `x` is *one*.\n\nd\n  (of e) f\n```\n"
 
 
@@ -30,10 +35,22 @@ def test_every_key_of_a_study_stands_in_the_tables():
         assert model in described
         for name in model.model_fields:
             assert f"| `{name}` |" in text
-    assert {"[study]", "[system]", "[simulate]", "[basins]", "[[basins.map]]", "[basins.axes.<name>]"} <= {place for place, _ in tables()}
+    assert {
+        "[study]",
+        "[system]",
+        "[simulate]",
+        "[basins]",
+        "[[basins.map]]",
+        "[basins.axes.<name>]",
+    } <= {place for place, _ in tables()}
     assert "anything" not in text, "a type has no words"
     headings = [line for line in text.splitlines() if line.startswith("#")]
-    assert {'### `[method] name = "Taylor"`', "### `[[lyapunov]]`", "### `[[poincare]]`", "### `[[basins.map]]`"} <= set(headings)
+    assert {
+        '### `[method] name = "Taylor"`',
+        "### `[[lyapunov]]`",
+        "### `[[poincare]]`",
+        "### `[[basins.map]]`",
+    } <= set(headings)
     assert not any("Annotated" in line for line in headings)
 
 
@@ -88,7 +105,11 @@ def test_types_in_words(annotation, text):
         ('<link rel="stylesheet" href="//fonts.example.org/a.css">', 1),
         ('<img src="http://example.org/a.png"><img srcset="https://example.org/b.png 2x">', 2),
         ("<style>@import url('https://example.org/a.css')</style>", 1),
-        ('<a href="https://example.org/">read</a><script src="_static/a.js"></script><img src="data:image/png;base64,AA//AA">', 0),
+        (
+            '<a href="https://example.org/">read</a><script src="_static/a.js"></script><img '
+            'src="data:image/png;base64,AA//AA">',
+            0,
+        ),
         ('<link rel="canonical" href="https://example.org/">', 0),
     ],
 )
@@ -102,7 +123,9 @@ def test_a_page_that_loads_something_from_elsewhere_is_found(tmp_path, html, loa
 def test_a_style_sheet_that_loads_something_from_elsewhere_is_found(tmp_path):
     from offline import requests
 
-    (tmp_path / "a.css").write_text("@font-face { src: url(https://example.org/a.woff2); } b { background: url(local.png); }")
+    (tmp_path / "a.css").write_text(
+        "@font-face { src: url(https://example.org/a.woff2); } b { background: url(local.png); }"
+    )
     assert [address for _, address in requests(tmp_path)] == ["https://example.org/a.woff2"]
 
 
@@ -123,7 +146,9 @@ def test_a_record_is_written_and_shown(root, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(root))
     record = importlib.import_module("benchmarks.record")
     table = record.Table(
-        "T", (record.Column("program"), record.Column("time [s]", ".2f"), record.Column("cells", "d")), [("a|b", 1.234, None)]
+        "T",
+        (record.Column("program"), record.Column("time [s]", ".2f"), record.Column("cells", "d")),
+        [("a|b", 1.234, None)],
     )
     file = record.Record("probe", "A setting.", [table], ["one isn't installed"]).write(tmp_path)
     text = markdown(json.loads(file.read_text(encoding="utf-8")))

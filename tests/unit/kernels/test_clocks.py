@@ -1,4 +1,6 @@
-"""The pieces that clocks hold, against NumPy's evaluation of the same equation at random times; no compiler needed."""
+"""The pieces that clocks hold, against NumPy's evaluation of the same equation at random times; no
+compiler needed.
+"""
 
 import math
 from fractions import Fraction
@@ -17,7 +19,9 @@ POINTS, VALUES = [-1.0, 0.0, 0.3, 1.1, 2.0], [0.5, 2.0, -1.0, 0.25, 0.5]
 
 
 def clocks_of(system):
-    """The template's functions for a system, as plain Python; its numbers are in `n`, its tables in `data`."""
+    """The template's functions for a system, as plain Python; its numbers are in `n`, its tables in
+    `data`.
+    """
     clocks = Clocks(system)
     scope = {"math": math, "kernel": lambda f: f, "inner": lambda f: f, **clocks.constants()}
     exec(clocks.function() + templates.text("clocks"), scope)
@@ -29,7 +33,9 @@ def drive_of(value):
 
     @sl.system(states="x")
     def alone(t, x, *, rate=1.0, offset=0.0, cycle=0.7, level=0.2, factor=1.0):
-        return value(t, rate, offset, cycle, level, factor) + 0 * (rate + offset + cycle + level + factor)
+        return value(t, rate, offset, cycle, level, factor) + 0 * (
+            rate + offset + cycle + level + factor
+        )
 
     return alone
 
@@ -45,24 +51,41 @@ def at(scope, clocks, system, t, base=0.0, known=None):
 
 
 SWITCHES = {
-    "level": lambda t, rate, offset, cycle, level, factor: sl.where(rate * t + offset > level, 1, -1),
-    "sine": lambda t, rate, offset, cycle, level, factor: sl.where(factor * sl.sin(rate * t + offset) > level, 1, -1),
-    "cosine": lambda t, rate, offset, cycle, level, factor: sl.where(level < factor * sl.cos(rate * t + offset), 1, -1),
-    "pulse": lambda t, rate, offset, cycle, level, factor: sl.where(factor * sl.mod(rate * t + offset, cycle) > level, 1, -1),
+    "level": lambda t, rate, offset, cycle, level, factor: sl.where(
+        rate * t + offset > level, 1, -1
+    ),
+    "sine": lambda t, rate, offset, cycle, level, factor: sl.where(
+        factor * sl.sin(rate * t + offset) > level, 1, -1
+    ),
+    "cosine": lambda t, rate, offset, cycle, level, factor: sl.where(
+        level < factor * sl.cos(rate * t + offset), 1, -1
+    ),
+    "pulse": lambda t, rate, offset, cycle, level, factor: sl.where(
+        factor * sl.mod(rate * t + offset, cycle) > level, 1, -1
+    ),
 }
 VALUE = {
     "mod": lambda t, rate, offset, cycle, level, factor: sl.mod(rate * t + offset, cycle),
-    "hold": lambda t, rate, offset, cycle, level, factor: sl.table(rate * t + offset, POINTS, VALUES),
-    "extend": lambda t, rate, offset, cycle, level, factor: sl.table(rate * t + offset, POINTS, VALUES, "spline", outside="extend"),
-    "periodic": lambda t, rate, offset, cycle, level, factor: sl.table(rate * t + offset, POINTS, VALUES, "spline", outside="periodic"),
-    "pchip": lambda t, rate, offset, cycle, level, factor: sl.table(rate * t + offset, POINTS, VALUES, "pchip", outside="periodic"),
+    "hold": lambda t, rate, offset, cycle, level, factor: sl.table(
+        rate * t + offset, POINTS, VALUES
+    ),
+    "extend": lambda t, rate, offset, cycle, level, factor: sl.table(
+        rate * t + offset, POINTS, VALUES, "spline", outside="extend"
+    ),
+    "periodic": lambda t, rate, offset, cycle, level, factor: sl.table(
+        rate * t + offset, POINTS, VALUES, "spline", outside="periodic"
+    ),
+    "pchip": lambda t, rate, offset, cycle, level, factor: sl.table(
+        rate * t + offset, POINTS, VALUES, "pchip", outside="periodic"
+    ),
 }
 RATES = [1.0, 2.5, -1.0, -0.37, 0.0]
 
 
 def random_values(random):
     return dict(
-        rate=random.choice(RATES), offset=random.uniform(-3, 3), cycle=random.uniform(0.3, 2), level=random.uniform(-1.2, 1.2),
+        rate=random.choice(RATES), offset=random.uniform(-3, 3), cycle=random.uniform(0.3, 2),
+        level=random.uniform(-1.2, 1.2),
         factor=random.choice([1.0, -1.0, 2.0]),
     )  # fmt: skip
 
@@ -78,8 +101,14 @@ def test_every_clock_holds_what_its_equation_says(kind):
         for t, base in zip(random.uniform(-6, 6, 12), [0.0, 0.0, 5.0, -4.0] * 3, strict=True):
             (exact,) = evaluate(system.field, t=base + t, values=system.values)
             h, following = at(scope, clocks, system, t, base)
-            held = h[ON] if kind in SWITCHES else sum(h[C0 + i] * (t - h[REF]) ** i for i in range(4))
-            assert held == pytest.approx(exact, rel=1e-11, abs=1e-11), (dict(system.values), t, base)
+            held = (
+                h[ON] if kind in SWITCHES else sum(h[C0 + i] * (t - h[REF]) ** i for i in range(4))
+            )
+            assert held == pytest.approx(exact, rel=1e-11, abs=1e-11), (
+                dict(system.values),
+                t,
+                base,
+            )
             assert following > t
             again, _ = at(scope, clocks, system, t, base, known=h)
             assert np.array_equal(again, h)
@@ -98,7 +127,11 @@ def test_between_breaks_nothing_changes_and_no_break_is_missed(kind):
             end = min(following, 4.0)
             inside = t + (end - t) * random.uniform(0.001, 0.999, 5)
             exact = evaluate(system.field, t=inside, values=system.values)[0] * np.ones(5)
-            held = h[ON] if kind in SWITCHES else sum(h[C0 + i] * (inside - h[REF]) ** i for i in range(4))
+            held = (
+                h[ON]
+                if kind in SWITCHES
+                else sum(h[C0 + i] * (inside - h[REF]) ** i for i in range(4))
+            )
             assert np.allclose(held, exact, rtol=0, atol=1e-11), (dict(system.values), t)
             t = end
 

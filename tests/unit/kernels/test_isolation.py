@@ -1,4 +1,6 @@
-"""Root isolation: the first place in (0, 1) where a polynomial goes below zero, against all roots of its derivative."""
+"""Root isolation: the first place in (0, 1) where a polynomial goes below zero, against all roots
+of its derivative.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +19,14 @@ DEGREE = 20
 
 
 def crossing(q, noise=0.0, shifted=False):
-    """(whether it crosses, where, places of the touches before, smallest minimum that was no crossing)."""
+    """(whether it crosses, where, places of the touches before, smallest minimum that was no
+    crossing).
+    """
     q = np.array(q, float)
     out, touches = np.full(2, np.inf), np.zeros((iso.MOST_TOUCHES, 2))
-    crosses, count = iso.first_crossing(q, q.size - 1, shifted, noise, 3, *iso.work_arrays(q.size - 1), out, touches, 0)
+    crosses, count = iso.first_crossing(
+        q, q.size - 1, shifted, noise, 3, *iso.work_arrays(q.size - 1), out, touches, 0
+    )
     assert set(touches[:count, iso.TOUCH_GUARD]) <= {3.0}
     return crosses, out[iso.AT], touches[:count, iso.TOUCH_AT].tolist(), out[iso.MARGIN]
 
@@ -31,10 +37,20 @@ def from_roots(roots, scale=1.0):
 
 
 def truth(q):
-    """First place in (0, 1) where q changes sign, and how close the decision was: q is monotone between the roots of its derivative."""
+    """First place in (0, 1) where q changes sign, and how close the decision was: q is monotone
+    between the roots of its derivative.
+    """
     polynomial = np.polynomial.Polynomial(q)
     turns = polynomial.deriv().roots()
-    places = np.sort(np.concatenate([[0.0], turns.real[(np.abs(turns.imag) < 1e-7) & (turns.real > 0) & (turns.real < 1)], [1.0]]))
+    places = np.sort(
+        np.concatenate(
+            [
+                [0.0],
+                turns.real[(np.abs(turns.imag) < 1e-7) & (turns.real > 0) & (turns.real < 1)],
+                [1.0],
+            ]
+        )
+    )
     values = polynomial(places)
     size = np.sum(np.abs(q))
     if np.any(values < 0):
@@ -93,7 +109,8 @@ def test_shallow_dips_are_crossings_and_near_misses_are_none(place, depth):
         assert abs(at - (place - half)) < 8 * EPS * place**2 / half
     crosses, _, touches, margin = crossing([place**2 + depth, -2 * place, 1.0])
     assert (crosses, touches) == (False, [])
-    if depth < 0.01 * place * (1 - place):  # larger ones may be cleared without a look at the extremum
+    # larger ones may be cleared without a look at the extremum
+    if depth < 0.01 * place * (1 - place):
         assert abs(margin - depth) < 8 * EPS
 
 
@@ -106,9 +123,13 @@ def test_a_dip_beside_a_maximum_exactly_at_a_halving(degree):
         place, depth = rng.uniform(0.02, summit - 0.05), 10.0 ** rng.uniform(-9, -2)
         if place < np.sqrt(depth):
             continue
-        beyond = summit + ((summit - place) ** 2 - depth) / (2 * (summit - place))  # the third root that puts the maximum there
+        # the third root that puts the maximum there
+        beyond = summit + ((summit - place) ** 2 - depth) / (2 * (summit - place))
         q = np.zeros(degree + 1)
-        q[:4] = -rng.uniform(0.5, 2.0) * np.polymul([1, -2 * place, place**2 - depth], [1, -beyond])[::-1]
+        q[:4] = (
+            -rng.uniform(0.5, 2.0)
+            * np.polymul([1, -2 * place, place**2 - depth], [1, -beyond])[::-1]
+        )
         crosses, at, _, _ = crossing(q)
         assert crosses
         assert abs(at - (place - np.sqrt(depth))) < 1e-4 * np.sqrt(depth)
@@ -124,7 +145,8 @@ def test_tangencies_are_touches(place, multiplicity, degree):
     crosses, at, touches, margin = crossing(q)
     if crosses:
         assert abs(at - place) < flat
-        assert place * 8 % 1 == 0  # next to a halving it may round to a crossing, which the flow calls unresolved
+        # next to a halving it may round to a crossing, which the flow calls unresolved
+        assert place * 8 % 1 == 0
     else:
         assert len(touches) == 1 or (multiplicity == 4 and len(touches) < 4)
         assert np.max(np.abs(np.array(touches) - place)) < flat
@@ -141,12 +163,22 @@ def test_roots_of_odd_multiplicity_are_crossings(place, multiplicity):
 
 
 @pytest.mark.parametrize(
-    "roots", [[0.3, 0.3, 0.9], [0.1, 0.1, 0.7], [0.65, 0.65, 0.85], [0.25, 0.25, 0.75], [0.5, 0.5, 0.8], [0.5, 0.5, 0.75]]
+    "roots",
+    [
+        [0.3, 0.3, 0.9],
+        [0.1, 0.1, 0.7],
+        [0.65, 0.65, 0.85],
+        [0.25, 0.25, 0.75],
+        [0.5, 0.5, 0.8],
+        [0.5, 0.5, 0.75],
+    ],
 )
 @pytest.mark.parametrize("degree", [3, DEGREE])
 @pytest.mark.parametrize("beside", [0.0, 1e-16, 1e-12, 1e-9])
 def test_a_touch_before_a_crossing_is_kept(roots, degree, beside):
-    """A minimum within the noise is a touch; next to a halving it may round to a crossing there, which the flow calls unresolved."""
+    """A minimum within the noise is a touch; next to a halving it may round to a crossing there,
+    which the flow calls unresolved.
+    """
     place = roots[0] + beside
     q = np.zeros(degree + 1)
     q[:4] = from_roots([place, place, roots[2]], scale=-1.0)
@@ -160,7 +192,10 @@ def test_a_touch_before_a_crossing_is_kept(roots, degree, beside):
         assert place * 8 % 1 < 1e-7  # a halving
 
 
-@pytest.mark.parametrize("roots", [[0.5, 0.6, 0.7], [0.25, 0.5, 0.75], [0.4, 0.5, 0.5], [0.5, 0.75, 0.75], [0.2, 0.5, 0.50001]])
+@pytest.mark.parametrize(
+    "roots",
+    [[0.5, 0.6, 0.7], [0.25, 0.5, 0.75], [0.4, 0.5, 0.5], [0.5, 0.75, 0.75], [0.2, 0.5, 0.50001]],
+)
 def test_the_first_of_several(roots):
     crosses, at, touches, _ = crossing(from_roots(roots, scale=-1.0))
     assert (crosses, touches) == (True, [])
@@ -180,7 +215,9 @@ def test_a_root_next_to_the_start(place):
 
 
 def test_the_depth_of_a_gap_whose_root_at_zero_was_divided_out():
-    """Gap x ((x - 0.3)^2 +/- 1e-4): the margin is that of the gap at the quotient's minimum, not of the quotient."""
+    """Gap x ((x - 0.3)^2 +/- 1e-4): the margin is that of the gap at the quotient's minimum, not of
+    the quotient.
+    """
     _, _, _, margin = crossing([0.09 + 1e-4, -0.6, 1.0], shifted=True)
     assert np.isclose(margin, 0.3e-4, rtol=1e-6)
     crosses, at, _, _ = crossing([0.09 - 1e-4, -0.6, 1.0], shifted=True)
@@ -199,20 +236,32 @@ def test_the_noise_is_what_the_caller_says_and_the_rounding_of_the_terms():
 
 def test_a_margin_is_only_ever_lowered():
     q, out = np.array([0.09 + 1e-4, -0.6, 1.0]), np.array([0.0, 1e-7])
-    iso.first_crossing(q, 2, False, 0.0, 0, *iso.work_arrays(2), out, np.zeros((iso.MOST_TOUCHES, 2)), 0)
+    iso.first_crossing(
+        q, 2, False, 0.0, 0, *iso.work_arrays(2), out, np.zeros((iso.MOST_TOUCHES, 2)), 0
+    )
     assert out[iso.MARGIN] == 1e-7
 
 
 def test_touches_that_are_held_already_stay():
     touches = np.zeros((iso.MOST_TOUCHES, 2))
     touches[0] = 0.9, 1.0
-    crosses, count = iso.first_crossing(from_roots([0.3, 0.3]), 2, False, 1e-15, 2, *iso.work_arrays(2), np.full(2, np.inf), touches, 1)
+    crosses, count = iso.first_crossing(
+        from_roots([0.3, 0.3]),
+        2,
+        False,
+        1e-15,
+        2,
+        *iso.work_arrays(2),
+        np.full(2, np.inf),
+        touches,
+        1,
+    )
     assert (crosses, count) == (False, 2)
     assert touches[0].tolist() == [0.9, 1.0]
     assert abs(touches[1, iso.TOUCH_AT] - 0.3) < 1e-7
 
 
-# -- parts ---------------------------------------------------------------------------------------------------------------------------------
+# -- parts -----------------------------------------------------------------------------------------
 
 
 def test_bernstein_coefficients_and_halving():
@@ -220,14 +269,19 @@ def test_bernstein_coefficients_and_halving():
     q = rng.normal(size=DEGREE + 1)
     rows, _, _ = iso.work_arrays(DEGREE)
     iso.to_bernstein(q, DEGREE, rows[0])
-    direct = [sum(comb(i, k) / comb(DEGREE, k) * q[k] for k in range(i + 1)) for i in range(DEGREE + 1)]
+    direct = [
+        sum(comb(i, k) / comb(DEGREE, k) * q[k] for k in range(i + 1)) for i in range(DEGREE + 1)
+    ]
     assert np.allclose(rows[0], direct, rtol=0, atol=1e-13)
     bounds = np.array([[0.0, 1.0], [np.nan, np.nan]])
     iso.halve(rows, bounds, 0, DEGREE)
     assert bounds.tolist() == [[0.5, 1.0], [0.0, 0.5]]
     for row, place in ((1, lambda x: x / 2), (0, lambda x: (1 + x) / 2)):
         for x in (0.0, 0.2, 0.7, 1.0):
-            value = sum(comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) * rows[row, i] for i in range(DEGREE + 1))
+            value = sum(
+                comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) * rows[row, i]
+                for i in range(DEGREE + 1)
+            )
             assert np.isclose(value, iso.polynomial(q, DEGREE, place(x)), rtol=0, atol=1e-12)
 
 
@@ -243,13 +297,23 @@ def test_value_and_slope():
 
 @pytest.mark.parametrize(
     ("values", "count"),
-    [([1, 2, 3], 0), ([1, -1], 1), ([1, 0, 0, -1], 1), ([1, 0, 2, -1, 0, 3], 2), ([0, 0, 0], 0), ([-0.0, 1, -1e-300, 1], 2)],
+    [
+        ([1, 2, 3], 0),
+        ([1, -1], 1),
+        ([1, 0, 0, -1], 1),
+        ([1, 0, 2, -1, 0, 3], 2),
+        ([0, 0, 0], 0),
+        ([-0.0, 1, -1e-300, 1], 2),
+    ],
 )
 def test_sign_variations(values, count):
     assert iso.variations(np.array(values, float), len(values) - 1) == count
 
 
-@pytest.mark.parametrize(("q", "sign"), [([2, -1], 1), ([0, -1, 5], -1), ([0, 0, 3], 1), ([0, 0, 0], 0), ([-0.0, 1e-320], 1)])
+@pytest.mark.parametrize(
+    ("q", "sign"),
+    [([2, -1], 1), ([0, -1, 5], -1), ([0, 0, 3], 1), ([0, 0, 0], 0), ([-0.0, 1e-320], 1)],
+)
 def test_leading_sign(q, sign):
     assert iso.leading_sign(np.array(q, float), len(q) - 1) == sign
 

@@ -1,4 +1,6 @@
-"""Operations on lanes: the compiled ones and the NumPy ones that stand in for them give the same numbers, lane by lane."""
+"""Operations on lanes: the compiled ones and the NumPy ones that stand in for them give the same
+numbers, lane by lane.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,24 @@ from saltus.kernels.lanes import (
 
 JIT = not jit_disabled()
 WIDTHS = (2, 4, 8, 16)
-SPECIAL = [0.0, -0.0, 1.0, -1.5, math.inf, -math.inf, math.nan, 5e-324, -1e308, 2.5, 3.5, -0.5, 1e-300, 7.0, -2.0, 0.3]
+SPECIAL = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.5,
+    math.inf,
+    -math.inf,
+    math.nan,
+    5e-324,
+    -1e308,
+    2.5,
+    3.5,
+    -0.5,
+    1e-300,
+    7.0,
+    -2.0,
+    0.3,
+]
 
 
 def _arithmetic(a, b, c, out, flags):
@@ -104,11 +123,15 @@ def compiled(function, width, count):
 
 
 def in_lanes(function, rows, width, results, flags=0):
-    """Run a function of lanes compiled, or plain with the JIT off; ``rows`` (lanes, width) are its arguments."""
+    """Run a function of lanes compiled, or plain with the JIT off; ``rows`` (lanes, width) are its
+    arguments.
+    """
     if not JIT:
         return plain(function, rows, width, results, flags)
     out, integers = np.zeros((results, width)), np.zeros(flags, np.int64)
-    compiled(function, width, len(rows))(np.array(rows, float), out, *((integers,) if flags else ()))
+    compiled(function, width, len(rows))(
+        np.array(rows, float), out, *((integers,) if flags else ())
+    )
     return out, integers
 
 
@@ -139,12 +162,23 @@ def test_arithmetic_comparisons_and_choices(width):
         rest = [i for i in range(23) if i not in fused]
         assert np.array_equal(found[rest], expected[rest], equal_nan=True)
         numbers = ~np.isnan(expected[rest])
-        assert np.array_equal(np.signbit(found[rest])[numbers], np.signbit(expected[rest])[numbers])  # 0 and -0 are told apart
+        # 0 and -0 are told apart
+        assert np.array_equal(np.signbit(found[rest])[numbers], np.signbit(expected[rest])[numbers])
         assert found_flags.tolist() == flags.tolist()
         with np.errstate(all="ignore"):
-            size = np.abs(arguments[0] * arguments[1]) + np.abs(arguments[2]) + 2 * np.abs(arguments[0]) + np.abs(arguments[1]) + 2
-            same = (found[fused] == expected[fused]) | (np.abs(found[fused] - expected[fused]) <= 2.0**-52 * size)
-        assert np.all(same | (np.isnan(found[fused]) & np.isnan(expected[fused])) | ~np.isfinite(size))
+            size = (
+                np.abs(arguments[0] * arguments[1])
+                + np.abs(arguments[2])
+                + 2 * np.abs(arguments[0])
+                + np.abs(arguments[1])
+                + 2
+            )
+            same = (found[fused] == expected[fused]) | (
+                np.abs(found[fused] - expected[fused]) <= 2.0**-52 * size
+            )
+        assert np.all(
+            same | (np.isnan(found[fused]) & np.isnan(expected[fused])) | ~np.isfinite(size)
+        )
 
 
 @pytest.mark.nojit
@@ -158,22 +192,36 @@ def test_functions_of_the_c_library(width):
 @pytest.mark.skipif(not JIT, reason="NumPy has no fused multiply-add")
 def test_fma_rounds_once():
     tiny = 2.0**-30
-    out, _ = in_lanes(lambda a, b, c, out: store(out, 0, fma(a, b, c)), [[1 + tiny] * 4, [1 - tiny] * 4, [-1.0] * 4], 4, 1)
+    out, _ = in_lanes(
+        lambda a, b, c, out: store(out, 0, fma(a, b, c)),
+        [[1 + tiny] * 4, [1 - tiny] * 4, [-1.0] * 4],
+        4,
+        1,
+    )
     assert out[0].tolist() == [-(tiny**2)] * 4
 
 
 @pytest.mark.nojit
 def test_coarse_logarithm_and_its_inverse():
-    values = np.ldexp(np.random.default_rng(1).uniform(0.5, 1.0, (200, 4)), np.random.default_rng(2).integers(-900, 900, (200, 4)))
+    values = np.ldexp(
+        np.random.default_rng(1).uniform(0.5, 1.0, (200, 4)),
+        np.random.default_rng(2).integers(-900, 900, (200, 4)),
+    )
     for row in values * np.array([1, -1, 1, -1]):
         logs, _ = in_lanes(_rough, [row], 4, 2)
         assert np.all(np.abs(logs[0] - np.log2(np.abs(row))) < 0.09)
         assert np.array_equal(logs[0], coarse_log2(row))
         back, _ = in_lanes(_rough, [logs[0]], 4, 2)
-        assert np.allclose(back[1], np.abs(row), rtol=1e-12, atol=0)  # 1000 + log2 keeps so many digits
+        # 1000 + log2 keeps so many digits
+        assert np.allclose(back[1], np.abs(row), rtol=1e-12, atol=0)
     ends, _ = in_lanes(_rough, [[0.0, 2000.0, -2000.0, 0.0]], 4, 2)
     assert ends[0, 0] == -1023.0
-    assert ends[1].tolist() == [1.0, coarse_exp2(np.array([1000.0]))[0], coarse_exp2(np.array([-1000.0]))[0], 1.0]
+    assert ends[1].tolist() == [
+        1.0,
+        coarse_exp2(np.array([1000.0]))[0],
+        coarse_exp2(np.array([-1000.0]))[0],
+        1.0,
+    ]
 
 
 @pytest.mark.nojit
@@ -214,15 +262,23 @@ def test_the_lowest_bit(number):
     assert njit(lambda value: lowest_bit(value))(number) == lowest
 
 
-@pytest.mark.parametrize("number", [0.0, 5e-324, 1e-310, 2.0**-1022, 0.3, 1.0, 1.5, 2.0**52, 1e300, math.inf, math.nan])
+@pytest.mark.parametrize(
+    "number", [0.0, 5e-324, 1e-310, 2.0**-1022, 0.3, 1.0, 1.5, 2.0**52, 1e300, math.inf, math.nan]
+)
 def test_the_distance_to_the_next_number(number):
     expected = np.spacing(number)
-    assert np.array_equal([spacing(number), njit(lambda value: spacing(value))(number)], [expected, expected], equal_nan=True)
+    assert np.array_equal(
+        [spacing(number), njit(lambda value: spacing(value))(number)],
+        [expected, expected],
+        equal_nan=True,
+    )
 
 
 def test_every_operation_is_tried_here():
     """A new operation in lanes.py needs a line above."""
     operations = {
-        name for name, item in vars(lanes).items() if inspect.isfunction(item) and item.__module__ == lanes.__name__ and name[0] != "_"
+        name
+        for name, item in vars(lanes).items()
+        if inspect.isfunction(item) and item.__module__ == lanes.__name__ and name[0] != "_"
     }
     assert operations <= {name for name, item in globals().items() if inspect.isfunction(item)}

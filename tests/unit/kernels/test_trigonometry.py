@@ -29,7 +29,9 @@ def one_row(angles, sines, cosines):
 
 @cache
 def _one_row():
-    """Sine and cosine of one row of lanes: compiled as in an equation, or plain with the JIT off."""
+    """Sine and cosine of one row of lanes: compiled as in an equation, or plain with
+    the JIT off.
+    """
     if JIT:
         return compiled(ONE_ROW, (ARRAY,) * 3, LANES)
     names = dict(sincos=sincos, load=load, store=store, LANES=LANES)
@@ -44,9 +46,9 @@ def _sincos_rows(angles, sines, cosines):
 
 def in_ulps(values, exact):
     """Errors in units in the last place of the exact values."""
-    return np.array([float(abs(mpf(float(v)) - e)) for v, e in zip(values, exact, strict=True)]) / np.spacing(
-        np.abs(np.array(exact, float))
-    )
+    return np.array(
+        [float(abs(mpf(float(v)) - e)) for v, e in zip(values, exact, strict=True)]
+    ) / np.spacing(np.abs(np.array(exact, float)))
 
 
 def errors(angles):
@@ -71,7 +73,9 @@ SPREADS = {
 }
 
 
-NEEDS_FMA = pytest.mark.skipif(not JIT, reason="the reduction needs a fused multiply-add, which NumPy lacks")
+NEEDS_FMA = pytest.mark.skipif(
+    not JIT, reason="the reduction needs a fused multiply-add, which NumPy lacks"
+)
 #: Half an ulp of the polynomial, half of the reduced angle's rounding, half of the result's.
 ALLOWED = 1.5
 
@@ -87,7 +91,13 @@ def test_sine_and_cosine_to_about_an_ulp(spread):
 def test_next_to_quarter_turns(turns):
     """Where sine or cosine nearly vanishes the reduction must hold all digits."""
     close = turns * math.pi / 2
-    angles = [np.nextafter(close, 0), close, np.nextafter(close, math.inf), close + 1e-7 * close, -close]
+    angles = [
+        np.nextafter(close, 0),
+        close,
+        np.nextafter(close, math.inf),
+        close + 1e-7 * close,
+        -close,
+    ]
     assert np.max(errors(angles)) < ALLOWED
 
 
@@ -122,7 +132,7 @@ def test_a_lane_beyond_the_reduction_does_not_change_its_neighbours():
         assert a[0, [0, 2, 3]].tolist() == b[0, [0, 2, 3]].tolist()
 
 
-# -- phases --------------------------------------------------------------------------------------------------------------------------------
+# -- phases ----------------------------------------------------------------------------------------
 
 
 def exact_phase(rate, period, count):
@@ -138,7 +148,10 @@ def exact_phase(rate, period, count):
 def test_phase_of_a_harmonic_that_does_not_fit_the_period(rate, count):
     for period in (1 / 17, 0.1428571, 2.5):
         difference = turned(rate, period, count) - exact_phase(rate, period, count)
-        assert abs(difference - 2 * math.pi * round(difference / (2 * math.pi))) < 1e-13 + 1e-15 * count**0.5
+        assert (
+            abs(difference - 2 * math.pi * round(difference / (2 * math.pi)))
+            < 1e-13 + 1e-15 * count**0.5
+        )
 
 
 @pytest.mark.nojit

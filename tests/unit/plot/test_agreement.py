@@ -23,7 +23,9 @@ def texts(ax):
 
 def test_maps_are_named_by_their_methods_where_these_differ():
     ds = agreement_map(A, B).assign_attrs(
-        method_a="ODE45", method_options_a='{"rtol": 1e-4, "atol": 1e-7, "events": "ignore"}', method_b="Taylor"
+        method_a="ODE45",
+        method_options_a='{"rtol": 1e-4, "atol": 1e-7, "events": "ignore"}',
+        method_b="Taylor",
     )
     titles = [one.get_title(loc="left") for one in agreement(ds)]
     assert titles[:2] == ["ode45, rtol 0.0001, atol 1e-07, contacts not located", "exact"]
@@ -73,7 +75,10 @@ def test_shares_at_the_ends_of_the_scale():
     same = np.zeros((40, 60), dtype=int)
     other = same.copy()
     other[0, 0] = 1
-    titles = [agreement(agreement_map(*both))[2].get_title(loc="left") for both in [(same, same), (same, other), (same - 2, same)]]
+    titles = [
+        agreement(agreement_map(*both))[2].get_title(loc="left")
+        for both in [(same, same), (same, other), (same - 2, same)]
+    ]
     assert titles == ["100 % agree", "> 99.9 % agree", "nothing settles in both"]
 
 

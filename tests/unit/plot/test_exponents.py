@@ -14,15 +14,20 @@ MINUS = "\N{MINUS SIGN}"
 
 
 def converging(kinds=("chaotic",), unit="1/s", values=(5.98, -7.86), half=0.26, points=50):
-    """Running means that approach their values like 1/t, with intervals that shrink like its root."""
+    """Running means that approach their values like 1/t, with intervals that shrink
+    like its root.
+    """
     k, time = len(kinds), np.tile(np.linspace(1, 400, points), (len(kinds), 1))
     exact = np.tile(values, (k, 1))
     running = exact[:, :, None] + 3 / time[:, None]
     width = half * np.sqrt(400 / time)[:, None]
     columns = {
-        "kind": kinds, "response_period": [3 if kind == "periodic" else 0 for kind in kinds], "lyapunov_exponent": exact,
-        "lyapunov_error": 0 * exact + half / 2, "lyapunov_low": exact - half, "lyapunov_high": exact + half, "status": ["ok"] * k,
-        "running_time": time, "running_exponent": running, "running_low": running - width, "running_high": running + width,
+        "kind": kinds, "response_period": [3 if kind == "periodic" else 0 for kind in kinds],
+        "lyapunov_exponent": exact,
+        "lyapunov_error": 0 * exact + half / 2, "lyapunov_low": exact - half,
+        "lyapunov_high": exact + half, "status": ["ok"] * k,
+        "running_time": time, "running_exponent": running, "running_low": running - width,
+        "running_high": running + width,
     }  # fmt: skip
     return made_results.exponents(columns=columns, rate=unit, states=("x", "v"), attrs=PROVENANCE)
 
@@ -36,7 +41,8 @@ def test_a_curve_with_its_interval_for_each_exponent():
     assert ax.get_ylabel() == "Lyapunov exponent [1/s]"
     assert ax.get_xlabel() == "time after the transient [s]"
     assert "motion: chaotic" in (ax.get_title(loc="left"), ax.get_title())
-    assert curves[0].get_xdata()[0] >= 0.1 * curves[0].get_xdata()[-1]  # the beginning, whose intervals are wide, isn't shown
+    # the beginning, whose intervals are wide, isn't shown
+    assert curves[0].get_xdata()[0] >= 0.1 * curves[0].get_xdata()[-1]
     low, high = ax.get_ylim()
     assert low < -8.12
     assert 6.24 < high < 12
@@ -62,7 +68,14 @@ def test_units_and_panels():
 
 def test_exponents_that_are_not_known():
     ds = converging()
-    for name in ("lyapunov_exponent", "lyapunov_low", "lyapunov_high", "running_exponent", "running_low", "running_high"):
+    for name in (
+        "lyapunov_exponent",
+        "lyapunov_low",
+        "lyapunov_high",
+        "running_exponent",
+        "running_low",
+        "running_high",
+    ):
         ds[name][:] = np.nan
     ds["status"][:] = "ok"
     assert exponents(ds).get_legend().get_texts()[0].get_text() == "not known"

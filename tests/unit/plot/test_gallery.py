@@ -17,8 +17,10 @@ def known(batch):
     """Attractors for the four trajectories of the batch: two that repeat, two that don't."""
     x, v = (batch[name].values[:, 1000::100] for name in "xv")
     return attractors(
-        [x[0, -3:], x[1], x[2], x[3, -1:]], [v[0, -3:], v[1], v[2], v[3, -1:]], period=[3, 0, 0, 1], contacts=[8, 2.4, 2.1, 2],
-        fraction=[0.123, 0.5, 0.377, 0.0], attractor_peak=("attractor", [0.912e-3, 1e-3, 1e-3, 2e-3], {"units": "m"}),
+        [x[0, -3:], x[1], x[2], x[3, -1:]], [v[0, -3:], v[1], v[2], v[3, -1:]], period=[3, 0, 0, 1],
+        contacts=[8, 2.4, 2.1, 2],
+        fraction=[0.123, 0.5, 0.377, 0.0],
+        attractor_peak=("attractor", [0.912e-3, 1e-3, 1e-3, 2e-3], {"units": "m"}),
     )  # fmt: skip
 
 
@@ -27,23 +29,40 @@ def rows(figure):
 
 
 def test_titles(known):
-    assert title_of(known, 0) == "3T, 8 contacts, multipliers |µ| = 0.53, peak 0.912 mm, 12.3 % of the starts"
-    assert title_of(known, 1) == "chaotic, 2.4 contacts per T, exponent 12.3 ± 0.3 1/s, peak 1 mm, 50.0 % of the starts"
-    bare = known.drop_vars(["attractor_fraction", "attractor_multiplier_real", "attractor_peak", "attractor_exponent"])
-    assert [title_of(bare, key) for key in (0, 2)] == ["3T, 8 contacts", "chaotic, 2.1 contacts per T"]
+    assert title_of(known, 0) == (
+        "3T, 8 contacts, multipliers |µ| = 0.53, peak 0.912 mm, 12.3 % of the starts"
+    )
+    assert title_of(known, 1) == (
+        "chaotic, 2.4 contacts per T, exponent 12.3 ± 0.3 1/s, peak 1 mm, 50.0 % of the starts"
+    )
+    bare = known.drop_vars(
+        ["attractor_fraction", "attractor_multiplier_real", "attractor_peak", "attractor_exponent"]
+    )
+    assert [title_of(bare, key) for key in (0, 2)] == [
+        "3T, 8 contacts",
+        "chaotic, 2.1 contacts per T",
+    ]
     both = known.assign(attractor_multiplier_imag=known["attractor_multiplier_imag"] * [1, 0.5])
     assert "|µ| = 0.53, 0.265," in title_of(both, 0)
 
 
 def test_a_row_for_each_attractor(known, batch):
     figure = gallery(known, batch)
-    assert [row[0].get_title(loc="left") for row in rows(figure)] == [title_of(known, key) for key in range(4)]
-    assert [tuple(np.round(row[0].get_xlim(), 6)) for row in rows(figure)] == [(17, 20), (8, 20), (8, 20), (18, 20)]
+    assert [row[0].get_title(loc="left") for row in rows(figure)] == [
+        title_of(known, key) for key in range(4)
+    ]
+    assert [tuple(np.round(row[0].get_xlim(), 6)) for row in rows(figure)] == [
+        (17, 20),
+        (8, 20),
+        (8, 20),
+        (18, 20),
+    ]
     assert [one.get_xlabel() for one in rows(figure)[-1]] == ["time [T]", "x [mm]", "x [mm]"]
     named = [one.get_text() for one in figure.legends[0].get_texts()]
     assert {"free", "contact", "Poincaré points", "other attractors"} <= set(named)
     assert len(named) == len(set(named))
-    assert not any(one.child_axes for one in rows(figure)[:, 1])  # names of gaps there would meet the title of the row
+    # names of gaps there would meet the title of the row
+    assert not any(one.child_axes for one in rows(figure)[:, 1])
 
 
 def test_poincare_points_have_the_hue_of_the_map_and_stay_inside(known, batch):
@@ -82,7 +101,11 @@ def test_without_stroboscopic_points_two_columns_remain(known, batch):
         ("map", "plot.gallery takes what sl.basins, sl.attractors or sl.basin_fractions"),
         ("runs", "plot.gallery takes what sl.simulate returns"),
         ("points", "takes what sl.simulate returns"),
-        ("few", r"runs holds 2 trajectories, none for attractor 2 of 4.*trajectory i starts on attractor i"),
+        (
+            "few",
+            r"runs holds 2 trajectories, none for attractor 2 of 4.*trajectory i starts on "
+            r"attractor i",
+        ),
         ("id", "no attractor 7. Known: 0, 1, 2, 3"),
         ("none", "shows 1 to 20 attractors, not 0. Nothing settled"),
     ],
@@ -102,7 +125,9 @@ def test_errors_teach(known, batch, points, which, message):
 
 
 def test_an_equilibrium_is_a_flat_line_and_twins_are_told_apart():
-    """What is left of the motion is rounding; drawn to the height of the picture it looked like an oscillation."""
+    """What is left of the motion is rounding; drawn to the height of the picture it looked like an
+    oscillation.
+    """
 
     @sl.system(states="x v", units={"x": "m", "v": "m/s"})
     def saddle(t, x, v, *, rate="100 1/s^2", damping="3 1/s"):
@@ -111,7 +136,12 @@ def test_an_equilibrium_is_a_flat_line_and_twins_are_told_apart():
     starts = {"x": [1.9e-3, -1.9e-3], "v": 0.0}
     found = sl.attractors(saddle, starts, every=0.3, progress=False)
     assert found.attractor_type.values.tolist() == ["equilibrium"] * 2
-    runs = sl.simulate(saddle, {name: found[f"attractor_{name}"].values[:, 0] for name in "xv"}, t_end=3.0, progress=False)
+    runs = sl.simulate(
+        saddle,
+        {name: found[f"attractor_{name}"].values[:, 0] for name in "xv"},
+        t_end=3.0,
+        progress=False,
+    )
     runs["x"][:] += 1e-18 * np.sin(np.arange(runs.sizes["time"]))
     figure = gallery(found, runs)
     for row, place in zip(rows(figure), (-2.0, 2.0), strict=True):

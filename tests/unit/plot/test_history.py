@@ -1,4 +1,6 @@
-"""A time history shows every contact of its window, changes colour exactly there, and names its units."""
+"""A time history shows every contact of its window, changes colour exactly there, and names its
+units.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -30,7 +32,10 @@ def ends(ax, label):
     return np.concatenate([xy[first], xy[last]])
 
 
-@pytest.mark.parametrize(("periods", "begin", "end"), [(None, 0, 40), (5, 35, 40), (2.5, 37.5, 40), ((10, 12.25), 10, 12.25)])
+@pytest.mark.parametrize(
+    ("periods", "begin", "end"),
+    [(None, 0, 40), (5, 35, 40), (2.5, 37.5, 40), ((10, 12.25), 10, 12.25)],
+)
 def test_every_contact_of_the_window_is_marked(run, periods, begin, end):
     ax = history(run, periods=periods)
     inside = contacts(run, begin, end)
@@ -43,13 +48,20 @@ def test_every_contact_of_the_window_is_marked(run, periods, begin, end):
 
 def test_colours_change_exactly_at_the_boundaries(run):
     ax = history(run, periods=5)
-    for label, allowed in {"upper contact": [0.4], "free": [0.0, 0.4], "lower contact": [0.0]}.items():
+    for label, allowed in {
+        "upper contact": [0.4],
+        "free": [0.0, 0.4],
+        "lower contact": [0.0],
+    }.items():
         inner = [x for t, x in ends(ax, label) if ax.get_xlim()[0] < t < ax.get_xlim()[1]]
         assert len(inner) > 4
         assert set(inner) <= set(allowed), label
     assert np.nanmin(line(ax, "upper contact").get_ydata()) == 0.4
     assert np.nanmax(line(ax, "lower contact").get_ydata()) == 0.0
-    assert (np.nanmin(line(ax, "free").get_ydata()), np.nanmax(line(ax, "free").get_ydata())) == (0.0, 0.4)
+    assert (np.nanmin(line(ax, "free").get_ydata()), np.nanmax(line(ax, "free").get_ydata())) == (
+        0.0,
+        0.4,
+    )
 
 
 def test_pieces_join_without_a_hole(run):
@@ -67,18 +79,24 @@ def test_no_sample_is_lost(run):
 
 def test_colours_are_those_of_the_palette(run):
     ax = history(run)
-    assert {label: to_hex(line(ax, label).get_color()) for label in COLORS} == {k: OKABE_ITO[v].lower() for k, v in COLORS.items()}
+    assert {label: to_hex(line(ax, label).get_color()) for label in COLORS} == {
+        k: OKABE_ITO[v].lower() for k, v in COLORS.items()
+    }
 
 
 def test_a_run_that_stopped_early_ends_there():
     stopped = rig_run(periods=10, status="sliding")
     late = stopped["time"].values > 2.5 * stopped["time"].values[-1] / 10
-    stopped = stopped.assign({name: stopped[name].where(~late) for name in ("x", "v")}).assign(end_time=0.2)
+    stopped = stopped.assign({name: stopped[name].where(~late) for name in ("x", "v")}).assign(
+        end_time=0.2
+    )
     last = stopped["time"].values[~late][-1]
     assert history(stopped).get_xlim()[1] == pytest.approx(last)
     assert phase(stopped).texts[-1].get_text() == "status: sliding, stopped at 0.2 s"
     assert history(stopped, periods=1).get_xlim() == pytest.approx((last - PERIOD, last))
-    at_once = stopped.assign({name: stopped[name].where(stopped["time"] == 0) for name in ("x", "v")})
+    at_once = stopped.assign(
+        {name: stopped[name].where(stopped["time"] == 0) for name in ("x", "v")}
+    )
     for ax in (history(at_once), history(at_once, periods=5), phase(at_once)):
         assert ax.texts[0].get_text() == "It stopped where it began: there is no motion to draw."
 
@@ -86,7 +104,9 @@ def test_a_run_that_stopped_early_ends_there():
 def test_axes_have_units_and_gap_lines(run):
     ax = history(run, periods=3)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("time [s]", "x [mm]")
-    dashed = [one.get_ydata()[0] for one in ax.lines if one.get_linestyle() == "--" or one.is_dashed()]
+    dashed = [
+        one.get_ydata()[0] for one in ax.lines if one.get_linestyle() == "--" or one.is_dashed()
+    ]
     assert dashed == [gap * 1e3 for gap in GAPS]
     assert [text.get_text() for text in ax.texts] == ["lower gap\n0 mm", "upper gap\n0.4 mm"]
 
@@ -96,7 +116,13 @@ def test_periods_stand_at_the_top(run):
     ax.figure.canvas.draw()
     (top,) = ax.child_axes
     assert np.allclose(top.get_xlim(), (36, 40))
-    assert [label.get_text() for label in top.get_xticklabels()] == ["36 T", "37 T", "38 T", "39 T", "40 T"]
+    assert [label.get_text() for label in top.get_xticklabels()] == [
+        "36 T",
+        "37 T",
+        "38 T",
+        "39 T",
+        "40 T",
+    ]
     assert not history(run, time="s").child_axes
 
 
@@ -104,7 +130,9 @@ def test_time_in_periods(run):
     ax = history(run, periods=4, time="T")
     assert ax.get_xlabel() == "time [T]"
     assert np.allclose(ax.get_xlim(), (36, 40))
-    assert np.allclose(line(ax, "contact").get_xdata(), contacts(run, 36, 40)["contact_time"].values / PERIOD)
+    assert np.allclose(
+        line(ax, "contact").get_xdata(), contacts(run, 36, 40)["contact_time"].values / PERIOD
+    )
 
 
 def test_another_state_keeps_the_colours_of_the_guarded_one(run):
@@ -126,7 +154,9 @@ def test_units_can_be_chosen(run):
 
 
 def test_grazes_have_markers_of_their_own():
-    run = rig_run(periods=3, kinds=["graze", "graze_unresolved", "graze"], status="graze_unresolved")
+    run = rig_run(
+        periods=3, kinds=["graze", "graze_unresolved", "graze"], status="graze_unresolved"
+    )
     ax = history(run)
     graze, open_ = line(ax, "graze"), line(ax, "graze, unresolved")
     assert (len(graze.get_xdata()), len(open_.get_xdata())) == (2, 1)
@@ -157,7 +187,9 @@ def test_one_of_a_batch_into_given_axes(batch):
     assert np.array_equal(line(grid[0, 0], "contact").get_xdata(), alone["contact_time"].values)
     assert len(history(batch, [0, 3], ax=grid[1])) == 2
     selected = batch.sel(trajectory=2)
-    assert np.array_equal(line(history(selected), "contact").get_xdata(), alone["contact_time"].values)
+    assert np.array_equal(
+        line(history(selected), "contact").get_xdata(), alone["contact_time"].values
+    )
 
 
 def test_a_run_without_forcing(run):

@@ -18,7 +18,11 @@ def _closed():
 
 def points(axes):
     """Points of every marker layer, by label."""
-    return {line.get_label(): np.stack(line.get_data(), axis=1) for line in axes.lines if line.get_marker() == "o"}
+    return {
+        line.get_label(): np.stack(line.get_data(), axis=1)
+        for line in axes.lines
+        if line.get_marker() == "o"
+    }
 
 
 def test_a_section_shows_what_moves():
@@ -44,7 +48,8 @@ def test_lines_of_a_periodic_response_and_the_curve_of_another():
     assert axes.get_yscale() == "log"
     assert axes.get_ylabel() == "amplitude of x [m]"
     assert len(axes.collections) == 1  # the stems
-    assert points(axes)["_child1"][:, 0] == pytest.approx(np.arange(6.0))  # what lies below 1e-5 of the largest isn't shown
+    # what lies below 1e-5 of the largest isn't shown
+    assert points(axes)["_child1"][:, 0] == pytest.approx(np.arange(6.0))
     curve = sl.plot.spectrum(data.spectrum(window="hann"), state="v")
     assert not curve.collections
     with pytest.raises(ParameterError, match="no state 'y'"):
@@ -54,7 +59,10 @@ def test_lines_of_a_periodic_response_and_the_curve_of_another():
 def test_spectra_of_several_trajectories():
     axes = sl.plot.spectrum(data.spectrum(2, own=True), highest=3.0)
     assert axes.get_xlim()[1] == 3.0
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["trajectory 0", "trajectory 1"]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        "trajectory 0",
+        "trajectory 1",
+    ]
 
 
 def test_impacts_are_counted_by_guard():
@@ -67,7 +75,9 @@ def test_impacts_are_counted_by_guard():
 def with_speeds(speeds):
     """Impacts at the lower gap with these speeds."""
     ds = data.impacts()
-    rows = ds.isel(contact=np.zeros(len(speeds), dtype=int)).assign(contact_speed=("contact", np.asarray(speeds, dtype=float)))
+    rows = ds.isel(contact=np.zeros(len(speeds), dtype=int)).assign(
+        contact_speed=("contact", np.asarray(speeds, dtype=float))
+    )
     return rows.assign(speed_histogram=rows["speed_histogram"] * (len(speeds) > 0))
 
 
@@ -75,7 +85,10 @@ def with_speeds(speeds):
     ("speeds", "says"),
     [
         ([], "No contact in the observed time."),
-        ([0.2, 0.1 * (1 + 1e-12), 0.1] * 4, "The speeds at contact repeat.\nlower gap: 12 contacts, at 0.1 m/s, 0.2 m/s"),
+        (
+            [0.2, 0.1 * (1 + 1e-12), 0.1] * 4,
+            "The speeds at contact repeat.\nlower gap: 12 contacts, at 0.1 m/s, 0.2 m/s",
+        ),
         (np.linspace(0.1, 0.2, 12), None),
         ([0.1, 0.2], None),  # seen once each: nothing repeats
     ],
@@ -92,9 +105,15 @@ def test_what_holds_nothing_says_so_in_place_of_an_empty_frame():
     empty = data.spectrum()
     empty = empty.assign(x_amplitude=empty["x_amplitude"] * np.nan)
     for axes, says in (
-        (sl.plot.energy(stopped), "There is no balance: the motion stopped before the first interval had passed."),
+        (
+            sl.plot.energy(stopped),
+            "There is no balance: the motion stopped before the first interval had passed.",
+        ),
         (sl.plot.spectrum(empty), "There is no spectrum: the motion stopped before its end."),
-        (sl.plot.section(data.section().isel(crossing=[])), "Section x = 0.3 mm: no crossing in the observed time."),
+        (
+            sl.plot.section(data.section().isel(crossing=[])),
+            "Section x = 0.3 mm: no crossing in the observed time.",
+        ),
     ):
         assert axes.texts[0].get_text() == says
         assert not axes.axison
@@ -119,7 +138,9 @@ def test_each_result_knows_its_picture(name, tmp_path):
 
 def test_trajectories_are_named_by_what_varies():
     def varied(ds):
-        return ds.assign_coords(gap=("trajectory", [1e-3, 2e-3], {"units": "m"})).assign_attrs(varied_parameters='["gap"]')
+        return ds.assign_coords(gap=("trajectory", [1e-3, 2e-3], {"units": "m"})).assign_attrs(
+            varied_parameters='["gap"]'
+        )
 
     assert {"gap = 1 mm", "gap = 2 mm"} <= set(points(sl.plot.section(varied(data.section(2)))))
     legend = sl.plot.spectrum(varied(data.spectrum(2))).get_legend()
@@ -128,7 +149,9 @@ def test_trajectories_are_named_by_what_varies():
 
 def test_words_stay_inside_their_picture():
     rig = sl.models.delangre("b", force="4 N", frequency="15 Hz")
-    ds = sl.impact_statistics(rig, {"x": ["0.2 mm", "1 mm"], "v": 0.0}, periods=60, transient=300, progress=False)
+    ds = sl.impact_statistics(
+        rig, {"x": ["0.2 mm", "1 mm"], "v": 0.0}, periods=60, transient=300, progress=False
+    )
     axes = sl.plot.impacts(ds)
     (words,) = axes.texts
     assert "The speeds at contact repeat." in words.get_text()

@@ -1,4 +1,6 @@
-"""Picture of methods side by side: three panels, a colour a method, the reference without an error."""
+"""Picture of methods side by side: three panels, a colour a method, the reference
+without an error.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -15,12 +17,21 @@ VALUES = np.geomspace(1e3, 1e9, 64)
 def side_by_side(values=VALUES):
     axes = {"stiffness": ("stiffness", values, {"units": "N/m"}), "start": ("start", [0])}
     peak = xr.Variable(("stiffness", "start"), np.ones((len(values), 1)), {"units": "m"})
-    base = xr.Dataset({"peak": peak, "response_of": peak.astype(int)}, axes, {"states": "x v", "saltus_result": "responses"})
+    base = xr.Dataset(
+        {"peak": peak, "response_of": peak.astype(int)},
+        axes,
+        {"states": "x v", "saltus_result": "responses"},
+    )
     k = (3, len(values))
     agrees = np.ones((*k, 1), int)
     agrees[1, ::2], agrees[2, :4] = 0, -1
     error = np.outer([0.0, 1e-3, 1e-6], np.ones(len(values)))
-    fields = {"agrees": agrees, "known": agrees, "step_error": error, "steps_per_period": np.outer([20, 60, 200], np.ones(len(values)))}
+    fields = {
+        "agrees": agrees,
+        "known": agrees,
+        "step_error": error,
+        "steps_per_period": np.outer([20, 60, 200], np.ones(len(values))),
+    }
     columns = {"method_cpu_seconds": np.array([1.0, np.nan, 3.0])}
     return methods_dataset(base, ["Taylor", "ode45 a", "ode45 b"], columns, fields, {})
 
@@ -30,8 +41,16 @@ def test_three_panels_share_a_logarithmic_axis_with_its_unit():
     assert len(panels) == 3
     assert {panel.get_xscale() for panel in panels} == {"log"}
     assert panels[2].get_xlabel() == "stiffness [N/m]"
-    assert [text.get_text() for text in panels[0].get_legend().get_texts()] == ["ode45 a", "ode45 b"]  # the reference has no error
-    assert [text.get_text() for text in panels[2].get_legend().get_texts()] == ["Taylor: 1 s", "ode45 a", "ode45 b: 3 s"]
+    # the reference has no error
+    assert [text.get_text() for text in panels[0].get_legend().get_texts()] == [
+        "ode45 a",
+        "ode45 b",
+    ]
+    assert [text.get_text() for text in panels[2].get_legend().get_texts()] == [
+        "Taylor: 1 s",
+        "ode45 a",
+        "ode45 b: 3 s",
+    ]
     plt.close("all")
 
 

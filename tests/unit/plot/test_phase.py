@@ -28,7 +28,9 @@ def test_poincare_points_are_the_states_at_whole_periods(run):
     whole = run.isel(time=slice(3300, None, 100))
     assert np.array_equal(x, whole["x"].values * 1e3)
     assert np.array_equal(v, whole["v"].values * 1e3)
-    assert not [one for one in phase(run, poincare=False).lines if str(one.get_label()).startswith(POINCARE)]
+    assert not [
+        one for one in phase(run, poincare=False).lines if str(one.get_label()).startswith(POINCARE)
+    ]
 
 
 def test_the_last_30_percent_are_shown(run):
@@ -41,21 +43,32 @@ def test_colours_change_exactly_at_the_boundaries(run):
     ax = phase(run, periods=5)
     begin, end = run.isel(time=3500), run.isel(time=-1)
     loose = {float(one["x"]) * 1e3 for one in (begin, end)}
-    for label, allowed in {"upper contact": {0.4}, "free": {0.0, 0.4}, "lower contact": {0.0}}.items():
+    for label, allowed in {
+        "upper contact": {0.4},
+        "free": {0.0, 0.4},
+        "lower contact": {0.0},
+    }.items():
         assert set(ends(ax, label)[:, 0]) <= allowed | loose
 
 
 def test_axes_have_units_and_gap_lines(run):
     ax = phase(run)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [mm]", "v [mm/s]")
-    assert [one.get_xdata()[0] for one in ax.lines if one.is_dashed()] == [gap * 1e3 for gap in GAPS]
-    assert {text.get_text() for text in ax.get_legend().get_texts()} == {*COLORS, f"{POINCARE}, 28 T to 40 T"}
+    assert [one.get_xdata()[0] for one in ax.lines if one.is_dashed()] == [
+        gap * 1e3 for gap in GAPS
+    ]
+    assert {text.get_text() for text in ax.get_legend().get_texts()} == {
+        *COLORS,
+        f"{POINCARE}, 28 T to 40 T",
+    }
 
 
 def test_states_can_be_turned(run):
     ax = phase(run, states=("v", "x"))
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("v [mm/s]", "x [mm]")
-    assert [one.get_ydata()[0] for one in ax.lines if one.is_dashed()] == [gap * 1e3 for gap in GAPS]
+    assert [one.get_ydata()[0] for one in ax.lines if one.is_dashed()] == [
+        gap * 1e3 for gap in GAPS
+    ]
 
 
 def test_a_batch_is_laid_over_one_another(batch):
@@ -85,7 +98,9 @@ def test_stroboscopic_points_alone(points):
 def test_many_points_become_pixels(points):
     many = rig_run(periods=2)
     assert not line(phase(many), POINCARE).get_rasterized()
-    cloud = points.isel(period=np.zeros(600, dtype=int), trajectory=[0]).assign_coords(period=np.arange(600))
+    cloud = points.isel(period=np.zeros(600, dtype=int), trajectory=[0]).assign_coords(
+        period=np.arange(600)
+    )
     assert line(phase(cloud, 0, periods=(0, 600)), POINCARE).get_rasterized()
 
 
@@ -135,7 +150,9 @@ def test_a_phase_portrait_shows_a_state_and_its_rate():
     def pair(t, a, b, va, vb, *, gap=0.5):
         return va, vb, -a, -4 * b - sl.max(b - gap, 0)
 
-    run = sl.simulate(pair, {"a": [1.0, 2.0], "b": 1.0, "va": 0.0, "vb": 0.0}, t_end=5.0, progress=False)
+    run = sl.simulate(
+        pair, {"a": [1.0, 2.0], "b": 1.0, "va": 0.0, "vb": 0.0}, t_end=5.0, progress=False
+    )
     ax = phase(run, 0)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("a", "va")
     ax = phase(run, states=("a", "b"))

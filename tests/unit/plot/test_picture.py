@@ -1,4 +1,6 @@
-"""Names with dollar signs in pictures: a formula is drawn as one, anything else as it is written; no picture fails to be saved."""
+"""Names with dollar signs in pictures: a formula is drawn as one, anything else as it is written;
+no picture fails to be saved.
+"""
 
 import io
 
@@ -25,7 +27,11 @@ def test_what_is_no_formula_is_drawn_as_it_is_written(name):
 
 
 def test_a_formula_is_drawn_as_one():
-    drawn = texts(plot.frequency_response({r"$\mu = 0.3$": resonance(20), "$5 a piece": resonance(20, shift=2.0)}))
+    drawn = texts(
+        plot.frequency_response(
+            {r"$\mu = 0.3$": resonance(20), "$5 a piece": resonance(20, shift=2.0)}
+        )
+    )
     assert {r"$\mu = 0.3$", "$5 a piece"} <= set(drawn)
 
 

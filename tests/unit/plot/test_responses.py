@@ -1,4 +1,6 @@
-"""Pictures of steady responses: every response in its place and colour, whatever part of a Dataset is drawn."""
+"""Pictures of steady responses: every response in its place and colour, whatever part of a Dataset
+is drawn.
+"""
 
 import io
 import time
@@ -10,7 +12,14 @@ import xarray as xr
 from matplotlib.colors import same_color, to_rgb
 
 from saltus.errors import ParameterError
-from saltus.plot import bifurcation_diagram, frequency_response, kinds, palette, response_points, type_map
+from saltus.plot import (
+    bifurcation_diagram,
+    frequency_response,
+    kinds,
+    palette,
+    response_points,
+    type_map,
+)
 from saltus.results import Guards, ResultFileError
 
 from .responses_data import cascade, kinds_map, resonance, responses
@@ -28,7 +37,9 @@ def layer(ax, gid):
 
 def all_points(ax, start="kind"):
     lines = [one for one in ax.lines if str(one.get_gid()).startswith(start)]
-    return np.sort_complex(np.concatenate([one.get_xdata() + 1j * one.get_ydata() for one in lines]))
+    return np.sort_complex(
+        np.concatenate([one.get_xdata() + 1j * one.get_ydata() for one in lines])
+    )
 
 
 @pytest.fixture(scope="module")
@@ -41,13 +52,17 @@ def diagram():
     return cascade(200, keep=40)
 
 
-# -- kinds ---------------------------------------------------------------------------------------------------------------------
+# -- kinds -----------------------------------------------------------------------------------------
 def test_a_kind_has_one_colour_whatever_else_is_there():
-    assert kinds.codes(["periodic", "periodic", "chaotic", "quasi_periodic", "periodic"], [1, 3, 0, 0, 24]).tolist() == [
-        1, 3, kinds.CHAOTIC, kinds.QUASI_PERIODIC, kinds.LONG]  # fmt: skip
+    assert kinds.codes(
+        ["periodic", "periodic", "chaotic", "quasi_periodic", "periodic"], [1, 3, 0, 0, 24]
+    ).tolist() == [1, 3, kinds.CHAOTIC, kinds.QUASI_PERIODIC, kinds.LONG]
     a, b = frequency_response(resonance()), bifurcation_diagram(cascade(200, keep=40))
     for code in ("kind 1", "kind 3", f"kind {kinds.CHAOTIC}"):
-        first, second = (next(one for one in ax.lines if one.get_gid() == code).get_markerfacecolor() for ax in (a, b))
+        first, second = (
+            next(one for one in ax.lines if one.get_gid() == code).get_markerfacecolor()
+            for ax in (a, b)
+        )
         assert same_color(first, second)
 
 
@@ -62,13 +77,20 @@ def test_long_periods_are_named():
     periods = np.array([1, 24, 36])
     assert kinds.label(kinds.LONG, periods) == "24T, 36T"
     assert kinds.label(kinds.LONG, np.arange(40)) == f"{kinds.OWN_HUES + 1}T to 39T"
-    assert [kinds.label(code, periods) for code in (1, 2, kinds.QUASI_PERIODIC, kinds.CHAOTIC)] == ["T", "2T", "quasi-periodic", "chaotic"]
+    assert [kinds.label(code, periods) for code in (1, 2, kinds.QUASI_PERIODIC, kinds.CHAOTIC)] == [
+        "T",
+        "2T",
+        "quasi-periodic",
+        "chaotic",
+    ]
 
 
-# -- frequency response --------------------------------------------------------------------------------------------------------
+# -- frequency response ----------------------------------------------------------------------------
 def test_every_response_is_drawn_once(peak):
     ax = frequency_response(peak)
-    expected = np.sort_complex(peak["response_frequency"].values + 1e3j * peak["response_rms"].values)
+    expected = np.sort_complex(
+        peak["response_frequency"].values + 1e3j * peak["response_rms"].values
+    )
     assert np.allclose(all_points(ax), expected)
     assert texts(ax) == ["T", "3T", "24T", "chaotic", "fold", "onset of chaos", "graze"]
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency [Hz]", "steady rms of x [mm]")
@@ -87,7 +109,9 @@ def test_lines_join_neighbours_on_a_branch_only(peak):
 def test_phases_have_ticks_wherever_they_lie(peak, low, high):
     phases = np.deg2rad(np.linspace(low, high, peak.sizes["response"]))
     with_phase = peak.drop_dims("output", errors="ignore").assign_coords(output=["x"])
-    with_phase = with_phase.assign(output_phase=(("response", "output"), phases[:, None]), output_units=("output", ["m"]))
+    with_phase = with_phase.assign(
+        output_phase=(("response", "output"), phases[:, None]), output_units=("output", ["m"])
+    )
     ax = frequency_response(with_phase, quantity="phase")
     seen = [tick for tick in ax.get_yticks() if ax.get_ylim()[0] <= tick <= ax.get_ylim()[1]]
     assert len(seen) >= 3
@@ -116,7 +140,9 @@ def test_one_start_is_drawn_alone(peak):
 def test_a_response_that_no_start_leads_to_stays(peak):
     share = np.where(peak["response_period"].values == 24, 0.0, 0.5)
     ds = peak.assign(response_share=("response", share)).isel(start=[0])
-    ds["response_of"] = ds["response_of"].where(~np.isin(ds["response_of"], np.flatnonzero(share == 0)), -2)
+    ds["response_of"] = ds["response_of"].where(
+        ~np.isin(ds["response_of"], np.flatnonzero(share == 0)), -2
+    )
     assert "24T" in texts(frequency_response(ds))
 
 
@@ -124,7 +150,10 @@ def test_several_are_drawn_over_each_other(peak):
     ax = frequency_response({"exact": peak, "ode45": resonance(shift=0.5)})
     assert texts(ax)[:2] == ["exact", "ode45"]
     assert layer(ax, "dataset exact")[0].size == peak.sizes["response"]
-    first, second = (next(one for one in ax.lines if one.get_gid() == f"dataset {name}") for name in ("exact", "ode45"))
+    first, second = (
+        next(one for one in ax.lines if one.get_gid() == f"dataset {name}")
+        for name in ("exact", "ode45")
+    )
     assert first.get_marker() != second.get_marker()
     assert not same_color(first.get_markeredgecolor(), second.get_markeredgecolor())
 
@@ -132,23 +161,32 @@ def test_several_are_drawn_over_each_other(peak):
 def test_events_are_marked_on_the_axis(peak):
     ax = frequency_response(peak)
     assert layer(ax, "event fold")[0].tolist() == [15.0, 19.0]
-    assert not [one for one in frequency_response(peak, events=False).lines if str(one.get_gid()).startswith("event")]
+    assert not [
+        one
+        for one in frequency_response(peak, events=False).lines
+        if str(one.get_gid()).startswith("event")
+    ]
     part = frequency_response(peak.sel(frequency=slice(14, 17)))
     assert layer(part, "event fold")[0].tolist() == [15.0]
     assert "graze" not in texts(part)
 
 
-# -- measured points -----------------------------------------------------------------------------------------------------------
+# -- measured points -------------------------------------------------------------------------------
 def test_measured_points_from_a_file_are_converted(peak, tmp_path):
     file = tmp_path / "points.csv"
-    file.write_text("# from the shaker\namplitude [um], note, frequency [rad/s]\n1500,a,100\n2000,b,120\n\n", encoding="utf-8")
+    file.write_text(
+        "# from the shaker\namplitude [um], note, frequency [rad/s]\n1500,a,100\n2000,b,120\n\n",
+        encoding="utf-8",
+    )
     x, y = layer(frequency_response(peak, measured=file), "measured")
     assert np.allclose(x, np.array([100, 120]) / (2 * np.pi))
     assert np.allclose(y, [1.5, 2.0])
 
 
 def test_measured_points_from_a_dataset(peak):
-    points = xr.Dataset({"frequency": ("i", [16.0], {"units": "Hz"}), "amplitude": ("i", [1.7], {"units": "mm"})})
+    points = xr.Dataset(
+        {"frequency": ("i", [16.0], {"units": "Hz"}), "amplitude": ("i", [1.7], {"units": "mm"})}
+    )
     ax = frequency_response(peak, measured=points)
     assert [float(one[0]) for one in layer(ax, "measured")] == pytest.approx([16.0, 1.7])
     assert "measured" in texts(ax)
@@ -158,10 +196,22 @@ def test_measured_points_from_a_dataset(peak):
     ("text", "message"),
     [
         ("", "is empty. Its first line names the columns: frequency"),
-        ("frequency,amplitude [mm]\n1,2\n", r"'frequency' has no unit.*frequency \[Hz\], amplitude \[mm\]"),
-        ("freqency [Hz],amplitude [mm]\n1,2\n", r"no column 'frequency'\. The first line must be like frequency \[Hz\]"),
-        ("frequency [Hz],amplitude [mm]\n1,two\n", "line 2: what stands in the column 'amplitude' is no finite number"),
-        ("frequency [Hz],amplitude [mm]\n1\n", "line 2: what stands in the column 'amplitude' is no finite number"),
+        (
+            "frequency,amplitude [mm]\n1,2\n",
+            r"'frequency' has no unit.*frequency \[Hz\], amplitude \[mm\]",
+        ),
+        (
+            "freqency [Hz],amplitude [mm]\n1,2\n",
+            r"no column 'frequency'\. The first line must be like frequency \[Hz\]",
+        ),
+        (
+            "frequency [Hz],amplitude [mm]\n1,two\n",
+            "line 2: what stands in the column 'amplitude' is no finite number",
+        ),
+        (
+            "frequency [Hz],amplitude [mm]\n1\n",
+            "line 2: what stands in the column 'amplitude' is no finite number",
+        ),
         (
             "frequency [Hz],amplitude [kg]\n1,2\n",
             r"column 'amplitude' has the wrong unit in its header\. Write amplitude \[mm\]",
@@ -187,13 +237,18 @@ def test_measured_datasets_need_units(peak):
         frequency_response(peak, measured=points[["frequency"]])
 
 
-# -- bifurcation diagram -------------------------------------------------------------------------------------------------------
+# -- bifurcation diagram ---------------------------------------------------------------------------
 def test_every_sample_is_drawn(diagram):
     ax = bifurcation_diagram(diagram)
     there = np.isfinite(diagram["sample_x"].values)
     x = np.broadcast_to(diagram["response_contact_stiffness"].values[:, None], there.shape)[there]
-    assert np.allclose(all_points(ax), np.sort_complex(x + 1e3j * diagram["sample_x"].values[there]))
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("contact stiffness [N/m]", "x at turning points [mm]")
+    assert np.allclose(
+        all_points(ax), np.sort_complex(x + 1e3j * diagram["sample_x"].values[there])
+    )
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (
+        "contact stiffness [N/m]",
+        "x at turning points [mm]",
+    )
 
 
 def test_the_axis_is_logarithmic_as_the_grid_is(diagram):
@@ -203,8 +258,10 @@ def test_the_axis_is_logarithmic_as_the_grid_is(diagram):
 
 @pytest.mark.parametrize(
     ("values", "log"),
-    [(np.geomspace(1, 1e6, 50), True), (np.geomspace(1, 2, 9), True), (np.linspace(1, 1e6, 50), False), (np.array([1.0, 10.0]), False),
-     (np.linspace(-1, 1, 5), False), (np.linspace(1e6, 1e6 + 0.1, 5), False), (np.geomspace(1, 1e6, 50)[[0, 3, 4, 20]], False)],
+    [(np.geomspace(1, 1e6, 50), True), (np.geomspace(1, 2, 9), True),
+        (np.linspace(1, 1e6, 50), False), (np.array([1.0, 10.0]), False),
+     (np.linspace(-1, 1, 5), False), (np.linspace(1e6, 1e6 + 0.1, 5), False),
+     (np.geomspace(1, 1e6, 50)[[0, 3, 4, 20]], False)],
 )  # fmt: skip
 def test_grids_even_in_their_logarithms(values, log):
     assert response_points.is_log(values) is log
@@ -218,7 +275,10 @@ def test_without_samples_whole_periods_are_drawn():
 
 def test_gaps_are_dashed_and_named(diagram):
     ax = bifurcation_diagram(diagram)
-    assert [one.get_text() for one in ax.texts] == ["lower gap\n\N{MINUS SIGN}0.2 mm", "upper gap\n0.4 mm"]
+    assert [one.get_text() for one in ax.texts] == [
+        "lower gap\n\N{MINUS SIGN}0.2 mm",
+        "upper gap\n0.4 mm",
+    ]
 
 
 def test_a_gap_that_the_parameter_moves_is_a_curve():
@@ -228,7 +288,11 @@ def test_a_gap_that_the_parameter_moves_is_a_curve():
     ax = bifurcation_diagram(responses(values, rows, axis="gap", guards=guards))
     x, y = layer(ax, "gap")
     assert not ax.texts  # the gap is above the picture
-    beside = bifurcation_diagram(responses(values, [(*row[:5], [4e-3 * row[0] / 4]) for row in rows], axis="gap", guards=guards))
+    beside = bifurcation_diagram(
+        responses(
+            values, [(*row[:5], [4e-3 * row[0] / 4]) for row in rows], axis="gap", guards=guards
+        )
+    )
     assert [one.get_text() for one in beside.texts] == ["stop"]
     assert np.allclose(x, y)
     assert np.allclose(y, 1e3 * values)
@@ -250,7 +314,7 @@ def test_thousands_of_responses_are_quick_and_small_in_vector_files():
     assert file.tell() < 2e6
 
 
-# -- map -----------------------------------------------------------------------------------------------------------------------
+# -- map -------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("log", [True, False])
 def test_every_cell_has_the_colour_of_its_kind(log):
     ds = kinds_map(log=log)
@@ -263,7 +327,10 @@ def test_every_cell_has_the_colour_of_its_kind(log):
     assert np.allclose(cells[0, 0], to_rgb("white"))
     assert ax.get_yscale() == ("log" if log else "linear")
     assert ax.get_title(loc="left") == "x = 0.32 mm, v = 0 m/s"
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency [Hz]", "contact stiffness [N/m]" if log else "contact stiffness [MN/m]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (
+        "frequency [Hz]",
+        "contact stiffness [N/m]" if log else "contact stiffness [MN/m]",
+    )
 
 
 def test_shares_add_up():
@@ -272,10 +339,14 @@ def test_shares_add_up():
     assert "escaped, 0.8 %" in texts(type_map(kinds_map()))
 
 
-# -- what is refused -----------------------------------------------------------------------------------------------------------
+# -- what is refused -------------------------------------------------------------------------------
 @pytest.mark.parametrize("draw", [frequency_response, bifurcation_diagram])
 def test_two_parameters_want_a_choice(draw):
-    with pytest.raises(ParameterError, match=r"frequency and contact_stiffness: choose one value, such as ds.isel\(contact_stiffness=0\)"):
+    with pytest.raises(
+        ParameterError,
+        match=r"frequency and contact_stiffness: choose one value, such as "
+        r"ds.isel\(contact_stiffness=0\)",
+    ):
         draw(kinds_map())
     ax = draw(kinds_map().isel(contact_stiffness=12))
     assert all_points(ax).size == 40
@@ -287,8 +358,14 @@ def test_two_parameters_want_a_choice(draw):
         (lambda: type_map(resonance()), "two parameters, this Dataset has frequency"),
         (lambda: type_map(kinds_map(), start=3), "no start 3"),
         (lambda: frequency_response({}), "nothing to draw"),
-        (lambda: frequency_response({str(i): resonance(5) for i in range(9)}), "8 Datasets apart, not 9"),
-        (lambda: frequency_response({"a": resonance(5), "b": cascade(5, keep=5)}), "over contact_stiffness, frequency"),
+        (
+            lambda: frequency_response({str(i): resonance(5) for i in range(9)}),
+            "8 Datasets apart, not 9",
+        ),
+        (
+            lambda: frequency_response({"a": resonance(5), "b": cascade(5, keep=5)}),
+            "over contact_stiffness, frequency",
+        ),
         (lambda: frequency_response(resonance(5), quantity="size"), "Known: rms, peak"),
         (lambda: frequency_response(resonance(5).drop_vars("response_rms")), "no output 'x'"),
         (lambda: frequency_response(xr.Dataset()), "saltus_result"),

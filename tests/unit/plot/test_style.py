@@ -61,7 +61,10 @@ def test_texts():
 def dataset(names, values):
     n = len(names)
     return xr.Dataset(
-        {"guard_state": ("guard", np.array(["x"] * n, dtype=np.str_)), "guard_boundary": ("guard", np.array(values, dtype=float))},
+        {
+            "guard_state": ("guard", np.array(["x"] * n, dtype=np.str_)),
+            "guard_boundary": ("guard", np.array(values, dtype=float)),
+        },
         {"guard": np.array(names, dtype=np.str_)},
     )
 
@@ -85,7 +88,9 @@ def test_which_region_is_free(names, values, labels):
     found = regions.along(dataset(names, values), "x")
     assert [region.label for region in found.regions] == labels
     assert [region.contact for region in found.regions] == [label != "free" for label in labels]
-    assert [region.color == OKABE_ITO["green"] for region in found.regions] == [label == "free" for label in labels]
+    assert [region.color == OKABE_ITO["green"] for region in found.regions] == [
+        label == "free" for label in labels
+    ]
 
 
 def test_bits_lead_to_regions_in_any_order():
@@ -94,9 +99,13 @@ def test_bits_lead_to_regions_in_any_order():
 
 
 def test_opposite_gaps_keep_free_green():
-    """Between two bodies the gaps of a freeplay may point away from each other: none positive is free."""
+    """Between two bodies the gaps of a freeplay may point away from each other: none positive is
+    free.
+    """
     ds = dataset(["a", "b"], [np.nan, np.nan]).assign(
-        guard_state=("guard", np.array(["", ""])), mode=("time", [0, 1, 0, 2]), contact_mode_after=("contact", [1, 0])
+        guard_state=("guard", np.array(["", ""])),
+        mode=("time", [0, 1, 0, 2]),
+        contact_mode_after=("contact", [1, 0]),
     )
     found = regions.find(ds, ["y"])
     assert [region.label for region in found.regions] == ["free", "beyond a", "beyond b"]
@@ -109,24 +118,31 @@ def test_opposite_gaps_keep_free_green():
         (["rub"], [0, 1], ["below rub", "above rub"]),
         (["x - y = gap"], [0, 1], ["x - y < gap", "x - y > gap"]),
         (["lower", "upper"], [0, 1, 3], ["beyond lower", "free", "beyond upper"]),
-        (["lower", "upper"], [1, 3], ["below upper", "above upper"]),  # which of them is free isn't known
+        # which of them is free isn't known
+        (["lower", "upper"], [1, 3], ["below upper", "above upper"]),
         (["lower", "upper"], [1], [""]),  # nothing is met
     ],
 )
 def test_sides_of_guards_that_bound_no_state_have_names(names, modes, labels):
     ds = dataset(names, [np.nan] * len(names)).assign(
-        guard_state=("guard", np.array([""] * len(names))), mode=("time", modes), contact_mode_after=("contact", modes[:1])
+        guard_state=("guard", np.array([""] * len(names))),
+        mode=("time", modes),
+        contact_mode_after=("contact", modes[:1]),
     )
     assert [region.label for region in regions.find(ds, ["y"]).regions] == labels
 
 
 def test_a_notebook_stays_interactive(tmp_path):
-    """Notebooks' backend switches interaction on when it is loaded, which the first picture does; later pictures need it too."""
+    """Notebooks' backend switches interaction on when it is loaded, which the first picture does;
+    later pictures need it too.
+    """
     (tmp_path / "notebook_backend.py").write_text(
-        "import matplotlib\nfrom matplotlib.backends.backend_agg import FigureCanvas, FigureManager\nmatplotlib.interactive(True)\n"
+        "import matplotlib\nfrom matplotlib.backends.backend_agg import FigureCanvas, "
+        "FigureManager\nmatplotlib.interactive(True)\n"
     )
     program = (
-        "import matplotlib, matplotlib.pyplot as plt, saltus as sl\nwith sl.plot.style(): plt.figure()\nassert matplotlib.is_interactive()"
+        "import matplotlib, matplotlib.pyplot as plt, saltus as sl\nwith sl.plot.style(): "
+        "plt.figure()\nassert matplotlib.is_interactive()"
     )
     paths = os.pathsep.join([str(tmp_path), *sys.path])
     environment = os.environ | {"MPLBACKEND": "module://notebook_backend", "PYTHONPATH": paths}

@@ -60,7 +60,15 @@ def test_another_input_is_another_result(at):
     assert CALLS == [1.0, 1.0]
 
 
-@pytest.mark.parametrize("other", [{"system": saltus.models.delangre("c")}, {"method": ODE45()}, {"compute": compute}, {"compute": beside}])
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"system": saltus.models.delangre("c")},
+        {"method": ODE45()},
+        {"compute": compute},
+        {"compute": beside},
+    ],
+)
 def test_another_system_method_or_analysis_is_another_result(at, other):
     job().result({}, at)
     assert replace(job(), **other).result({}, at)[1]
@@ -96,8 +104,9 @@ def test_the_code_of_saltus_is_no_paper_s_own():
     assert jobs._own_code("saltus.analysis.motion.simulate") == ""
 
 
-# -- what a result depends on ----------------------------------------------------------------------------------------------------
-#: Packages that take no part in numbers: messages, what kinds arguments may be of, the end of work, and pictures of what was computed.
+# -- what a result depends on ----------------------------------------------------------------------
+#: Packages that take no part in numbers: messages, what kinds arguments may be of, the end of work,
+#: and pictures of what was computed.
 NO_NUMBERS = ("errors", "arguments", "interrupt", "plot")
 #: What only says which system, method and arguments: these are in the identity themselves.
 SAYS_WHAT = ("replication.Job", "study.tables", "study.setting")
@@ -110,9 +119,13 @@ def sources(place):
 
 
 def imported(file):
-    """What a module imports of saltus or of its own folder, wherever it does so: ``analysis.lyapunov``, ``units.to_si``."""
+    """What a module imports of saltus or of its own folder, wherever it does so:
+    ``analysis.lyapunov``, ``units.to_si``.
+    """
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and (node.level or (node.module or "").partition(".")[0] == "saltus"):
+        if isinstance(node, ast.ImportFrom) and (
+            node.level or (node.module or "").partition(".")[0] == "saltus"
+        ):
             module = node.module or "" if not node.level else f"saltus.beside.{node.module or ''}"
             yield from (f"{module}.{alias.name}".partition(".")[2] for alias in node.names)
 
@@ -120,7 +133,12 @@ def imported(file):
 def strangers(files, known):
     """Imports from outside of some packages."""
     inside = tuple(f"{place}." for place in known)
-    found = {(file.name, name) for file in files for name in imported(file) if not f"{name}.".startswith(inside)}
+    found = {
+        (file.name, name)
+        for file in files
+        for name in imported(file)
+        if not f"{name}.".startswith(inside)
+    }
     return {one for one in found if one[1] != "__version__"}
 
 
@@ -133,14 +151,21 @@ def test_the_hash_of_a_study_covers_all_that_its_code_calls():
 @pytest.mark.parametrize("paper", papers.names())
 def test_the_identity_of_a_job_covers_all_that_its_code_calls(paper):
     """Its own file counts, so it may call none beside it."""
-    assert strangers([papers.folder_of(paper) / "jobs.py"], (*code.COMPUTING, *NO_NUMBERS, *SAYS_WHAT)) == set()
+    assert (
+        strangers([papers.folder_of(paper) / "jobs.py"], (*code.COMPUTING, *NO_NUMBERS, *SAYS_WHAT))
+        == set()
+    )
 
 
 def test_errors_of_further_methods_are_kept(at):
     """From a diagram of three values: as Fig. 7 asks for them."""
     own = papers.code("saunders2021", "jobs")
-    asked = {"vary": {"contact_stiffness": ("1 kN/m", "1 MN/m", 3, "log")}, "start": {"x": "0.32 mm", "v": "0 m/s"}, "periods": 200,
-             "sample": "stroboscope"}  # fmt: skip
+    asked = {
+        "vary": {"contact_stiffness": ("1 kN/m", "1 MN/m", 3, "log")},
+        "start": {"x": "0.32 mm", "v": "0 m/s"},
+        "periods": 200,
+        "sample": "stroboscope",
+    }
     system = saltus.models.delangre("c").with_values(force="4 N", frequency="5 Hz")
     exact = jobs.Job("exact", own.bifurcation_diagram, system, own.ENDS["exact"], asked)
     tighter = jobs.Job("tighter", own.tighter, system, own.ENDS["exact"], {}, ("exact",))

@@ -1,4 +1,6 @@
-"""The replication of a paper: verdicts follow from checks, every claim says how it is judged, the report needs nothing from outside."""
+"""The replication of a paper: verdicts follow from checks, every claim says how it is judged, the
+report needs nothing from outside.
+"""
 
 import math
 import re
@@ -12,10 +14,20 @@ from saltus.errors import ParameterError
 from saltus.replication import find, papers
 from saltus.replication.claims import Row, filled
 from saltus.replication.run import reproduce
-from saltus.replication.verdict import FAILS, HOLDS, IN_PART, RULES, UNDECIDED, VERDICTS, Check, passed, verdict_of
+from saltus.replication.verdict import (
+    FAILS,
+    HOLDS,
+    IN_PART,
+    RULES,
+    UNDECIDED,
+    VERDICTS,
+    Check,
+    passed,
+    verdict_of,
+)
 
 
-# -- verdicts --------------------------------------------------------------------------------------------------------------------
+# -- verdicts --------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("passed", "verdict"),
     [
@@ -39,13 +51,15 @@ def test_one_more_failure_never_makes_a_verdict_better():
         assert order[verdict_of([*checks, Check("", False)])] >= order[verdict_of(checks)]
 
 
-# -- rules and rows --------------------------------------------------------------------------------------------------------------
+# -- rules and rows --------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("rule", "limit", "so", "not_so"),
     [
-        ("below", 2, 1, 2), ("at_most", 2, 2, 3), ("above", 2, 3, 2), ("at_least", 2, 2, 1), ("equals", 2, 2, 1), ("differs", 2, 1, 2),
+        ("below", 2, 1, 2), ("at_most", 2, 2, 3), ("above", 2, 3, 2), ("at_least", 2, 2, 1),
+        ("equals", 2, 2, 1), ("differs", 2, 1, 2),
         ("between", [1, 2], 2, 3), ("inside", [1, 2], 1.5, 2), ("near", [100, 0.1], 109, 111),
-        ("same_set", ["a", "b", "b"], ["b", "a", "b"], ["a", "b"]), ("contains", ["x"], ["x", "y"], ["y"]), ("is", True, True, False),
+        ("same_set", ["a", "b", "b"], ["b", "a", "b"], ["a", "b"]),
+        ("contains", ["x"], ["x", "y"], ["y"]), ("is", True, True, False),
     ],
 )  # fmt: skip
 def test_each_rule_can_pass_and_fail(rule, limit, so, not_so):
@@ -54,7 +68,9 @@ def test_each_rule_can_pass_and_fail(rule, limit, so, not_so):
     assert passed({"of": "a", rule: "b"}, {"a": so, "b": limit}) is True
 
 
-@pytest.mark.parametrize("row", [{"of": "b"}, {"of": "a", "equals": "b"}, {"of": "a", "given": "b"}])
+@pytest.mark.parametrize(
+    "row", [{"of": "b"}, {"of": "a", "equals": "b"}, {"of": "a", "given": "b"}]
+)
 def test_a_name_that_nothing_has_is_no_verdict(row):
     with pytest.raises(KeyError):
         passed(row, {"a": 1})
@@ -81,25 +97,40 @@ def test_what_is_not_known_is_not_decided(row, quantities):
 
 def test_a_row_makes_checks_and_sentences_from_quantities():
     row = Row(
-        read=lambda data: {"cases": [{"name": "a", "part": 0.5}, {"name": "b", "part": 2e-4}], "most": 0.4, "odd": True},
+        read=lambda data: {"cases": [{"name": "a", "part": 0.5}, {"name": "b", "part": 2e-4}],
+            "most": 0.4, "odd": True},
         checks=({"each": "cases", "text": "{name}: {part:share}", "of": "part", "below": "most"},),
-        lines={"all": {"each": "cases", "text": "{name} {most:.1f}"}}, own="{all}.", exact="{cases[0][name]}", sure="so",
-        why=({"unless": "odd", "text": "first"}, {"when": "odd", "text": "second"}, {"text": "third"}),
+        lines={"all": {"each": "cases", "text": "{name} {most:.1f}"}}, own="{all}.",
+        exact="{cases[0][name]}", sure="so",
+        why=({"unless": "odd", "text": "first"}, {"when": "odd", "text": "second"},
+            {"text": "third"}),
     )  # fmt: skip
     finding = row.judge({})
-    assert [(check.text, check.passed) for check in finding.checks] == [("a: 50.0 %", False), ("b: < 0.1 %", True)]
-    assert (finding.own, finding.exact, finding.why, finding.verdict) == ("a 0.4; b 0.4.", "a", "second", IN_PART)
+    assert [(check.text, check.passed) for check in finding.checks] == [
+        ("a: 50.0 %", False),
+        ("b: < 0.1 %", True),
+    ]
+    assert (finding.own, finding.exact, finding.why, finding.verdict) == (
+        "a 0.4; b 0.4.",
+        "a",
+        "second",
+        IN_PART,
+    )
 
 
 def test_words_for_numbers():
     numbers = {"k": 2.55e4, "nan": math.nan, "n": [1, 3, 0], "d": 1.23e-5, "none": []}
     text = "{k:power} {nan:power} {n:period} {d:um} {d:mm} {nan:alpha} {none:share}"
-    assert filled(text, numbers) == "2.55e4 nowhere T, 3T, not periodic 12.3 µm 0.012 mm not measurable none"
+    assert filled(text, numbers) == (
+        "2.55e4 nowhere T, 3T, not periodic 12.3 µm 0.012 mm not measurable none"
+    )
 
 
 @pytest.mark.parametrize("name", papers.names())
 def test_a_row_of_a_claim_says_what_is_known_and_nothing_else(name):
-    rows = tomllib.loads((papers.folder_of(name) / "claims.toml").read_text(encoding="utf-8"))["claim"]
+    rows = tomllib.loads((papers.folder_of(name) / "claims.toml").read_text(encoding="utf-8"))[
+        "claim"
+    ]
     for check in (check for row in rows for check in row.get("checks", ())):
         assert {"text", "of"} <= set(check)
         assert set(check) - {"text", "of", "each", "given"} <= set(RULES)
@@ -121,14 +152,21 @@ def test_code_is_imported_from_no_folder_but_saltus_s_own(tmp_path, monkeypatch)
         (folder / file).write_text("raise SystemExit('foreign code ran')")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr("sys.modules", {key: one for key, one in __import__("sys").modules.items() if not key.startswith("saltus_")})
+    monkeypatch.setattr(
+        "sys.modules",
+        {
+            key: one
+            for key, one in __import__("sys").modules.items()
+            if not key.startswith("saltus_")
+        },
+    )
     assert papers.find.__wrapped__("saunders2021").claims
     for name in ("../saunders2021", str(folder), "replications.saunders2021"):
         with pytest.raises(ParameterError, match="no paper"):
             papers.code(name, "jobs")
 
 
-# -- the paper -------------------------------------------------------------------------------------------------------------------
+# -- the paper -------------------------------------------------------------------------------------
 PAPER = find("saunders2021")
 
 
@@ -155,7 +193,7 @@ def test_a_wrong_name_is_answered_with_the_nearest():
         reproduce(PAPER, None, ["99"])
 
 
-# -- the report ------------------------------------------------------------------------------------------------------------------
+# -- the report ------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     """Fig. 4, the quickest, end to end."""
@@ -166,9 +204,14 @@ def report(tmp_path_factory):
 def test_the_report_is_one_file_that_loads_nothing(report):
     _, result = report
     page = result.report.read_text(encoding="utf-8")
-    loaded = re.findall(r"(?:src|srcset)\s*=\s*[\"']([^\"']+)|<link[^>]+href\s*=\s*[\"']([^\"']+)|url\(([^)]+)\)|@import\s+(\S+)", page)
+    loaded = re.findall(
+        r"(?:src|srcset)\s*=\s*[\"']([^\"']+)|<link[^>]+href\s*=\s*[\"']([^\"']+)|url\(([^)]+)\)|@import\s+(\S+)",
+        page,
+    )
     assert loaded
-    assert all(place.strip("'\"").startswith("data:") for group in loaded for place in group if place)
+    assert all(
+        place.strip("'\"").startswith("data:") for group in loaded for place in group if place
+    )
     assert "<script" not in page
 
 
@@ -184,7 +227,9 @@ def test_the_report_shows_each_claim_with_its_verdict(report):
 
 def test_the_two_responses_of_fig_4_are_found(report):
     _, result = report
-    assert {claim.id: finding.verdict for claim, finding in result.findings}["fig4-periods"] == HOLDS
+    assert {claim.id: finding.verdict for claim, finding in result.findings}[
+        "fig4-periods"
+    ] == HOLDS
 
 
 @pytest.mark.nightly
@@ -202,7 +247,9 @@ def test_what_is_there_is_not_computed_again(report):
     before = {file: file.stat().st_mtime_ns for file in (out / "data").rglob("*") if file.is_file()}
     reproduce(PAPER, out, ["4"], quick=True)
     assert before
-    assert {file: file.stat().st_mtime_ns for file in (out / "data").rglob("*") if file.is_file()} == before
+    assert {
+        file: file.stat().st_mtime_ns for file in (out / "data").rglob("*") if file.is_file()
+    } == before
 
 
 def test_what_is_damaged_or_missing_is_computed_again(report):

@@ -1,4 +1,6 @@
-"""What a replication does when something fails, is stopped, or meets another: on a paper whose jobs take no time."""
+"""What a replication does when something fails, is stopped, or meets another: on a paper whose jobs
+take no time.
+"""
 
 from __future__ import annotations
 
@@ -39,21 +41,41 @@ def test_without_failures_everything_is_there(tmp_path):
     result = reproduce(small_paper(), tmp_path)
     assert result.failures == {}
     assert verdicts(result) == {"two-is": HOLDS, "ten-is": HOLDS}
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["claims.csv", "data", "locks", "pictures", "report.html"]
-    assert sorted(file.name for file in (tmp_path / "pictures").iterdir()) == ["numbers.csv", "ten.png", "two.png"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == [
+        "claims.csv",
+        "data",
+        "locks",
+        "pictures",
+        "report.html",
+    ]
+    assert sorted(file.name for file in (tmp_path / "pictures").iterdir()) == [
+        "numbers.csv",
+        "ten.png",
+        "two.png",
+    ]
     assert "Missing" not in page(result)
 
 
-# -- something fails -------------------------------------------------------------------------------------------------------------
+# -- something fails -------------------------------------------------------------------------------
 def test_a_job_that_fails_costs_only_what_needs_it(tmp_path):
     said = []
     result = reproduce(small_paper(compute=broken), tmp_path, say=said.append)
     assert verdicts(result) == {"two-is": UNDECIDED, "ten-is": HOLDS}
     assert [picture.name for picture, _ in result.pictures] == ["ten"]
     assert [text.split(":")[0] for text in said] == ["figure 2 not complete", "figure 10 done"]
-    assert set(result.failures) == {"fig2/first", "fig2/second", "picture two", "table numbers", "claim two-is"}
+    assert set(result.failures) == {
+        "fig2/first",
+        "fig2/second",
+        "picture two",
+        "table numbers",
+        "claim two-is",
+    }
     (why,) = set(result.failures.values())
-    assert re.match(r"fig2/first could not be computed: ZeroDivisionError in test_run.py, line \d+: no such luck\. What is computed", why)
+    assert re.match(
+        r"fig2/first could not be computed: ZeroDivisionError in test_run.py, line "
+        r"\d+: no such luck\. What is computed",
+        why,
+    )
     assert str(tmp_path / "data") in why
     assert "run the same command again" in why
     assert page(result).count("no such luck") == 3  # picture, table and claim
@@ -67,7 +89,9 @@ def test_a_job_that_two_figures_need_fails_once(tmp_path):
         raise ZeroDivisionError
 
     paper = small_paper(compute=failing)
-    both = replace(paper, claims=tuple(replace(claim, needs=("fig2/first",)) for claim in paper.claims))
+    both = replace(
+        paper, claims=tuple(replace(claim, needs=("fig2/first",)) for claim in paper.claims)
+    )
     assert set(verdicts(reproduce(both, tmp_path)).values()) == {UNDECIDED}
     assert len(tried) == 1
 
@@ -79,7 +103,10 @@ def test_what_failed_is_tried_again_and_only_that(tmp_path):
     assert verdicts(again) == {"two-is": HOLDS, "ten-is": HOLDS}
 
 
-@pytest.mark.parametrize(("part", "what"), [("draw", "picture two"), ("judge", "claim two-is"), ("table", "table numbers")])
+@pytest.mark.parametrize(
+    ("part", "what"),
+    [("draw", "picture two"), ("judge", "claim two-is"), ("table", "table numbers")],
+)
 def test_a_picture_table_or_judge_that_fails_costs_only_itself(tmp_path, part, what):
     result = reproduce(small_paper(**{part: broken}), tmp_path)
     assert set(result.failures) == {what}
@@ -110,13 +137,15 @@ def test_a_folder_that_can_not_be_written_to_stops_everything(tmp_path, monkeypa
 
 
 def test_claims_that_fail_come_first(tmp_path):
-    paper = small_paper(judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite"))
+    paper = small_paper(
+        judge=lambda data: Finding("one", "two", (Check("so it is not", False),), "quite")
+    )
     failing, holding = paper.claims
     text = page(reproduce(replace(paper, claims=(holding, failing)), tmp_path))
     assert text.index(f'href="#{failing.id}"') < text.index(f'href="#{holding.id}"')
 
 
-# -- it is stopped ---------------------------------------------------------------------------------------------------------------
+# -- it is stopped ---------------------------------------------------------------------------------
 def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(tmp_path):
     def stop(report):
         if report.name == "fig2/second (2 of 2)":
@@ -139,10 +168,17 @@ def test_what_ctrl_c_interrupts_is_computed_again(tmp_path):
     assert len(reproduce(small_paper(), tmp_path).computed) == 3
 
 
-# -- it meets another ------------------------------------------------------------------------------------------------------------
+# -- it meets another ------------------------------------------------------------------------------
 def test_two_runs_at_a_time_in_one_folder_are_kept_apart(tmp_path):
     (tmp_path / "locks").mkdir()
-    with locked(tmp_path / "locks", WHOLE), pytest.raises(StoreError, match=rf"{tmp_path} is being written by process \d+ on"):
+    with (
+        locked(tmp_path / "locks", WHOLE),
+        pytest.raises(
+            StoreError,
+            match=rf"{tmp_path} is being "
+            rf"written by process \d+ on",
+        ),
+    ):
         reproduce(small_paper(), tmp_path)
     assert not list((tmp_path / "data").iterdir())
     assert reproduce(small_paper(), tmp_path).failures == {}
@@ -161,12 +197,15 @@ def test_a_run_holds_the_folder_while_it_computes(tmp_path):
     assert len(refused) == 1
 
 
-# -- some figures ----------------------------------------------------------------------------------------------------------------
+# -- some figures ----------------------------------------------------------------------------------
 @pytest.mark.parametrize("figure", ["10", "fig10", "Fig. 10", "FIG.10", "figure 10"])
 def test_a_figure_has_a_report_of_its_own(tmp_path, figure):
     result = reproduce(small_paper(), tmp_path, [figure])
     assert result.figures == ("10",)
-    assert {file.name for file in tmp_path.iterdir() if file.is_file()} == {"report-fig10.html", "claims-fig10.csv"}
+    assert {file.name for file in tmp_path.iterdir() if file.is_file()} == {
+        "report-fig10.html",
+        "claims-fig10.csv",
+    }
 
 
 def test_the_report_of_a_figure_leaves_that_of_all_alone(tmp_path):
@@ -188,7 +227,7 @@ def test_an_unknown_figure_lists_them_in_their_order_and_leaves_no_folder(tmp_pa
     assert not list(tmp_path.iterdir())
 
 
-# -- what it leaves --------------------------------------------------------------------------------------------------------------
+# -- what it leaves --------------------------------------------------------------------------------
 def test_open_figures_and_the_backend_stay(tmp_path):
     """A notebook's own; those that a picture opened are closed, drawn or not."""
     backend = matplotlib.get_backend()
@@ -232,6 +271,10 @@ def test_the_folder_of_study_files_says_what_each_is():
     """And how all of them are computed at once."""
     folder = Path(__file__).parents[3] / "replications" / "saunders2021"
     told = (folder / "README.md").read_text(encoding="utf-8")
-    assert [file.name for file in sorted(folder.glob("*.*")) if file.name != "README.md" and f"`{file.name}`" not in told] == []
+    assert [
+        file.name
+        for file in sorted(folder.glob("*.*"))
+        if file.name != "README.md" and f"`{file.name}`" not in told
+    ] == []
     assert "saltus reproduce saunders2021" in told
     assert "measured_" in told

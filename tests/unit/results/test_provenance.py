@@ -1,4 +1,6 @@
-"""Provenance: complete, plain, free of clocks; and a hash that sees every bit of the numbers and nothing else."""
+"""Provenance: complete, plain, free of clocks; and a hash that sees every bit of the numbers and
+nothing else.
+"""
 
 import json
 import platform
@@ -16,7 +18,13 @@ def test_attributes_are_plain_and_complete(run):
     assert json.loads(run.attrs["equations"])[0] == "x' = v"
     assert json.loads(run.attrs["method_options"]) == {"tolerance": 1e-16, "order": None}
     assert json.loads(run.attrs["versions"])["python"] == platform.python_version()
-    assert set(json.loads(run.attrs["versions"])) == {"python", "numpy", "llvmlite", "xarray", "saltus"}
+    assert set(json.loads(run.attrs["versions"])) == {
+        "python",
+        "numpy",
+        "llvmlite",
+        "xarray",
+        "saltus",
+    }
 
 
 def test_the_same_run_has_the_same_attributes():
@@ -51,7 +59,14 @@ def test_hash_ignores_attributes_and_widths(run):
 
 def test_describe_says_what_it_is(batch):
     text = describe(batch)
-    for part in ("sine", "gap = 1 mm", "closed form(tolerance=1e-16", "3 trajectories", "3 ok", "12 crossing"):
+    for part in (
+        "sine",
+        "gap = 1 mm",
+        "closed form(tolerance=1e-16",
+        "3 trajectories",
+        "3 ok",
+        "12 crossing",
+    ):
         assert part in text
     assert batch.attrs["result_hash"].startswith(text.split()[-1])
     assert "1 ok, 1 resting" in describe(sine_points())

@@ -34,12 +34,25 @@ periods = 20
 def test_answers_are_those_of_the_command(tmp_path):
     shares = []
     answers = ask(STUDY, threads=1, progress=shares.append)
-    run_study(parse(STUDY), STUDY, tmp_path, None, Resources(threads=1), lambda _: None, lambda _: None, pictures=False)
+    run_study(
+        parse(STUDY),
+        STUDY,
+        tmp_path,
+        None,
+        Resources(threads=1),
+        lambda _: None,
+        lambda _: None,
+        pictures=False,
+    )
     assert [answer.question.stem for answer in answers] == ["run", "impact-statistics"]
     for answer in answers:
-        assert answer.dataset.drop_attrs().identical(load(tmp_path / f"{answer.question.stem}.nc").drop_attrs())
+        assert answer.dataset.drop_attrs().identical(
+            load(tmp_path / f"{answer.question.stem}.nc").drop_attrs()
+        )
         written = (tmp_path / f"{answer.question.stem}.csv").read_text().splitlines()
-        assert len([line for line in written if not line.startswith("#")]) == len(answer.rows[0].data)
+        assert len([line for line in written if not line.startswith("#")]) == len(
+            answer.rows[0].data
+        )
         assert answer.figure.axes
     assert shares == sorted(shares)
     assert 0.5 < shares[-1] <= 1
@@ -64,10 +77,17 @@ def test_a_map_needs_no_store(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("study", "told"),
     [
-        (STUDY.replace("periods = 5", "period = 5"), r"\[simulate\] has no key 'period'\. Did you mean 'periods'\?"),
+        (
+            STUDY.replace("periods = 5", "period = 5"),
+            r"\[simulate\] has no key 'period'\. Did you "
+            r"mean 'periods'\?",
+        ),
         ({"study": {"name": "a"}, "simulat": {}}, "has no table 'simulat'"),
         (STUDY + '[compare]\nprinted = "/etc/passwd"\n', r"\[compare\] is for one start"),
-        (STUDY.replace('["0.2 mm", "1 mm"]', '"1 mm"') + '[compare]\nprinted = "/etc/passwd"\n', "no file may be read here"),
+        (
+            STUDY.replace('["0.2 mm", "1 mm"]', '"1 mm"') + '[compare]\nprinted = "/etc/passwd"\n',
+            "no file may be read here",
+        ),
     ],
 )
 def test_faults_are_told_as_by_the_command(study, told):

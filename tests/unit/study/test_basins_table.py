@@ -1,4 +1,6 @@
-"""The table of a map of basins: what it says of attractors that errors of the method blur, and of starts that they keep from settling."""
+"""The table of a map of basins: what it says of attractors that errors of the method blur, and of
+starts that they keep from settling.
+"""
 
 import dataclasses
 import math
@@ -13,21 +15,33 @@ from saltus.study.answers.basins_rows import attractor_table
 
 SCATTER = 4.3e-6 / 3
 TABLE = AttractorTable(
-    kind=["periodic", "periodic"], period=np.array([3, 24]), contacts=np.array([8.0, 60.0]), itinerary=["", ""],
+    kind=["periodic", "periodic"], period=np.array([3, 24]), contacts=np.array([8.0, 60.0]),
+    itinerary=["", ""],
     peak=np.array([1e-3, 8e-4]), rms=np.array([5e-4, 3e-4]),
-    margin=np.array([1e-4, 5e-6]), multipliers=np.full((2, 2), 0.5 + 0j), exponent=np.array([-0.9, -0.2]),
+    margin=np.array([1e-4, 5e-6]), multipliers=np.full((2, 2), 0.5 + 0j),
+    exponent=np.array([-0.9, -0.2]),
     exponent_error=np.zeros(2), points=[np.zeros((3, 2)), np.zeros((24, 2))],
     fractions=(np.array([0.75, 0.25]), np.array([0.7, 0.2]), np.array([0.8, 0.3])),
 )  # fmt: skip
-NOISY = dataclasses.replace(TABLE, kind=["periodic", "noisy_periodic"], scatter=np.array([math.nan, SCATTER]))
+NOISY = dataclasses.replace(
+    TABLE, kind=["periodic", "noisy_periodic"], scatter=np.array([math.nan, SCATTER])
+)
 
 
 def made(table=TABLE, basin=((0, 0), (0, 1)), **attrs):
     basin = np.array(basin)
-    trust = {"smallest_basin_seen": 0.1, "flip_checked": 0, "uncertainty_exponent": math.nan, "unresolved_cells": 0, "method": "ODE45"}
+    trust = {
+        "smallest_basin_seen": 0.1,
+        "flip_checked": 0,
+        "uncertainty_exponent": math.nan,
+        "unresolved_cells": 0,
+        "method": "ODE45",
+    }
     return attractor_table("made up", made_results.basins(
-        states=("x", "v"), units={"x": "m", "v": "m/s"}, axes={"x": np.array([0.0, 1.0]), "v": np.array([0.0, 1.0])}, basin=basin,
-        periods_to_settle=0 * basin, status=0 * basin + 2, status_meanings={2: "ok"}, grazes_unresolved=0 * basin, attractors=table,
+        states=("x", "v"), units={"x": "m", "v": "m/s"},
+        axes={"x": np.array([0.0, 1.0]), "v": np.array([0.0, 1.0])}, basin=basin,
+        periods_to_settle=0 * basin, status=0 * basin + 2, status_meanings={2: "ok"},
+        grazes_unresolved=0 * basin, attractors=table,
         gap_unit="m", attrs={**trust, "unsettled_cells": int((basin < 0).sum()), **attrs},
     ))  # fmt: skip
 
@@ -51,13 +65,21 @@ def test_without_noise_there_is_no_word_of_it():
 @pytest.mark.parametrize(
     ("attrs", "words"),
     [
-        ({"unconverged_exactly": "24T", "unconverged_stray": 0.314}, "settles to 24T, and ode45 strays from there by up to 31%"),
-        ({"unconverged_exactly": "", "unconverged_stray": math.nan}, "By exact integration from where they stand they settle to no orbit"),
+        ({"unconverged_exactly": "24T", "unconverged_stray": 0.314}, "settles to 24T, and ode45 "
+            "strays from there by up to 31%"),
+        ({"unconverged_exactly": "", "unconverged_stray": math.nan}, "By exact integration from "
+            "where they stand they settle to no orbit"),
         ({}, "Errors of ode45 itself can keep a motion from settling."),
         ({"method": "Taylor"}, "1 starts lead to no known attractor within the periods allowed."),
     ],
 )  # fmt: skip
 def test_starts_that_never_settled_are_told_with_what_errors_have_to_do_with_it(attrs, words):
-    (note,) = [note for note in made(basin=((0, 0), (-2, 1)), **attrs).notes if "no known attractor" in note]
+    (note,) = [
+        note
+        for note in made(basin=((0, 0), (-2, 1)), **attrs).notes
+        if "no known attractor" in note
+    ]
     assert words in note
-    assert ("ode45" in note) == (attrs.get("method") != "Taylor" and attrs.get("unconverged_exactly") != "")
+    assert ("ode45" in note) == (
+        attrs.get("method") != "Taylor" and attrs.get("unconverged_exactly") != ""
+    )

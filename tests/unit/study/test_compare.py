@@ -13,7 +13,9 @@ from saltus.study.answers.compare import contact_table, exact_times, printed_row
 
 
 def made_up_run(method: str, times: list[float]) -> xr.Dataset:
-    """Three contacts with the guards at 0 and 0.4 mm; the second lands 1e-17 m beside its boundary."""
+    """Three contacts with the guards at 0 and 0.4 mm; the second lands 1e-17 m beside
+    its boundary.
+    """
     return xr.Dataset(
         {
             "contact_time": ("contact", times),
@@ -31,7 +33,8 @@ def made_up_run(method: str, times: list[float]) -> xr.Dataset:
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "printed.csv").write_text(
-        "# a comment\nmarker,event_number,time_s,position_minus_boundary_m\nA,2,0.25,-4e-17\nB,3,0.5,1e-16\n"
+        "# a comment\nmarker,event_number,time_s,position_minus_boundary_m\n"
+        "A,2,0.25,-4e-17\nB,3,0.5,1e-16\n"
     )
     (tmp_path / "exact.csv").write_text("event_number,time_s\n1,0.125\n2,0.2500001\n3,0.5\n")
     return tmp_path
@@ -41,13 +44,25 @@ def table(folder, exact="exact.csv", reference="Taylor"):
     printed = printed_rows((folder / "printed.csv").read_bytes(), folder / "printed.csv")
     times = exact_times((folder / exact).read_bytes(), folder / exact) if exact else {}
     second = made_up_run("Taylor", [0.125, 0.2500001, 0.5 + 1e-13]) if reference else None
-    return contact_table("title", made_up_run("ODE45", [0.125, 0.25 + 2**-50, 0.5]), printed, times, second)
+    return contact_table(
+        "title", made_up_run("ODE45", [0.125, 0.25 + 2**-50, 0.5]), printed, times, second
+    )
 
 
 def test_rows(folder):
     rows = table(folder).rows
-    assert rows[0] == ("A", "2", "0.2500000000000009", "0.2500000000000000", "8.88e-16", "1.00e-17", "4.00e-17", "0.2500001000000000",
-                       "0.0e+00", "6 5")  # fmt: skip
+    assert rows[0] == (
+        "A",
+        "2",
+        "0.2500000000000009",
+        "0.2500000000000000",
+        "8.88e-16",
+        "1.00e-17",
+        "4.00e-17",
+        "0.2500001000000000",
+        "0.0e+00",
+        "6 5",
+    )
     assert rows[1][:2] == ("B", "3")
     assert math.isclose(float(rows[1][8]), 1e-13, rel_tol=1e-2)
     assert rows[1][9] == "3", "only the legs since the row before"
@@ -69,7 +84,13 @@ def test_without_exact_times_and_second_method(folder):
 def test_a_residual_off_the_states_is_unknown(folder):
     run = made_up_run("ODE45", [0.125, 0.25, 0.5])
     run["guard_state"] = ("guard", ["", "x"])
-    found = contact_table("title", run, printed_rows((folder / "printed.csv").read_bytes(), folder / "printed.csv"), {}, None)
+    found = contact_table(
+        "title",
+        run,
+        printed_rows((folder / "printed.csv").read_bytes(), folder / "printed.csv"),
+        {},
+        None,
+    )
     assert np.isnan(float(found.rows[0][5]))
 
 
@@ -77,16 +98,32 @@ def test_a_residual_off_the_states_is_unknown(folder):
     ("file", "text", "part"),
     [
         ("printed.csv", "marker,time_s\nA,0.25\n", "lacks the column 'event_number'"),
-        ("printed.csv", "event_number,time_s\n2,hunter2\n", "printed.csv, line 2: what stands in the column 'time_s' is no finite number"),
-        ("printed.csv", "# from a book\nevent_number,time_s\n2,inf\n", "printed.csv, line 3: what stands in the column 'time_s'"),
+        (
+            "printed.csv",
+            "event_number,time_s\n2,hunter2\n",
+            "printed.csv, line 2: what stands in the column 'time_s' is no finite number",
+        ),
+        (
+            "printed.csv",
+            "# from a book\nevent_number,time_s\n2,inf\n",
+            "printed.csv, line 3: what stands in the column 'time_s'",
+        ),
         ("printed.csv", "event_number,time_s\nnan,1\n", "is no finite number"),
         ("printed.csv", "event_number,time_s\n1e400,1\n", "is no finite number"),
         ("printed.csv", "event_number,time_s\n1.7,1\n", "is no whole number from 1 to 2^31"),
         ("printed.csv", "event_number,time_s\n0,1\n", "is no whole number from 1 to 2^31"),
-        ("printed.csv", "event_number,time_s,position_minus_boundary_m\n1,1,x\n", "'position_minus_boundary_m' is no finite number"),
+        (
+            "printed.csv",
+            "event_number,time_s,position_minus_boundary_m\n1,1,x\n",
+            "'position_minus_boundary_m' is no finite number",
+        ),
         ("printed.csv", "", "lacks the column 'event_number'"),
         ("printed.csv", "a\0b", "line 1 holds the control character U+0000"),
-        ("printed.csv", "event_number,time_s\n4,0.7\n", "names contact 4, but ODE45 had 3. Run longer."),
+        (
+            "printed.csv",
+            "event_number,time_s\n4,0.7\n",
+            "names contact 4, but ODE45 had 3. Run longer.",
+        ),
         ("exact.csv", "event_number\n1\n", "lacks the column 'time_s'"),
     ],
 )
@@ -99,7 +136,9 @@ def test_refusals(folder, file, text, part):
 
 
 def test_a_mark_of_windows_before_the_text_is_no_part_of_it(folder):
-    (folder / "printed.csv").write_bytes(b"\xef\xbb\xbf" + (folder / "printed.csv").read_bytes().replace(b"\n", b"\r\n"))
+    (folder / "printed.csv").write_bytes(
+        b"\xef\xbb\xbf" + (folder / "printed.csv").read_bytes().replace(b"\n", b"\r\n")
+    )
     assert [row[1] for row in table(folder).rows] == ["2", "3"]
 
 

@@ -1,4 +1,6 @@
-"""Formulas in studies: outputs, energies, surfaces and forces; systems and curves of one's own, without code."""
+"""Formulas in studies: outputs, energies, surfaces and forces; systems and curves of one's own,
+without code.
+"""
 
 from __future__ import annotations
 
@@ -71,8 +73,22 @@ DRIVE[-1] = DRIVE[0]
 
 
 @sl.system(states="x v", forced_at="frequency", units={"x": "m", "v": "m/s"})
-def rig(t, x, v, *, mass="3 kg", stiffness="2 kN/m", damping="6 N*s/m", gap="0.4 mm", force="4 N", frequency="5 Hz"):
-    contact = sl.piecewise((sl.table(x - gap, [0.0, 5e-4], [0.0, 7.0], outside="extend", name="stop"), x > gap), otherwise=0)
+def rig(
+    t,
+    x,
+    v,
+    *,
+    mass="3 kg",
+    stiffness="2 kN/m",
+    damping="6 N*s/m",
+    gap="0.4 mm",
+    force="4 N",
+    frequency="5 Hz",
+):
+    contact = sl.piecewise(
+        (sl.table(x - gap, [0.0, 5e-4], [0.0, 7.0], outside="extend", name="stop"), x > gap),
+        otherwise=0,
+    )
     pull = force * sl.table(frequency * t, PHASE, DRIVE, "spline", outside="periodic", name="drive")
     return v, (pull - stiffness * x - damping * v - contact) / mass
 
@@ -87,7 +103,17 @@ def files(folder):
 def run(folder, text, inputs=None):
     inputs = inputs or Inputs(files(folder.parent / "study"))
     folder.mkdir(exist_ok=True)
-    return run_study(parse(text), text, folder, None, Resources(threads=1), lambda _: None, [].append, False, inputs=inputs)
+    return run_study(
+        parse(text),
+        text,
+        folder,
+        None,
+        Resources(threads=1),
+        lambda _: None,
+        [].append,
+        False,
+        inputs=inputs,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +128,10 @@ def test_a_system_that_is_written_out_is_that_of_python(whole):
     made = questions_of(parse(RIG + SIMULATE), None, Inputs(whole.parent / "study"))[0].system
     assert made.fingerprint() == rig.fingerprint()
     assert made.description == "A mass with a stop, driven by a record."
-    ours, theirs = load(whole / "run.nc"), sl.simulate(rig, (0, 0), periods=6, samples=16, progress=False)
+    ours, theirs = (
+        load(whole / "run.nc"),
+        sl.simulate(rig, (0, 0), periods=6, samples=16, progress=False),
+    )
     np.testing.assert_array_equal(ours.x, theirs.x)
     assert ours.sizes["contact"] > 0
 
@@ -111,7 +140,9 @@ def test_outputs_are_those_of_python(whole):
     ours = load(whole / "frequency-response.nc")
     outputs = {"stop force": lambda x, gap: sl.piecewise((14e3 * (x - gap), x > gap), otherwise=0),
                "power": (lambda v, damping: damping * v**2, "W")}  # fmt: skip
-    theirs = sl.frequency_response(rig, [4.0, 5.0], start=(1e-3, 0), periods=300, outputs=outputs, progress=False)
+    theirs = sl.frequency_response(
+        rig, [4.0, 5.0], start=(1e-3, 0), periods=300, outputs=outputs, progress=False
+    )
     assert ours.output.values.tolist() == ["x", "v", "stop force", "power"]
     assert ours.output_units.values.tolist() == ["m", "m/s", "", "W"]
     np.testing.assert_allclose(ours.output_maximum, theirs.output_maximum, rtol=1e-9)
@@ -133,12 +164,24 @@ def test_a_surface_and_a_force_are_formulas(whole):
 def test_the_files_of_curves_are_kept_and_changing_one_changes_the_answers(whole, tmp_path):
     text = RIG + SIMULATE
     run(tmp_path / "out", text)
-    assert sorted(file.name for file in (tmp_path / "out" / "inputs").iterdir()) == ["drive.csv", "stop.csv"]
+    assert sorted(file.name for file in (tmp_path / "out" / "inputs").iterdir()) == [
+        "drive.csv",
+        "stop.csv",
+    ]
     assert "stop.csv: SHA-256" in (tmp_path / "out" / "run.csv").read_text()
     first = load(tmp_path / "out" / "run.nc")
     study, text = read(copy_of(tmp_path / "out"))
-    run_study(study, text, tmp_path / "out", None, Resources(threads=1), lambda _: None, [].append, False,
-              inputs=inputs_of(tmp_path / "out", text))  # fmt: skip
+    run_study(
+        study,
+        text,
+        tmp_path / "out",
+        None,
+        Resources(threads=1),
+        lambda _: None,
+        [].append,
+        False,
+        inputs=inputs_of(tmp_path / "out", text),
+    )
     (tmp_path / "study" / "stop.csv").write_text("depth [mm],force [kN]\n0,0\n0.5,0.02\n")
     run(tmp_path / "out", text, Inputs(tmp_path / "study"))
     assert not np.array_equal(first.x, load(tmp_path / "out" / "run.nc").x)
@@ -155,13 +198,19 @@ def test_a_formula_takes_part_in_the_identity(whole):
 
 
 def test_guards_have_the_names_that_the_study_gives_them(tmp_path):
-    text = RIG + '[system.guards]\n"the stop" = "gap < x"\n' + SECTION.replace('{ formula = "v - 0.01" }', '"the stop"')
+    text = (
+        RIG
+        + '[system.guards]\n"the stop" = "gap < x"\n'
+        + SECTION.replace('{ formula = "v - 0.01" }', '"the stop"')
+    )
     (question,) = questions_of(parse(text), None, Inputs(files(tmp_path)))
     assert [guard.name for guard in question.system.guards] == ["the stop"]
 
 
 def test_a_motion_without_a_start_begins_at_rest(tmp_path):
-    (question,) = questions_of(parse(RIG + "[simulate]\nperiods = 6\n"), None, Inputs(files(tmp_path)))
+    (question,) = questions_of(
+        parse(RIG + "[simulate]\nperiods = 6\n"), None, Inputs(files(tmp_path))
+    )
     assert question.arguments["start"] is None, "the analysis begins at rest then"
 
 
@@ -178,42 +227,70 @@ rates = { x = "v", v = "-k*x - c*v/mass" }
 [simulate]
 t_end = "1 s"
 """
-    with pytest.raises(StudyError, match=r"\[system\] forgotten.*\[system\] check_units = false leaves units unchecked"):
+    with pytest.raises(
+        StudyError,
+        match=r"\[system\] forgotten.*\[system\] check_units = false "
+        r"leaves units unchecked",
+    ):
         questions_of(parse(text), None, Inputs(files(tmp_path)))
-    (question,) = questions_of(parse(text.replace("[system]", "[system]\ncheck_units = false")), None, Inputs(tmp_path))
+    (question,) = questions_of(
+        parse(text.replace("[system]", "[system]\ncheck_units = false")), None, Inputs(tmp_path)
+    )
     assert question.system.name == "forgotten"
 
 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (RIG.replace("- damping*v", "- dampin*v") + SIMULATE, "[system] 'damping' stands in no rate. Did you mean 'dampin'?"),
-        (RIG.replace('gap = "0.4 mm"\n', "") + SIMULATE, "'gap' is no state, parameter, term or table"),
-        (RIG.replace('force = "4 N"', "force = 4").replace('v = "m/s"', 'v = "m/s"\nforce = "N"') + SIMULATE, "force = 4 has no unit"),
+        (RIG.replace("- damping*v", "- dampin*v") + SIMULATE, "[system] 'damping' stands in no "
+            "rate. Did you mean 'dampin'?"),
+        (RIG.replace('gap = "0.4 mm"\n', "") + SIMULATE, "'gap' is no state, parameter, term or "
+                                                         "table"),
+        (RIG.replace('force = "4 N"', "force = 4").replace('v = "m/s"',
+            'v = "m/s"\nforce = "N"') + SIMULATE, "force = 4 has no unit"),
         (RIG.replace('x = "v"', 'x = "v^2"') + SIMULATE, "a power is written x**2"),
-        (RIG.replace("drive(frequency*t)", "drive(2.5*frequency*t)") + SIMULATE, "doesn't repeat after the forcing period"),
+        (RIG.replace("drive(frequency*t)", "drive(2.5*frequency*t)") + SIMULATE, "doesn't repeat "
+            "after the forcing period"),
         (RIG.replace('x = "v"', 'x = "mass*v"') + SIMULATE, "[system] written out"),
         (RIG.replace('"stop.csv"', '"../stop.csv"') + SIMULATE, "outside the study's folder"),
-        (RIG.replace('"stop.csv"', '"words.csv"') + SIMULATE, "line 3: what stands in the column '2' is no finite number"),
-        (RIG.replace('"stop.csv"', '"down.csv"') + SIMULATE, "[system.tables.stop] down.csv: points must ascend"),
-        (RIG.replace('"stop.csv"', '"bare.csv"') + SIMULATE, "begins with numbers. Its first line names the columns"),
-        (RIG.replace("[system.tables.stop]", "[system.tables.sin]") + SIMULATE, "'sin' can't be the name of a term or a table"),
-        (RIG + '[system.guards]\nstop = "x > 2*gap"\n' + SIMULATE, "[system] written out: the guard 'stop' means no boundary"),
-        (RIG + '[system.guards]\nstop = "x - gap"\n' + SIMULATE, "the guard 'stop' must be one comparison, such as x > gap"),
-        ('[study]\nname="b"\n[system]\nmodel="delangre"\nguards.a="x > 0"\n' + SIMULATE, "guards: this is for equations of your own"),
-        (RIG.replace("[system]", '[system]\nmodel = "chain"') + SIMULATE, "[system] a model and rates: these are several systems"),
+        (RIG.replace('"stop.csv"', '"words.csv"') + SIMULATE, "line 3: what stands in the column "
+            "'2' is no finite number"),
+        (RIG.replace('"stop.csv"', '"down.csv"') + SIMULATE, "[system.tables.stop] down.csv: "
+            "points must ascend"),
+        (RIG.replace('"stop.csv"', '"bare.csv"') + SIMULATE, "begins with numbers. Its first line "
+            "names the columns"),
+        (RIG.replace("[system.tables.stop]", "[system.tables.sin]") + SIMULATE, "'sin' can't be "
+            "the name of a term or a table"),
+        (RIG + '[system.guards]\nstop = "x > 2*gap"\n' + SIMULATE, "[system] written out: the "
+            "guard 'stop' means no boundary"),
+        (RIG + '[system.guards]\nstop = "x - gap"\n' + SIMULATE, "the guard 'stop' must be one "
+            "comparison, such as x > gap"),
+        ('[study]\nname="b"\n[system]\nmodel="delangre"\nguards.a="x '
+         '> 0"\n' + SIMULATE, "guards: this "
+            "is for equations of your own"),
+        (RIG.replace("[system]", '[system]\nmodel = "chain"') + SIMULATE, "[system] a model and "
+            "rates: these are several systems"),
         (RIG + SIMULATE.replace("[simulate]", "[simulate]\nperiod = 3"), "has no key 'period'"),
-        (RIG + RESPONSE.replace('"contact"', '"contact + q"'), "[frequency_response.outputs] the output 'stop force' of written out"),
-        (RIG + RESPONSE.replace('unit = "W"', 'unit = "N"'), "[frequency_response.outputs] the output 'power' is said to be in N"),
-        (RIG + RESPONSE.replace('"contact"', "3"), '[frequency_response.outputs.stop force] must be a formula, such as "k*x"'),
-        (RIG + RESPONSE.replace("formula = ", "formla = "), "no key 'formla'. Did you mean 'formula'?"),
+        (RIG + RESPONSE.replace('"contact"', '"contact + q"'), "[frequency_response.outputs] the "
+            "output 'stop force' of written out"),
+        (RIG + RESPONSE.replace('unit = "W"', 'unit = "N"'), "[frequency_response.outputs] the "
+            "output 'power' is said to be in N"),
+        (RIG + RESPONSE.replace('"contact"', "3"), '[frequency_response.outputs.stop force] must '
+                                                   'be a formula, such as "k*x"'),
+        (RIG + RESPONSE.replace("formula = ", "formla = "), "no key 'formla'. Did you mean "
+            "'formula'?"),
         (RIG.replace('x = "v"', 'x = ""') + SIMULATE, "a formula is text of 1 to 1000 characters"),
-        (RIG + ENERGY.replace('supplied = "pull*v"\n', ""), '[energy] lacks supplied. Write supplied = "..."'),
+        (RIG + ENERGY.replace('supplied = "pull*v"\n', ""), '[energy] lacks supplied. Write '
+            'supplied = "..."'),
         (RIG + ENERGY.replace("pull*v", "pull*"), "[energy] the formula 'pull*' can't be read"),
         (RIG + ENERGY.replace("pull*v", "pull*w"), "asks for 'w'"),
-        (RIG + IMPACTS.replace("gap =", "gab ="), "[impacts.force] 'gab' is no guard of written out. Did you mean 'gap'?"),
-        (RIG + SECTION.replace("v - 0.01", "__import__('os').system('ls')"), "has no meaning in a formula"),
-        (RIG.replace("contact = ", 'long = "' + "1+" * 600 + '1"\ncontact = ') + SIMULATE, "a text of 1201 characters"),
+        (RIG + IMPACTS.replace("gap =", "gab ="), "[impacts.force] 'gab' is no guard of written "
+                                                  "out. Did you mean 'gap'?"),
+        (RIG + SECTION.replace("v - 0.01", "__import__('os').system('ls')"), "has no meaning in a "
+            "formula"),
+        (RIG.replace("contact = ", 'long = "' + "1+" * 600 + '1"\ncontact = ') + SIMULATE,
+            "a text of "
+            "1201 characters"),
     ],
 )  # fmt: skip
 def test_faults_are_told_before_anything_is_computed(text, told, tmp_path):
@@ -228,7 +305,9 @@ def test_faults_are_told_before_anything_is_computed(text, told, tmp_path):
 
 
 def test_the_schema_takes_outputs_as_text_and_as_tables():
-    outputs = Study.model_json_schema()["$defs"]["FrequencyResponse"]["properties"]["outputs"]["additionalProperties"]
+    outputs = Study.model_json_schema()["$defs"]["FrequencyResponse"]["properties"]["outputs"][
+        "additionalProperties"
+    ]
     assert outputs == {"anyOf": [{"type": "string"}, {"$ref": "#/$defs/Output"}]}
 
 
@@ -251,4 +330,8 @@ outputs = { "measured force" = "stop(depth)" }
     question = questions_of(parse(text), None, Inputs(files(tmp_path)))[0]
     assert list(question.arguments["outputs"]) == ["measured force"]
     with pytest.raises(StudyError, match="this is for equations of your own"):
-        questions_of(parse(text.replace("terms =", 'forced_at = "frequency"\nterms =')), None, Inputs(tmp_path))
+        questions_of(
+            parse(text.replace("terms =", 'forced_at = "frequency"\nterms =')),
+            None,
+            Inputs(tmp_path),
+        )

@@ -1,4 +1,6 @@
-"""Studies of basins as they run: one outcome, whoever computes it; what is there is kept; what is damaged is found."""
+"""Studies of basins as they run: one outcome, whoever computes it; what is there is kept; what is
+damaged is found.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ from small_study import maps_of, small_study
 STUDY = small_study(24)
 #: 64 starts in two chunks, twice.
 PAIR = STUDY.replace("count = 24", "count = 8") + (
-    '[[basins.map]]\nname = "16 Hz"\n[[basins.map]]\nname = "7 Hz"\nvalues = { frequency = "7 Hz" }\ncompare = "16 Hz"\n'
+    '[[basins.map]]\nname = "16 Hz"\n[[basins.map]]\nname = "7 Hz"\nvalues = { frequency = "7 Hz" '
+    '}\ncompare = "16 Hz"\n'
 )
 
 
@@ -42,7 +45,14 @@ class Run:
         folder.mkdir(exist_ok=True)
         self.folder, self.reports, self.said = folder, [], []
         self.outcome = run_study(
-            parse(text), text, folder, None, Resources(**({"threads": 1} | resources)), self.reports.append, self.said.append, pictures
+            parse(text),
+            text,
+            folder,
+            None,
+            Resources(**({"threads": 1} | resources)),
+            self.reports.append,
+            self.said.append,
+            pictures,
         )
 
     @property
@@ -52,7 +62,11 @@ class Run:
 
 def contents(folder):
     """Every file of its stores but the locks."""
-    files = {str(file.relative_to(folder)): file.read_bytes() for file in (folder / "stores").rglob("*") if file.is_file()}
+    files = {
+        str(file.relative_to(folder)): file.read_bytes()
+        for file in (folder / "stores").rglob("*")
+        if file.is_file()
+    }
     return {name: data for name, data in files.items() if "/locks/" not in name}
 
 
@@ -75,9 +89,11 @@ def copied(whole, folder):
     return folder
 
 
-# -- one outcome -----------------------------------------------------------------------------------------------------------------
+# -- one outcome -----------------------------------------------------------------------------------
 def test_the_study_is_one_that_can_tell(whole):
-    """Twelve chunks, four attractors, several of them in most chunks: a chunk in the wrong place would be seen."""
+    """Twelve chunks, four attractors, several of them in most chunks: a chunk in the wrong place
+    would be seen.
+    """
     ds = load(whole.folder / "basins.nc")
     assert ds.sizes["attractor"] == 4
     parts = ds.basin.values.reshape(12, 48)
@@ -89,12 +105,18 @@ def test_the_study_is_one_that_can_tell(whole):
 def test_two_threads(whole, tmp_path):
     two = Run(tmp_path / "two", threads=2)
     assert contents(two.folder) == contents(whole.folder)
-    assert load(two.folder / "basins.nc").drop_attrs().identical(load(whole.folder / "basins.nc").drop_attrs())
+    assert (
+        load(two.folder / "basins.nc")
+        .drop_attrs()
+        .identical(load(whole.folder / "basins.nc").drop_attrs())
+    )
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_shards(whole, tmp_path, order):
-    """Two jobs that share the folder and nothing else, in either order; the first can't finish the map, the second does."""
+    """Two jobs that share the folder and nothing else, in either order; the first can't finish the
+    map, the second does.
+    """
     first = Run(tmp_path / "run", shard=(order[0], 2))
     assert first.outcome.waiting == ["small"]
     assert first.outcome.files == []
@@ -103,7 +125,11 @@ def test_shards(whole, tmp_path, order):
     second = Run(tmp_path / "run", shard=(order[1], 2))
     assert second.outcome.waiting == []
     assert contents(second.folder) == contents(whole.folder)
-    assert load(second.folder / "basins.nc").drop_attrs().identical(load(whole.folder / "basins.nc").drop_attrs())
+    assert (
+        load(second.folder / "basins.nc")
+        .drop_attrs()
+        .identical(load(whole.folder / "basins.nc").drop_attrs())
+    )
 
 
 def test_more_shards_than_chunks(tmp_path):
@@ -116,7 +142,9 @@ def test_more_shards_than_chunks(tmp_path):
 def test_a_study_is_what_basins_returns(whole):
     """The store, its types and its files change nothing: labels, periods, table of attractors."""
     rig = sl.models.delangre("b", force="4 N", frequency="16 Hz")
-    ds = sl.basins(rig, x=("-5 mm", "5 mm", 24), v=("-1 m/s", "1 m/s", 24), threads=1, progress=False)
+    ds = sl.basins(
+        rig, x=("-5 mm", "5 mm", 24), v=("-1 m/s", "1 m/s", 24), threads=1, progress=False
+    )
     kept = load(whole.folder / "basins.nc")
     for name in ds.data_vars:
         np.testing.assert_array_equal(kept[name].values, ds[name].values, err_msg=name)
@@ -124,7 +152,7 @@ def test_a_study_is_what_basins_returns(whole):
     assert kept.attrs["study"] == STUDY
 
 
-# -- going on --------------------------------------------------------------------------------------------------------------------
+# -- going on --------------------------------------------------------------------------------------
 def test_only_what_is_missing_is_computed(whole, tmp_path):
     folder = copied(whole, tmp_path / "run")
     forget(folder, (0, 5, 11))
@@ -132,18 +160,28 @@ def test_only_what_is_missing_is_computed(whole, tmp_path):
     assert (status.done, status.total, status.damaged) == (9, 12, 0)
     again = Run(folder)
     assert again.computed == 3
-    assert [report.done for report in again.reports] == sorted(report.done for report in again.reports)
+    assert [report.done for report in again.reports] == sorted(
+        report.done for report in again.reports
+    )
     assert again.reports[-1].done == again.reports[-1].total == 12
     assert contents(folder) == contents(whole.folder)
 
 
 def test_a_finished_study_computes_nothing(whole, tmp_path, monkeypatch):
     folder = copied(whole, tmp_path / "run")
-    monkeypatch.setattr(pipeline.BasinPlan, "chunk", lambda *_: pytest.fail("a chunk is computed again"))
-    monkeypatch.setattr(pipeline.BasinPlan, "scout", lambda *_: pytest.fail("attractors are looked for again"))
+    monkeypatch.setattr(
+        pipeline.BasinPlan, "chunk", lambda *_: pytest.fail("a chunk is computed again")
+    )
+    monkeypatch.setattr(
+        pipeline.BasinPlan, "scout", lambda *_: pytest.fail("attractors are looked for again")
+    )
     again = Run(folder)
     assert again.outcome.waiting == []
-    assert load(folder / "basins.nc").drop_attrs().identical(load(whole.folder / "basins.nc").drop_attrs())
+    assert (
+        load(folder / "basins.nc")
+        .drop_attrs()
+        .identical(load(whole.folder / "basins.nc").drop_attrs())
+    )
 
 
 @pytest.mark.parametrize("damage", ["cut", "bit", "place"])
@@ -171,14 +209,18 @@ def test_damaged_attractors_are_found_again(whole, tmp_path):
     assert contents(folder) == contents(whole.folder)
 
 
-# -- another study ---------------------------------------------------------------------------------------------------------------
+# -- another study ---------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
         ('"4 N"', '"4.1 N"', "values was .*4.0.*is .*4.1"),
         ("count = 24 }\naxes.v", "count = 23 }\naxes.v", "axes was .*in 24.*is .*in 23"),
         ('"-1 m/s"', '"-1.1 m/s"', r"axes was .*-1\.0.*is .*-1\.1"),
-        ("[basins]", '[method]\nname = "Taylor"\norder = 22\n[basins]', "method options was .*20.*is .*22"),
+        (
+            "[basins]",
+            '[method]\nname = "Taylor"\norder = 22\n[basins]',
+            "method options was .*20.*is .*22",
+        ),
         ("[basins]", '[method]\nname = "ODE45"\n[basins]', "method was 'Taylor', is 'ODE45'"),
         ("[basins]", "[basins]\nperiods = 100", "periods was '2000', is '100'"),
     ],
@@ -214,12 +256,13 @@ def test_another_title_is_the_same_map(whole, tmp_path):
     assert again.outcome.tables[0].title == "by another name"
 
 
-# -- what comes out --------------------------------------------------------------------------------------------------------------
+# -- what comes out --------------------------------------------------------------------------------
 def test_two_maps_and_their_agreement(tmp_path):
     run = Run(tmp_path / "run", PAIR, pictures=True)
     names = {file.name for file in run.outcome.files}
     assert names == {
-        "16-hz.nc", "16-hz.csv", "16-hz.png", "16-hz-attractors.png", "7-hz.nc", "7-hz.csv", "7-hz.png", "7-hz-attractors.png",
+        "16-hz.nc", "16-hz.csv", "16-hz.png", "16-hz-attractors.png", "7-hz.nc", "7-hz.csv",
+        "7-hz.png", "7-hz-attractors.png",
         "7-hz-agreement.nc", "7-hz-agreement.csv", "7-hz-agreement.png",
     }  # fmt: skip
     assert all(file.stat().st_size > 0 for file in run.outcome.files)
@@ -231,20 +274,31 @@ def test_two_maps_and_their_agreement(tmp_path):
     assert found["peak |x| [m]"].tolist() == ds["attractor_peak"].values.tolist()
     assert found["share of starts"].tolist() == ds["attractor_fraction"].values.tolist()
     agreement = pd.read_csv(run.folder / "7-hz-agreement.csv", comment="#")
-    assert agreement["share in b"].dropna().tolist() == both["match_fraction_b"].values[both["match_b"].values >= 0].tolist()
+    assert (
+        agreement["share in b"].dropna().tolist()
+        == both["match_fraction_b"].values[both["match_b"].values >= 0].tolist()
+    )
     assert [one.note["name"] for one in stores(run.folder)] == ["16 Hz", "7 Hz"]
     assert Run(run.folder, PAIR).computed == 0
 
 
 def test_a_map_compared_with_a_later_one(tmp_path):
-    text = PAIR.replace('name = "16 Hz"', 'name = "16 Hz"\ncompare = "7 Hz"').replace('compare = "16 Hz"\n', "")
+    text = PAIR.replace('name = "16 Hz"', 'name = "16 Hz"\ncompare = "7 Hz"').replace(
+        'compare = "16 Hz"\n', ""
+    )
     names = [file.name for file in Run(tmp_path / "run", text).outcome.files]
     assert "16-hz-agreement.nc" in names
 
 
 def test_a_map_on_which_nothing_settles(tmp_path):
-    """Starts beyond the range of numbers: every cell escapes, no attractor; the table is empty, the picture is drawn."""
-    text = STUDY.replace("count = 24", "count = 8").replace("-5 mm", "1e200 mm").replace("5 mm", "2e200 mm")
+    """Starts beyond the range of numbers: every cell escapes, no attractor; the table is empty, the
+    picture is drawn.
+    """
+    text = (
+        STUDY.replace("count = 24", "count = 8")
+        .replace("-5 mm", "1e200 mm")
+        .replace("5 mm", "2e200 mm")
+    )
     run = Run(tmp_path / "run", text, pictures=True)
     ds = load(run.folder / "basins.nc")
     assert ds.sizes["attractor"] == 0
@@ -267,7 +321,7 @@ def test_a_large_map_is_estimated_first(tmp_path, monkeypatch):
     assert said[0].startswith("small: 64 cells: about ")
 
 
-# -- status ----------------------------------------------------------------------------------------------------------------------
+# -- status ----------------------------------------------------------------------------------------
 def test_status_of_a_folder_and_of_a_store(whole):
     (one,), (other,) = stores(whole.folder), stores(whole.folder / "stores" / "basins")
     assert one == other
@@ -285,7 +339,9 @@ def test_status_of_a_store_at_work(whole, tmp_path):
 
 
 def test_a_damaged_store_is_a_row_of_the_status_and_is_mended(whole, tmp_path):
-    """Its head can't be read: the others are told all the same, and going on writes it again and computes nothing."""
+    """Its head can't be read: the others are told all the same, and going on writes it again and
+    computes nothing.
+    """
     folder = copied(whole, tmp_path / "run")
     copied(whole, tmp_path / "second")
     (tmp_path / "second" / "stores" / "basins").rename(folder / "stores" / "second")

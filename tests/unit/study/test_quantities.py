@@ -1,4 +1,6 @@
-"""Units in studies: what has a dimension shows its unit, and one frequency is never taken for another."""
+"""Units in studies: what has a dimension shows its unit, and one frequency is never taken for
+another.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ def simulate_table(text: str):
 
 
 def test_text_becomes_si():
-    assert quantities.parameters(RIG, {"upper_gap": "0.4 mm", "damping_ratio": 0.03, "frequency": "900 rpm"}) == {
+    assert quantities.parameters(
+        RIG, {"upper_gap": "0.4 mm", "damping_ratio": 0.03, "frequency": "900 rpm"}
+    ) == {
         "upper_gap": 0.4e-3,
         "damping_ratio": 0.03,
         "frequency": 15.0,
@@ -32,7 +36,11 @@ def test_angular_frequency_is_converted():
 
 
 def test_bare_number_for_a_dimension_is_refused():
-    with pytest.raises(StudyError, match=r'\[system\] force = 4 has no unit\. Write it with one, for example force = "4 N"\.'):
+    with pytest.raises(
+        StudyError,
+        match=r"\[system\] force = 4 has no unit\. Write it with one, "
+        r'for example force = "4 N"\.',
+    ):
         quantities.parameters(RIG, {"force": 4.0})
 
 
@@ -42,7 +50,11 @@ def test_wrong_unit_is_refused():
 
 
 def test_unknown_parameter_gets_the_nearest():
-    with pytest.raises(StudyError, match=r"\[system\] 'forze' is unknown to delangre\. Did you mean 'force'\?"):
+    with pytest.raises(
+        StudyError,
+        match=r"\[system\] 'forze' is unknown to delangre\. Did you "
+        r"mean 'force'\?",
+    ):
         quantities.parameters(RIG, {"forze": "4 N"})
 
 
@@ -85,6 +97,8 @@ def test_lists_of_different_lengths(text):
 
 
 def test_varied_values():
-    assert quantities.varied(RIG, {"frequency": ["14 Hz", "900 rpm"]}) == {"frequency": [14.0, 15.0]}
+    assert quantities.varied(RIG, {"frequency": ["14 Hz", "900 rpm"]}) == {
+        "frequency": [14.0, 15.0]
+    }
     with pytest.raises(StudyError, match=r"\[simulate\.values\] 'frequenzy' is unknown"):
         quantities.varied(RIG, {"frequenzy": ["14 Hz"]})

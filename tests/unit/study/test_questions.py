@@ -1,4 +1,6 @@
-"""Several questions in one study: planned and checked together, kept one by one, computed again only when something changed."""
+"""Several questions in one study: planned and checked together, kept one by one, computed again
+only when something changed.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +60,14 @@ class Run:
         self.folder, self.reports, self.said = folder, [], []
         resources = Resources(threads=1, shard=options.pop("shard", None))
         self.outcome = run_study(
-            parse(text), text, folder, None, resources, self.reports.append, self.said.append, **({"pictures": False} | options)
+            parse(text),
+            text,
+            folder,
+            None,
+            resources,
+            self.reports.append,
+            self.said.append,
+            **({"pictures": False} | options),
         )
 
     @property
@@ -84,17 +93,23 @@ def times(folder):
     return {file.name: file.stat().st_mtime_ns for file in folder.glob("*.nc")}
 
 
-# -- what comes out --------------------------------------------------------------------------------------------------------------
+# -- what comes out --------------------------------------------------------------------------------
 def test_every_question_is_answered(whole):
     assert whole.names == [
         "run.nc", "run.csv", "run.png",
-        "frequency-response.nc", "frequency-response.csv", "frequency-response-responses.csv", "frequency-response.png",
+        "frequency-response.nc", "frequency-response.csv", "frequency-response-responses.csv",
+        "frequency-response.png",
         "soft.nc", "soft.csv", "soft-responses.csv", "soft.png",
         "a-map.nc", "a-map.csv", "a-map-responses.csv", "a-map.png",
     ]  # fmt: skip
     assert all(file.stat().st_size > 50 for file in whole.outcome.files)
     titles = [table.title for table in whole.outcome.tables]
-    assert [title for title in titles if "on the way" not in title] == ["one of each", "Frequency response", "soft", "A map"]
+    assert [title for title in titles if "on the way" not in title] == [
+        "one of each",
+        "Frequency response",
+        "soft",
+        "A map",
+    ]
     assert (whole.folder / "study.toml").read_text() == STUDY
 
 
@@ -102,8 +117,12 @@ def test_an_answer_is_what_the_analysis_returns(whole):
     import saltus as sl
 
     rig = sl.models.delangre("b", force="4 N")
-    expected = sl.frequency_response(rig, ("14 Hz", "16 Hz", 3), {"x": [0.0, 1e-3], "v": 0.0}, threads=1, progress=False)
-    assert load(whole.folder / "frequency-response.nc").drop_attrs().identical(expected.drop_attrs())
+    expected = sl.frequency_response(
+        rig, ("14 Hz", "16 Hz", 3), {"x": [0.0, 1e-3], "v": 0.0}, threads=1, progress=False
+    )
+    assert (
+        load(whole.folder / "frequency-response.nc").drop_attrs().identical(expected.drop_attrs())
+    )
 
 
 def test_values_and_methods_of_one_question(whole):
@@ -125,21 +144,31 @@ def test_tables_tell_branches_and_kinds(whole):
     ds = load(whole.folder / "frequency-response.nc")
     assert sum(int(row[2]) for row in branches.rows) == ds.sizes["response"]
     assert tables["A map"].columns == ("type", "share", "contact stiffness", "frequency")
-    assert sum(float(row[1].rstrip(" %")) for row in tables["A map"].rows) == pytest.approx(100, abs=0.1)
+    assert sum(float(row[1].rstrip(" %")) for row in tables["A map"].rows) == pytest.approx(
+        100, abs=0.1
+    )
 
 
 def test_csv_of_every_question_is_plain_numbers_in_si(whole):
-    """What pandas reads are the numbers of the Dataset, to the last digit, with the unit in the heading."""
-    read = {name: pd.read_csv(whole.folder / f"{name}.csv", comment="#") for name in ("run", "frequency-response", "soft", "a-map")}
+    """What pandas reads are the numbers of the Dataset, to the last digit, with the unit in the
+    heading.
+    """
+    read = {
+        name: pd.read_csv(whole.folder / f"{name}.csv", comment="#")
+        for name in ("run", "frequency-response", "soft", "a-map")
+    }
     run = load(whole.folder / "run.nc")
     assert read["run"]["x at the end [m]"].tolist() == [float(run["end_x"])]
     assert read["run"]["trajectory"].tolist() == [0]
     ds, table = load(whole.folder / "frequency-response.nc"), read["frequency-response"]
     first = ds.isel(response=ds["response_branch"].values == 0)
     for name, value in (
-        ("frequency from [Hz]", first["response_frequency"].min()), ("frequency to [Hz]", first["response_frequency"].max()),
-        ("largest rms of x [m]", first["response_rms"].max()), ("peak |x| [m]", first["response_peak"].max()),
-        ("contacts in T from", first["response_contacts"].min()), ("to a graze [m]", first["response_margin"].min()),
+        ("frequency from [Hz]", first["response_frequency"].min()),
+        ("frequency to [Hz]", first["response_frequency"].max()),
+        ("largest rms of x [m]", first["response_rms"].max()),
+        ("peak |x| [m]", first["response_peak"].max()),
+        ("contacts in T from", first["response_contacts"].min()),
+        ("to a graze [m]", first["response_margin"].min()),
         ("largest exponent [1/s]", first["response_exponent"].max()),
     ):  # fmt: skip
         assert table[name][0] == float(value), name
@@ -154,14 +183,19 @@ def test_csv_of_every_question_is_plain_numbers_in_si(whole):
 def test_progress_is_told_for_each(whole):
     last = {report.name: report for report in whole.reports}
     assert list(last) == ["one of each", "Frequency response", "soft", "A map"]
-    assert all((report.done, report.total, report.what, report.last) == (100, 100, "%", True) for report in last.values())
+    assert all(
+        (report.done, report.total, report.what, report.last) == (100, 100, "%", True)
+        for report in last.values()
+    )
 
 
-# -- going on --------------------------------------------------------------------------------------------------------------------
+# -- going on --------------------------------------------------------------------------------------
 @pytest.fixture
 def no_computing(monkeypatch):
     for name in ("simulate", "frequency_response", "bifurcation_diagram"):
-        monkeypatch.setattr(f"{sl._HOMES[name]}.{name}", lambda *_, **__: pytest.fail("something is computed again"))
+        monkeypatch.setattr(
+            f"{sl._HOMES[name]}.{name}", lambda *_, **__: pytest.fail("something is computed again")
+        )
 
 
 def test_what_is_there_is_not_computed_again(whole, copied, no_computing):
@@ -175,7 +209,11 @@ def test_what_is_there_is_not_computed_again(whole, copied, no_computing):
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("count = 3 }\nstart", "count = 2 }\nstart", "the frequency changed since frequency-response.nc was written"),
+        (
+            "count = 3 }\nstart",
+            "count = 2 }\nstart",
+            "the frequency changed since frequency-response.nc was written",
+        ),
         ('"0 mm", "1 mm"', '"0 mm", "2 mm"', "the start changed"),
         ('force = "4 N"', 'force = "4.1 N"', "the values changed"),
     ],
@@ -197,11 +235,18 @@ def test_a_damaged_answer_is_computed_again(whole, copied):
     data[len(data) // 2] ^= 255
     (copied / "soft.nc").write_bytes(bytes(data))
     states = [(row[0], row[2]) for row in status_tables(copied)[0].rows]
-    assert states == [("one of each", "done"), ("Frequency response", "done"), ("soft", "damaged"), ("A map", "done")]
+    assert states == [
+        ("one of each", "done"),
+        ("Frequency response", "done"),
+        ("soft", "damaged"),
+        ("A map", "done"),
+    ]
     again = Run(copied)
     assert len(again.said) == 1
     assert "soft: computed again" in again.said[0]
-    assert load(copied / "soft.nc").drop_attrs().identical(load(whole.folder / "soft.nc").drop_attrs())
+    assert (
+        load(copied / "soft.nc").drop_attrs().identical(load(whole.folder / "soft.nc").drop_attrs())
+    )
 
 
 def test_a_stop_keeps_what_is_computed(whole, copied, monkeypatch):
@@ -217,22 +262,34 @@ def test_a_stop_keeps_what_is_computed(whole, copied, monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             Run(copied)
     assert (copied / "soft-partial.nc").exists()
-    assert sorted(row[2] for row in status_tables(copied)[0].rows) == ["done", "done", "not yet", "stopped on the way"]
+    assert sorted(row[2] for row in status_tables(copied)[0].rows) == [
+        "done",
+        "done",
+        "not yet",
+        "stopped on the way",
+    ]
     again = Run(copied)
     assert not (copied / "soft-partial.nc").exists()
-    assert load(copied / "soft.nc").drop_attrs().identical(load(whole.folder / "soft.nc").drop_attrs())
+    assert (
+        load(copied / "soft.nc").drop_attrs().identical(load(whole.folder / "soft.nc").drop_attrs())
+    )
     assert again.outcome.tables == whole.outcome.tables
 
 
 def test_only_one_question(tmp_path, no_computing, monkeypatch):
     calls = []
     monkeypatch.setattr(
-        "saltus.analysis.responses.bifurcation_diagram.bifurcation_diagram", lambda *_, **call: calls.append(call) or pytest.skip("reached")
+        "saltus.analysis.responses.bifurcation_diagram.bifurcation_diagram",
+        lambda *_, **call: calls.append(call) or pytest.skip("reached"),
     )
     for name in ("soft", "A map", "a-map"):
         assert len(questions_of(parse(STUDY), None, Inputs(tmp_path), [name])) == 1
     assert len(questions_of(parse(STUDY), None, Inputs(tmp_path), ["bifurcation_diagram"])) == 2
-    with pytest.raises(StudyError, match=r"--only sofd: this study has no such question\. Did you mean 'soft'\?"):
+    with pytest.raises(
+        StudyError,
+        match=r"--only sofd: this study has no such question\. Did you "
+        r"mean 'soft'\?",
+    ):
         questions_of(parse(STUDY), None, Inputs(tmp_path), ["sofd"])
 
 
@@ -241,30 +298,84 @@ def test_other_shards_leave_small_questions_to_the_first(tmp_path):
     assert Run(tmp_path / "first", HEAD + SIMULATE, shard=(0, 2)).names == ["run.nc", "run.csv"]
 
 
-# -- what is refused before anything is computed ---------------------------------------------------------------------------------
+# -- what is refused before anything is computed ---------------------------------------------------
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (RESPONSE.replace('"14 Hz"', '"14 N"'), r"\[frequency_response\.frequency\] frequency\.first"),
-        (RESPONSE.replace('"14 Hz"', "14"), r'frequency\.first = 14 has no unit.*frequency\.first = "14 Hz"'),
-        (RESPONSE.replace('"14 Hz"', '"17 Hz"'), r"\[frequency_response\] the values of frequency must ascend"),
+        (
+            RESPONSE.replace('"14 Hz"', '"14 N"'),
+            r"\[frequency_response\.frequency\] "
+            r"frequency\.first",
+        ),
+        (
+            RESPONSE.replace('"14 Hz"', "14"),
+            r"frequency\.first = 14 has no unit.*frequency\.first "
+            r'= "14 Hz"',
+        ),
+        (
+            RESPONSE.replace('"14 Hz"', '"17 Hz"'),
+            r"\[frequency_response\] the values of frequency "
+            r"must ascend",
+        ),
         (RESPONSE.replace("x =", "y ="), r"\[frequency_response\] start lacks x"),
-        (RESPONSE.replace('"0 mm", "1 mm"]', '"0 mm", "1 mm"]').replace('"0 m/s"', '["0 m/s"]'), r"lists must have the same length"),
-        (RESPONSE.split("start")[0] + 'start = "sweep_sideways"\n', r"\[frequency_response\] start = .sweep_sideways. isn't known"),
+        (
+            RESPONSE.replace('"0 mm", "1 mm"]', '"0 mm", "1 mm"]').replace('"0 m/s"', '["0 m/s"]'),
+            r"lists must "
+            r"have the same length",
+        ),
+        (
+            RESPONSE.split("start")[0] + 'start = "sweep_sideways"\n',
+            r"\[frequency_response\] start "
+            r"= .sweep_sideways. isn't known",
+        ),
         (RESPONSE.split("start")[0] + 'start = "random 5"\n', r"random starts need a box"),
-        (RESPONSE.split("start")[0] + 'start = "random 5"\nbox = { x = ["1 mm", "2 kg"] }\n', r"\[frequency_response\.box\] x"),
-        (RESPONSE + 'values = { forse = "1 N" }\n', r"\[frequency_response\.values\] 'forse' is unknown.*Did you mean 'force'"),
-        (DIAGRAMS.replace("vary.contact_stiffness", "vary.contact"), r"\[bifurcation_diagram\.vary\] 'contact' is unknown"),
+        (
+            RESPONSE.split("start")[0] + 'start = "random 5"\nbox = { x = ["1 mm", "2 kg"] }\n',
+            r"\[frequency_response\.box\] x",
+        ),
+        (
+            RESPONSE + 'values = { forse = "1 N" }\n',
+            r"\[frequency_response\.values\] 'forse' is "
+            r"unknown.*Did you mean 'force'",
+        ),
+        (
+            DIAGRAMS.replace("vary.contact_stiffness", "vary.contact"),
+            r"\[bifurcation_diagram\.vary\] "
+            r"'contact' is unknown",
+        ),
         (DIAGRAMS.replace('"1e3 N/m"', '"0 N/m"'), r"can't have a log scale"),
         (DIAGRAMS.replace("A map", "Soft"), r"same file names, such as soft"),
         (DIAGRAMS.replace("A map", "run") + SIMULATE, r"same file names, such as run"),
-        ("[lyapunov]\nvalues = { frequency = 3 }\n", r"\[lyapunov\.values\] frequency = 3 has no unit"),
-        ("[lyapunov]\nstart = { x = [1], v = [1, 2] }\n", r"\[lyapunov\] lists must have the same length"),
-        ("[lyapunov]\nperiods = 0\n", r"\[lyapunov\] periods = 0 must be greater than or equal to 1"),
+        (
+            "[lyapunov]\nvalues = { frequency = 3 }\n",
+            r"\[lyapunov\.values\] frequency = 3 has "
+            r"no unit",
+        ),
+        (
+            "[lyapunov]\nstart = { x = [1], v = [1, 2] }\n",
+            r"\[lyapunov\] lists must have the same "
+            r"length",
+        ),
+        (
+            "[lyapunov]\nperiods = 0\n",
+            r"\[lyapunov\] periods = 0 must be greater than or "
+            r"equal to 1",
+        ),
         ("[[lyapunov]]\n[[lyapunov]]\n", r"each of several \[\[lyapunov\]\] needs a name"),
-        ("[bifurcation_diagram]\nvary = {}\n", r"\[bifurcation_diagram\] varies one parameter, or two"),
-        ('[frequency_response]\nfrequency = { first = "2 Hz" }\n', r"\[frequency_response\.frequency\] needs first, last and count"),
-        ('[frequency_response]\nfrequency = { values = ["2 Hz"], count = 3 }\n', r"has values one by one"),
+        (
+            "[bifurcation_diagram]\nvary = {}\n",
+            r"\[bifurcation_diagram\] varies one parameter, "
+            r"or two",
+        ),
+        (
+            '[frequency_response]\nfrequency = { first = "2 Hz" }\n',
+            r"\[frequency_response\.frequency\] "
+            r"needs first, last and count",
+        ),
+        (
+            '[frequency_response]\nfrequency = { values = ["2 Hz"], count = 3 }\n',
+            r"has values one by one",
+        ),
     ],
 )
 def test_faults_are_told_before_anything_is_computed(text, told, tmp_path, no_computing):
@@ -275,13 +386,18 @@ def test_faults_are_told_before_anything_is_computed(text, told, tmp_path, no_co
 
 def test_a_frequency_response_needs_forcing(tmp_path):
     (tmp_path / "free.py").write_text(
-        "import saltus as sl\n@sl.system(states='x v')\ndef rig(t, x, v, *, stiffness=4.0):\n    return v, -stiffness*x\n"
+        "import saltus as sl\n@sl.system(states='x v')\ndef rig(t, x, v, *, stiffness=4.0):\n    "
+        "return v, -stiffness*x\n"
     )
     from saltus.cli.own_system import own_system
 
     own = own_system(str(tmp_path / "free.py"))
     with pytest.raises(StudyError, match="no forcing frequency"):
-        questions_of(parse('[study]\nname = "a"\n[frequency_response]\nfrequency = { values = [1.0] }\n'), own, Inputs(tmp_path))
+        questions_of(
+            parse('[study]\nname = "a"\n[frequency_response]\nfrequency = { values = [1.0] }\n'),
+            own,
+            Inputs(tmp_path),
+        )
     with pytest.raises(StudyError, match="Write every ="):
         questions_of(parse('[study]\nname = "a"\n[lyapunov]\n'), own, Inputs(tmp_path))
 
@@ -290,14 +406,18 @@ def test_measured_points_are_drawn_and_kept_with_the_study(tmp_path, whole):
     (tmp_path / "shaker.csv").write_text("frequency [Hz],amplitude [mm]\n15,0.3\n")
     text = HEAD + RESPONSE + 'measured = "shaker.csv"\n'
     run = Run(tmp_path / "out", text, inputs=Inputs(tmp_path), pictures=True)
-    assert (tmp_path / "out" / "inputs" / "shaker.csv").read_text() == (tmp_path / "shaker.csv").read_text()
-    with_points, without = ((folder / "frequency-response.png").read_bytes() for folder in (run.folder, whole.folder))
+    assert (tmp_path / "out" / "inputs" / "shaker.csv").read_text() == (
+        tmp_path / "shaker.csv"
+    ).read_text()
+    with_points, without = (
+        (folder / "frequency-response.png").read_bytes() for folder in (run.folder, whole.folder)
+    )
     assert with_points != without
     Run(tmp_path / "out", text, inputs=inputs_of(tmp_path / "out", text), pictures=True)
     assert (run.folder / "frequency-response.png").read_bytes() == with_points
 
 
-# -- schema ----------------------------------------------------------------------------------------------------------------------
+# -- schema ----------------------------------------------------------------------------------------
 def test_every_key_tells_what_it_is():
     """A description and an example for each key of each table, so that editors can show them."""
     schema = Study.model_json_schema()
@@ -307,7 +427,15 @@ def test_every_key_tells_what_it_is():
                 assert field.get("description"), f"{name}.{key}"
                 assert field.get("examples"), f"{name}.{key}"
         assert table["description"], name
-    for key in ("poincare", "spectrum", "impacts", "energy", "lyapunov", "frequency_response", "bifurcation_diagram"):
+    for key in (
+        "poincare",
+        "spectrum",
+        "impacts",
+        "energy",
+        "lyapunov",
+        "frequency_response",
+        "bifurcation_diagram",
+    ):
         forms = schema["properties"][key]["anyOf"]
         assert {"$ref" in forms[0], forms[1].get("type") == "array"} == {True}
 
@@ -316,8 +444,13 @@ def test_examples_of_the_schema_are_read():
     from saltus.study.tables.questions import BifurcationDiagram, FrequencyResponse
     from saltus.study.tables.wording import toml
 
-    for key, table in (("frequency_response", FrequencyResponse), ("bifurcation_diagram", BifurcationDiagram)):
-        lines = [f"{name} = {toml(field.examples[0])}" for name, field in table.model_fields.items()]
+    for key, table in (
+        ("frequency_response", FrequencyResponse),
+        ("bifurcation_diagram", BifurcationDiagram),
+    ):
+        lines = [
+            f"{name} = {toml(field.examples[0])}" for name, field in table.model_fields.items()
+        ]
         parse(f'[study]\nname = "a"\n[{key}]\n' + "\n".join(lines))
 
 

@@ -29,7 +29,10 @@ def test_smallest_study():
 
 
 def test_values_keep_their_text_and_their_bits():
-    study = parse(WHOLE + '[system]\nmodel = "delangre"\nforce = "4 N"\ndamping_ratio = 0.03\n[method]\nname = "ODE45"\nrtol = 1e-4\n')
+    study = parse(
+        WHOLE + '[system]\nmodel = "delangre"\nforce = "4 N"\ndamping_ratio = '
+        '0.03\n[method]\nname = "ODE45"\nrtol = 1e-4\n'
+    )
     assert study.system.values == {"force": "4 N", "damping_ratio": 0.03}
     assert study.method == ODE45(name="ODE45", rtol=1e-4, atol=1e-6, events="locate")
 
@@ -56,21 +59,43 @@ def test_not_toml(text, parts):
         (HEAD + "nme = 3", "[study] has no key 'nme'. Did you mean 'name'?"),
         (WHOLE + "sampels = 3", "[simulate] has no key 'sampels'. Did you mean 'samples'?"),
         (HEAD + "[simulat]", "the file has no table 'simulat'. Did you mean 'simulate'?"),
-        (HEAD, "a study asks something: it has a table [simulate], [poincare], [spectrum], [impacts], [energy], [lyapunov], "),
+        (
+            HEAD,
+            "a study asks something: it has a table [simulate], [poincare], [spectrum], "
+            "[impacts], [energy], [lyapunov], ",
+        ),
         (WHOLE.replace("periods", "# "), "[simulate] give the length once"),
         (WHOLE + 't_end = "2 s"', "[simulate] give the length once"),
-        (WHOLE.replace("3", "3.0"), "[simulate] periods = 3.0 must be a whole number. For example: periods = 60"),
+        (
+            WHOLE.replace("3", "3.0"),
+            "[simulate] periods = 3.0 must be a whole number. For example: periods = 60",
+        ),
         (WHOLE.replace("3", "true"), "[simulate] periods = true must be a whole number."),
         (WHOLE.replace("3", "0"), "[simulate] periods = 0 must be greater than or equal to 1."),
-        (WHOLE + "[system]\nforce = true", "[system] force = true must be a plain number, or text with a unit"),
+        (
+            WHOLE + "[system]\nforce = true",
+            "[system] force = true must be a plain number, or text with a unit",
+        ),
         (WHOLE + "[system]\nforce = nan", "[system] force = nan must be a finite number."),
-        (WHOLE + '[method]\nname = "ode45"', "[method] name = \"ode45\" is no method. Did you mean 'ODE45'?"),
+        (
+            WHOLE + '[method]\nname = "ode45"',
+            "[method] name = \"ode45\" is no method. Did you mean 'ODE45'?",
+        ),
         (WHOLE + "[method]\nrtol = 1e-3", "[method] needs 'name'."),
-        (WHOLE + '[method]\nname = "ODE45"\ntol = 1', "[method] has no key 'tol'. Did you mean 'rtol'?"),
+        (
+            WHOLE + '[method]\nname = "ODE45"\ntol = 1',
+            "[method] has no key 'tol'. Did you mean 'rtol'?",
+        ),
         (WHOLE + '[method]\nname = "ODE45"\nrtol = "1"', '[method] rtol = "1" must be a number.'),
         (WHOLE + '[method]\nname = "ODE45"\nevents = "off"', "must be 'locate' or 'ignore'"),
-        (WHOLE + '[compare]\nexact = "a.csv"', "[compare] needs 'printed'. For example: printed = \"table2.csv\""),
-        (WHOLE + '[compare]\nprinted = "a.csv"\nreference = { name = "Taylor", ordr = 3 }', "Did you mean 'order'?"),
+        (
+            WHOLE + '[compare]\nexact = "a.csv"',
+            "[compare] needs 'printed'. For example: printed = \"table2.csv\"",
+        ),
+        (
+            WHOLE + '[compare]\nprinted = "a.csv"\nreference = { name = "Taylor", ordr = 3 }',
+            "Did you mean 'order'?",
+        ),
     ],
 )
 def test_not_a_study(text, part):
@@ -79,7 +104,11 @@ def test_not_a_study(text, part):
 
 def test_every_fault_is_named():
     message = refusal(HEAD + "nme = 3\n[simulate]\nsampels = 3\nkep = 2")
-    assert [line.split("]")[0] for line in message.splitlines()[1:]] == ["  - [study", "  - [simulate", "  - [simulate"]
+    assert [line.split("]")[0] for line in message.splitlines()[1:]] == [
+        "  - [study",
+        "  - [simulate",
+        "  - [simulate",
+    ]
 
 
 def test_missing_file(tmp_path):
@@ -97,8 +126,11 @@ def test_schema_tells_editors_the_keys():
     schema = Study.model_json_schema()
     json.dumps(schema)
     assert set(schema["properties"]) == {
-        "study", "system", "method", "simulate", "compare", "poincare", "spectrum", "impacts", "energy", "lyapunov",
+        "study", "system", "method", "simulate", "compare", "poincare", "spectrum", "impacts",
+        "energy", "lyapunov",
         "frequency_response", "bifurcation_diagram", "basins",
     }  # fmt: skip
     assert schema["$defs"]["Simulate"]["additionalProperties"] is False
-    assert schema["$defs"]["SystemTable"]["additionalProperties"] != {}, "values are numbers or text"
+    assert schema["$defs"]["SystemTable"]["additionalProperties"] != {}, (
+        "values are numbers or text"
+    )

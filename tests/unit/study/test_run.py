@@ -1,4 +1,6 @@
-"""Studies run: the replication of Table 2, a batch, a system of one's own, the demo and the doctor."""
+"""Studies run: the replication of Table 2, a batch, a system of one's own, the demo
+and the doctor.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,15 @@ class Run:
         folder.mkdir(exist_ok=True)
         resources = Resources(threads=1)
         self.outcome = run_study(
-            parse(text), text, folder, own, resources, lambda _: None, self.said.append, **({"pictures": False} | options), inputs=inputs
+            parse(text),
+            text,
+            folder,
+            own,
+            resources,
+            lambda _: None,
+            self.said.append,
+            **({"pictures": False} | options),
+            inputs=inputs,
         )
 
     @property
@@ -63,7 +73,7 @@ def run_text(tmp_path):
     return lambda text, own=None: Run(text, tmp_path / "out", own)
 
 
-# -- Table 2 ------------------------------------------------------------------------------------------------------------------------------
+# -- Table 2 ---------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def table2(tmp_path_factory) -> Run:
     file = ROOT / "replications" / "saunders2021" / "table2.toml"
@@ -73,7 +83,13 @@ def table2(tmp_path_factory) -> Run:
 def test_table2_gives_the_printed_times(table2):
     """Five times within 2e-14 s of the paper, residuals below 2e-16 m."""
     rows = table2.table.rows
-    assert [row[:2] for row in rows] == [("A", "1"), ("B", "3"), ("C", "7"), ("D", "10"), ("E", "13")]
+    assert [row[:2] for row in rows] == [
+        ("A", "1"),
+        ("B", "3"),
+        ("C", "7"),
+        ("D", "10"),
+        ("E", "13"),
+    ]
     assert max(abs(float(row[4])) for row in rows) < 2e-14
     assert max(float(row[5]) for row in rows) < 2e-16
 
@@ -83,7 +99,9 @@ def test_table2_takes_matlabs_steps(table2):
 
 
 def test_table2_exact_times_by_taylor(table2):
-    """All 63 contacts in 2 s within 1e-13 s; those that ode45 locates are off by up to 2.75e-5 s."""
+    """All 63 contacts in 2 s within 1e-13 s; those that ode45 locates are off by up
+    to 2.75e-5 s.
+    """
     with (REFERENCE / "fig2b_exact_events.csv").open() as file:
         exact = np.array([float(row["t_s"]) for row in csv.DictReader(file)])
     assert np.abs(table2.reference["contact_time"].values - exact).max() < 1e-13
@@ -96,7 +114,10 @@ def test_files_keep_it_all(table2):
     study = (ROOT / "replications" / "saunders2021" / "table2.toml").read_text()
     assert table2.run.attrs["study"] == study
     assert (table2.folder / "study.toml").read_text() == study
-    assert sorted(file.name for file in (table2.folder / "inputs").iterdir()) == ["exact_events.csv", "table2.csv"]
+    assert sorted(file.name for file in (table2.folder / "inputs").iterdir()) == [
+        "exact_events.csv",
+        "table2.csv",
+    ]
 
 
 def test_a_study_goes_on_from_its_copy(table2):
@@ -108,7 +129,7 @@ def test_a_study_goes_on_from_its_copy(table2):
     assert (table2.folder / "run.nc").stat().st_mtime_ns == before
 
 
-# -- other studies ------------------------------------------------------------------------------------------------------------------------
+# -- other studies ---------------------------------------------------------------------------------
 def test_batch(run_text):
     outcome = run_text(BATCH)
     assert outcome.run.sizes["trajectory"] == 2
@@ -123,13 +144,20 @@ def test_values_per_trajectory(run_text):
 def test_own_system_with_values(run_text, tmp_path):
     """x'' = -9 x from 1: cos 3t."""
     (tmp_path / "my_rig.py").write_text(
-        "from saltus.system import system\n@system(states='x v')\ndef rig(t, x, v, *, stiffness=4.0):\n    return v, -stiffness*x\n"
+        "from saltus.system import system\n@system(states='x v')\ndef rig(t, x, v, *, "
+        "stiffness=4.0):\n    return v, -stiffness*x\n"
     )
-    text = '[study]\nname = "own"\n[system]\nstiffness = 9.0\n[simulate]\nstart = { x = 1.0, v = 0.0 }\nt_end = "2 s"\n'
+    text = (
+        '[study]\nname = "own"\n[system]\nstiffness = 9.0\n[simulate]\nstart = { x = 1.0, v = '
+        '0.0 }\nt_end = "2 s"\n'
+    )
     outcome = run_text(text, own_system(f"{tmp_path / 'my_rig.py'}:rig"))
     assert abs(float(outcome.run["end_x"]) - np.cos(6.0)) < 1e-14
     with pytest.raises(StudyError, match="has no forcing period"):
-        run_text(text.replace('t_end = "2 s"', "periods = 3"), own_system(f"{tmp_path / 'my_rig.py'}:rig"))
+        run_text(
+            text.replace('t_end = "2 s"', "periods = 3"),
+            own_system(f"{tmp_path / 'my_rig.py'}:rig"),
+        )
     with pytest.raises(StudyError, match=r"these are several systems\. Keep one"):
         run_text(BATCH, own_system(f"{tmp_path / 'my_rig.py'}:rig"))
 
@@ -155,37 +183,47 @@ def test_refusals(run_text, old, new, part):
 
 
 def test_comparing_needs_the_contacts_from_the_start(run_text):
-    text = BATCH.replace('["0.2 mm", "1 mm"]', '"1 mm"') + 'keep = 3\n[compare]\nprinted = "a.csv"\n'
+    text = BATCH.replace('["0.2 mm", "1 mm"]', '"1 mm"') + (
+        'keep = 3\n[compare]\nprinted = "a.csv"\n'
+    )
     with pytest.raises(StudyError, match="leave keep out"):
         run_text(text)
 
 
-# -- demo and doctor ----------------------------------------------------------------------------------------------------------------------
+# -- demo and doctor -------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def rig():
     return demo()
 
 
 def test_demo_finds_the_periods(rig):
-    """Case b4 at 15 Hz: the paper's "12T" from 0.4 mm is 24T (the 12T orbit is unstable); its 4T is reached from 1.9 mm."""
+    """Case b4 at 15 Hz: the paper's "12T" from 0.4 mm is 24T (the 12T orbit is unstable); its 4T is
+    reached from 1.9 mm.
+    """
     assert rig.settled["response_period"].values.tolist() == [3, 5, 24, 24, 4, 1]
     assert (rig.run["status"] == "ok").all()
 
 
 def test_demo_says_where_a_nanometre_decides(rig):
-    """The paper reports 4T from 2.0 mm. That start lies where the outcome changes from one nanometre to the next."""
+    """The paper reports 4T from 2.0 mm. That start lies where the outcome changes from one
+    nanometre to the next.
+    """
     assert [row[2] == "same" for row in rig.table.rows] == [True, True, True, False, True, True]
 
 
 def test_demo_agrees_with_the_known_orbits(rig):
-    """rms, largest |x| and contacts of the periodic orbits of tests/reference/orbits.csv; the peak is that of 200 samples a period."""
+    """rms, largest |x| and contacts of the periodic orbits of tests/reference/orbits.csv; the peak
+    is that of 200 samples a period.
+    """
     with (REFERENCE / "orbits.csv").open() as file:
         orbits = {row["name"]: row for row in csv.DictReader(file)}
     for trajectory, name in ((0, "B4_15_P3"), (4, "B4_15_P4"), (5, "B4_15_high")):
         row, orbit = rig.settled.isel(trajectory=trajectory), orbits[name]
         assert float(row["contacts_per_response"]) == float(orbit["contact_events_per_period"])
         assert float(row["x_rms"]) == pytest.approx(float(orbit["rms_m"]), rel=1e-6)
-        assert float(row["x_peak"]) == pytest.approx(max(float(orbit["xmax_m"]), -float(orbit["xmin_m"])), rel=1e-3)
+        assert float(row["x_peak"]) == pytest.approx(
+            max(float(orbit["xmax_m"]), -float(orbit["xmin_m"])), rel=1e-3
+        )
 
 
 def test_demo_table_and_picture(rig, tmp_path):

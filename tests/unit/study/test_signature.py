@@ -1,4 +1,6 @@
-"""Tables made from functions: a parameter of the function is a key of the table, and nothing is lost on the way."""
+"""Tables made from functions: a parameter of the function is a key of the table, and nothing is
+lost on the way.
+"""
 
 from __future__ import annotations
 
@@ -43,14 +45,23 @@ def test_keys_are_the_parameters_with_their_defaults(made, function, besides):
 def test_options_are_those_of_the_methods():
     for name, made in METHODS.items():
         parameters = inspect.signature(getattr(sl, name)).parameters
-        assert {key: field.default for key, field in made.model_fields.items() if key != "name"} == {
-            key: parameter.default for key, parameter in parameters.items()
-        }
+        assert {
+            key: field.default for key, field in made.model_fields.items() if key != "name"
+        } == {key: parameter.default for key, parameter in parameters.items()}
 
 
 def test_choices_are_those_that_the_docstring_names():
-    assert get_args(questions.Lyapunov.model_fields["unit"].annotation) == ("1/s", "1/period", "bit/s", "bit/period")
-    with pytest.raises(StudyError, match=r"\[simulate\] time_errors = \"loca\" must be 'measured' or 'local'"):
+    assert get_args(questions.Lyapunov.model_fields["unit"].annotation) == (
+        "1/s",
+        "1/period",
+        "bit/s",
+        "bit/period",
+    )
+    with pytest.raises(
+        StudyError,
+        match=r"\[simulate\] time_errors = \"loca\" must be 'measured' "
+        r"or 'local'",
+    ):
         parse(HEAD + '[simulate]\nperiods = 3\ntime_errors = "loca"\n')
 
 
@@ -69,9 +80,21 @@ def test_a_parameter_that_no_kind_describes_is_refused(monkeypatch):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ('[method]\nname = "Taylor"\norder = 50\n[simulate]\nperiods = 3\n', r"\[method\] order must be at most 40, not 50"),
-        ('[simulate]\nperiods = 3\nmethod = { name = "Taylor", lanes = 3 }\n', r"\[simulate\.method\] lanes must be 2, 4, 8 or 16"),
-        ('[lyapunov]\nflow = { name = "Taylor", order = 2 }\n', r"\[lyapunov\.flow\] order must be a whole number of at least 6"),
+        (
+            '[method]\nname = "Taylor"\norder = 50\n[simulate]\nperiods = 3\n',
+            r"\[method\] order "
+            r"must be at most 40, not 50",
+        ),
+        (
+            '[simulate]\nperiods = 3\nmethod = { name = "Taylor", lanes = 3 }\n',
+            r"\[simulate\.method\] "
+            r"lanes must be 2, 4, 8 or 16",
+        ),
+        (
+            '[lyapunov]\nflow = { name = "Taylor", order = 2 }\n',
+            r"\[lyapunov\.flow\] order must be "
+            r"a whole number of at least 6",
+        ),
     ],
 )
 def test_what_a_method_refuses_is_told_of_its_table(text, told):

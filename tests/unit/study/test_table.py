@@ -38,7 +38,8 @@ def test_the_file_holds_every_digit_in_si(tmp_path):
     assert file.read_text().splitlines()[:2] == ["# made up", "# one note"]
     frame = pd.read_csv(file, comment="#")
     assert list(frame.columns) == [
-        "trajectory", "motion", "rms [m]", "peak [m/s]", "contacts from", "contacts to", "exponent [1/s]", "exponent error [1/s]",
+        "trajectory", "motion", "rms [m]", "peak [m/s]", "contacts from", "contacts to",
+        "exponent [1/s]", "exponent error [1/s]",
     ]  # fmt: skip
     assert frame.iloc[0].tolist() == [0, "'=T", THIRD, -2.5, 2.0, 4.0, -0.5, 0.001]
     assert frame.iloc[1, 2:].isna().all()
@@ -46,6 +47,9 @@ def test_the_file_holds_every_digit_in_si(tmp_path):
 
 
 def test_the_file_holds_the_rows_that_the_screen_leaves_out(tmp_path):
-    many = table("many", [words("branch", range(100)), Column("share", "{} %".format, {"share": [0.01] * 100})])
+    many = table(
+        "many",
+        [words("branch", range(100)), Column("share", "{} %".format, {"share": [0.01] * 100})],
+    )
     assert len(many.rows) == 24
     assert len(pd.read_csv(many.write_csv(tmp_path / "many.csv"), comment="#")) == 100

@@ -10,9 +10,13 @@ NAMES = {"state": ("x", "v"), "param": ("p", "q")}
 
 @pytest.fixture(scope="session")
 def expressions():
-    """A strategy of smooth expressions in x, v, t, p, q that are defined for all real arguments, except for overflow."""
+    """A strategy of smooth expressions in x, v, t, p, q that are defined for all real arguments,
+    except for overflow.
+    """
     leaves = st.one_of(
-        st.sampled_from([ex.state("x"), ex.state("v"), ex.parameter("p"), ex.parameter("q"), ex.TIME]),
+        st.sampled_from(
+            [ex.state("x"), ex.state("v"), ex.parameter("p"), ex.parameter("q"), ex.TIME]
+        ),
         st.integers(-3, 3).map(ex.constant),
         st.floats(-2, 2).map(ex.constant),
     )
@@ -33,6 +37,8 @@ def _larger(inner):
         inner.map(lambda a: ex.elementary("sqrt", 1 + a**2)),
         inner.map(lambda a: ex.elementary("log", 1 + a**2)),
         inner.map(lambda a: ex.elementary("exp", ex.elementary("tanh", a))),
-        st.tuples(st.sampled_from(["sin", "cos", "atan", "tanh"]), inner).map(lambda pair: ex.elementary(*pair)),
+        st.tuples(st.sampled_from(["sin", "cos", "atan", "tanh"]), inner).map(
+            lambda pair: ex.elementary(*pair)
+        ),
         inner.map(lambda a: ex.elementary("tan", ex.elementary("atan", a))),
     )

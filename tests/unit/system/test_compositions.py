@@ -1,4 +1,6 @@
-"""Functions made of others: against mpmath at 50 digits on and near their special points, values and derivatives."""
+"""Functions made of others: against mpmath at 50 digits on and near their special points, values
+and derivatives.
+"""
 
 import math
 
@@ -16,12 +18,24 @@ X, Y = ex.state("x"), ex.state("y")
 EPS = 2.0**-52
 NEAR_ZERO = [1e-300, 1e-20, 1e-8, 1e-3, 0.1, 0.7]
 WIDE = [0.0, *NEAR_ZERO, *(-x for x in NEAR_ZERO), 1.0, -1.0, 3.0, -3.0, 20.0, -20.0, 300.0]
-WITHIN_ONE = [0.0, *NEAR_ZERO, *(-x for x in NEAR_ZERO), 1 - 1e-3, 1 - 1e-9, 1 - EPS, -1 + 1e-3, -1 + 1e-9, -1 + EPS]
+WITHIN_ONE = [
+    0.0,
+    *NEAR_ZERO,
+    *(-x for x in NEAR_ZERO),
+    1 - 1e-3,
+    1 - 1e-9,
+    1 - EPS,
+    -1 + 1e-3,
+    -1 + 1e-9,
+    -1 + EPS,
+]
 
 
 def ulps(value, exact):
     """Distance in units of the last place of the exact value."""
-    return float(abs(mpmath.mpf(float(value)) - exact) / max(abs(exact), mpmath.mpf(2) ** -1000)) / EPS
+    return (
+        float(abs(mpmath.mpf(float(value)) - exact) / max(abs(exact), mpmath.mpf(2) ** -1000)) / EPS
+    )
 
 
 @pytest.mark.parametrize(
@@ -76,8 +90,12 @@ def test_angle_and_distance_of_a_point():
 @pytest.mark.parametrize("x", [-2.0, 0.0, 3.0])
 @pytest.mark.parametrize("y", [-1.0, 0.5])
 def test_angle_with_one_plain_side(x, y):
-    assert evaluate([sl.atan2(Y, x)], states={"y": y})[0] == pytest.approx(math.atan2(y, x), rel=4 * EPS)
-    assert evaluate([sl.atan2(y, X)], states={"x": x})[0] == pytest.approx(math.atan2(y, x), rel=4 * EPS)
+    assert evaluate([sl.atan2(Y, x)], states={"y": y})[0] == pytest.approx(
+        math.atan2(y, x), rel=4 * EPS
+    )
+    assert evaluate([sl.atan2(y, X)], states={"x": x})[0] == pytest.approx(
+        math.atan2(y, x), rel=4 * EPS
+    )
     assert sl.atan2(y, x) == math.atan2(y, x)
 
 
@@ -85,25 +103,65 @@ def test_angle_with_one_plain_side(x, y):
 def test_switches(x):
     traced = [sl.sign(X), sl.heaviside(X), sl.where(X > 0, 2 * X, -X), sl.clip(X, -1, 0.5)]
     plain = [sl.sign(x), sl.heaviside(x), sl.where(x > 0, 2 * x, -x), sl.clip(x, -1, 0.5)]
-    assert evaluate(traced, states={"x": x}) == plain == [np.sign(x), np.heaviside(x, 0.5), 2 * x if x > 0 else -x, np.clip(x, -1, 0.5)]
+    assert (
+        evaluate(traced, states={"x": x})
+        == plain
+        == [np.sign(x), np.heaviside(x, 0.5), 2 * x if x > 0 else -x, np.clip(x, -1, 0.5)]
+    )
     assert (sl.sign(0), sl.heaviside(0), sl.heaviside(0, 1), sl.hypot(3, 4)) == (0, 0.5, 1, 5)
 
 
-# -- NumPy's functions are those of saltus -------------------------------------------------------------------------------------
-ONE = ["sin", "cos", "tan", "exp", "log", "sqrt", "arctan", "arcsin", "arccos", "sinh", "cosh", "tanh", "abs", "sign", "square", "radians"]
+# -- NumPy's functions are those of saltus ---------------------------------------------------------
+ONE = [
+    "sin",
+    "cos",
+    "tan",
+    "exp",
+    "log",
+    "sqrt",
+    "arctan",
+    "arcsin",
+    "arccos",
+    "sinh",
+    "cosh",
+    "tanh",
+    "abs",
+    "sign",
+    "square",
+    "radians",
+]
 
 
 @pytest.mark.parametrize("name", ONE)
 def test_numpy_on_a_traced_value(name):
     function = getattr(np, name)
-    assert evaluate([function(X)], states={"x": 0.3})[0] == pytest.approx(function(0.3), rel=8 * EPS)
+    assert evaluate([function(X)], states={"x": 0.3})[0] == pytest.approx(
+        function(0.3), rel=8 * EPS
+    )
 
 
-@pytest.mark.parametrize("name", ["arctan2", "hypot", "maximum", "minimum", "heaviside", "add", "subtract", "multiply", "divide"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "arctan2",
+        "hypot",
+        "maximum",
+        "minimum",
+        "heaviside",
+        "add",
+        "subtract",
+        "multiply",
+        "divide",
+    ],
+)
 def test_numpy_on_two_values(name):
     function = getattr(np, name)
-    assert evaluate([function(X, 0.5)], states={"x": 0.3})[0] == pytest.approx(function(0.3, 0.5), rel=8 * EPS)
-    assert evaluate([function(X, Y)], states={"x": 0.3, "y": -2.0})[0] == pytest.approx(function(0.3, -2.0), rel=8 * EPS)
+    assert evaluate([function(X, 0.5)], states={"x": 0.3})[0] == pytest.approx(
+        function(0.3, 0.5), rel=8 * EPS
+    )
+    assert evaluate([function(X, Y)], states={"x": 0.3, "y": -2.0})[0] == pytest.approx(
+        function(0.3, -2.0), rel=8 * EPS
+    )
 
 
 def test_numpy_scalars_on_the_left():
@@ -112,7 +170,7 @@ def test_numpy_scalars_on_the_left():
     assert repr((two > X).gap) == repr((X < 2.0).gap)
 
 
-# -- what can't be traced teaches ----------------------------------------------------------------------------------------------
+# -- what can't be traced teaches ------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("mistake", "teaches"),
     [
@@ -141,7 +199,9 @@ def test_mistakes(mistake, teaches):
 
 
 def test_a_parameter_that_nothing_uses_is_named():
-    with pytest.warns(UnusedParameterWarning, match="forgetful: gap is declared but the equations don't use it"):
+    with pytest.warns(
+        UnusedParameterWarning, match="forgetful: gap is declared but the equations don't use it"
+    ):
 
         @sl.system(states="x")
         def forgetful(t, x, *, k=1.0, gap=0.1):
@@ -156,12 +216,18 @@ def test_the_forcing_frequency_is_used_by_the_period():
 
 
 def test_measured_numbers_bring_their_own_units():
-    """The coefficients of a table are numbers in an equation, but not plain ones: nothing is asked of its unit."""
+    """The coefficients of a table are numbers in an equation, but not plain ones: nothing is asked
+    of its unit.
+    """
 
     @sl.system(states="x v", units={"x": "m", "v": "m/s"})
     def law(t, x, v, *, mass="2 kg", force="3 N", period="0.5 s"):
         drive = force * sl.where(sl.mod(t, period) < 0.1, 1, 0)
-        return v, (drive + sl.table(t, [0, 1], [0, 1]) - sl.table(x, [-1, 0, 1], [-3, 0, 4], "spline", outside="extend")) / mass
+        return v, (
+            drive
+            + sl.table(t, [0, 1], [0, 1])
+            - sl.table(x, [-1, 0, 1], [-3, 0, 4], "spline", outside="extend")
+        ) / mass
 
     assert [guard.name for guard in law.guards] == ["x = 0"]
 
@@ -173,14 +239,24 @@ def test_a_table_in_a_state_is_the_same_curve_in_pieces(kind, outside):
     law = sl.system(states="x")(lambda t, x: -sl.table(x, points, values, kind, outside=outside))
     x = np.linspace(-2, 3, 301)
     by_guards = field(law, 0.0, [x])[0]
-    assert np.allclose(by_guards, [-sl.table(float(one), points, values, kind, outside=outside) for one in x], rtol=0, atol=1e-14)
-    assert [guard.boundary.payload for guard in law.guards] == (points if outside == "hold" else points[1:-1])
+    assert np.allclose(
+        by_guards,
+        [-sl.table(float(one), points, values, kind, outside=outside) for one in x],
+        rtol=0,
+        atol=1e-14,
+    )
+    assert [guard.boundary.payload for guard in law.guards] == (
+        points if outside == "hold" else points[1:-1]
+    )
 
 
 @pytest.mark.parametrize(
     ("make", "teaches"),
     [
-        (lambda t, x: sl.table(x, np.arange(40.0), np.random.default_rng(1).normal(size=40)), "has 40 knots.*32 at most"),
+        (
+            lambda t, x: sl.table(x, np.arange(40.0), np.random.default_rng(1).normal(size=40)),
+            "has 40 knots.*32 at most",
+        ),
         (lambda t, x: sl.table(x, [0, 1], [0, 0], outside="periodic"), "is for tables in time"),
         (lambda t, x: sl.table(t * t, [0, 1], [0, 0]), "write a state, or rate"),
         (lambda t, x: sl.table(t, [0, 1, 1], [0, 0, 0]), r"points\[2\] = 1 follows 1"),

@@ -1,4 +1,6 @@
-"""Dimensions of equations. Truth: textbook equations are consistent, and inconsistent with any of their parameters in another unit."""
+"""Dimensions of equations. Truth: textbook equations are consistent, and inconsistent with any of
+their parameters in another unit.
+"""
 
 import pytest
 
@@ -71,16 +73,22 @@ def powered(t, x, v, *, rate="3 1/s^2", length="2 mm"):
 @pytest.mark.parametrize(
     ("function", "says"),
     [
-        (missing_mass, r"line \d+: return v, -stiffness \* x - damping \* v / mass\): -stiffness\*x \[N\] and damping\*v/mass "
-                       r"\[m/s\^2\] are added or compared, which needs one unit: a division by a mass is missing in the first\. "
+        (missing_mass, r"line \d+: return v, -stiffness \* x - damping \* v / mass\): "
+                       r"-stiffness\*x \[N\] and damping\*v/mass "
+                       r"\[m/s\^2\] are added or compared, which needs one unit: a division by a "
+                       r"mass is missing in the first\. "
                        r".*check_units=False"),
-        (no_mass, r"line \d+\): dv/dt is a rate in m/s\^2, but force is in N: a division by a mass is missing\."),
-        (stiffness_as_damping, r"dv/dt is a rate in m/s\^2, but -stiffness\*v/mass is in m/s\^3: they differ by a factor in s\."),
+        (no_mass, r"line \d+\): dv/dt is a rate in m/s\^2, but force is in N: a division by a mass "
+                  r"is missing\."),
+        (stiffness_as_damping, r"dv/dt is a rate in m/s\^2, but -stiffness\*v/mass is in m/s\^3: "
+                               r"they differ by a factor in s\."),
         (wrong_gap, r"x \[m\] and gap \[m/s\] are added or compared"),
         (wrong_piece, r"stiffness\*x \[N\] and gap \[m\] are pieces of one value"),
-        (no_frequency, r"2\*pi\*frequency is in 1/s, but stands in cos\(2\*pi\*frequency\), which takes a plain number or an angle"),
+        (no_frequency, r"2\*pi\*frequency is in 1/s, but stands in cos\(2\*pi\*frequency\), which "
+                       r"takes a plain number or an angle"),
         (swapped_states, r"dx/dt is a rate in m/s, but x is in m: they differ by a factor in s"),
-        (powered, r"length\*0.69.* is in m, but stands in exp|length is in m, but stands as the exponent"),
+        (powered, r"length\*0.69.* is in m, but stands in exp|length is in m, but stands as the "
+                  r"exponent"),
     ],
 )  # fmt: skip
 def test_what_does_not_add_up_is_named(function, says):
@@ -90,7 +98,8 @@ def test_what_does_not_add_up_is_named(function, says):
 
 
 def hertz(
-    t, x, v, *, contact="1e9 N/m^1.5", mass="2 kg", preload="2 N", gap="0.1 mm", gravity="1 g0", f="2 Hz", slip="1 mm/s", mu="0.3"
+    t, x, v, *, contact="1e9 N/m^1.5", mass="2 kg", preload="2 N", gap="0.1 mm", gravity="1 g0",
+    f="2 Hz", slip="1 mm/s", mu="0.3"
 ):  # fmt: skip
     depth = sl.max(x - gap, 0)
     drive = gravity * sl.sin(2 * sl.pi * f * t) * sl.exp(-t * f) * (1 - sl.sign(v) / 2)

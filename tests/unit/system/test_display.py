@@ -12,8 +12,9 @@ TEXT = """\
 System delangre: 2 states, 2 guards, forced at frequency = 15 Hz (T = 66.6667 ms)
 states      x [m], v [m/s]
 equations   dx/dt = v
-            dv/dt = -2*damping_ratio*(2*pi*natural_frequency)*v - (2*pi*natural_frequency)**2*x - cubic/mass*x**3 - \
-contact_stiffness/mass*piecewise((x + lower_gap, x < -lower_gap), (x - upper_gap, x > upper_gap), otherwise=0) + \
+            dv/dt = -2*damping_ratio*(2*pi*natural_frequency)*v - (2*pi*natural_frequency)**2*x - \
+cubic/mass*x**3 - contact_stiffness/mass*piecewise((x + lower_gap, x < -lower_gap), \
+(x - upper_gap, x > upper_gap), otherwise=0) + \
 force*(1 - 18/(2*pi*frequency)**2)*cos(2*pi*frequency*t)/mass
 guards      lower_gap  x = -lower_gap  (0 m)
             upper_gap  x = upper_gap  (0.4 mm)
@@ -52,14 +53,20 @@ def test_a_system_without_anything():
     def decay(t, x):
         return -x
 
-    assert repr(decay) == "System decay: 1 state, 0 guards, not forced\nstates      x\nequations   dx/dt = -x"
+    assert repr(decay) == (
+        "System decay: 1 state, 0 guards, not forced\nstates      x\nequations   dx/dt = -x"
+    )
     assert "table" not in decay._repr_html_()
 
 
 def test_shared_parts_are_named_and_names_do_not_clash():
     @system(states="x s1")
     def clash(t, x, s1, *, a_long_parameter_name=1.0, another_long_parameter_name=2.0):
-        shared = a_long_parameter_name * x**2 + another_long_parameter_name * s1**2 + abs(x) * a_long_parameter_name
+        shared = (
+            a_long_parameter_name * x**2
+            + another_long_parameter_name * s1**2
+            + abs(x) * a_long_parameter_name
+        )
         return s1 * shared, -x * shared
 
     lines = clash.equations()
@@ -70,8 +77,10 @@ def test_shared_parts_are_named_and_names_do_not_clash():
 @pytest.mark.parametrize(
     ("name", "latex"),
     [
-        ("x", "x"), ("x1", "x_{1}"), ("omega", r"\omega"), ("x_max", r"x_{\mathrm{max}}"), ("k_1", "k_{1}"), ("k_c", "k_{c}"),
-        ("upper_gap", r"\mathrm{upper\_gap}"), ("zeta_n", r"\zeta_{n}"), ("m2_b", r"m_{\mathrm{2 b}}"), ("a_b_c", r"\mathrm{a\_b\_c}"),
+        ("x", "x"), ("x1", "x_{1}"), ("omega", r"\omega"), ("x_max", r"x_{\mathrm{max}}"),
+        ("k_1", "k_{1}"), ("k_c", "k_{c}"),
+        ("upper_gap", r"\mathrm{upper\_gap}"), ("zeta_n", r"\zeta_{n}"),
+        ("m2_b", r"m_{\mathrm{2 b}}"), ("a_b_c", r"\mathrm{a\_b\_c}"),
         ("größe", r"\mathrm{gr\text{ö}\text{ß}e}"),
     ],
 )  # fmt: skip
@@ -82,8 +91,14 @@ def test_names_in_formulas(name, latex):
 def test_formulas_of_the_rig():
     first, second = latex_lines(delangre())
     assert first == r"\dot{x} &= v"
-    assert second.startswith(r"\dot{v} &= -2 \, \mathrm{damping\_ratio} \, 2 \pi \, \mathrm{natural\_frequency} \, v - {\left(2 \pi \, ")
-    drive = r"\frac{\mathrm{force} \, \left(1 - \frac{18}{{\left(2 \pi \, \mathrm{frequency}\right)}^{2}}\right) \, \cos\left(2 \pi"
+    assert second.startswith(
+        r"\dot{v} &= -2 \, \mathrm{damping\_ratio} \, 2 \pi \, "
+        r"\mathrm{natural\_frequency} \, v - {\left(2 \pi \, "
+    )
+    drive = (
+        r"\frac{\mathrm{force} \, \left(1 - \frac{18}{{\left(2 \pi \, "
+        r"\mathrm{frequency}\right)}^{2}}\right) \, \cos\left(2 \pi"
+    )
     assert drive in second
     assert r"x + \mathrm{lower\_gap} & \text{if } x \lt -\mathrm{lower\_gap} \\" in second
 

@@ -13,7 +13,9 @@ X = ex.state("x")
 def by_hand(t, x, v, f=15.0, force=4.0, j1=0.0, j2=0.4e-3, kc=1.4e4):
     w, wn = 2 * np.pi * f, 10 * np.pi
     contact = np.where(x < -j1, kc * (x + j1), np.where(x > j2, kc * (x - j2), 0.0))
-    return v, (force * (1 - 18 / w**2) * np.cos(w * t) - contact) / 3 - 2 * 0.03 * wn * v - wn**2 * x - 7e8 / 3 * x**3
+    return v, (
+        force * (1 - 18 / w**2) * np.cos(w * t) - contact
+    ) / 3 - 2 * 0.03 * wn * v - wn**2 * x - 7e8 / 3 * x**3
 
 
 def test_the_rig_against_its_equation_on_arrays():
@@ -35,7 +37,9 @@ def test_sides_and_modes():
 
 def test_a_given_mode_is_kept():
     rig = delangre()
-    (v, inside), (_, outside) = (field(rig, 0.0, (1e-3, 0.5), bits=bits) for bits in ([True, False], [True, True]))
+    (v, inside), (_, outside) = (
+        field(rig, 0.0, (1e-3, 0.5), bits=bits) for bits in ([True, False], [True, True])
+    )
     assert v == 0.5
     assert inside - outside == pytest.approx(1.4e4 * 0.6e-3 / 3, rel=1e-12)
 
@@ -44,7 +48,9 @@ def test_conditions():
     a, b = X > 0, X > 1
     cases = {-1.0: (0, 0, 1), 0.5: (0, 1, 0), 2.0: (1, 1, 0)}
     for x, expected in cases.items():
-        found = evaluate([ex.select(condition, 1, 0) for condition in (a & b, a | b, ~a)], states={"x": x})
+        found = evaluate(
+            [ex.select(condition, 1, 0) for condition in (a & b, a | b, ~a)], states={"x": x}
+        )
         assert tuple(found) == expected
 
 

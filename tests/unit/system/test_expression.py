@@ -23,9 +23,12 @@ def test_the_same_operation_on_the_same_operands_is_one_object():
 @pytest.mark.parametrize(
     ("folded", "expected"),
     [
-        (X + 0, X), (0 + X, X), (X - 0, X), (0 - X, -X), (0 - (-X), X), (X * 1, X), (1 * X, X), (X / 1, X), (X**1, X), (+X, X),
-        (X * 0, ex.constant(0)), (X**0, ex.constant(1)), (X - X, ex.constant(0)), (0 / X, ex.constant(0)),
-        (ex.constant(2) ** 3, ex.constant(8)), (abs(ex.constant(-2)), ex.constant(2)), (ex.elementary("cos", 0), ex.constant(1)),
+        (X + 0, X), (0 + X, X), (X - 0, X), (0 - X, -X), (0 - (-X), X), (X * 1, X), (1 * X, X),
+        (X / 1, X), (X**1, X), (+X, X),
+        (X * 0, ex.constant(0)), (X**0, ex.constant(1)), (X - X, ex.constant(0)),
+        (0 / X, ex.constant(0)),
+        (ex.constant(2) ** 3, ex.constant(8)), (abs(ex.constant(-2)), ex.constant(2)),
+        (ex.elementary("cos", 0), ex.constant(1)),
         (ex.select(ex.Bit(0), X, X), X), (np.float64(2) * X, 2 * X), (X * np.float64(2), X * 2),
     ],
 )  # fmt: skip

@@ -33,7 +33,11 @@ def test_extremes_and_absolute_value(a, b, c):
     values = {"x": a, "v": b}
     assert min(a, b, c) == sorted((a, b, c))[0]
     assert max(a, b, c) == sorted((a, b, c))[2]
-    assert evaluate([min(X, V, c), max(X, V, c), abs(X)], states=values) == [min(a, b, c), max(a, b, c), abs(a)]
+    assert evaluate([min(X, V, c), max(X, V, c), abs(X)], states=values) == [
+        min(a, b, c),
+        max(a, b, c),
+        abs(a),
+    ]
 
 
 def test_extremes_of_one_or_equal_values():
@@ -51,10 +55,14 @@ def test_absolute_value_of_parameters_is_no_guard():
 @given(x=numbers)
 def test_piecewise_on_numbers_and_symbols_agree(x):
     def law(x):
-        return piecewise((2 * (x + 1), x < -1), (3 * (x - 2), (x > 2) & ~(x > 5)), (-x, x > 5), otherwise=0)
+        return piecewise(
+            (2 * (x + 1), x < -1), (3 * (x - 2), (x > 2) & ~(x > 5)), (-x, x > 5), otherwise=0
+        )
 
     def on_numbers(x):
-        return piecewise((2 * (x + 1), x < -1), (3 * (x - 2), x > 2 and not x > 5), (-x, x > 5), otherwise=0)
+        return piecewise(
+            (2 * (x + 1), x < -1), (3 * (x - 2), x > 2 and not x > 5), (-x, x > 5), otherwise=0
+        )
 
     value = on_numbers(x)
     assert type(value) is float

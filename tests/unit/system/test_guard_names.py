@@ -1,4 +1,6 @@
-"""A user names guards by comparisons, written in any way; whatever means none of the boundaries, or one twice, is refused."""
+"""A user names guards by comparisons, written in any way; whatever means none of the boundaries, or
+one twice, is refused.
+"""
 
 import pytest
 
@@ -23,11 +25,16 @@ def names(of):
 def test_a_comparison_names_its_boundary_however_it_is_written():
     assert names(named()) == ["x2 - x1 = -gap", "x2 - x1 = gap", "k*(x2 - wall) = 0"]
     ways = named(
-        ahead=lambda x1, x2, gap: 2 * gap < (x2 - x1) * 2, behind=lambda x1, x2, gap: x1 > x2 + gap, stop=lambda x2, wall: x2 >= wall
+        ahead=lambda x1, x2, gap: 2 * gap < (x2 - x1) * 2,
+        behind=lambda x1, x2, gap: x1 > x2 + gap,
+        stop=lambda x2, wall: x2 >= wall,
     )
     assert names(ways) == ["behind", "ahead", "stop"]
     assert [guard.gap for guard in ways.guards] == [guard.gap for guard in named().guards]
-    assert names(named(stop=lambda k, x2, wall: k * (x2 - wall) > 0)) == [*names(named())[:2], "stop"]
+    assert names(named(stop=lambda k, x2, wall: k * (x2 - wall) > 0)) == [
+        *names(named())[:2],
+        "stop",
+    ]
 
 
 def test_names_stay_with_copies_and_with_the_data():
@@ -40,7 +47,9 @@ def test_a_guard_inside_a_gap_is_named_too():
     def nested(t, x, v, *, gap=1.0):
         return v, -max(abs(x) - gap, 0)
 
-    of = system(states="x v", guards={"middle": lambda x: x < 0, "either side": lambda x, gap: abs(x) > gap})(nested)
+    of = system(
+        states="x v", guards={"middle": lambda x: x < 0, "either side": lambda x, gap: abs(x) > gap}
+    )(nested)
     assert names(of) == ["middle", "either side"]
 
 

@@ -1,4 +1,6 @@
-"""Boundaries are found, merged however they are written, oriented and named; what is no boundary is refused."""
+"""Boundaries are found, merged however they are written, oriented and named; what is no boundary is
+refused.
+"""
 
 import numpy as np
 import pytest
@@ -22,7 +24,12 @@ def guards_of(*field):
 
 
 def described(guard):
-    return guard.name, to_text(guard.gap), guard.state, None if guard.boundary is None else to_text(guard.boundary)
+    return (
+        guard.name,
+        to_text(guard.gap),
+        guard.state,
+        None if guard.boundary is None else to_text(guard.boundary),
+    )
 
 
 @pytest.mark.parametrize(
@@ -73,7 +80,9 @@ def test_other_boundaries_keep_their_gap(condition, gap, payload):
 
 @st.composite
 def rewritten(draw, left, right, depth=4):
-    """A comparison left > right, written in another way. Its numbers are dyadic, so that folding them doesn't round."""
+    """A comparison left > right, written in another way. Its numbers are dyadic, so that folding
+    them doesn't round.
+    """
     for _ in range(draw(st.integers(0, depth))):
         other = draw(st.sampled_from([X, V, P, Q, T, ex.constant(0.75), X * V]))
         factor = draw(st.sampled_from([0.25, 0.5, 2.0, 8.0]))
@@ -97,33 +106,49 @@ def rewritten(draw, left, right, depth=4):
 
 @given(st.data())
 def test_one_boundary_is_one_guard_however_it_is_written(data):
-    left, right = data.draw(st.sampled_from([(X, P), (X - V, P), (X * V + P, 2 * Q), (X, P * cos(T))]))
+    left, right = data.draw(
+        st.sampled_from([(X, P), (X - V, P), (X * V + P, 2 * Q), (X, P * cos(T))])
+    )
     first, second = (data.draw(rewritten(left, right)) for _ in range(2))
-    (a, b), guards = find_guards([piecewise((1, first), otherwise=-1), piecewise((1, second), otherwise=-1)])
+    (a, b), guards = find_guards(
+        [piecewise((1, first), otherwise=-1), piecewise((1, second), otherwise=-1)]
+    )
     assert len(guards) == 1
     assert a is b
     values = {"x": 0.3, "v": -1.2}, {"p": 0.7, "q": -0.4}
-    gap, difference = evaluate([guards[0].gap, left - right], t=0.2, states=values[0], values=values[1])
+    gap, difference = evaluate(
+        [guards[0].gap, left - right], t=0.2, states=values[0], values=values[1]
+    )
     (side,) = evaluate([a], bits=[gap > 0])
     assert side == np.sign(difference)
 
 
 def test_equal_numbers_under_different_names_stay_two_guards():
-    assert [guard.name for guard in guards_of(piecewise((X, X < -P), (V, X > Q), otherwise=0))] == ["p", "q"]
+    assert [guard.name for guard in guards_of(piecewise((X, X < -P), (V, X > Q), otherwise=0))] == [
+        "p",
+        "q",
+    ]
 
 
 def test_order_is_that_of_reading():
     inner = piecewise((1, V > P), otherwise=0)
-    guards = guards_of(piecewise((inner, X > Q), (2, X > R), otherwise=0), piecewise((1, V > P), otherwise=X))
+    guards = guards_of(
+        piecewise((inner, X > Q), (2, X > R), otherwise=0), piecewise((1, V > P), otherwise=X)
+    )
     assert [guard.name for guard in guards] == ["q", "p", "r"]
 
 
 def test_names_are_unique():
-    guards = guards_of(piecewise((1, X < -P), (2, X > P), (3, V > P), (4, X - V > P + Q), otherwise=0))
+    guards = guards_of(
+        piecewise((1, X < -P), (2, X > P), (3, V > P), (4, X - V > P + Q), otherwise=0)
+    )
     assert [guard.name for guard in guards] == [
         "x = -p", "x = p", "v = p", "x - v = p + q",
     ]  # fmt: skip
-    assert [guard.name for guard in guards_of(abs(X) + piecewise((1, X > P), otherwise=0))] == ["x = 0", "p"]
+    assert [guard.name for guard in guards_of(abs(X) + piecewise((1, X > P), otherwise=0))] == [
+        "x = 0",
+        "p",
+    ]
     assert [guard.name for guard in guards_of(piecewise((1, X - V > P), otherwise=0))] == ["p"]
 
 
@@ -133,13 +158,21 @@ def test_long_names_are_cut_and_stay_unique():
             start = start * V**2 + number
         return start
 
-    first, second = guards_of(piecewise((1, deep(X**2) > P * Q), (2, deep(X**3) > P * Q), otherwise=0))
+    first, second = guards_of(
+        piecewise((1, deep(X**2) > P * Q), (2, deep(X**3) > P * Q), otherwise=0)
+    )
     assert second.name == first.name + "'"
     assert len(first.name) < 200
 
 
 def test_comparisons_inside_functions_and_products_are_found():
-    (field,), guards = find_guards([cos(piecewise((X, X > P), otherwise=0)) * V / (-Q + piecewise((1, P - X < 0), otherwise=2))])
+    (field,), guards = find_guards(
+        [
+            cos(piecewise((X, X > P), otherwise=0))
+            * V
+            / (-Q + piecewise((1, P - X < 0), otherwise=2))
+        ]
+    )
     assert [guard.name for guard in guards] == ["p"]
     on = ex.select(Bit(0), X, 0)
     assert field is ex.elementary("cos", on) * V / (-Q + ex.select(Bit(0), 1, 2))
@@ -167,7 +200,9 @@ def test_nested_extremes_keep_their_value(x, v):
     for guard in guards:
         (gap,) = evaluate([guard.gap], states={"x": x, "v": v}, bits=bits)
         bits.append(gap > 0)
-    assert evaluate([field], states={"x": x, "v": v}, bits=bits) == evaluate([law], states={"x": x, "v": v})
+    assert evaluate([field], states={"x": x, "v": v}, bits=bits) == evaluate(
+        [law], states={"x": x, "v": v}
+    )
 
 
 def test_conditions_that_are_certain_are_folded():
@@ -192,7 +227,9 @@ def test_conditions_that_are_certain_are_folded():
 def test_a_boundary_on_which_nothing_depends_is_left_out():
     assert guards_of(piecewise((X, X > Q), otherwise=X)) == ()
     # the branches become equal only when X > P and P < X are known to be one boundary
-    same = piecewise((piecewise((X, X > P), otherwise=V), V > Q), otherwise=piecewise((X, P < X), otherwise=V))
+    same = piecewise(
+        (piecewise((X, X > P), otherwise=V), V > Q), otherwise=piecewise((X, P < X), otherwise=V)
+    )
     twice = piecewise((1, (abs(V) > R) & ~(X > P) | (V > 3)), otherwise=2)
     (first, second), guards = find_guards([same, twice])
     assert [guard.name for guard in guards] == ["p", "v = 0", "r", "v = 3"]

@@ -13,13 +13,21 @@ from saltus.system import freeplay, piecewise
 from saltus.system.guards import find_guards
 from saltus.system.text import to_text
 
-X, V, K, J, C = ex.state("x"), ex.state("v"), ex.parameter("k"), ex.parameter("j"), ex.parameter("c")
+X, V, K, J, C = (
+    ex.state("x"),
+    ex.state("v"),
+    ex.parameter("k"),
+    ex.parameter("j"),
+    ex.parameter("c"),
+)
 sizes = st.floats(0, 2)
 
 
 @given(x=st.floats(-3, 3), v=st.floats(-3, 3), lower=sizes, upper=sizes, c=sizes, preload=sizes)
 def test_force(x, v, lower, upper, c, preload):
-    force = freeplay(x, stiffness=7.0, lower_gap=lower, upper_gap=upper, damping=c, velocity=v, preload=preload)
+    force = freeplay(
+        x, stiffness=7.0, lower_gap=lower, upper_gap=upper, damping=c, velocity=v, preload=preload
+    )
     if x > upper:
         expected = 7 * (x - upper) + c * v
     elif x < -lower:
@@ -65,4 +73,12 @@ def test_errors_teach(arguments, teaches):
 
 
 def test_numbers_of_any_kind_go_together():
-    assert freeplay(Decimal("0.5"), stiffness=np.longdouble(2), upper_gap=np.float32(0.25), preload=Decimal(1)) == 1.5
+    assert (
+        freeplay(
+            Decimal("0.5"),
+            stiffness=np.longdouble(2),
+            upper_gap=np.float32(0.25),
+            preload=Decimal(1),
+        )
+        == 1.5
+    )

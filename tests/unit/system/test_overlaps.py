@@ -26,19 +26,26 @@ def one_sided(t, x, v, *, stiffness=2.0, gap="1 mm"):
 
 @sl.system(states="x v")
 def interference(t, x, v, *, stiffness=2.0, gap=-0.5):
-    return v, -sl.freeplay(x, stiffness=stiffness, lower_gap=gap) - sl.freeplay(x, stiffness=stiffness, upper_gap=gap)
+    return v, -sl.freeplay(x, stiffness=stiffness, lower_gap=gap) - sl.freeplay(
+        x, stiffness=stiffness, upper_gap=gap
+    )
 
 
 def test_a_clearance_is_not_negative_whatever_its_name():
-    says = r"two_sided: with clearance = -0.5 the contacts at x = -clearance and x = clearance overlap.* can't be negative.*sum of two"
+    says = (
+        r"two_sided: with clearance = -0.5 the contacts at x = -clearance and x = clearance "
+        r"overlap.* can't be negative.*sum of two"
+    )
     with pytest.raises(ParameterError, match=says):
         two_sided.with_values(clearance=-0.5)
     assert two_sided.with_values(clearance=0.0).values["clearance"] == 0.0
 
 
 def test_of_two_stops_the_distance_counts():
-    moved = between.with_values(lower=-0.1, upper=0.3)  # both stops on one side: a clearance from 0.1 to 0.3
-    np.testing.assert_allclose(moved.rhs(0.0, (0.0, 0.0)), [0.2, -0.2])  # pressed against the lower one at the start
+    # both stops on one side: a clearance from 0.1 to 0.3
+    moved = between.with_values(lower=-0.1, upper=0.3)
+    # pressed against the lower one at the start
+    np.testing.assert_allclose(moved.rhs(0.0, (0.0, 0.0)), [0.2, -0.2])
     np.testing.assert_allclose(moved.rhs(0.0, (0.1, 0.0)), 0.0, atol=0)
     with pytest.raises(ParameterError, match=r"with lower = -0.4, upper = 0.3 the contacts"):
         between.with_values(lower=-0.4, upper=0.3)
@@ -58,7 +65,9 @@ def test_springs_that_touch_on_both_sides_are_a_sum():
 
 
 def test_pieces_that_overlap_for_all_values_are_the_users_choice():
-    system = sl.system(states="x", name="chain")(lambda t, x, *, k=1.0: -sl.piecewise((k, x < 1), (2 * k, x > 0), otherwise=0))
+    system = sl.system(states="x", name="chain")(
+        lambda t, x, *, k=1.0: -sl.piecewise((k, x < 1), (2 * k, x > 0), otherwise=0)
+    )
     assert system.values["k"] == 1.0
 
 

@@ -1,4 +1,6 @@
-"""A forced system repeats after its forcing period: by formula, by samples, and asked again for every new value."""
+"""A forced system repeats after its forcing period: by formula, by samples, and asked again for
+every new value.
+"""
 
 from dataclasses import replace
 
@@ -11,14 +13,18 @@ from saltus.system.periodic import check_periodic, timing_of
 
 def forced(law, **options):
     def rig(t, x, v, *, amplitude=1e-3, stiffness=1e4, frequency=15.0, other=30.0):
-        return v, law(t, x, amplitude, frequency, other) - stiffness * x - freeplay(x, stiffness=stiffness, gap=0.1)
+        return v, law(t, x, amplitude, frequency, other) - stiffness * x - freeplay(
+            x, stiffness=stiffness, gap=0.1
+        )
 
     return system(**{"states": "x v", "forced_at": "frequency", **options})(rig)
 
 
 SMOOTH = [
     lambda t, x, a, f, g: a * cos(2 * pi * f * t + x) ** 3 * exp(sin(2 * pi * g * t)) - x,
-    lambda t, x, a, f, g: a * cos(2 * pi * f * t - 2 * pi * g * t + 1.0) + a * sin(2 * pi * g * (t + x)),
+    lambda t, x, a, f, g: (
+        a * cos(2 * pi * f * t - 2 * pi * g * t + 1.0) + a * sin(2 * pi * g * (t + x))
+    ),
     lambda t, x, a, f, g: a * cos(2 * pi * mod(g * t, 1.0)),
 ]
 CLOCKS = [
@@ -33,7 +39,9 @@ def verdicts(made):
     passed = []
     for other in OTHERS:
         try:
-            check_periodic(replace(made, values={**made.values, "other": other}, forced_at="frequency"))
+            check_periodic(
+                replace(made, values={**made.values, "other": other}, forced_at="frequency")
+            )
             passed.append(True)
         except TraceError:
             passed.append(False)
@@ -51,9 +59,13 @@ def test_the_formula_tells_all_where_time_enters_as_phases_and_clocks(law, monke
 
 @pytest.mark.parametrize("law", SMOOTH)
 def test_samples_find_the_same(law, monkeypatch):
-    """Of smooth laws: short pulses lie between samples, which is why clocks have the formula only."""
+    """Of smooth laws: short pulses lie between samples, which is why clocks have the
+    formula only.
+    """
     made = forced(law, forced_at=None)
-    monkeypatch.setattr(periodic, "timing_of", lambda entry: replace(timing_of(entry), clocks=(), complete=False))
+    monkeypatch.setattr(
+        periodic, "timing_of", lambda entry: replace(timing_of(entry), clocks=(), complete=False)
+    )
     assert verdicts(made) == list(OTHERS.values())
 
 
@@ -71,7 +83,9 @@ def test_every_value_that_sets_a_period_is_looked_at():
     [
         lambda t, x, a, f, g: a * cos(2 * pi * f * t) + (g - 30.0) * t,
         lambda t, x, a, f, g: a * cos(2 * pi * f * t + (g - 30.0) * t**2),
-        lambda t, x, a, f, g: a * cos(2 * pi * f * t + piecewise((x, x > 0), otherwise=(g - 30.0) * t)),
+        lambda t, x, a, f, g: (
+            a * cos(2 * pi * f * t + piecewise((x, x > 0), otherwise=(g - 30.0) * t))
+        ),
         lambda t, x, a, f, g: a * cos(2 * pi * f * t + (g - 30.0) * t * x),
     ],
 )
@@ -86,4 +100,6 @@ def test_what_no_formula_tells_is_sampled_with_each_value(law):
 def test_a_step_in_time_is_no_phase():
     """An angle that jumps once: its rate is the same on both sides."""
     with pytest.raises(TraceError, match="dv/dt doesn't repeat"):
-        forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t + piecewise((0.5, t > 0.1), otherwise=0.0)))
+        forced(
+            lambda t, x, a, f, g: a * cos(2 * pi * f * t + piecewise((0.5, t > 0.1), otherwise=0.0))
+        )

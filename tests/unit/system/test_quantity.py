@@ -1,21 +1,31 @@
-"""Quantities: functions that join a system read its guards' sides, make guards of their own behind them, and say what is wrong."""
+"""Quantities: functions that join a system read its guards' sides, make guards of their own behind
+them, and say what is wrong.
+"""
 
 import pytest
 
 import saltus as sl
 from saltus.errors import ParameterError, TraceError, UnitError
 from saltus.system.expression import Bit, Not
-from saltus.system.quantity import quantity, turning_surface, with_integrals, with_level, with_surface
+from saltus.system.quantity import (
+    quantity,
+    turning_surface,
+    with_integrals,
+    with_level,
+    with_surface,
+)
 from saltus.system.tangent import tangent_system
 from saltus.system.text import to_text
 
 
 @sl.system(states="x v", forced_at="frequency", units={"x": "m", "v": "m/s"})
 def rig(t, x, v, *, stiffness=1.4e4, gap="0.4 mm", force=4.0, frequency=15.0):
-    return v, force * sl.cos(2 * sl.pi * frequency * t) - x - sl.freeplay(x, stiffness=stiffness, upper_gap=gap)
+    return v, force * sl.cos(2 * sl.pi * frequency * t) - x - sl.freeplay(
+        x, stiffness=stiffness, upper_gap=gap
+    )
 
 
-# -- tracing -------------------------------------------------------------------------------------------------------------------
+# -- tracing ---------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("function", "payload"),
     [
@@ -31,9 +41,12 @@ def test_a_comparison_that_means_a_guard_reads_its_side(function, payload):
 
 
 def test_other_comparisons_become_guards_behind_those_of_the_system():
-    root, guards = quantity(rig, lambda x, gap: sl.piecewise((1, x > -gap), (2, x > gap), otherwise=0))
+    root, guards = quantity(
+        rig, lambda x, gap: sl.piecewise((1, x > -gap), (2, x > gap), otherwise=0)
+    )
     assert guards[0] is rig.guards[0]
-    assert [guard.name for guard in guards] == ["gap", "x = -gap"]  # that of the system keeps its name, although both hold one parameter
+    # that of the system keeps its name, although both hold one parameter
+    assert [guard.name for guard in guards] == ["gap", "x = -gap"]
     assert root.payload == Bit(1)
     assert root.args[1].payload == Bit(0)
 
@@ -60,7 +73,11 @@ def _branches(x):
 @pytest.mark.parametrize(
     ("function", "words"),
     [
-        (lambda x, stifness: x, r"asks for 'stifness', which is neither t nor a state or parameter of rig. Did you mean 'stiffness'\?"),
+        (
+            lambda x, stifness: x,
+            r"asks for 'stifness', which is neither t nor a state or parameter "
+            r"of rig. Did you mean 'stiffness'\?",
+        ),
         (lambda *args: args, "asks for 'args'"),
         (lambda x: None, "returns nothing"),
         (_branches, r"if x > 0"),
@@ -74,7 +91,7 @@ def test_what_cant_be_traced_says_where_and_why(function, words):
         quantity(rig, function)
 
 
-# -- surfaces ------------------------------------------------------------------------------------------------------------------
+# -- surfaces --------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("function", "gap", "state"),
     [
@@ -95,7 +112,11 @@ def test_a_surface_is_the_last_guard_with_the_sign_and_scale_of_its_function(fun
 
 def test_a_surface_survives_data_and_has_a_fingerprint_of_its_own():
     system = with_surface(rig, lambda x, v: x * v - 1)
-    assert sl.System.from_dict(system.to_dict()).fingerprint() == system.fingerprint() != rig.fingerprint()
+    assert (
+        sl.System.from_dict(system.to_dict()).fingerprint()
+        == system.fingerprint()
+        != rig.fingerprint()
+    )
     assert "surface" in repr(system)
     assert tangent_system(system).guards == system.guards
 
@@ -125,7 +146,11 @@ def test_a_state_turns_where_its_rate_is_zero():
         (lambda: with_surface(rig, "y"), ParameterError, "no state 'y'"),
         (lambda: with_surface(rig, lambda t: t - 1), TraceError, "depends on time only"),
         (lambda: with_surface(rig, lambda gap: gap - 1), TraceError, "depends on parameters only"),
-        (lambda: with_surface(rig, lambda t, x: x - sl.cos(t)), TraceError, "the boundary 'surface' doesn't repeat"),
+        (
+            lambda: with_surface(rig, lambda t, x: x - sl.cos(t)),
+            TraceError,
+            "the boundary 'surface' doesn't repeat",
+        ),
         (lambda: with_level(rig, "x", "0.3 s"), UnitError, "level of x"),
         (lambda: turning_surface(rig, "y"), ParameterError, "no state 'y'"),
     ],
@@ -135,9 +160,11 @@ def test_what_is_no_surface_is_refused(make, error, words):
         make()
 
 
-# -- integrals -----------------------------------------------------------------------------------------------------------------
+# -- integrals -------------------------------------------------------------------------------------
 def test_integrals_are_the_last_states():
-    system = with_integrals(rig, {"work": lambda v, force: force * v, "path": lambda v: abs(v)}, {"work": "J"})
+    system = with_integrals(
+        rig, {"work": lambda v, force: force * v, "path": lambda v: abs(v)}, {"work": "J"}
+    )
     assert system.states == ("x", "v", "work", "path")
     assert system.field[:2] == rig.field
     assert to_text(system.field[2]) == "force*v"

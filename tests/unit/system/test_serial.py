@@ -22,7 +22,11 @@ from saltus.system.guards import find_guards
 def nested():
     @system(states="x v", forced_at="frequency", units={"x": "m"})
     def rig(t, x, v, *, gap=0.1, frequency=2.0):
-        law = piecewise((abs(x) - gap, (abs(x) > gap) & ~(v > 0) | (v > 3)), (max(x, v), x > 2 * v), otherwise=0.1)
+        law = piecewise(
+            (abs(x) - gap, (abs(x) > gap) & ~(v > 0) | (v > 3)),
+            (max(x, v), x > 2 * v),
+            otherwise=0.1,
+        )
         return v, -law + cos(2 * pi * frequency * t)
 
     return rig
@@ -30,11 +34,26 @@ def nested():
 
 def same(a, b):
     guards = [[(g.name, g.gap, g.state, g.boundary) for g in made.guards] for made in (a, b)]
-    plain = [(m.name, m.description, m.source, m.states, dict(m.values), dict(m.units), m.forced_at, m.fingerprint()) for m in (a, b)]
-    return a.field == b.field and guards[0] == guards[1] and plain[0] == plain[1]  # interned: equal expressions are one object
+    plain = [
+        (
+            m.name,
+            m.description,
+            m.source,
+            m.states,
+            dict(m.values),
+            dict(m.units),
+            m.forced_at,
+            m.fingerprint(),
+        )
+        for m in (a, b)
+    ]
+    # interned: equal expressions are one object
+    return a.field == b.field and guards[0] == guards[1] and plain[0] == plain[1]
 
 
-@pytest.mark.parametrize("made", [model() for model in MODELS.values()] + [nested()], ids=lambda made: made.name)
+@pytest.mark.parametrize(
+    "made", [model() for model in MODELS.values()] + [nested()], ids=lambda made: made.name
+)
 def test_round_trips(made):
     assert same(System.from_dict(json.loads(json.dumps(made.to_dict()))), made)
     assert same(pickle.loads(pickle.dumps(made)), made)
@@ -47,7 +66,9 @@ def test_random_equations_round_trip(expressions, data):
     entry = data.draw(expressions)
     gap = data.draw(expressions) + 2 * ex.state("x")
     field, guards = find_guards([ex.state("v"), piecewise((entry, gap > 0), otherwise=-entry)])
-    made = System("random", ("x", "v"), field, guards, {"p": 0.1, "q": 1e300}, dict.fromkeys("xvpq", ""))
+    made = System(
+        "random", ("x", "v"), field, guards, {"p": 0.1, "q": 1e300}, dict.fromkeys("xvpq", "")
+    )
     assert same(System.from_dict(json.loads(json.dumps(made.to_dict()))), made)
 
 
@@ -59,10 +80,14 @@ def test_pickles_hold_no_code():
     assert pickle.loads(pickle.dumps(local)).field is not None
 
 
-def variant(stiffness=2.0, states="x v", unit="Hz", name="k", guard=True, forced_at="f", factor=3.0):
+def variant(
+    stiffness=2.0, states="x v", unit="Hz", name="k", guard=True, forced_at="f", factor=3.0
+):
     def rig(t, x, v, *, k=stiffness, f=1.0):
         force = piecewise((k * x * factor, x > 1 if guard else x > 2), otherwise=0)
-        return v, force + (cos(2 * pi * f * t) if unit == "Hz" else cos(f * t) * cos(2 * pi * f * t / (2 * pi)))
+        return v, force + (
+            cos(2 * pi * f * t) if unit == "Hz" else cos(f * t) * cos(2 * pi * f * t / (2 * pi))
+        )
 
     return system(states=states, forced_at=forced_at, units={"f": unit}, name=name)(rig)
 
@@ -73,7 +98,12 @@ def test_the_fingerprint_knows_equations_only():
     assert variant(stiffness=5.0).fingerprint() == reference
     assert variant(name="other").fingerprint() == reference
     assert variant().with_values(k=7.0).fingerprint() == reference
-    others = [variant(guard=False), variant(forced_at=None), variant(factor=3.0000000000000004), variant(unit="rad/s")]
+    others = [
+        variant(guard=False),
+        variant(forced_at=None),
+        variant(factor=3.0000000000000004),
+        variant(unit="rad/s"),
+    ]
     assert len({reference, *(other.fingerprint() for other in others)}) == 5
 
 
@@ -81,7 +111,10 @@ def test_the_fingerprint_knows_what_sets_the_period():
     def rig(t, x, *, f=1.0):
         return -x * f
 
-    made = [system(states="x", forced_at=forced, units={"f": unit})(rig) for forced, unit in (("f", "Hz"), ("f", "rad/s"), (None, "Hz"))]
+    made = [
+        system(states="x", forced_at=forced, units={"f": unit})(rig)
+        for forced, unit in (("f", "Hz"), ("f", "rad/s"), (None, "Hz"))
+    ]
     assert made[0].field == made[1].field == made[2].field
     assert len({one.fingerprint() for one in made}) == 3
 
@@ -90,7 +123,11 @@ def test_the_fingerprint_is_that_of_another_process():
     code = "from saltus.models import delangre; print(delangre('c').fingerprint())"
     for seed in ("1", "2"):
         run = subprocess.run(
-            [sys.executable, "-c", code], check=True, capture_output=True, text=True, env={**os.environ, "PYTHONHASHSEED": seed}
+            [sys.executable, "-c", code],
+            check=True,
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYTHONHASHSEED": seed},
         )
         assert run.stdout.strip() == delangre("b").fingerprint()
 
@@ -115,7 +152,12 @@ def damaged(change):
         (damaged(lambda d: d["nodes"].insert(0, ["add", [-1, -1], None])), "wrong operands"),
         (damaged(lambda d: d["nodes"].append(["select", [0, 1], ["bit", 99]])), None),
         (damaged(lambda d: d["nodes"].append(["select", [0, 1], ["xor", 1]])), "unknown condition"),
-        (damaged(lambda d: d["nodes"].append(["select", [0, 1], ["not", ["bit", 0], ["bit", 0]]])), "unknown condition"),
+        (
+            damaged(
+                lambda d: d["nodes"].append(["select", [0, 1], ["not", ["bit", 0], ["bit", 0]]])
+            ),
+            "unknown condition",
+        ),
         (damaged(lambda d: d["guards"].clear()), "unknown guard"),
         (damaged(lambda d: d["guards"].insert(0, d["guards"].pop(1))), "later guard"),
         (damaged(lambda d: d["guards"][0].__setitem__(2, "zzz")), "unknown state"),
@@ -123,7 +165,10 @@ def damaged(change):
         (damaged(lambda d: d["field"].__setitem__(0, -1)), "stands in no node"),
         (damaged(lambda d: d["guards"][0].__setitem__(1, -1)), "stands in no node"),
         (damaged(lambda d: d["guards"][0].__setitem__(3, -1)), "stands in no node"),
-        (damaged(lambda d: d["guards"][0].__setitem__(0, "a\x1b]0;title\x07")), "no name of a boundary"),
+        (
+            damaged(lambda d: d["guards"][0].__setitem__(0, "a\x1b]0;title\x07")),
+            "no name of a boundary",
+        ),
         (damaged(lambda d: d["guards"][0].__setitem__(0, 5)), "must be text"),
         (damaged(lambda d: d["units"].update(x="\x1b[31m")), "unit .* can't be read"),
         (damaged(lambda d: d.update(forced_at="zzz")), "forced_at"),
@@ -136,7 +181,15 @@ def damaged(change):
         (damaged(lambda d: d.update(source=["a"])), "must be text"),
         (damaged(lambda d: d["nodes"].insert(0, ["const", [], 10**400])), "damaged"),
         (
-            damaged(lambda d: d["nodes"].append(["select", [0, 1], functools.reduce(lambda c, _: ["not", c], range(3000), ["bit", 0])])),
+            damaged(
+                lambda d: d["nodes"].append(
+                    [
+                        "select",
+                        [0, 1],
+                        functools.reduce(lambda c, _: ["not", c], range(3000), ["bit", 0]),
+                    ]
+                )
+            ),
             "damaged",
         ),
         (damaged(lambda d: d["values"].update(gap="a")), "damaged"),
@@ -186,7 +239,9 @@ def test_a_traced_state_of_a_strange_name_is_refused(name):
 
 
 def test_text_of_a_name_is_no_code(tmp_path):
-    """The name that once closed the docstring of the generated module and went on as code is refused as data and when it is traced."""
+    """The name that once closed the docstring of the generated module and went on as code is
+    refused as data and when it is traced.
+    """
     name = f'x"""\nopen({str(tmp_path / "mark")!r}, "w")\n"""'
     with pytest.raises(SaltusError, match="one line of text"):
         System.from_dict(delangre("b").to_dict() | {"name": name})

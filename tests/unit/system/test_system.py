@@ -31,7 +31,11 @@ def test_with_values_gives_a_copy_and_traces_nothing():
 
 
 def test_values_are_given_by_name():
-    with pytest.raises(ParameterError, match=r"takes values by name, and \{'force': 3\} has none. Write with_values\(mass=...\)"):
+    with pytest.raises(
+        ParameterError,
+        match=r"takes values by name, and \{'force': 3\} has none. "
+        r"Write with_values\(mass=...\)",
+    ):
         RIG.with_values({"force": 3})
 
 
@@ -55,11 +59,19 @@ def test_nothing_can_be_changed_in_place():
 @pytest.mark.parametrize(
     ("values", "error", "teaches"),
     [
-        ({"contact_stifness": 1.0}, ParameterError, "no parameter 'contact_stifness'. Did you mean 'contact_stiffness'"),
+        (
+            {"contact_stifness": 1.0},
+            ParameterError,
+            "no parameter 'contact_stifness'. Did you mean 'contact_stiffness'",
+        ),
         ({"zzz": 1.0}, ParameterError, "Known: contact_stiffness, cubic"),
         ({"mass": 0.0}, ParameterError, "mass = 0 must be positive"),
         ({"mass": "-3 kg"}, ParameterError, "mass = -3 must be positive"),
-        ({"upper_gap": "-0.1 mm"}, ParameterError, "lower_gap = 0, upper_gap = -0.0001 the contacts at .* overlap"),
+        (
+            {"upper_gap": "-0.1 mm"},
+            ParameterError,
+            "lower_gap = 0, upper_gap = -0.0001 the contacts at .* overlap",
+        ),
         ({"frequency": 0.0}, ParameterError, "it is the forcing frequency"),
         ({"frequency": "-1 Hz"}, ParameterError, "it is the forcing frequency"),
         ({"force": math.nan}, ParameterError, "force = nan is not a finite number"),
@@ -77,14 +89,26 @@ def test_errors_teach(values, error, teaches):
 @pytest.mark.parametrize(
     ("call", "teaches"),
     [
-        (lambda: RIG["upper_gap"], r"no items: delangre\.values\['upper_gap'\] is .* delangre\.with_values\(upper_gap=\.\.\.\)"),
+        (
+            lambda: RIG["upper_gap"],
+            r"no items: delangre\.values\['upper_gap'\] is .* "
+            r"delangre\.with_values\(upper_gap=\.\.\.\)",
+        ),
         (lambda: RIG.upper_gap, r"no attribute 'upper_gap': delangre\.values\['upper_gap'\]"),
-        (lambda: RIG["x"], r"'x' is a state\. Its motion is sl\.simulate\(delangre, \.\.\.\)\['x'\]"),
+        (
+            lambda: RIG["x"],
+            r"'x' is a state\. Its motion is sl\.simulate\(delangre, "
+            r"\.\.\.\)\['x'\]",
+        ),
         (lambda: RIG["uper_gap"], "Did you mean 'upper_gap'"),
         (lambda: RIG[0], r"parameters are in delangre\.values"),
         (lambda: list(RIG), r"parameters are in delangre\.values"),
         (lambda: "x" in RIG, r"parameters are in delangre\.values"),
-        (lambda: RIG.__setitem__("upper_gap", 1), r"never changed: .*delangre\.with_values\(upper_gap=\.\.\.\)"),
+        (
+            lambda: RIG.__setitem__("upper_gap", 1),
+            r"never changed: "
+            r".*delangre\.with_values\(upper_gap=\.\.\.\)",
+        ),
     ],
 )
 def test_a_system_taken_for_a_table_says_what_to_write(call, teaches):
@@ -116,13 +140,18 @@ def test_period():
     assert RIG.period({"force": 1.0}) == 1 / 15
     assert aeroelastic().period() is None
     for frequency in ({}, "9 Hz", None, [], 0):
-        with pytest.raises(ParameterError, match=r"frequency must be a positive number or an array of them, not .+\.$"):
+        with pytest.raises(
+            ParameterError,
+            match=r"frequency must be a positive number or an array "
+            r"of them, not .+\.$",
+        ):
             RIG.period({"frequency": frequency})
 
 
 @pytest.mark.parametrize(
     "value",
-    [{}, set(), b"3 N", np.zeros((2, 2)), np.array([None]), np.ma.masked_array([1.0], [True]), np.datetime64("2020"), datetime.timedelta(1),
+    [{}, set(), b"3 N", np.zeros((2, 2)), np.array([None]), np.ma.masked_array([1.0], [True]),
+        np.datetime64("2020"), datetime.timedelta(1),
      decimal.Decimal("sNaN"), 1j, RIG, lambda: 3, np.array(["3 N"] * 2)],
     ids=lambda value: type(value).__name__,
 )  # fmt: skip
@@ -130,9 +159,12 @@ def test_what_is_no_value_is_refused_on_one_line(value):
     """Whatever it is, and however its text looks."""
     data = RIG.to_dict()
     calls = [
-        lambda: RIG.with_values(force=value), lambda: RIG.with_values(value), lambda: System.from_dict({**data, "name": value}),
-        lambda: System.from_dict({**data, "field": [value]}), lambda: System.from_dict({**data, "nodes": [[value, [], 1.0]]}),
-        lambda: system(states="x", name=value), lambda: system(states="x", check_units=value), lambda: system(states="x")(value),
+        lambda: RIG.with_values(force=value), lambda: RIG.with_values(value),
+        lambda: System.from_dict({**data, "name": value}),
+        lambda: System.from_dict({**data, "field": [value]}),
+        lambda: System.from_dict({**data, "nodes": [[value, [], 1.0]]}),
+        lambda: system(states="x", name=value), lambda: system(states="x", check_units=value),
+        lambda: system(states="x")(value),
     ]  # fmt: skip
     for call in calls:
         with pytest.raises(SaltusError) as caught:
@@ -150,23 +182,41 @@ def test_units_and_texts():
         RIG.parameter_text("y")
 
 
-@pytest.mark.parametrize("made", [delangre("c"), chain(), gear_pair(), aeroelastic()], ids=lambda made: made.name)
+@pytest.mark.parametrize(
+    "made", [delangre("c"), chain(), gear_pair(), aeroelastic()], ids=lambda made: made.name
+)
 def test_jacobian_and_gradients_against_differences(made):
     random = np.random.default_rng(3)
     y = random.uniform(-3e-3, 3e-3, len(made.states))
     bits = list(random.random(len(made.guards)) < 0.5)
     expressions = [*made.field, *(guard.gap for guard in made.guards)]
-    derived = np.array([evaluate(row, t=0.01, states=dict(zip(made.states, y, strict=True)), values=made.values, bits=bits)
-                        for row in (*made.jacobian, *made.guard_gradients)])  # fmt: skip
+    derived = np.array(
+        [
+            evaluate(
+                row,
+                t=0.01,
+                states=dict(zip(made.states, y, strict=True)),
+                values=made.values,
+                bits=bits,
+            )
+            for row in (*made.jacobian, *made.guard_gradients)
+        ]
+    )
     for column in range(len(y)):
         ends = []
         for sign in (-1, 1):
             moved = y.copy()
             moved[column] += sign * 1e-6
             states = dict(zip(made.states, moved, strict=True))
-            ends.append(np.array(evaluate(expressions, t=0.01, states=states, values=made.values, bits=bits)))
+            ends.append(
+                np.array(
+                    evaluate(expressions, t=0.01, states=states, values=made.values, bits=bits)
+                )
+            )
         scale = np.abs(derived).max()
-        assert (ends[1] - ends[0]) / 2e-6 == pytest.approx(derived[:, column], rel=1e-5, abs=1e-8 * scale)
+        assert (ends[1] - ends[0]) / 2e-6 == pytest.approx(
+            derived[:, column], rel=1e-5, abs=1e-8 * scale
+        )
 
 
 def test_derived_equations_are_computed_once():
@@ -188,7 +238,9 @@ def test_copies_share_what_follows_from_the_equations(monkeypatch):
 
 
 def test_copies_share_their_tangent_system():
-    """Of two systems that are no copies of one another the flow is compiled, or looked up, twice."""
+    """Of two systems that are no copies of one another the flow is compiled, or
+    looked up, twice.
+    """
     other = RIG.with_values(force="5 N")
     assert tangent_system(other).origin is tangent_system(RIG).origin
     assert (tangent_system(other).values, tangent_system(RIG).values) == (other.values, RIG.values)
@@ -196,8 +248,16 @@ def test_copies_share_their_tangent_system():
 
 
 def test_importing_the_layer_is_light():
-    code = "import sys, saltus.system, saltus.models; print([m for m in ('sympy', 'llvmlite', 'scipy', 'xarray') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.strip() == "[]"
+    code = (
+        "import sys, saltus.system, saltus.models; print([m for m in ('sympy', 'llvmlite', "
+        "'scipy', 'xarray') if m in sys.modules])"
+    )
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], check=True, capture_output=True, text=True
+        ).stdout.strip()
+        == "[]"
+    )
 
 
 def test_the_right_hand_side_is_a_plain_function():
@@ -205,7 +265,13 @@ def test_the_right_hand_side_is_a_plain_function():
     t, y = 0.123, np.array([[-1e-4, 2e-4, 1e-3], [0.1, -0.2, 0.3]])
     wn, w, (x, v) = 2 * np.pi * 5.0, 2 * np.pi * 7.0, y
     stop = np.where(x < 0, x, np.where(x > 0.4e-3, x - 0.4e-3, 0.0))
-    rate = -2 * 0.03 * wn * v - wn**2 * x - 7e8 / 3 * x**3 - 1.4e4 / 3 * stop + 4 * (1 - 18 / w**2) * np.cos(w * t) / 3
+    rate = (
+        -2 * 0.03 * wn * v
+        - wn**2 * x
+        - 7e8 / 3 * x**3
+        - 1.4e4 / 3 * stop
+        + 4 * (1 - 18 / w**2) * np.cos(w * t) / 3
+    )
     np.testing.assert_allclose(rig.rhs(t, y), [v, rate], rtol=1e-14)
     np.testing.assert_allclose(rig.rhs(t, y[:, 2]), [v[2], rate[2]], rtol=1e-14)
     with pytest.raises(ParameterError, match="delangre has the states x, v, but y holds 3 of them"):

@@ -34,7 +34,10 @@ SCOPE |= {"x": X, "v": V, "p": P, "q": ex.parameter("q"), "t": ex.TIME}
         (X**-1, "x**(-1)"),
         (7e8 * X + 1e-3, "7e8*x + 0.001"),
         (ex.elementary("sin", X * P), "sin(x*p)"),
-        (ex.select(X > P, X, ex.select(X < -P, V, 0)), "piecewise((x, x > p), (v, -p > x), otherwise=0)"),
+        (
+            ex.select(X > P, X, ex.select(X < -P, V, 0)),
+            "piecewise((x, x > p), (v, -p > x), otherwise=0)",
+        ),
         (ex.select((X > P) & ~(V > 0), X, 0), "piecewise((x, (x > p) & (v < 0)), otherwise=0)"),
         (ex.select(~((X > P) & (V > 0)), X, 0), "piecewise((x, (x < p) | (v < 0)), otherwise=0)"),
         (ex.select(ex.Bit(2), X, 0), "piecewise((x, guard2 > 0), otherwise=0)"),

@@ -19,7 +19,9 @@ def test_many_states_come_together():
     def written_out(t, a, b, c, d, *, spring=4.0):
         return c, d, -spring * a, -spring * b
 
-    together, apart = (system(states="a b c d", name="row")(function) for function in (row, written_out))
+    together, apart = (
+        system(states="a b c d", name="row")(function) for function in (row, written_out)
+    )
     assert together.equations() == apart.equations()
     assert together.states == ("a", "b", "c", "d")
 
@@ -33,7 +35,9 @@ def oscillator(t, x, v, *, stiffness=4.0, gap=0.1, force=1.0, frequency=2.0):
 
     More about it.
     """
-    return v, force * cos(2 * pi * frequency * t) - piecewise((stiffness * (x - gap), x > gap), otherwise=0)
+    return v, force * cos(2 * pi * frequency * t) - piecewise(
+        (stiffness * (x - gap), x > gap), otherwise=0
+    )
 
 
 def test_what_a_system_is_made_from():
@@ -41,11 +45,19 @@ def test_what_a_system_is_made_from():
     assert made.name == "oscillator"
     assert made.states == ("x", "v")
     assert dict(made.values) == {"stiffness": 4.0, "gap": 0.1, "force": 1.0, "frequency": 2.0}
-    assert dict(made.units) == {"x": "", "v": "", "stiffness": "", "gap": "", "force": "", "frequency": "Hz"}
+    assert dict(made.units) == {
+        "x": "",
+        "v": "",
+        "stiffness": "",
+        "gap": "",
+        "force": "",
+        "frequency": "Hz",
+    }
     assert (made.forced_at, made.source) == ("frequency", "a paper")
     assert made.description == "A block behind a gap.\n\nMore about it."
     assert [to_text(entry) for entry in made.field] == [
-        "v", "force*cos(2*pi*frequency*t) - piecewise((stiffness*(x - gap), guard0 > 0), otherwise=0)",
+        "v", "force*cos(2*pi*frequency*t) - piecewise((stiffness*(x - gap), guard0 > 0), "
+             "otherwise=0)",
     ]  # fmt: skip
     assert [guard.name for guard in made.guards] == ["gap"]
 
@@ -74,13 +86,32 @@ def test_states_as_a_list_and_one_state():
 
 
 def test_defaults_with_units():
-    def rig(t, x, v, *, mass="3 kg", gap="0.4 mm", stiffness="14 kN/m", frequency="900 rpm", own="2 Hz", angle="90 deg"):
+    def rig(
+        t,
+        x,
+        v,
+        *,
+        mass="3 kg",
+        gap="0.4 mm",
+        stiffness="14 kN/m",
+        frequency="900 rpm",
+        own="2 Hz",
+        angle="90 deg",
+    ):
         return v, -stiffness * x / mass * cos(2 * pi * frequency * t) + 0 * own - v * angle / gap
 
     made = make(rig, forced_at="frequency", units={"x": "m"})
-    assert dict(made.values) == {"mass": 3.0, "gap": 4e-4, "stiffness": 14e3, "frequency": 15.0, "own": 2.0, "angle": math.pi / 2}
+    assert dict(made.values) == {
+        "mass": 3.0,
+        "gap": 4e-4,
+        "stiffness": 14e3,
+        "frequency": 15.0,
+        "own": 2.0,
+        "angle": math.pi / 2,
+    }
     assert dict(made.units) == {
-        "x": "m", "v": "", "mass": "kg", "gap": "m", "stiffness": "N/m", "frequency": "Hz", "own": "Hz", "angle": "rad",
+        "x": "m", "v": "", "mass": "kg", "gap": "m", "stiffness": "N/m", "frequency": "Hz",
+        "own": "Hz", "angle": "rad",
     }  # fmt: skip
     declared = make(rig, forced_at="frequency", units={"frequency": "Hz", "own": "rad/s"})
     assert declared.values["own"] == pytest.approx(4 * math.pi, rel=1e-15)
@@ -100,9 +131,15 @@ def test_a_default_in_rad_per_second_says_that_the_forcing_is_counted_so():
     assert make(turning, forced_at="speed").units["speed"] == "Hz"
 
 
-@pytest.mark.parametrize("law", [lambda x: freeplay(x, 4.0, 0.1), lambda x: freeplay(x, k=4.0, gap=0.1)])
+@pytest.mark.parametrize(
+    "law", [lambda x: freeplay(x, 4.0, 0.1), lambda x: freeplay(x, k=4.0, gap=0.1)]
+)
 def test_a_law_called_otherwise_is_answered_by_how_it_is_called(law):
-    with pytest.raises(TraceError, match=r"sl\.freeplay\(\) .*Write sl\.freeplay\(x, stiffness=\.\.\., gap=\.\.\.\)") as caught:
+    with pytest.raises(
+        TraceError,
+        match=r"sl\.freeplay\(\) .*Write sl\.freeplay\(x, "
+        r"stiffness=\.\.\., gap=\.\.\.\)",
+    ) as caught:
         make(lambda t, x, v: (v, -law(x)))
     assert "np.interp" not in str(caught.value)
 
@@ -133,13 +170,19 @@ def test_signatures(function, teaches):
         make(function)
 
 
-@pytest.mark.parametrize(("states", "teaches"), [("", "names no state"), ("x x", "twice"), ("x 2v", "'2v' can't be"), ("x-v", "can't be")])
+@pytest.mark.parametrize(
+    ("states", "teaches"),
+    [("", "names no state"), ("x x", "twice"), ("x 2v", "'2v' can't be"), ("x-v", "can't be")],
+)
 def test_names_of_states(states, teaches):
     with pytest.raises(TraceError, match=teaches):
         make(lambda t, x, v: (v, x), states=states)
 
 
-@pytest.mark.parametrize(("word", "teaches"), [("forcing", 'Write forced_at=.*forced_at="frequency"'), ("unit", "Did you mean 'units'")])
+@pytest.mark.parametrize(
+    ("word", "teaches"),
+    [("forcing", 'Write forced_at=.*forced_at="frequency"'), ("unit", "Did you mean 'units'")],
+)
 def test_an_option_that_is_not_there_is_answered_by_one_that_is(word, teaches):
     with pytest.raises(TraceError, match=teaches):
         system(states="x v", **{word: "f"})
@@ -150,9 +193,14 @@ def test_the_decorator_needs_its_states():
         system(states=lambda t, x, v: (v, x))
 
 
-@pytest.mark.parametrize("first", ["import saltus.models", "from saltus.system import System", "sl.system", "pass"])
+@pytest.mark.parametrize(
+    "first", ["import saltus.models", "from saltus.system import System", "sl.system", "pass"]
+)
 def test_the_public_name_is_the_decorator_whatever_was_imported_before(first):
-    code = f"import saltus as sl\n{first}\n@sl.system(states='x')\ndef rig(t, x):\n    return -x\nassert isinstance(rig, sl.System)"
+    code = (
+        f"import saltus as sl\n{first}\n@sl.system(states='x')\ndef rig(t, x):\n    return "
+        f"-x\nassert isinstance(rig, sl.System)"
+    )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
@@ -294,23 +342,40 @@ class TestPeriodicity:
     @staticmethod
     def forced(law, **options):
         def rig(t, x, v, *, amplitude=1e-3, stiffness=1e10, frequency=15.0, other=30.0):
-            return v, law(t, x, amplitude, frequency, other) - stiffness * x - freeplay(x, stiffness=stiffness, gap=0.1)
+            return v, law(t, x, amplitude, frequency, other) - stiffness * x - freeplay(
+                x, stiffness=stiffness, gap=0.1
+            )
 
         return make(rig, **{"forced_at": "frequency", **options})
 
     def test_the_forgotten_two_pi(self):
-        with pytest.raises(TraceError, match=r"dv/dt doesn't repeat.*T = 0.0666667 s.*cos\(2\*pi\*frequency\*t\)"):
+        with pytest.raises(
+            TraceError,
+            match=r"dv/dt doesn't repeat.*T = 0.0666667 "
+            r"s.*cos\(2\*pi\*frequency\*t\)",
+        ):
             self.forced(lambda t, x, a, f, g: a * cos(f * t))
-        with pytest.raises(TraceError, match=r"as cos\(frequency\*t\), or as cos\(2\*pi\*frequency\*t\) with units={'frequency': 'Hz'}"):
+        with pytest.raises(
+            TraceError,
+            match=r"as cos\(frequency\*t\), or as "
+            r"cos\(2\*pi\*frequency\*t\) with units={'frequency': "
+            r"'Hz'}",
+        ):
             self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t), units={"frequency": "rad/s"})
 
     def test_revolutions_per_minute_are_hertz_unless_said_otherwise(self):
         def rotor(t, x, v, *, speed="1200 rpm"):
             return v, cos(speed * t) - x
 
-        with pytest.raises(TraceError, match=r"as cos\(2\*pi\*speed\*t\), or as cos\(speed\*t\) with units={'speed': 'rad/s'}"):
+        with pytest.raises(
+            TraceError,
+            match=r"as cos\(2\*pi\*speed\*t\), or as cos\(speed\*t\) "
+            r"with units={'speed': 'rad/s'}",
+        ):
             make(rotor, forced_at="speed")
-        assert make(rotor, forced_at="speed", units={"speed": "rad/s"}).period() == pytest.approx(0.05, rel=1e-15)
+        assert make(rotor, forced_at="speed", units={"speed": "rad/s"}).period() == pytest.approx(
+            0.05, rel=1e-15
+        )
 
     def test_a_ramp(self):
         with pytest.raises(TraceError, match="leave forced_at= out"):
@@ -337,7 +402,12 @@ class TestPeriodicity:
         assert len(self.forced(lambda t, x, a, f, g: moving(t, x, a, f, 2 * pi * f)).guards) == 3
 
     def test_phases_and_harmonics_pass(self):
-        assert self.forced(lambda t, x, a, f, g: a * cos(2 * pi * f * t + x) ** 3 + a * sin(200 * pi * f * t)).period() == 1 / 15
+        assert (
+            self.forced(
+                lambda t, x, a, f, g: a * cos(2 * pi * f * t + x) ** 3 + a * sin(200 * pi * f * t)
+            ).period()
+            == 1 / 15
+        )
         assert self.forced(lambda t, x, a, f, g: 0.0).period() == 1 / 15
         assert self.forced(lambda t, x, a, f, g: a * cos(f * t), forced_at=None).period() is None
 
@@ -369,12 +439,18 @@ def test_defaults_in_torques_and_half_powers_are_read():
 
 
 def test_letters_that_only_look_alike_are_told():
-    """The micro sign of keyboards; Python reads it as the Greek letter in the names of arguments, not in texts."""
+    """The micro sign of keyboards; Python reads it as the Greek letter in the names of arguments,
+    not in texts.
+    """
 
     def block(t, x, v, *, µ=0.3):
         return v, -x - µ * v
 
-    with pytest.raises(SaltusError, match=r"Write 'μ' \('\\u03bc'\), which is how Python reads 'µ' \('\\xb5'\) in the function"):
+    with pytest.raises(
+        SaltusError,
+        match=r"Write 'μ' \('\\u03bc'\), which is how Python reads 'µ' "
+        r"\('\\xb5'\) in the function",
+    ):
         system(states="x v", units={"\u00b5": "1"})(block)
     traced = system(states="x v", units={"\u03bc": "1"})(block)
     with pytest.raises(SaltusError, match="they only appear alike"):

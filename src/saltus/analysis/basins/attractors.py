@@ -52,11 +52,14 @@ def attractors(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """The attractors that given starts lead to: period, contacts, size, multipliers, margin to the next graze.
+    """The attractors that given starts lead to: period, contacts, size, multipliers, margin to the
+    next graze.
 
-    A trajectory is followed until it has settled, not for a fixed number of periods. Periodic responses are polished by Newton's method on
-    the stroboscopic map and verified by their Floquet multipliers; what never repeats is typed by its largest Lyapunov exponent. Where
-    errors of the method keep a motion from closing (ode45 at a loose tolerance), exact integration says which orbit it scatters about.
+    A trajectory is followed until it has settled, not for a fixed number of periods. Periodic
+    responses are polished by Newton's method on the stroboscopic map and verified by their Floquet
+    multipliers; what never repeats is typed by its largest Lyapunov exponent. Where errors of the
+    method keep a motion from closing (ode45 at a loose tolerance), exact integration says which
+    orbit it scatters about.
 
     Parameters
     ----------
@@ -78,10 +81,12 @@ def attractors(
     Returns
     -------
     Dataset
-        Dim ``attractor``: ``attractor_type``, ``attractor_period`` (the n of nT), ``attractor_contacts``, ``attractor_itinerary``,
-        ``attractor_peak``, ``attractor_rms``, ``attractor_margin``, multipliers, exponent, and its states at whole periods. Of a noisy one
-        these are the exact orbit's, and ``attractor_scatter`` [unit of the first state] says how far from it the points lie. Dim
-        ``trajectory``: ``basin``, the attractor of each start (-2: none was established), ``periods_to_settle``.
+        Dim ``attractor``: ``attractor_type``, ``attractor_period`` (the n of nT),
+        ``attractor_contacts``, ``attractor_itinerary``, ``attractor_peak``, ``attractor_rms``,
+        ``attractor_margin``, multipliers, exponent, and its states at whole periods. Of a noisy one
+        these are the exact orbit's, and ``attractor_scatter`` [unit of the first state] says how
+        far from it the points lie. Dim ``trajectory``: ``basin``, the attractor of each start (-2:
+        none was established), ``periods_to_settle``.
 
     Raises
     ------
@@ -101,12 +106,25 @@ def attractors(
     ([1, 3], [0, 1, 0])
     """
     group, periods = ensemble(system, start, None), whole(periods, "periods")
-    map_ = Stroboscope(system, check_method(method), every=None if every is None else to_si(every, "s", "every"), threads=threads)
+    map_ = Stroboscope(
+        system,
+        check_method(method),
+        every=None if every is None else to_si(every, "s", "every"),
+        threads=threads,
+    )
     scale = _spread(map_, group.start)
     with reporting(progress) as show:
         found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
-    starts = {"trajectory": np.arange(group.size), "basin": np.where(label < 0, Kind.UNCONVERGED, label), "periods_to_settle": settled}
-    attrs = provenance(system, map_.method, system.values) | {"periods": periods} | stray_attrs(found.astray)
+    starts = {
+        "trajectory": np.arange(group.size),
+        "basin": np.where(label < 0, Kind.UNCONVERGED, label),
+        "periods_to_settle": settled,
+    }
+    attrs = (
+        provenance(system, map_.method, system.values)
+        | {"periods": periods}
+        | stray_attrs(found.astray)
+    )
     return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
 
 
@@ -124,7 +142,8 @@ def basin_fractions(
     progress: bool | Callable[[float], None] | None = None,
     **box: Any,
 ) -> xr.Dataset:
-    """How likely each response is: random starts from a box of any number of states, with confidence intervals.
+    """How likely each response is: random starts from a box of any number of states, with
+    confidence intervals.
 
     Parameters
     ----------
@@ -142,7 +161,8 @@ def basin_fractions(
     Returns
     -------
     Dataset
-        As :func:`attractors`, with ``attractor_fraction`` and its 95 % Wilson interval, and ``smallest_basin_seen`` (rule of three).
+        As :func:`attractors`, with ``attractor_fraction`` and its 95 % Wilson interval, and
+        ``smallest_basin_seen`` (rule of three).
 
     Raises
     ------
@@ -151,7 +171,8 @@ def basin_fractions(
 
     References
     ----------
-    Menck, Heitzig, Marwan & Kurths, Nature Physics 9 (2013) 89-92; Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212.
+    Menck, Heitzig, Marwan & Kurths, Nature Physics 9 (2013) 89-92; Wilson, J. Am. Stat. Assoc. 22
+    (1927) 209-212.
 
     Examples
     --------
@@ -164,29 +185,69 @@ def basin_fractions(
     True
     """
     check_system(system)
-    samples, periods, seed = whole(samples, "samples"), whole(periods, "periods"), whole(seed, "seed", 0)
+    samples, periods, seed = (
+        whole(samples, "samples"),
+        whole(periods, "periods"),
+        whole(seed, "seed", 0),
+    )
     fixed = fixed_states(system, at, box)
     ranges = _ranges(system, box)
-    check_room(memory(samples, len(system.states)), f"{samples} random starts", "Draw fewer: samples=10_000 tells shares to 1 %.")
-    map_ = Stroboscope(system, check_method(method), every=None if every is None else to_si(every, "s", "every"), threads=threads)
-    start = fill(system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed)
+    check_room(
+        memory(samples, len(system.states)),
+        f"{samples} random starts",
+        "Draw fewer: samples=10_000 tells shares to 1 %.",
+    )
+    map_ = Stroboscope(
+        system,
+        check_method(method),
+        every=None if every is None else to_si(every, "s", "every"),
+        threads=threads,
+    )
+    start = fill(
+        system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed
+    )
     scale = _spread(map_, start[:SPREAD_STARTS])
     with reporting(progress) as show:
         scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
         found = find_attractors(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
-    table = replace(portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found)))
-    starts = {"trajectory": np.arange(samples), "basin": result.label, "periods_to_settle": result.periods}
-    ds = attractors_dataset(subject(system, provenance(system, map_.method, system.values) | {"periods": periods}), table, starts)
+    table = replace(
+        portraits(map_, found), fractions=uncertainty.fractions(result.label, len(found))
+    )
+    starts = {
+        "trajectory": np.arange(samples),
+        "basin": result.label,
+        "periods_to_settle": result.periods,
+    }
+    ds = attractors_dataset(
+        subject(system, provenance(system, map_.method, system.values) | {"periods": periods}),
+        table,
+        starts,
+    )
     strays = stray_attrs(found.astray if (result.label == Kind.UNCONVERGED).any() else [])
-    return ds.assign_attrs(**strays, smallest_basin_seen=uncertainty.smallest_basin(len(start)), samples=samples, seed=seed)
+    return ds.assign_attrs(
+        **strays,
+        smallest_basin_seen=uncertainty.smallest_basin(len(start)),
+        samples=samples,
+        seed=seed,
+    )
 
 
-def attractors_dataset(subject: Subject, table: AttractorTable, starts: Mapping[str, Any] | None = None) -> xr.Dataset:
-    """The Dataset of some attractors, and where they are kept of the starts: ``trajectory``, ``basin``, ``periods_to_settle``."""
+def attractors_dataset(
+    subject: Subject, table: AttractorTable, starts: Mapping[str, Any] | None = None
+) -> xr.Dataset:
+    """The Dataset of some attractors, and where they are kept of the starts: ``trajectory``,
+    ``basin``, ``periods_to_settle``.
+    """
     values = {**(starts or {}), **table.values(len(subject.states))}
-    return build(schema.ATTRACTORS, subject, values, words={"<when>": table.points_when}, flags={"basin": basin_meanings(len(table))})
+    return build(
+        schema.ATTRACTORS,
+        subject,
+        values,
+        words={"<when>": table.points_when},
+        flags={"basin": basin_meanings(len(table))},
+    )
 
 
 def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
@@ -195,26 +256,38 @@ def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, fl
         try:
             low, high = (to_si(value, system.units[name], name) for value in given)
         except (TypeError, ValueError) as error:
-            raise ParameterError(f'{name} must be (low, high), such as {name}=("-5 mm", "5 mm"): {error}') from None
+            raise ParameterError(
+                f'{name} must be (low, high), such as {name}=("-5 mm", "5 mm"): {error}'
+            ) from None
         if not low < high:
             raise ParameterError(f"the range of {name} is empty: {shown(low)} to {shown(high)}.")
         ranges[name] = (low, high)
     if not ranges:
-        raise ParameterError(f'give a range for at least one state of {", ".join(system.states)}: {system.states[0]}=("-1 mm", "1 mm").')
+        raise ParameterError(
+            f"give a range for at least one state of {', '.join(system.states)}: "
+            f'{system.states[0]}=("-1 mm", "1 mm").'
+        )
     return ranges
 
 
 def _draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[str, np.ndarray]:
     """Starts of the states that have a range, from numbers in [0, 1), one column for each."""
-    return {name: low + (high - low) * column for (name, (low, high)), column in zip(ranges.items(), unit.T, strict=True)}
+    return {
+        name: low + (high - low) * column
+        for (name, (low, high)), column in zip(ranges.items(), unit.T, strict=True)
+    }
 
 
 def _spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
-    """Range of each state over the starts, their first iterates and the time between two of them; 1 for a state that never moves."""
+    """Range of each state over the starts, their first iterates and the time between two of them; 1
+    for a state that never moves.
+    """
     iterates = map_.launch(start, SPREAD).advance(SPREAD)
     last = iterates[:WATCHED, -1][np.isfinite(iterates[:WATCHED, -1]).all(axis=1)]
     between = map_.run(last, 1, Schedule.even(1, SPREAD)).samples
-    points = np.concatenate([start, iterates.reshape(-1, start.shape[1]), between.reshape(-1, start.shape[1])])
+    points = np.concatenate(
+        [start, iterates.reshape(-1, start.shape[1]), between.reshape(-1, start.shape[1])]
+    )
     points = points[np.isfinite(points).all(axis=1)]
     wide = np.ptp(points, axis=0)
     return np.where(wide > 0, wide, 1.0)

@@ -35,17 +35,18 @@ def basins(
 ) -> xr.Dataset:
     """The attractor that each start of a grid leads to, every attractor typed and verified.
 
-    Attractors are first found from a fixed sample of 1024 starts; a trajectory ends when it enters a neighbourhood of one of them in which
-    the return map was seen to contract with an unchanged sequence of contacts. What isn't captured is followed further, and new attractors
-    are looked for there.
+    Attractors are first found from a fixed sample of 1024 starts; a trajectory ends when it enters
+    a neighbourhood of one of them in which the return map was seen to contract with an unchanged
+    sequence of contacts. What isn't captured is followed further, and new attractors are looked for
+    there.
 
     Parameters
     ----------
     system : System
         Equations, contacts and values.
     **axes : (low, high, count), or a list or array of starts
-        Two states, the range of each [SI or text with a unit] and the number of starts, ends included:
-        ``x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)``.
+        Two states, the range of each [SI or text with a unit] and the number of starts, ends
+        included: ``x=("-5 mm", "5 mm", 400), v=("-1 m/s", "1 m/s", 400)``.
     at : mapping, optional
         Starts of the other states; default zero.
     method : Method
@@ -62,8 +63,9 @@ def basins(
     Returns
     -------
     Dataset
-        Dims: the two states, ``attractor``, ``multiplier``, ``phase``. Variables ``basin``, ``periods_to_settle``, ``status``,
-        ``grazes_unresolved`` and the table ``attractor_*``; attributes: fractions' uncertainty, ``smallest_basin_seen``, ``flip_rate``,
+        Dims: the two states, ``attractor``, ``multiplier``, ``phase``. Variables ``basin``,
+        ``periods_to_settle``, ``status``, ``grazes_unresolved`` and the table ``attractor_*``;
+        attributes: fractions' uncertainty, ``smallest_basin_seen``, ``flip_rate``,
         ``basin_entropy``, ``uncertainty_exponent``, ...
 
     Raises
@@ -75,7 +77,8 @@ def basins(
 
     References
     ----------
-    Daza et al., Scientific Reports 6 (2016) 31416 (entropies); McDonald et al., Physica D 17 (1985) 125 (uncertainty exponent).
+    Daza et al., Scientific Reports 6 (2016) 31416 (entropies); McDonald et al., Physica D 17 (1985)
+    125 (uncertainty exponent).
 
     Examples
     --------
@@ -85,10 +88,14 @@ def basins(
     >>> found["basin"].shape, found["attractor_period"].values.tolist()
     ((20, 20), [1, 1, 3, 9])
     """
-    return map_of(basin_plan(system, axes, at, check_method(method), periods, every), threads, progress)
+    return map_of(
+        basin_plan(system, axes, at, check_method(method), periods, every), threads, progress
+    )
 
 
-def map_of(plan: BasinPlan, threads: int | None, progress: bool | Callable[[float], None] | None) -> xr.Dataset:
+def map_of(
+    plan: BasinPlan, threads: int | None, progress: bool | Callable[[float], None] | None
+) -> xr.Dataset:
     """The Dataset of a planned map, as :func:`basins` returns it. Raises Interrupted on Ctrl-C."""
     result = Settling.empty(plan.cells, len(plan.system.states))
     found = None
@@ -96,11 +103,20 @@ def map_of(plan: BasinPlan, threads: int | None, progress: bool | Callable[[floa
         try:
             found = plan.scout(threads, stage(show, 0.0, SCOUTING))
             chunks, rest = range(plan.chunks), stage(show, SCOUTING, 1.0)
-            label_all(plan, found, chunks, lambda i, part: result.put(plan.cells_of(i), part), threads, rest)
+            label_all(
+                plan,
+                found,
+                chunks,
+                lambda i, part: result.put(plan.cells_of(i), part),
+                threads,
+                rest,
+            )
             return plan.finish(result, found, threads)
         except KeyboardInterrupt:
             scouted = found
-            raise Interrupted(None if scouted is None else lambda: plan.dataset(result, scouted, threads)) from None
+            raise Interrupted(
+                None if scouted is None else lambda: plan.dataset(result, scouted, threads)
+            ) from None
 
 
 def label_all(
@@ -111,7 +127,9 @@ def label_all(
     threads: int | None,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Label chunks on threads; ``done(index, settling)`` is called from this thread as each is ready, in any order."""
+    """Label chunks on threads; ``done(index, settling)`` is called from this thread as each is
+    ready, in any order.
+    """
     map_ = plan.map(1)
     map_.launch(plan.starts(plan.cells_of(0)[:1]), 1)  # compiles before threads ask for it
     on_threads(lambda index: plan.chunk(index, found, map_), chunks, done, threads, progress)

@@ -12,7 +12,8 @@ import numpy as np
 
 
 def halton(count: int, dimensions: int) -> np.ndarray:
-    """The first points of the sequence, in [0, 1): float64[count, dimensions]; the first is the origin.
+    """The first points of the sequence, in [0, 1): float64[count, dimensions]; the first is the
+    origin.
 
     Coordinate i of point n is n written backwards behind the point, in base of the i-th prime.
 

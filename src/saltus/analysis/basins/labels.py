@@ -1,4 +1,6 @@
-"""Where many starts lead, once the attractors are known: a pure function of its arguments, so that any part can be computed anywhere."""
+"""Where many starts lead, once the attractors are known: a pure function of its arguments, so that
+any part can be computed anywhere.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ OPEN = min(Kind) - 1
 BLOCK = 8
 #: Starts that one thread follows at a time.
 PIECE = 4096
-#: Age at which a trajectory may be taken for one on a chaotic attractor, and age between two tests after that.
+#: Age at which a trajectory may be taken for one on a chaotic attractor, and age between two tests
+#: after that.
 APERIODIC_WINDOW = 64
 #: Trajectories that nothing captured from which new attractors are looked for.
 SAMPLE = 256
@@ -54,7 +57,13 @@ class Settling:
     def empty(cls, count: int, size: int) -> Settling:
         """Nothing computed yet."""
         label, periods = np.full(count, Kind.NOT_COMPUTED, np.int64), np.full(count, -1, np.int64)
-        return cls(label, periods, np.full(count, st.NOT_COMPUTED, np.int64), np.zeros(count, np.int64), np.full((count, size), np.nan))
+        return cls(
+            label,
+            periods,
+            np.full(count, st.NOT_COMPUTED, np.int64),
+            np.zeros(count, np.int64),
+            np.full((count, size), np.nan),
+        )
 
     def put(self, where: np.ndarray | slice, other: Settling) -> None:
         """Write another's results to some places."""
@@ -63,7 +72,9 @@ class Settling:
 
 
 def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
-    """Follow trajectories until an attractor captures them, float64[k, D], for ``most`` iterates at the longest."""
+    """Follow trajectories until an attractor captures them, float64[k, D], for ``most`` iterates at
+    the longest.
+    """
     result = Settling.empty(len(start), start.shape[1])
     travel, who = map_.launch(start, most), np.arange(len(start))
     iterates = np.zeros((len(start), 0, start.shape[1]))
@@ -80,7 +91,9 @@ def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
         going = travel.going & (label < 0)
         leaves = np.flatnonzero(~going)
         label[leaves] = np.where(
-            label[leaves] >= 0, label[leaves], np.where(travel.status[leaves] == st.NONFINITE, Kind.ESCAPED, Kind.FAILED)
+            label[leaves] >= 0,
+            label[leaves],
+            np.where(travel.status[leaves] == st.NONFINITE, Kind.ESCAPED, Kind.FAILED),
         )
         _write(result, who[leaves], label[leaves], periods[leaves], travel, leaves)
         travel.keep(going)
@@ -90,30 +103,55 @@ def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
 
 
 def settle_all(
-    map_: Map, start: np.ndarray, found: Found, most: int, threads: int | None = None, progress: Callable[[float], None] | None = None
+    map_: Map,
+    start: np.ndarray,
+    found: Found,
+    most: int,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Settling:
     """:func:`settle` for any number of starts, in pieces on threads."""
     result = Settling.empty(len(start), start.shape[1])
     pieces = [slice(first, first + PIECE) for first in range(0, len(start), PIECE)]
-    on_threads(lambda piece: settle(map_, start[piece], found, most), pieces, result.put, threads, progress)
+    on_threads(
+        lambda piece: settle(map_, start[piece], found, most), pieces, result.put, threads, progress
+    )
     return result
 
 
-def _write(result: Settling, who: np.ndarray, label: np.ndarray, periods: np.ndarray, travel: Travel, rows: np.ndarray) -> None:
+def _write(
+    result: Settling,
+    who: np.ndarray,
+    label: np.ndarray,
+    periods: np.ndarray,
+    travel: Travel,
+    rows: np.ndarray,
+) -> None:
     result.label[who], result.periods[who] = label, np.where(label >= 0, periods, -1)
     result.status[who], result.unresolved[who] = travel.status[rows], travel.unresolved[rows]
     result.end[who] = travel.state[rows]
 
 
-def complete(map_: Map, result: Settling, found: Found, scale: np.ndarray, most: int, threads: int | None = None) -> Found:
-    """Search new attractors where nothing captured, label what they capture, and give all attractors their final ids.
+def complete(
+    map_: Map,
+    result: Settling,
+    found: Found,
+    scale: np.ndarray,
+    most: int,
+    threads: int | None = None,
+) -> Found:
+    """Search new attractors where nothing captured, label what they capture, and give all
+    attractors their final ids.
 
-    Changes ``result``. The trajectories go on from where they stood. Returns the attractors in their final order.
+    Changes ``result``. The trajectories go on from where they stood. Returns the attractors in
+    their final order.
     """
     opened = np.flatnonzero(result.label == OPEN)
     if not len(opened):
         return found
-    sample = np.sort(np.random.default_rng(0).choice(opened, min(SAMPLE, len(opened)), replace=False))
+    sample = np.sort(
+        np.random.default_rng(0).choice(opened, min(SAMPLE, len(opened)), replace=False)
+    )
     wider, _, _ = find_attractors(map_, result.end[sample], scale, most, found)
     _renumber(result.label, found, wider)
     more = settle_all(map_, result.end[opened], wider, most, threads)

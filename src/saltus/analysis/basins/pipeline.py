@@ -1,7 +1,9 @@
-"""The plan of a basin map: which starts, in which chunks, and what each chunk computes. Everything that a store or a cluster needs to know.
+"""The plan of a basin map: which starts, in which chunks, and what each chunk computes. Everything
+that a store or a cluster needs to know.
 
-Three stages, each a pure function of the plan and of the stages before: *scout* finds the attractors from a fixed sample of the starts,
-*chunk* labels one run of cells with them, *finish* labels what no known attractor captured and makes the Dataset.
+Three stages, each a pure function of the plan and of the stages before: *scout* finds the
+attractors from a fixed sample of the starts, *chunk* labels one run of cells with them, *finish*
+labels what no known attractor captured and makes the Dataset.
 """
 
 from __future__ import annotations
@@ -61,11 +63,13 @@ class BasinPlan:
     fixed : mapping of str to float
         The other states at the start [SI].
     periods : int
-        Forcing periods that a trajectory is followed at most, before and once more after new attractors are looked for.
+        Forcing periods that a trajectory is followed at most, before and once more after new
+        attractors are looked for.
     every : float or None
         Time between two samples [s] for a system without forcing.
     scouts : int
-        Starts from which attractors are looked for first; the fewer, the more is left to what the cells themselves lead to.
+        Starts from which attractors are looked for first; the fewer, the more is left to what the
+        cells themselves lead to.
     """
 
     system: System
@@ -98,84 +102,147 @@ class BasinPlan:
 
     @property
     def scale(self) -> np.ndarray:
-        """Range of each state: of an axis its length, of others the largest of those with the same unit, else of any."""
+        """Range of each state: of an axis its length, of others the largest of those with the same
+        unit, else of any.
+        """
         lengths = {name: float(np.ptp(values)) for name, values in self.axes.items()}
         units = self.system.units
-        alike = {name: [length for axis, length in lengths.items() if units[axis] == units[name]] for name in self.system.states}
-        return np.array([lengths.get(name) or max(alike[name] or lengths.values()) for name in self.system.states])
+        alike = {
+            name: [length for axis, length in lengths.items() if units[axis] == units[name]]
+            for name in self.system.states
+        }
+        return np.array(
+            [
+                lengths.get(name) or max(alike[name] or lengths.values())
+                for name in self.system.states
+            ]
+        )
 
     def starts(self, cells: np.ndarray) -> np.ndarray:
         """States at the start of cells int64[k] of the flattened grid, float64[k, D]."""
         rows = dict(zip(self.axes, np.unravel_index(cells, self.shape), strict=True))
-        return fill(self.system, {name: self.axes[name][row] for name, row in rows.items()}, self.fixed)
+        return fill(
+            self.system, {name: self.axes[name][row] for name, row in rows.items()}, self.fixed
+        )
 
     def cells_of(self, chunk: int) -> np.ndarray:
         """Cells of a chunk, int64[k]."""
         return np.arange(chunk * CHUNK, min((chunk + 1) * CHUNK, self.cells))
 
-    # -- the three stages -------------------------------------------------------------------------------------------------------
-    def scout(self, threads: int | None = None, progress: Callable[[float], None] | None = None) -> Found:
+    # -- the three stages --------------------------------------------------------------------------
+    def scout(
+        self, threads: int | None = None, progress: Callable[[float], None] | None = None
+    ) -> Found:
         """The attractors that a fixed quasi-random sample of the box leads to."""
         unit = halton(self.scouts, 2)
-        low, high = (np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max))
+        low, high = (
+            np.array([end(values) for values in self.axes.values()]) for end in (np.min, np.max)
+        )
         drawn = dict(zip(self.axes, (low + (high - low) * unit).T, strict=True))
-        return find_attractors(self.map(threads), fill(self.system, drawn, self.fixed), self.scale, self.periods, progress=progress)[0]
+        return find_attractors(
+            self.map(threads),
+            fill(self.system, drawn, self.fixed),
+            self.scale,
+            self.periods,
+            progress=progress,
+        )[0]
 
     def sample(self, count: int) -> np.ndarray:
-        """Some of the cells, drawn at random, always the same ones: int64[count at most], ascending."""
-        return np.sort(np.random.default_rng(0).choice(self.cells, min(count, self.cells), replace=False))
+        """Some of the cells, drawn at random, always the same ones: int64[count at most],
+        ascending.
+        """
+        return np.sort(
+            np.random.default_rng(0).choice(self.cells, min(count, self.cells), replace=False)
+        )
 
     def chunk(self, index: int, found: Found, map_: Stroboscope | None = None) -> Settling:
         """Where the starts of one chunk lead. One thread."""
         return settle(map_ or self.map(1), self.starts(self.cells_of(index)), found, self.periods)
 
     def finish(self, result: Settling, found: Found, threads: int | None = None) -> xr.Dataset:
-        """The Dataset; what is still open is settled first, and a sample is checked. Changes ``result``."""
+        """The Dataset; what is still open is settled first, and a sample is checked. Changes
+        ``result``.
+        """
         found = complete(self.map(threads), result, found, self.scale, self.periods, threads)
         return self.dataset(result, found, threads).assign_attrs(self._check(result, found))
 
     def dataset(self, result: Settling, found: Found, threads: int | None = None) -> xr.Dataset:
-        """The Dataset of what is known; what is still open counts as unconverged. Changes ``result``."""
+        """The Dataset of what is known; what is still open counts as unconverged. Changes
+        ``result``.
+        """
         map_ = self.map(threads)
         result.label[result.label == OPEN] = Kind.UNCONVERGED
         labels = result.label.reshape(self.shape)
         table = replace(portraits(map_, found), fractions=uncertainty.fractions(labels, len(found)))
         values = {
-            "<state>": self.axes, "basin": labels, "periods_to_settle": result.periods.reshape(self.shape),
+            "<state>": self.axes, "basin": labels,
+            "periods_to_settle": result.periods.reshape(self.shape),
             "status": result.status.reshape(self.shape),
             "grazes_unresolved": result.unresolved.reshape(self.shape),
             **table.values(len(self.system.states)),
         }  # fmt: skip
-        flags = {"basin": basin_meanings(len(table)), "status": {code: name for code, (name, _) in st.STATUS.items()}}
+        flags = {
+            "basin": basin_meanings(len(table)),
+            "status": {code: name for code, (name, _) in st.STATUS.items()},
+        }
         words = {"<when>": table.points_when}
-        ds = build(schema.BASINS, subject(self.system, self.attrs()), values, grid=tuple(self.axes), words=words, flags=flags)
+        ds = build(
+            schema.BASINS,
+            subject(self.system, self.attrs()),
+            values,
+            grid=tuple(self.axes),
+            words=words,
+            flags=flags,
+        )
         strays = found.astray if (labels == Kind.UNCONVERGED).any() else []
-        return ds.assign_attrs(uncertainty.measure(ds), **stray_attrs(strays), flip_rate=np.nan, flip_checked=0)
+        return ds.assign_attrs(
+            uncertainty.measure(ds), **stray_attrs(strays), flip_rate=np.nan, flip_checked=0
+        )
 
     def attrs(self) -> dict[str, Any]:
         """Provenance."""
         every = {} if self.every is None else {"every": self.every}
-        return provenance(self.system, self.method, self.system.values) | {"periods": self.periods, "at": to_json(dict(self.fixed))} | every
+        return (
+            provenance(self.system, self.method, self.system.values)
+            | {"periods": self.periods, "at": to_json(dict(self.fixed))}
+            | every
+        )
 
     def _check(self, result: Settling, found: Found) -> dict[str, float | int]:
-        """Recompute a random sample of settled cells by a more exact method: the share that leads elsewhere, with its interval."""
+        """Recompute a random sample of settled cells by a more exact method: the share that leads
+        elsewhere, with its interval.
+        """
         chosen = self.sample(CHECKED)
         chosen = chosen[result.label[chosen] >= 0]
         if not len(chosen):
             return {}
-        again = settle(self.map(1).by(self.method.companion()), self.starts(chosen), found, 2 * self.periods)
+        again = settle(
+            self.map(1).by(self.method.companion()), self.starts(chosen), found, 2 * self.periods
+        )
         flips = int(np.count_nonzero(again.label != result.label[chosen]))
         low, high = wilson(flips, len(chosen))
-        return {"flip_rate": flips / len(chosen), "flip_rate_low": float(low), "flip_rate_high": float(high), "flip_checked": len(chosen)}
+        return {
+            "flip_rate": flips / len(chosen),
+            "flip_rate_low": float(low),
+            "flip_rate_high": float(high),
+            "flip_checked": len(chosen),
+        }
 
 
 def memory(cells: int, states: int) -> float:
-    """Memory that a map takes, or as many random starts [bytes]: what is kept of each cell, and the measures of the map."""
+    """Memory that a map takes, or as many random starts [bytes]: what is kept of each cell, and the
+    measures of the map.
+    """
     return 2.5e8 + cells * (120.0 + 24.0 * states)
 
 
 def basin_plan(
-    system: System, axes: Mapping[str, Any], at: Mapping[str, Any] | None, method: Method, periods: int, every: float | str | None
+    system: System,
+    axes: Mapping[str, Any],
+    at: Mapping[str, Any] | None,
+    method: Method,
+    periods: int,
+    every: float | str | None,
 ) -> BasinPlan:
     """A plan from what users write, checked.
 
@@ -187,12 +254,22 @@ def basin_plan(
     check_system(system)
     fixed = fixed_states(system, at, axes)
     if len(axes) != 2:
-        example = ", ".join(f'{name}=("-1 {system.units[name]}", "1 {system.units[name]}", 400)' for name in system.states[:2])
-        raise ParameterError(f"a basin map has two axes, not {len(axes)}. Give two states with range and number of starts: {example}.")
+        example = ", ".join(
+            f'{name}=("-1 {system.units[name]}", "1 {system.units[name]}", 400)'
+            for name in system.states[:2]
+        )
+        raise ParameterError(
+            f"a basin map has two axes, not {len(axes)}. Give two states with "
+            f"range and number of starts: {example}."
+        )
     periods = whole(periods, "periods")
     values = {name: _axis(system, name, given) for name, given in axes.items()}
     first, second = (len(one) for one in values.values())
-    check_room(memory(first * second, len(system.states)), f"{first} x {second} cells", "Take a coarser grid, or sl.basin_fractions.")
+    check_room(
+        memory(first * second, len(system.states)),
+        f"{first} x {second} cells",
+        "Take a coarser grid, or sl.basin_fractions.",
+    )
     seconds = None if every is None else to_si(every, "s", "every")
     plan = BasinPlan(system, method, values, fixed, periods, seconds)
     plan.map()  # every= is checked where it is used
@@ -202,7 +279,9 @@ def basin_plan(
 def _axis(system: System, name: str, given: Any) -> np.ndarray:
     """Starts along one state from (low, high, count) or a list or array of starts."""
     example = f'{name}=("-5 mm", "5 mm", 400)'
-    values = along(name, given, lambda value: to_si(value, system.units[name], name), "starts", example, 2)
+    values = along(
+        name, given, lambda value: to_si(value, system.units[name], name), "starts", example, 2
+    )
     if len(values) < 2 or not (np.diff(values) > 0).all():
         raise ParameterError(f"the starts along {name} must ascend, at least two of them.")
     return values

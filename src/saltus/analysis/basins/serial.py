@@ -1,4 +1,6 @@
-"""Attractors and labels as plain data: what a store keeps, and reads back to the last bit. No code is run on reading."""
+"""Attractors and labels as plain data: what a store keeps, and reads back to the last bit. No code
+is run on reading.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,12 @@ from saltus.analysis.orbits.orbits import Orbit
 from saltus.errors import SaltusError
 
 #: What is kept of each cell, beside where it ended.
-CELL: dict[str, Any] = {"label": np.int16, "periods": np.int32, "status": np.int8, "unresolved": np.int16}
+CELL: dict[str, Any] = {
+    "label": np.int16,
+    "periods": np.int32,
+    "status": np.int8,
+    "unresolved": np.int16,
+}
 
 
 def found_data(found: Found) -> dict[str, Any]:
@@ -25,7 +32,11 @@ def found_data(found: Found) -> dict[str, Any]:
         "orbits": [_orbit_data(orbit) for orbit in found.orbits],
         "unstable": [_orbit_data(orbit) for orbit in found.unstable],
         "sampled": [_sampled_data(one) for one in found.sampled],
-        "near": {"centres": found.near.centres.tolist(), "weights": found.near.weights.tolist(), "owners": found.near.owners.tolist()},
+        "near": {
+            "centres": found.near.centres.tolist(),
+            "weights": found.near.weights.tolist(),
+            "owners": found.near.owners.tolist(),
+        },
     }
 
 
@@ -42,27 +53,45 @@ def found_from(data: Mapping[str, Any], size: int) -> Found:
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError):
         found = None
     if found is None or not _holds_together(found, size):
-        raise SaltusError("the attractors that were kept aren't such as saltus writes: somebody changed them. Take them from a copy.")
+        raise SaltusError(
+            "the attractors that were kept aren't such as saltus writes: somebody "
+            "changed them. Take them from a copy."
+        )
     return found
 
 
 def _holds_together(found: Found, size: int) -> bool:
     """Whether sizes fit one another, and numbers what they count."""
-    near, orbits = found.near, [*found.orbits, *found.unstable, *(one.orbit for one in found.sampled if isinstance(one, Noisy))]
+    near, orbits = (
+        found.near,
+        [
+            *found.orbits,
+            *found.unstable,
+            *(one.orbit for one in found.sampled if isinstance(one, Noisy)),
+        ],
+    )
     return (
         len(near.centres) == len(near.weights) == len(near.owners)
         and bool(np.isfinite(near.centres).all() and np.isfinite(near.weights).all())
         and bool(((near.owners >= 0) & (near.owners < len(found))).all())
         and all(len(one.points) > 0 and one.multipliers.shape == (size,) for one in orbits)
         and all(len(one.points) > 0 and one.scale.shape == (size,) for one in found.sampled)
-        and all(one.size.shape == one.scatter.shape == (size,) for one in found.sampled if isinstance(one, Noisy))
+        and all(
+            one.size.shape == one.scatter.shape == (size,)
+            for one in found.sampled
+            if isinstance(one, Noisy)
+        )
     )
 
 
 def _found(data: Mapping[str, Any], size: int) -> Found:
     near = data["near"]
     return Found(
-        Neighbourhoods(_array(near["centres"], size), _array(near["weights"], size, size), np.array(near["owners"], np.int64)),
+        Neighbourhoods(
+            _array(near["centres"], size),
+            _array(near["weights"], size, size),
+            np.array(near["owners"], np.int64),
+        ),
         [_orbit_from(one, size) for one in data["orbits"]],
         [_sampled_from(one, size) for one in data["sampled"]],
         [_orbit_from(one, size) for one in data["unstable"]],
@@ -84,15 +113,27 @@ def _orbit_from(data: Mapping[str, Any], size: int) -> Orbit:
 
 def _sampled_data(one: SampledAttractor) -> dict[str, Any]:
     data = {
-        "kind": one.kind, "exponent": one.exponent, "error": one.exponent_error, "points": one.points.tolist(), "scale": one.scale.tolist(),
+        "kind": one.kind, "exponent": one.exponent, "error": one.exponent_error,
+        "points": one.points.tolist(), "scale": one.scale.tolist(),
     }  # fmt: skip
     if not isinstance(one, Noisy):
         return data
-    return data | {"orbit": _orbit_data(one.orbit), "size": one.size.tolist(), "scatter": one.scatter.tolist(), "stray": one.stray}
+    return data | {
+        "orbit": _orbit_data(one.orbit),
+        "size": one.size.tolist(),
+        "scatter": one.scatter.tolist(),
+        "stray": one.stray,
+    }
 
 
 def _sampled_from(data: Mapping[str, Any], size: int) -> SampledAttractor:
-    plain = str(data["kind"]), float(data["exponent"]), float(data["error"]), _array(data["points"], size), np.array(data["scale"], float)
+    plain = (
+        str(data["kind"]),
+        float(data["exponent"]),
+        float(data["error"]),
+        _array(data["points"], size),
+        np.array(data["scale"], float),
+    )
     if "orbit" not in data:
         return SampledAttractor(*plain)
     widths = np.array(data["size"], float), np.array(data["scatter"], float)
@@ -111,7 +152,9 @@ def cell_types(states: tuple[str, ...]) -> dict[str, Any]:
 def settling_arrays(part: Settling, states: tuple[str, ...]) -> dict[str, np.ndarray]:
     """The arrays of some cells, in the types of :func:`cell_types`."""
     most = np.iinfo(CELL["unresolved"]).max
-    columns = {name: getattr(part, name) for name in CELL} | {"unresolved": np.minimum(part.unresolved, most)}
+    columns = {name: getattr(part, name) for name in CELL} | {
+        "unresolved": np.minimum(part.unresolved, most)
+    }
     return {name: columns[name].astype(kind) for name, kind in CELL.items()} | {
         f"end_{name}": np.ascontiguousarray(part.end[:, i]) for i, name in enumerate(states)
     }

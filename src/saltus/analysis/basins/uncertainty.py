@@ -1,8 +1,10 @@
-"""How far a map of basins can be trusted: shares with intervals, what the grid can miss, and how intricate the boundaries are.
+"""How far a map of basins can be trusted: shares with intervals, what the grid can miss, and how
+intricate the boundaries are.
 
-All functions take the labels of the cells of a regular grid, int[nA, nB]. Negative labels are codes (escaped, unconverged, ...), not
-attractors: they have no share, but in the measures of boundaries each code counts as one more class, since a cell that may or may not
-settle is as uncertain as one between two attractors.
+All functions take the labels of the cells of a regular grid, int[nA, nB]. Negative labels are codes
+(escaped, unconverged, ...), not attractors: they have no share, but in the measures of boundaries
+each code counts as one more class, since a cell that may or may not settle is as uncertain as one
+between two attractors.
 """
 
 from __future__ import annotations
@@ -19,26 +21,30 @@ from saltus.results.dataset.schema import BASINS, check
 RULE_OF_THREE = 3.0
 #: Cells along the side of a box; Daza et al. use 5 in all of their figures.
 BOX = 5
-#: The largest distance looked at is this part of the shorter side of the grid: beyond it the sides are felt.
+#: The largest distance looked at is this part of the shorter side of the grid: beyond it the sides
+#: are felt.
 LARGEST_DISTANCE = 16
 #: Distances that a slope needs at least, so that it has an error.
 FEWEST_DISTANCES = 3
 
 
-# -- shares --------------------------------------------------------------------------------------------------------------------
+# -- shares ----------------------------------------------------------------------------------------
 def fractions(labels: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Share of the starts that lead to each attractor, with a 95 % interval.
 
-    For starts drawn at random the interval is the binomial one: 95 of 100 such samples hold the true share. The cells of a regular grid
-    are not drawn at random. There it says how far the share of as many random starts would scatter; the error of a grid is mostly
-    smaller (of the order of the boundary cells, whose share falls as N^(-alpha/2) with the uncertainty exponent alpha), but an evenly
-    spaced grid can also miss or favour structures of its own spacing, which no interval tells.
+    For starts drawn at random the interval is the binomial one: 95 of 100 such samples hold the
+    true share. The cells of a regular grid are not drawn at random. There it says how far the share
+    of as many random starts would scatter; the error of a grid is mostly smaller (of the order of
+    the boundary cells, whose share falls as N^(-alpha/2) with the uncertainty exponent alpha), but
+    an evenly spaced grid can also miss or favour structures of its own spacing, which no interval
+    tells.
 
     Parameters
     ----------
     labels : array of int, any shape
-        Attractor of each start; negative codes where there is none. Starts that weren't computed (-4) don't count; those that escaped or
-        did not settle do, so the shares may sum to less than 1.
+        Attractor of each start; negative codes where there is none. Starts that weren't computed
+        (-4) don't count; those that escaped or did not settle do, so the shares may sum to less
+        than 1.
     m : int
         Number of attractors.
 
@@ -51,30 +57,37 @@ def fractions(labels: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.nd
     cells = int((labels != Kind.NOT_COMPUTED).sum())
     count = np.bincount(labels[labels >= 0], minlength=m)
     if len(count) > m:
-        raise ParameterError(f"the labels go up to {len(count) - 1}, but there are {m} attractors, 0 to {m - 1}. Give m={len(count)}.")
+        raise ParameterError(
+            f"the labels go up to {len(count) - 1}, but there are {m} attractors, "
+            f"0 to {m - 1}. Give m={len(count)}."
+        )
     share = count / cells if cells else np.full(m, np.nan)
     return (share, *wilson(count, cells))
 
 
 def smallest_basin(cells: int) -> float:
-    """Share above which a basin can't have been missed by this number of starts, with a confidence of 95 %: 3/N, the rule of three.
+    """Share above which a basin can't have been missed by this number of starts, with a confidence
+    of 95 %: 3/N, the rule of three.
 
-    Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743. It holds for starts drawn at random. On a regular grid it says the same of
-    a basin that is scattered finely; a compact one is met for certain as soon as it holds a whole cell, 1/N. 1 if there are fewer than
-    three starts.
+    Hanley & Lippman-Hand, J. Am. Med. Assoc. 249 (1983) 1743. It holds for starts drawn at random.
+    On a regular grid it says the same of a basin that is scattered finely; a compact one is met for
+    certain as soon as it holds a whole cell, 1/N. 1 if there are fewer than three starts.
     """
     return min(RULE_OF_THREE / cells, 1.0) if cells else 1.0
 
 
-# -- boundaries ----------------------------------------------------------------------------------------------------------------
+# -- boundaries ------------------------------------------------------------------------------------
 def basin_entropy(labels: np.ndarray, box: int = BOX) -> tuple[float, float]:
     """Basin entropy and boundary basin entropy.
 
-    The grid is cut into boxes of box x box cells; each has the Gibbs entropy -sum p ln p of the shares p of the labels in it. Cells left
-    over at the far edges are dropped. The entropy depends on the size of the box and on the grid: compare maps of one grid only. A
-    boundary entropy above ln 2 proves a fractal boundary (between two smooth pieces at most two labels meet in most boxes).
+    The grid is cut into boxes of box x box cells; each has the Gibbs entropy -sum p ln p of the
+    shares p of the labels in it. Cells left over at the far edges are dropped. The entropy depends
+    on the size of the box and on the grid: compare maps of one grid only. A boundary entropy above
+    ln 2 proves a fractal boundary (between two smooth pieces at most two labels meet in most
+    boxes).
 
-    A. Daza, A. Wagemakers, B. Georgeot, D. Guery-Odelin, M. A. F. Sanjuan, Scientific Reports 6 (2016) 31416.
+    A. Daza, A. Wagemakers, B. Georgeot, D. Guery-Odelin, M. A. F. Sanjuan, Scientific Reports 6
+    (2016) 31416.
 
     Parameters
     ----------
@@ -108,17 +121,22 @@ def basin_entropy(labels: np.ndarray, box: int = BOX) -> tuple[float, float]:
 
 
 def uncertain_share(labels: np.ndarray, distance: int) -> float:
-    """Share of the cells of which a neighbour ``distance`` cells away, along either axis and to either side, has another label.
+    """Share of the cells of which a neighbour ``distance`` cells away, along either axis and to
+    either side, has another label.
 
-    Beyond its edges the grid is continued by its mirror image. That keeps every cell and changes no dimension: a share of the cells that
-    have all four neighbours would grow with the distance for a straight line, one of all cells would fall for noise.
+    Beyond its edges the grid is continued by its mirror image. That keeps every cell and changes no
+    dimension: a share of the cells that have all four neighbours would grow with the distance for a
+    straight line, one of all cells would fall for noise.
     """
     labels = np.asarray(labels)
     uncertain = np.zeros(labels.shape, dtype=bool)
     for axis, size in enumerate(labels.shape):
         place = np.arange(size)
         below, above = place - distance, place + distance
-        for neighbour in (np.where(below < 0, -1 - below, below), np.where(above >= size, 2 * size - 1 - above, above)):
+        for neighbour in (
+            np.where(below < 0, -1 - below, below),
+            np.where(above >= size, 2 * size - 1 - above, above),
+        ):
             uncertain |= labels != np.take(labels, neighbour, axis=axis)
     return float(uncertain.mean())
 
@@ -126,11 +144,13 @@ def uncertain_share(labels: np.ndarray, distance: int) -> float:
 def uncertainty_exponent(labels: np.ndarray) -> tuple[float, float, float]:
     """Uncertainty exponent of the boundaries and their fractal dimension.
 
-    The share f of uncertain cells (:func:`uncertain_share`) is taken at distances of 1, 2, 4, ... cells up to 1/16 of the shorter side of
-    the grid; alpha is the least-squares slope of ln f over ln distance. Cells are points, so their distance is exact and no correction
-    for the size of a box is needed. A smooth boundary has alpha = 1: twice the accuracy of the start, half the doubt. A small alpha
-    means that more accuracy buys little. Where boundaries lie closer to each other than the largest distance, f bends towards its ceiling
-    and alpha comes out low: 0.94 on 256 x 256 cells and 0.96 on 512 x 512 for a smooth boundary that winds.
+    The share f of uncertain cells (:func:`uncertain_share`) is taken at distances of 1, 2, 4, ...
+    cells up to 1/16 of the shorter side of the grid; alpha is the least-squares slope of ln f over
+    ln distance. Cells are points, so their distance is exact and no correction for the size of a
+    box is needed. A smooth boundary has alpha = 1: twice the accuracy of the start, half the doubt.
+    A small alpha means that more accuracy buys little. Where boundaries lie closer to each other
+    than the largest distance, f bends towards its ceiling and alpha comes out low: 0.94 on 256 x
+    256 cells and 0.96 on 512 x 512 for a smooth boundary that winds.
 
     S. W. McDonald, C. Grebogi, E. Ott, J. A. Yorke, Physica D 17 (1985) 125.
 
@@ -144,11 +164,13 @@ def uncertainty_exponent(labels: np.ndarray) -> tuple[float, float, float]:
     exponent : float
         alpha.
     error : float
-        Standard error of the slope: how far the points are from a line. It knows nothing of structures finer than the grid.
+        Standard error of the slope: how far the points are from a line. It knows nothing of
+        structures finer than the grid.
     dimension : float
         2 - alpha.
 
-        All three are NaN where there is no boundary, and on a grid of fewer than 64 cells a side, which has fewer than three distances.
+        All three are NaN where there is no boundary, and on a grid of fewer than 64 cells a side,
+        which has fewer than three distances.
     """
     largest = min(np.shape(labels)) // LARGEST_DISTANCE
     distances = 2 ** np.arange(max(largest, 0).bit_length())
@@ -164,7 +186,7 @@ def uncertainty_exponent(labels: np.ndarray) -> tuple[float, float, float]:
     return alpha, error, 2.0 - alpha
 
 
-# -- a map ---------------------------------------------------------------------------------------------------------------------
+# -- a map -----------------------------------------------------------------------------------------
 def measure(ds: xr.Dataset) -> dict[str, float | int]:
     """The trust numbers of a map of basins, to be kept in its attributes.
 
@@ -176,9 +198,11 @@ def measure(ds: xr.Dataset) -> dict[str, float | int]:
     Returns
     -------
     dict
-        ``smallest_basin_seen`` (share of the starts, of those that were computed), ``basin_entropy`` and ``boundary_basin_entropy`` [nat],
-        ``uncertainty_exponent``, ``uncertainty_exponent_error``, ``boundary_dimension``, ``unresolved_cells`` (on whose way a graze was
-        shallower than the local error), ``unsettled_cells`` (that have a code and no attractor).
+        ``smallest_basin_seen`` (share of the starts, of those that were computed),
+        ``basin_entropy`` and ``boundary_basin_entropy`` [nat], ``uncertainty_exponent``,
+        ``uncertainty_exponent_error``, ``boundary_dimension``, ``unresolved_cells`` (on whose way a
+        graze was shallower than the local error), ``unsettled_cells`` (that have a code and no
+        attractor).
     """
     check(ds, caller="measure", kinds=[BASINS])
     labels = ds["basin"].values

@@ -1,8 +1,11 @@
-"""How fast a flow makes volumes grow: the divergence of its field, integrated along the motion, and what contacts add.
+"""How fast a flow makes volumes grow: the divergence of its field, integrated along the motion, and
+what contacts add.
 
-By Liouville's rule the logarithm of the determinant of the tangent is the integral of the trace of the Jacobian. At a contact where the
-force jumps the determinant is multiplied by that of the saltation matrix, (n'f_after + g_t) / (n'f_before + g_t): the rate of the gap after
-the contact over the rate before. Nothing here uses the tangent flow, so that the sum of Lyapunov exponents can be held against it.
+By Liouville's rule the logarithm of the determinant of the tangent is the integral of the trace of
+the Jacobian. At a contact where the force jumps the determinant is multiplied by that of the
+saltation matrix, (n'f_after + g_t) / (n'f_before + g_t): the rate of the gap after the contact over
+the rate before. Nothing here uses the tangent flow, so that the sum of Lyapunov exponents can be
+held against it.
 """
 
 from __future__ import annotations
@@ -27,8 +30,9 @@ _INTEGRAL = "integral of the divergence"
 class Divergence:
     """The divergence of a system's field, integrated over blocks.
 
-    The trace of the Jacobian of most vibrating systems holds parameters only, or is constant in each mode: then it is summed by hand, the
-    times in the modes being known from the contacts. Any other is integrated as one more state.
+    The trace of the Jacobian of most vibrating systems holds parameters only, or is constant in
+    each mode: then it is summed by hand, the times in the modes being known from the contacts. Any
+    other is integrated as one more state.
     """
 
     def __init__(self, system: System):
@@ -37,24 +41,41 @@ class Divergence:
         self._moves = depends_on(self._trace, ("state", "time"))
         self._by_mode = any(node.op == "select" for node in walk(self._trace))
         units = {**system.units, _INTEGRAL: ""}
-        self._extended = replace(system, states=(*system.states, _INTEGRAL), field=(*system.field, self._trace), units=units)
+        self._extended = replace(
+            system,
+            states=(*system.states, _INTEGRAL),
+            field=(*system.field, self._trace),
+            units=units,
+        )
 
     def of_blocks(self, map_: Stroboscope, start: np.ndarray) -> np.ndarray:
-        """Logarithm of the growth of volumes over one block from float64[k, D], each with its row of the map, float64[k]."""
+        """Logarithm of the growth of volumes over one block from float64[k, D], each with its row
+        of the map, float64[k].
+        """
         constant = not self._moves and not self._by_mode
         if constant and not self._system.guards:
             return self._constant(map_)
         integrated = self._moves or (self._by_mode and not map_.method.records_contacts)
         if integrated:
             start = np.concatenate([start, np.zeros((len(start), 1))], axis=1)
-        outcome = map_.of_system(self._extended if integrated else self._system).run(start, 1, record=0)
-        total = outcome.state[:, -1].copy() if integrated else self._constant(map_) if constant else self._dwelling(map_, outcome)
+        outcome = map_.of_system(self._extended if integrated else self._system).run(
+            start, 1, record=0
+        )
+        total = (
+            outcome.state[:, -1].copy()
+            if integrated
+            else self._constant(map_)
+            if constant
+            else self._dwelling(map_, outcome)
+        )
         np.add.at(total, outcome.contacts.trajectory, self._jumps(map_, outcome))
         return np.where(np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED)), total, np.nan)
 
     def _constant(self, map_: Stroboscope) -> np.ndarray:
         """A trace of parameters only."""
-        return np.broadcast_to(evaluate([self._trace], values=map_.values)[0], len(map_)) * map_.period
+        return (
+            np.broadcast_to(evaluate([self._trace], values=map_.values)[0], len(map_)) * map_.period
+        )
 
     def _dwelling(self, map_: Stroboscope, outcome: Outcome) -> np.ndarray:
         """A trace that is constant in each mode: its values times the times in the modes."""
@@ -62,14 +83,20 @@ class Divergence:
         first = np.diff(row, prepend=-1) != 0
         begun = np.where(first, 0.0, np.roll(times, 1))
         total = np.zeros(len(map_))
-        np.add.at(total, row, (times - begun) * self._in_mode(map_, row, outcome.contacts.mode_before))
+        np.add.at(
+            total, row, (times - begun) * self._in_mode(map_, row, outcome.contacts.mode_before)
+        )
         last = np.zeros(len(map_))
         last[row] = times  # sorted by time: the last one stays
-        return total + (map_.period - last) * self._in_mode(map_, np.arange(len(map_)), outcome.mode)
+        return total + (map_.period - last) * self._in_mode(
+            map_, np.arange(len(map_)), outcome.mode
+        )
 
     def _in_mode(self, map_: Stroboscope, row: np.ndarray, mode: np.ndarray) -> np.ndarray:
         values = {name: column[row] for name, column in map_.values.items()}
-        return np.broadcast_to(evaluate([self._trace], values=values, bits=self._bits(mode))[0], len(row))
+        return np.broadcast_to(
+            evaluate([self._trace], values=values, bits=self._bits(mode))[0], len(row)
+        )
 
     def _bits(self, mode: np.ndarray) -> list[np.ndarray]:
         return [(mode >> i) & 1 == 1 for i in range(len(self._system.guards))]
@@ -79,15 +106,23 @@ class Divergence:
         system, contacts = self._system, outcome.contacts
         here: dict[str, Any] = {
             "t": contacts.time,
-            "states": dict(zip(system.states, contacts.state.T, strict=False)),  # an integral may follow them
+            # an integral may follow them
+            "states": dict(zip(system.states, contacts.state.T, strict=False)),
             "values": {name: column[contacts.trajectory] for name, column in map_.values.items()},
         }
         before, after = self._bits(contacts.mode_before), self._bits(contacts.mode_after)
         fields = [evaluate(system.field, bits=bits, **here) for bits in (before, after)]
         logarithm = np.zeros(len(contacts))
         for g, guard in enumerate(system.guards):
-            *normal, drift = evaluate([*gradient(guard.gap, system.states), time_derivative(guard.gap)], bits=before, **here)
-            rates = [sum((n * f for n, f in zip(normal, field, strict=True)), start=drift) for field in fields]
+            *normal, drift = evaluate(
+                [*gradient(guard.gap, system.states), time_derivative(guard.gap)],
+                bits=before,
+                **here,
+            )
+            rates = [
+                sum((n * f for n, f in zip(normal, field, strict=True)), start=drift)
+                for field in fields
+            ]
             mine = (contacts.guard == g) & (contacts.kind == st.CROSSING)
             with np.errstate(all="ignore"):
                 logarithm = np.where(mine, np.log(np.abs(rates[1] / rates[0])), logarithm)

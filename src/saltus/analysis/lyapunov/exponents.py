@@ -1,4 +1,6 @@
-"""Exponents of many trajectories of a flow: group after group, so that memory stays bounded, into the columns of a result."""
+"""Exponents of many trajectories of a flow: group after group, so that memory stays bounded, into
+the columns of a result.
+"""
 
 from __future__ import annotations
 
@@ -23,13 +25,18 @@ from saltus.results.dataset.kinds import Kind
 GROUP = 4_000_000
 #: Growth rates of a group: 80 MB, and some copies of it.
 RATES = 10_000_000
-#: Share of the range of a gap below which an orbit that misses or overshoots its boundary is near a graze. Exponents belong to
-#: infinitesimal deviations. A gap is known, and a deviation seen, to a thousandth of the motion at best: of an orbit so close to a boundary
-#: nobody could tell on which side of the graze it is, and beyond it the exponents are others. A motion that never repeats
-#: comes as close as one likes to every boundary that it meets, so of such a one only the grazes themselves count.
+#: Share of the range of a gap below which an orbit that misses or overshoots its boundary is near a
+#: graze. Exponents belong to infinitesimal deviations. A gap is known, and a deviation seen, to a
+#: thousandth of the motion at best: of an orbit so close to a boundary nobody could tell on which
+#: side of the graze it is, and beyond it the exponents are others. A motion that never repeats
+#: comes as close as one likes to every boundary that it meets, so of such a one only the grazes
+#: themselves count.
 NEAR_GRAZE = 1e-3
 #: The two conventions of a forced system.
-FORCED = "lyapunov_exponent: of the stroboscopic map; flow_lyapunov_exponent: of the flow, with a zero for the phase of the forcing"
+FORCED = (
+    "lyapunov_exponent: of the stroboscopic map; flow_lyapunov_exponent: of the flow, with a "
+    "zero for the phase of the forcing"
+)
 
 
 class Exponents:
@@ -49,16 +56,38 @@ class Exponents:
 
     algorithm = "variational equations with saltation, QR method"
 
-    def __init__(self, map_: Stroboscope, start: np.ndarray, periods: int, transient: int, every: float | None):
-        self.map, self._start, self._periods, self._transient, self._every = map_, start, periods, transient, every
+    def __init__(
+        self,
+        map_: Stroboscope,
+        start: np.ndarray,
+        periods: int,
+        transient: int,
+        every: float | None,
+    ):
+        self.map, self._start, self._periods, self._transient, self._every = (
+            map_,
+            start,
+            periods,
+            transient,
+            every,
+        )
         self._ends = running_ends(periods)
         k, size, m = *start.shape, len(self._ends)
         nan = np.full
         self._mean, self._error, self._half = (nan((k, size), np.nan) for _ in range(3))
         self._running, self._running_half = (nan((k, size, m), np.nan) for _ in range(2))
         self._volume, self._margin = nan(k, np.nan), nan(k, np.inf)
-        self._kind, self._period, self._batches = nan(k, "unclear", dtype=object), nan(k, 0), nan(k, 0)
-        self._status, self._near, self._grazes, self._unresolved = nan(k, st.NOT_COMPUTED), nan(k, 0), nan(k, 0), nan(k, 0)
+        self._kind, self._period, self._batches = (
+            nan(k, "unclear", dtype=object),
+            nan(k, 0),
+            nan(k, 0),
+        )
+        self._status, self._near, self._grazes, self._unresolved = (
+            nan(k, st.NOT_COMPUTED),
+            nan(k, 0),
+            nan(k, 0),
+            nan(k, 0),
+        )
 
     def run(self, progress: Callable[[float], None] | None = None) -> None:
         """Compute all, in groups."""
@@ -72,7 +101,9 @@ class Exponents:
                     progress((first + share * count) / k)
 
             flow = TangentFlow(self.map.rows(rows))
-            found = spectrum(flow, self._start[rows], self._periods, self._transient, self._every is None, show)
+            found = spectrum(
+                flow, self._start[rows], self._periods, self._transient, self._every is None, show
+            )
             if self._every is not None and autonomous(self.map.system):
                 _rest(found, flow, self._start[rows], self._every)
             self._keep(rows, flow, found)
@@ -80,14 +111,27 @@ class Exponents:
     def _keep(self, rows: np.ndarray, flow: TangentFlow, found: Spectrum) -> None:
         """Write a group to its places."""
         segment = found.growth.segment
-        self._mean[rows], self._error[rows], self._half[rows] = found.exponents, found.errors, found.half_width
+        self._mean[rows], self._error[rows], self._half[rows] = (
+            found.exponents,
+            found.errors,
+            found.half_width,
+        )
         self._running[rows], self._running_half[rows] = found.running.mean, found.running.half_width
-        self._volume[rows], self._batches[rows], self._kind[rows] = found.volume, found.batches, found.kinds
+        self._volume[rows], self._batches[rows], self._kind[rows] = (
+            found.volume,
+            found.batches,
+            found.kinds,
+        )
         self._period[rows] = [
-            orbit.period if orbit and kind == Kind.PERIODIC.word else 0 for orbit, kind in zip(found.orbits, found.kinds, strict=True)
+            orbit.period if orbit and kind == Kind.PERIODIC.word else 0
+            for orbit, kind in zip(found.orbits, found.kinds, strict=True)
         ]
         self._status[rows] = segment.status
-        self._grazes[rows], self._unresolved[rows], self._margin[rows] = segment.grazes, segment.unresolved, segment.margin
+        self._grazes[rows], self._unresolved[rows], self._margin[rows] = (
+            segment.grazes,
+            segment.unresolved,
+            segment.margin,
+        )
         for i, orbit in enumerate(found.orbits):
             if orbit is not None:
                 self._of_orbit(rows[i], flow.rows(np.array([i])), orbit)
@@ -143,14 +187,21 @@ class Exponents:
 
 
 def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -> None:
-    """Where a motion has come to an equilibrium, its exponents: the real parts of the eigenvalues of the Jacobian, exact but for rounding.
+    """Where a motion has come to an equilibrium, its exponents: the real parts of the eigenvalues
+    of the Jacobian, exact but for rounding.
 
     Means of growth lag behind: those of a pair of complex eigenvalues swing about its real part.
     """
     iterates = found.growth.segment.points
-    state, whole = iterates[:, -1], np.ptp(np.concatenate([start[:, None], iterates], axis=1), axis=1)
-    widest = whole.max(axis=1, keepdims=True)  # in place of the range of a state that began at rest and has come to rest
-    scale = np.where(whole > AT_REST * widest, whole, np.where((widest > 0) & np.isfinite(widest), widest, 1.0))
+    state, whole = (
+        iterates[:, -1],
+        np.ptp(np.concatenate([start[:, None], iterates], axis=1), axis=1),
+    )
+    # in place of the range of a state that began at rest and has come to rest
+    widest = whole.max(axis=1, keepdims=True)
+    scale = np.where(
+        whole > AT_REST * widest, whole, np.where((widest > 0) & np.isfinite(widest), widest, 1.0)
+    )
     still = find_equilibria(flow.map, state, scale, captures=False)
     with np.errstate(invalid="ignore"):
         attracts = (still.eigenvalues.real < 0).all(axis=1)

@@ -27,9 +27,16 @@ from saltus.system.system import System
 from saltus.units import to_si
 
 METHODS = ("variational", "wolf")
-#: Units in which exponents are given: what one block is worth, and whether the logarithm is natural.
-UNITS = {"1/s": (False, 1.0), "1/period": (True, 1.0), "bit/s": (False, math.log(2)), "bit/period": (True, math.log(2))}
-#: Blocks from which something can be said at least: the error of the mean needs 8 independent batches, of some blocks each.
+#: Units in which exponents are given: what one block is worth, and whether the logarithm is
+#: natural.
+UNITS = {
+    "1/s": (False, 1.0),
+    "1/period": (True, 1.0),
+    "bit/s": (False, math.log(2)),
+    "bit/period": (True, math.log(2)),
+}
+#: Blocks from which something can be said at least: the error of the mean needs 8 independent
+#: batches, of some blocks each.
 LEAST_PERIODS = 64
 
 
@@ -50,13 +57,15 @@ def lyapunov(
 ) -> xr.Dataset:
     """Lyapunov exponents of the motions that given starts lead to, with their errors.
 
-    A motion that settles to a periodic orbit has exactly the exponents of the orbit, the logarithms of the magnitudes of its Floquet
-    multipliers over its period. Any other has the mean growth of small deviations, by the variational equations, their jumps at contacts
-    (saltation) and the QR method, over ``periods`` blocks after ``transient``. A block is a forcing period.
+    A motion that settles to a periodic orbit has exactly the exponents of the orbit, the logarithms
+    of the magnitudes of its Floquet multipliers over its period. Any other has the mean growth of
+    small deviations, by the variational equations, their jumps at contacts (saltation) and the QR
+    method, over ``periods`` blocks after ``transient``. A block is a forcing period.
 
-    Two conventions are in use. A forced system of D states has D exponents as a stroboscopic map: ``lyapunov_exponent``. As a flow,
-    the phase of the forcing is one more state, whose exponent is zero: ``flow_lyapunov_exponent``. Without forcing both are the D
-    exponents of the flow, which has a zero of its own unless the motion ends in an equilibrium.
+    Two conventions are in use. A forced system of D states has D exponents as a stroboscopic map:
+    ``lyapunov_exponent``. As a flow, the phase of the forcing is one more state, whose exponent is
+    zero: ``flow_lyapunov_exponent``. Without forcing both are the D exponents of the flow, which
+    has a zero of its own unless the motion ends in an equilibrium.
 
     Parameters
     ----------
@@ -65,18 +74,21 @@ def lyapunov(
     start : sequence, mapping or array
         Starts, as for :func:`saltus.simulate`; one or many. Default: all zero.
     method : {"variational", "wolf"}
-        ``"wolf"``: the largest exponent only, from the growth of the distance between neighbours on the trajectory, as much of the
-        literature has it (:func:`saltus.wolf`). Points are all states and the phase of the forcing, 32 in a block; an evolution is
-        one block. It is the largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
+        ``"wolf"``: the largest exponent only, from the growth of the distance between neighbours on
+        the trajectory, as much of the literature has it (:func:`saltus.wolf`). Points are all
+        states and the phase of the forcing, 32 in a block; an evolution is one block. It is the
+        largest exponent of the flow, so never below zero: neighbours on an orbit stay neighbours.
     flow : Method
-        How to integrate. Default :class:`saltus.Taylor`. With ``sl.ODE45(events="ignore")`` jumps of the tangent are left out, as contacts
-        aren't known.
+        How to integrate. Default :class:`saltus.Taylor`. With ``sl.ODE45(events="ignore")`` jumps
+        of the tangent are left out, as contacts aren't known.
     periods : int
-        Blocks that growth is measured over, at least 64. The error falls with the square root of it.
+        Blocks that growth is measured over, at least 64. The error falls with the square root of
+        it.
     transient : int
         Blocks before them that don't count. In the last 128 of them the directions align.
     every : float or str, optional
-        Time of a block [s], for a system without forcing: about a turn of the motion. Deviations should grow by less than 1e8 in it.
+        Time of a block [s], for a system without forcing: about a turn of the motion. Deviations
+        should grow by less than 1e8 in it.
     values : mapping
         Parameter values of this call: one each, or an array with one for each trajectory.
     unit : {"1/s", "1/period", "bit/s", "bit/period"}
@@ -84,20 +96,24 @@ def lyapunov(
     threads : int
         Default all processors. Results don't depend on it.
     progress : bool or callable
-        Default: a bar on the terminal if the work lasts more than two seconds. A callable gets the share done.
+        Default: a bar on the terminal if the work lasts more than two seconds. A callable gets the
+        share done.
 
     Returns
     -------
     Dataset
-        Dims ``trajectory``, ``exponent`` (descending), ``flow_exponent``, ``running``. ``lyapunov_exponent`` with ``lyapunov_error``
-        (standard error) and the 95 % interval ``lyapunov_low``, ``lyapunov_high``: of an orbit the effect of rounding; of any other
-        motion from batch means whose batches grow until they are independent (Flyvbjerg & Petersen 1989), ``independent_batches`` of them,
-        by Student's t. ``kind``: ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or
-        ``unclear``; ``response_period``: n of
-        nT, or 0. ``exponent_sum`` beside ``mean_divergence``, which must agree: the mean trace of the Jacobian and what contacts
-        add, found without the tangent. ``near_graze``: 1 if the motion after the transient grazes a boundary, or is an orbit that
-        misses one by less than a thousandth of its size: then deviations that could be seen in practice don't grow as infinitesimal
-        ones do. ``running_exponent`` and its interval over ``running_time``; ``status``.
+        Dims ``trajectory``, ``exponent`` (descending), ``flow_exponent``, ``running``.
+        ``lyapunov_exponent`` with ``lyapunov_error`` (standard error) and the 95 % interval
+        ``lyapunov_low``, ``lyapunov_high``: of an orbit the effect of rounding; of any other motion
+        from batch means whose batches grow until they are independent (Flyvbjerg & Petersen 1989),
+        ``independent_batches`` of them, by Student's t. ``kind``: ``periodic``, ``quasi_periodic``,
+        ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``; ``response_period``: n of nT,
+        or 0. ``exponent_sum`` beside ``mean_divergence``, which must agree: the mean trace of the
+        Jacobian and what contacts add, found without the tangent. ``near_graze``: 1 if the motion
+        after the transient grazes a boundary, or is an orbit that misses one by less than a
+        thousandth of its size: then deviations that could be seen in practice don't grow as
+        infinitesimal ones do. ``running_exponent`` and its interval over ``running_time``;
+        ``status``.
 
     Raises
     ------
@@ -108,17 +124,20 @@ def lyapunov(
 
     References
     ----------
-    Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980) 9-30; Eckmann & Ruelle, Rev. Mod. Phys. 57 (1985) 617-656; Leine &
-    Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (2004), section 7; Flyvbjerg & Petersen, J. Chem. Phys. 91 (1989)
-    461-466; Wolf, Swift, Swinney & Vastano, Physica D 16 (1985) 285-317.
+    Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980) 9-30; Eckmann & Ruelle, Rev. Mod.
+    Phys. 57 (1985) 617-656; Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
+    Systems (2004), section 7; Flyvbjerg & Petersen, J. Chem. Phys. 91 (1989) 461-466; Wolf, Swift,
+    Swinney & Vastano, Physica D 16 (1985) 285-317.
 
     Examples
     --------
     >>> import saltus as sl
     >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
     >>> spectrum = sl.lyapunov(rig, start=(0, 0), periods=400)
-    >>> str(spectrum["kind"].values[0]), spectrum["lyapunov_exponent"].values.round(4).tolist()  # -damping_ratio * omega, twice
-    ('periodic', [[-0.9425, -0.9425]])
+    >>> str(spectrum["kind"].values[0])
+    'periodic'
+    >>> spectrum["lyapunov_exponent"].values.round(4).tolist()  # -damping_ratio * omega, twice
+    [[-0.9425, -0.9425]]
     """
     check_system(system)
     _check_words(method, unit, system)
@@ -128,7 +147,9 @@ def lyapunov(
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))
     block = None if every is None else to_si(every, "s", "every")
     map_ = Stroboscope(system, flow, rows, block, threads)
-    work = (Exponents if method == "variational" else NeighbourExponents)(map_, group.start, periods, transient, block)
+    work = (Exponents if method == "variational" else NeighbourExponents)(
+        map_, group.start, periods, transient, block
+    )
 
     def dataset() -> xr.Dataset:
         return _dataset(system, flow, group, work, unit)
@@ -146,7 +167,8 @@ def lyapunov(
 def _check_words(method: Any, unit: Any, system: System) -> None:
     if isinstance(method, Method):
         raise ParameterError(
-            f'method says how exponents are measured: "variational" or "wolf". How to integrate is flow=sl.{method.name}(...).'
+            f'method says how exponents are measured: "variational" or "wolf". How to integrate is '
+            f"flow=sl.{method.name}(...)."
         )
     if not among(method, METHODS):
         raise ParameterError(f"there is no method {shown(method)}. {nearest(method, METHODS)}")
@@ -154,14 +176,29 @@ def _check_words(method: Any, unit: Any, system: System) -> None:
         raise ParameterError(f"exponents aren't given in {shown(unit)}. {nearest(unit, UNITS)}")
     if UNITS[unit][0] and system.forced_at is None:
         raise ParameterError(
-            f"{system.name} has no forcing period, so {shown(unit)} has no meaning. Take unit={unit.replace('period', 's')!r}."
+            f"{system.name} has no forcing period, so {shown(unit)} has no meaning. Take "
+            f"unit={unit.replace('period', 's')!r}."
         )
 
 
-def _dataset(system: System, flow: Method, group: Ensemble, work: Exponents | NeighbourExponents, unit: str) -> xr.Dataset:
+def _dataset(
+    system: System, flow: Method, group: Ensemble, work: Exponents | NeighbourExponents, unit: str
+) -> xr.Dataset:
     """Everything under its name and in its unit."""
     per_period, logarithm = UNITS[unit]
     factor = (1.0 if per_period else 1.0 / work.map.period) / logarithm
-    attrs = provenance(system, flow, shared_values(system, group), group.varied) | work.settings() | {"unit": unit}
-    columns = {"trajectory": np.arange(group.size), **work.columns(np.broadcast_to(factor, group.size))}
-    return build(schema.EXPONENTS, subject(system, attrs, varied=group.varied), columns, words={"<rate>": unit})
+    attrs = (
+        provenance(system, flow, shared_values(system, group), group.varied)
+        | work.settings()
+        | {"unit": unit}
+    )
+    columns = {
+        "trajectory": np.arange(group.size),
+        **work.columns(np.broadcast_to(factor, group.size)),
+    }
+    return build(
+        schema.EXPONENTS,
+        subject(system, attrs, varied=group.varied),
+        columns,
+        words={"<rate>": unit},
+    )

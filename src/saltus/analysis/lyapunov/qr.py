@@ -1,9 +1,11 @@
-"""How small deviations grow along trajectories, block by block and in all directions: the QR method.
+"""How small deviations grow along trajectories, block by block and in all directions: the QR
+method.
 
-The derivatives of all blocks of a segment are computed in one batch, as the states at which they begin are known from the trajectory
-itself. Then an orthogonal frame is carried through them: block by block M Q = Q' R, and the logarithms of the diagonal of R are the growth
-of the frame's axes; their means are the Lyapunov exponents. Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980) 9-20 and 21-30;
-Eckmann & Ruelle, Reviews of Modern Physics 57 (1985) 617-656, section V.
+The derivatives of all blocks of a segment are computed in one batch, as the states at which they
+begin are known from the trajectory itself. Then an orthogonal frame is carried through them: block
+by block M Q = Q' R, and the logarithms of the diagonal of R are the growth of the frame's axes;
+their means are the Lyapunov exponents. Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980)
+9-20 and 21-30; Eckmann & Ruelle, Reviews of Modern Physics 57 (1985) 617-656, section V.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ import numpy as np
 from saltus.analysis.lyapunov.segments import Segment, TangentFlow
 from saltus.kernels import status as st
 
-#: Blocks of a segment. A trajectory starts afresh after each, so this number is part of the result and never depends on the batch.
+#: Blocks of a segment. A trajectory starts afresh after each, so this number is part of the result
+#: and never depends on the batch.
 SEGMENT = 1024
 #: Blocks at most in which the frame finds its way before growth counts, taken from the transient.
 ALIGNING = 128
@@ -39,7 +42,8 @@ class Growth:
     scale : float64[k, D]
         Range of each state.
     segment : Segment
-        Status and grazes after the transient; its points are those of the last SEGMENT blocks, or all if they are fewer.
+        Status and grazes after the transient; its points are those of the last SEGMENT blocks, or
+        all if they are fewer.
     """
 
     rates: np.ndarray
@@ -71,11 +75,18 @@ def grow(
     k, size = start.shape
     aligning = min(ALIGNING, transient)
     before = flow.advance(start, transient, transient - aligning)
-    scale = _scale(start, np.concatenate([before.points, flow.sample(before.points[:, -1])], axis=1))
+    scale = _scale(
+        start, np.concatenate([before.points, flow.sample(before.points[:, -1])], axis=1)
+    )
     frame = np.broadcast_to(np.eye(size), (k, size, size))
     if aligning:
         _, frame = carry(flow.derivatives(before.points[:, :-1]), frame, scale)
-    rates, volume, segments, state = np.full((k, count, size), np.nan), np.full((k, count), np.nan), [before], before.points[:, -1]
+    rates, volume, segments, state = (
+        np.full((k, count, size), np.nan),
+        np.full((k, count), np.nan),
+        [before],
+        before.points[:, -1],
+    )
     for first in range(0, count, SEGMENT):
         last = min(first + SEGMENT, count)
         segment = flow.advance(state, last - first)
@@ -90,18 +101,27 @@ def grow(
 
 
 def _scale(start: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """Range of each state, float64[k, D], in the motion float64[k, m, D]: it makes lengths of different units comparable.
+    """Range of each state, float64[k, D], in the motion float64[k, m, D]: it makes lengths of
+    different units comparable.
 
-    A motion that has come to rest has the range of all that came before, as what is left of it is rounding.
+    A motion that has come to rest has the range of all that came before, as what is left of it is
+    rounding.
     """
     with np.errstate(invalid="ignore"):
-        own, whole = np.ptp(motion, axis=1), np.ptp(np.concatenate([start[:, None], motion], axis=1), axis=1)
+        own, whole = (
+            np.ptp(motion, axis=1),
+            np.ptp(np.concatenate([start[:, None], motion], axis=1), axis=1),
+        )
     wide = np.where(own > AT_REST * whole, own, whole)
     return np.where((wide > 0) & np.isfinite(wide), wide, 1.0)
 
 
-def carry(matrices: np.ndarray, frame: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Carry frames float64[k, D, D] through matrices float64[k, n, D, D] in units of the scale: growth float64[k, n, D], and the frames."""
+def carry(
+    matrices: np.ndarray, frame: np.ndarray, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Carry frames float64[k, D, D] through matrices float64[k, n, D, D] in units of the scale:
+    growth float64[k, n, D], and the frames.
+    """
     matrices = matrices * scale[:, None, None, :] / scale[:, None, :, None]
     diagonal = np.empty(matrices.shape[:3])
     for j in range(matrices.shape[1]):
@@ -112,12 +132,16 @@ def carry(matrices: np.ndarray, frame: np.ndarray, scale: np.ndarray) -> tuple[n
 
 
 def _joined(segments: list[Segment]) -> Segment:
-    """Sums and minima after the transient, the first status that isn't a success, and the last points."""
+    """Sums and minima after the transient, the first status that isn't a success, and the last
+    points.
+    """
     after = segments[1:]
     status = segments[0].status
     for segment in after:
         status = np.where(np.isin(status, GOOD), np.maximum(status, segment.status), status)
-    points = np.concatenate([*(segment.points[:, :-1] for segment in after[-2:]), after[-1].points[:, -1:]], axis=1)
+    points = np.concatenate(
+        [*(segment.points[:, :-1] for segment in after[-2:]), after[-1].points[:, -1:]], axis=1
+    )
     return Segment(
         points[:, -SEGMENT - 1 :],
         status,

@@ -1,4 +1,6 @@
-"""Trajectories of a flow from block to block, with the derivative and the divergence of every block."""
+"""Trajectories of a flow from block to block, with the derivative and the divergence of every
+block.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ class Segment:
 
 
 class TangentFlow:
-    """Trajectories of a flow, each with a row of a map, and how deviations grow in each block: one iterate of the map."""
+    """Trajectories of a flow, each with a row of a map, and how deviations grow in each block: one
+    iterate of the map.
+    """
 
     def __init__(self, map_: Stroboscope):
         self.map = map_
@@ -50,24 +54,38 @@ class TangentFlow:
         """``count`` blocks from float64[k, D]; the points kept begin after ``first`` of them."""
         if not count:
             nothing = np.zeros(len(start), np.int64)
-            return Segment(start[:, None], nothing + st.OK, nothing, nothing, np.full(len(start), np.inf))
+            return Segment(
+                start[:, None], nothing + st.OK, nothing, nothing, np.full(len(start), np.inf)
+            )
         outcome = self.map.run(start, count, Schedule.even(count + 1 - first, 1, first))
         grazes, unresolved = outcome.counters[:, st.GRAZES], outcome.counters[:, st.UNRESOLVED]
-        return Segment(outcome.samples, outcome.status, grazes, unresolved, outcome.minima[:, st.GAP_MARGIN])
+        return Segment(
+            outcome.samples, outcome.status, grazes, unresolved, outcome.minima[:, st.GAP_MARGIN]
+        )
 
     def sample(self, start: np.ndarray) -> np.ndarray:
-        """States float64[k, m, D] of the motion from float64[k, D] on, close enough to one another to tell its size."""
-        return self.map.run(start, SAMPLED_BLOCKS, Schedule.even(SAMPLED_BLOCKS, SAMPLES_PER_BLOCK)).samples
+        """States float64[k, m, D] of the motion from float64[k, D] on, close enough to one another
+        to tell its size.
+        """
+        return self.map.run(
+            start, SAMPLED_BLOCKS, Schedule.even(SAMPLED_BLOCKS, SAMPLES_PER_BLOCK)
+        ).samples
 
     def derivatives(self, states: np.ndarray) -> np.ndarray:
         """Derivative float64[k, n, D, D] of the block that begins at each of float64[k, n, D]."""
         k, n, size = states.shape
-        return self._blocks(k, n).tangent(states.reshape(k * n, size), 1)[1].reshape(k, n, size, size)
+        return (
+            self._blocks(k, n).tangent(states.reshape(k * n, size), 1)[1].reshape(k, n, size, size)
+        )
 
     def divergences(self, states: np.ndarray) -> np.ndarray:
-        """Logarithm float64[k, n] of the factor by which volumes grow in the block that begins at each of float64[k, n, D]."""
+        """Logarithm float64[k, n] of the factor by which volumes grow in the block that begins at
+        each of float64[k, n, D].
+        """
         k, n, size = states.shape
-        return self._divergence.of_blocks(self._blocks(k, n), states.reshape(k * n, size)).reshape(k, n)
+        return self._divergence.of_blocks(self._blocks(k, n), states.reshape(k * n, size)).reshape(
+            k, n
+        )
 
     def rows(self, which: np.ndarray) -> Self:
         """Some of the trajectories, int64[m], with repeats if wanted."""

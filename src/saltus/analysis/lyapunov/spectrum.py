@@ -1,7 +1,9 @@
-"""Lyapunov spectra of trajectories of a flow or of any map, with what kind of motion they belong to.
+"""Lyapunov spectra of trajectories of a flow or of any map, with what kind of motion they belong
+to.
 
-A trajectory that settles to a periodic orbit has the exponents of the orbit, ln |multiplier| per period, exact but for rounding. Any other
-has the means of its growth rates, and the statistics of these say how sure they are.
+A trajectory that settles to a periodic orbit has the exponents of the orbit, ln |multiplier| per
+period, exact but for rounding. Any other has the means of its growth rates, and the statistics of
+these say how sure they are.
 """
 
 from __future__ import annotations
@@ -20,9 +22,11 @@ from saltus.analysis.orbits.tolerances import NEAR, ROUND, SAME
 from saltus.analysis.statistics import BOUNDED, UNCLEAR, Means, batch_means, running_ends
 from saltus.results.dataset.kinds import Kind
 
-#: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the rounding of the faster: three digits are left.
+#: Logarithm of the ratio of growths in one block beyond which the slower one is lost in the
+#: rounding of the faster: three digits are left.
 LOST = 29.0
-#: Factor on the rounding of a monodromy matrix beyond which a multiplier is lost, and blocks of the round trips that find it then.
+#: Factor on the rounding of a monodromy matrix beyond which a multiplier is lost, and blocks of the
+#: round trips that find it then.
 AMPLIFIED, TRIPS = 1e6, 256
 #: What a slow approach to an orbit must at least have gained over half of the last segment.
 GAINED = 0.5
@@ -43,7 +47,8 @@ class Spectrum:
     orbits : list of Orbit or None
         The periodic orbit to which each settles.
     kinds : list of str
-        ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``.
+        ``periodic``, ``quasi_periodic``, ``chaotic``, ``equilibrium``, ``limit_cycle`` or
+        ``unclear``.
     ends : int64[m]
         Blocks after which running means are kept,
     running : Means
@@ -74,13 +79,22 @@ def spectrum(
 ) -> Spectrum:
     """Exponents over ``count`` blocks after a transient, of trajectories from float64[k, D].
 
-    Without forcing a motion that repeats has an exponent of zero along itself; that makes a difference to what it is called.
+    Without forcing a motion that repeats has an exponent of zero along itself; that makes a
+    difference to what it is called.
     """
     growth = grow(flow, start, count, transient, progress)
-    rates = _told(np.take_along_axis(growth.rates, np.argsort(-growth.rates.mean(axis=1), axis=1, kind="stable")[:, None], axis=2))
+    rates = _told(
+        np.take_along_axis(
+            growth.rates,
+            np.argsort(-growth.rates.mean(axis=1), axis=1, kind="stable")[:, None],
+            axis=2,
+        )
+    )
     ends = running_ends(count)
     running = batch_means(np.swapaxes(rates, 1, 2), ends)
-    exponents, errors, half_width = (part[..., -1].copy() for part in (running.mean, running.error, running.half_width))
+    exponents, errors, half_width = (
+        part[..., -1].copy() for part in (running.mean, running.error, running.half_width)
+    )
     batches, volume = running.batches[:, 0, -1].copy(), growth.volume.mean(axis=1)
     orbits = _orbits(flow, growth)
     kinds = []
@@ -92,17 +106,21 @@ def spectrum(
         exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i])
         half_width[i], batches[i] = errors[i], 0
         volume[i] = _volume(flow, i, orbit)
-    return Spectrum(exponents, errors, half_width, volume, batches, orbits, kinds, ends, running, growth)
+    return Spectrum(
+        exponents, errors, half_width, volume, batches, orbits, kinds, ends, running, growth
+    )
 
 
 def _told(rates: np.ndarray) -> np.ndarray:
-    """Rates float64[k, n, D] with NaN for directions that are lost in the rounding of the fastest one."""
+    """Rates float64[k, n, D] with NaN for directions that are lost in the rounding of the fastest
+    one.
+    """
     with np.errstate(invalid="ignore"):
         lost = ~((rates[:, :, :1] - rates).mean(axis=1, keepdims=True) < LOST)
     return np.where(lost, np.nan, rates)
 
 
-# -- orbits --------------------------------------------------------------------------------------------------------------------
+# -- orbits ----------------------------------------------------------------------------------------
 def _orbits(flow: TangentFlow, growth: Growth) -> list[Orbit | None]:
     """The stable periodic orbit to which each trajectory has come, None for the others."""
     points, scale = growth.segment.points, growth.scale
@@ -116,24 +134,35 @@ def _orbits(flow: TangentFlow, growth: Growth) -> list[Orbit | None]:
 
 
 def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float) -> bool:
-    """Whether a trajectory float64[m, D] lies on an orbit at its end, or comes closer to it all the time."""
+    """Whether a trajectory float64[m, D] lies on an orbit at its end, or comes closer to it all the
+    time.
+    """
     n, half = orbit.period, len(points) // 2
     distance = np.abs((points[:, None] - orbit.points[None]) / scale).max(axis=2).min(axis=1)
     early, late = distance[max(half - n, 0) : half + 1].max(), distance[-n:].max()
-    return bool(late <= max(SAME, 4.0 * noise) or (late <= max(NEAR, 4.0 * noise) and late < GAINED * early))
+    return bool(
+        late <= max(SAME, 4.0 * noise) or (late <= max(NEAR, 4.0 * noise) and late < GAINED * early)
+    )
 
 
-def _of_orbit(flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Exponents of an orbit per block, and what the map's own errors make of them (Bauer & Fike: times the condition of the eigenvectors).
+def _of_orbit(
+    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Exponents of an orbit per block, and what the map's own errors make of them (Bauer & Fike:
+    times the condition of the eigenvectors).
 
-    Multipliers that are lost in the rounding of the largest are found as growth round the orbit, block by block.
+    Multipliers that are lost in the rounding of the largest are found as growth round the orbit,
+    block by block.
     """
     map_, n = flow.map.rows(np.array([i])), orbit.period
     noise, monodromy = map_.noise, map_.tangent(orbit.points[:1], n)[1][0] * scale / scale[:, None]
     condition = min(np.linalg.cond(np.linalg.eig(monodromy)[1]), 1.0 / noise)
     magnitudes = -np.sort(-np.abs(orbit.multipliers))
     with np.errstate(divide="ignore"):
-        exponents, amplified = np.log(magnitudes) / n, condition * np.linalg.norm(monodromy, 2) / magnitudes
+        exponents, amplified = (
+            np.log(magnitudes) / n,
+            condition * np.linalg.norm(monodromy, 2) / magnitudes,
+        )
         errors = noise * amplified / n
     lost = amplified > AMPLIFIED
     if lost.any():
@@ -141,8 +170,12 @@ def _of_orbit(flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray) -> tup
     return exponents, errors
 
 
-def _round_trips(flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean growth per block over the later half of many round trips of an orbit, and how far that of its two halves lies apart."""
+def _round_trips(
+    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean growth per block over the later half of many round trips of an orbit, and how far that
+    of its two halves lies apart.
+    """
     n, size = orbit.points.shape
     blocks = flow.rows(np.full(n, i)).derivatives(orbit.points[:, None])[:, 0]
     trips = max(-(-TRIPS // n), 8) // 4 * 4
@@ -156,16 +189,22 @@ def _volume(flow: TangentFlow, i: int, orbit: Orbit) -> float:
     return float(flow.rows(np.full(orbit.period, i)).divergences(orbit.points[:, None]).mean())
 
 
-# -- kinds ---------------------------------------------------------------------------------------------------------------------
+# -- kinds -----------------------------------------------------------------------------------------
 def kind_of(rates: np.ndarray, errors: np.ndarray, forced: bool) -> str:
-    """What a motion that isn't an orbit of the map is called, from rates float64[n, D] and the errors of their means."""
-    mean, first, second = rates.mean(axis=0), *(half.mean(axis=0) for half in np.array_split(rates, 2))
+    """What a motion that isn't an orbit of the map is called, from rates float64[n, D] and the
+    errors of their means.
+    """
+    mean, first, second = (
+        rates.mean(axis=0),
+        *(half.mean(axis=0) for half in np.array_split(rates, 2)),
+    )
     if not np.isfinite(mean[0]) or not errors[0] <= UNCLEAR:
         return "unclear"
     limit = np.maximum(SURE * errors, BOUNDED / len(rates))
     if mean[0] > limit[0] and second[0] > 0.5 * first[0]:  # not one that was chaotic only at first
         return Kind.CHAOTIC.word
-    if abs(second[0]) > min(limit[0], 2 * BOUNDED / len(rates)):  # zero only if what grew stays bounded, however wide the error is
+    # zero only if what grew stays bounded, however wide the error is
+    if abs(second[0]) > min(limit[0], 2 * BOUNDED / len(rates)):
         return "unclear"
     torus = forced or (len(mean) > 2 and abs(second[1]) <= limit[1])
     return (Kind.QUASI_PERIODIC if torus else Kind.LIMIT_CYCLE).word

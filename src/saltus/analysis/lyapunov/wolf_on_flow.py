@@ -1,4 +1,6 @@
-"""Largest exponents of trajectories of a flow from neighbours on them: all states, and the phase of the forcing."""
+"""Largest exponents of trajectories of a flow from neighbours on them: all states, and the phase of
+the forcing.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +34,21 @@ class NeighbourExponents:
 
     algorithm = "Wolf et al. (1985), fixed evolution time"
 
-    def __init__(self, map_: Stroboscope, start: np.ndarray, periods: int, transient: int, every: float | None):
-        self.map, self._start, self._periods, self._transient, self._every = map_, start, periods, transient, every
+    def __init__(
+        self,
+        map_: Stroboscope,
+        start: np.ndarray,
+        periods: int,
+        transient: int,
+        every: float | None,
+    ):
+        self.map, self._start, self._periods, self._transient, self._every = (
+            map_,
+            start,
+            periods,
+            transient,
+            every,
+        )
         self._found = [NOTHING] * len(start)
         self._status = np.full(len(start), st.NOT_COMPUTED)
 
@@ -44,7 +59,9 @@ class NeighbourExponents:
         step = max(GROUP // (self._periods * SAMPLES * size), 1)
         for first in range(0, k, step):
             rows = np.arange(first, min(first + step, k))
-            outcome = self.map.rows(rows).run(self._start[rows], self._transient + self._periods, schedule)
+            outcome = self.map.rows(rows).run(
+                self._start[rows], self._transient + self._periods, schedule
+            )
             for i, states in zip(rows, outcome.samples, strict=True):
                 if outcome.status[i - first] in GOOD:
                     self._found[i] = self._measure(states, float(self.map.period[i]))
@@ -57,18 +74,28 @@ class NeighbourExponents:
         points = states[:, wide > 0] / wide[wide > 0]
         if self._every is None:
             angle = 2 * math.pi * (np.arange(len(states)) % SAMPLES) / SAMPLES
-            points = np.concatenate([points, 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)], axis=1)
+            points = np.concatenate(
+                [points, 0.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)], axis=1
+            )
         return measure(points, period / SAMPLES, default_search(points, SAMPLES, SAMPLES))
 
     def columns(self, factor: np.ndarray) -> dict[str, Any]:
-        """The columns of the result; exponents, which come per second, are turned to those times a factor of a block."""
+        """The columns of the result; exponents, which come per second, are turned to those times a
+        factor of a block.
+        """
         per_second = factor * self.map.period
         k = len(self._found)
-        mean, error, half = (self._each(name, per_second)[:, None] for name in ("exponent", "error", "half_width"))
+        mean, error, half = (
+            self._each(name, per_second)[:, None] for name in ("exponent", "error", "half_width")
+        )
         times, running, running_half = (np.full((k, RUNNING), np.nan) for _ in range(3))
         for i, one in enumerate(self._found):
             m = len(one.ends)
-            times[i, :m], running[i, :m], running_half[i, :m] = one.ends, one.running * per_second[i], one.running_half * per_second[i]
+            times[i, :m], running[i, :m], running_half[i, :m] = (
+                one.ends,
+                one.running * per_second[i],
+                one.running_half * per_second[i],
+            )
         return {
             "kind": [one.kind for one in self._found],
             "response_period": np.zeros(k, np.int64),

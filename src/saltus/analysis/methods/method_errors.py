@@ -13,7 +13,8 @@ from saltus.kernels import status as st
 from saltus.results.dataset.schema import parameters_of, response_name, states_of
 from saltus.system.system import System
 
-#: Orbits of two methods are one if their distance is below this multiple of the method's noise, or below this part of the motion's range.
+#: Orbits of two methods are one if their distance is below this multiple of the method's noise, or
+#: below this part of the motion's range.
 SAME_NOISE, SAME_AT_LEAST = 4.0, 1e-3
 #: Points of a response from which one-period errors are measured; more say nothing new.
 POINTS = 64
@@ -25,8 +26,9 @@ def orbit_distances(exact: xr.Dataset, other: xr.Dataset) -> tuple[np.ndarray, n
     Returns
     -------
     distance : float64[places..., s]
-        From the exact response of the same start, in units of the range of its stroboscopic points and its peak; inf if kind or period
-        differ, NaN where one of both has none. Motions that never repeat are compared by peak and rms.
+        From the exact response of the same start, in units of the range of its stroboscopic points
+        and its peak; inf if kind or period differ, NaN where one of both has none. Motions that
+        never repeat are compared by peak and rms.
     nearest : float64[places..., s]
         From the nearest of the exact responses at that value.
     """
@@ -50,9 +52,14 @@ def _points(ds: xr.Dataset) -> np.ndarray:
     return np.stack([ds[response_name(name)].values for name in states_of(ds)], axis=2)
 
 
-def _apart(a: xr.Dataset, first: np.ndarray, i: int, b: xr.Dataset, second: np.ndarray, j: int) -> float:
+def _apart(
+    a: xr.Dataset, first: np.ndarray, i: int, b: xr.Dataset, second: np.ndarray, j: int
+) -> float:
     """Distance of two responses, in units of the exact one's size."""
-    if a["response_type"].values[i] != b["response_type"].values[j] or a["response_period"].values[i] != b["response_period"].values[j]:
+    if (
+        a["response_type"].values[i] != b["response_type"].values[j]
+        or a["response_period"].values[i] != b["response_period"].values[j]
+    ):
         return np.inf
     n = int(a["response_period"].values[i])
     levels = [
@@ -68,32 +75,43 @@ def _apart(a: xr.Dataset, first: np.ndarray, i: int, b: xr.Dataset, second: np.n
 
 
 def response_noise(system: System, method: Method, exact: xr.Dataset) -> np.ndarray:
-    """Noise of a method in units of the exact response of each start, float64[places..., s]; 0 where there is none."""
+    """Noise of a method in units of the exact response of each start, float64[places..., s]; 0
+    where there is none.
+    """
     peaks = exact["response_peak"].values[:, None]
     noise = Stroboscope(system, method).noise_of(peaks)
     return np.append(noise, 0.0)[exact["response_of"].values.clip(-1)]
 
 
-def cell_agreement(exact: xr.Dataset, other: xr.Dataset, distance: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """1 where two methods give one response, 0 where they don't, -1 where one of them gives none, int8."""
+def cell_agreement(
+    exact: xr.Dataset, other: xr.Dataset, distance: np.ndarray, noise: np.ndarray
+) -> np.ndarray:
+    """1 where two methods give one response, 0 where they don't, -1 where one of them gives none,
+    int8.
+    """
     settled = (exact["response_of"].values >= 0) & (other["response_of"].values >= 0)
     aperiodic = (exact["type"].values == other["type"].values) & (other["period"].values == 0)
-    same = (distance <= np.maximum(SAME_NOISE * noise, SAME_AT_LEAST)) | (aperiodic & np.isfinite(distance))
+    same = (distance <= np.maximum(SAME_NOISE * noise, SAME_AT_LEAST)) | (
+        aperiodic & np.isfinite(distance)
+    )
     return np.where(settled, same.astype(np.int8), np.int8(-1)).astype(np.int8)
 
 
 def one_period_errors(
     system: System, reference: Method, method: Method, exact: xr.Dataset, threads: int | None = None
 ) -> dict[str, np.ndarray]:
-    """Error of one forcing period by a method, from states on the exact responses at each value of the parameters.
+    """Error of one forcing period by a method, from states on the exact responses at each value of
+    the parameters.
 
-    Independent of stability and of basins, and so a smooth function of the parameters: what the method itself does wrong.
+    Independent of stability and of basins, and so a smooth function of the parameters: what the
+    method itself does wrong.
 
     Returns
     -------
     dict of float64[places...]
-        ``step_error``, ``step_error_rms``: largest and root mean square over the states of the responses and their points, in units of the
-        range of each state in the motion; ``steps_per_period``: steps tried.
+        ``step_error``, ``step_error_rms``: largest and root mean square over the states of the
+        responses and their points, in units of the range of each state in the motion;
+        ``steps_per_period``: steps tried.
     """
     axes = parameters_of(exact)
     places = np.array(exact["response_of"].shape[:-1])
@@ -108,7 +126,9 @@ def one_period_errors(
         column = exact[response_name(name)].values[response]
         rows[:, names.index(name)] = column
         where[:, a] = np.abs(exact[name].values[None, :] - column[:, None]).argmin(axis=1)
-    flat = np.ravel_multi_index(tuple(where.T), tuple(places)) if len(start) else np.zeros(0, np.int64)
+    flat = (
+        np.ravel_multi_index(tuple(where.T), tuple(places)) if len(start) else np.zeros(0, np.int64)
+    )
     right, wrong = (Stroboscope(system, one, rows, threads=threads) for one in (reference, method))
     scale = motion_range(right, start)
     outcome = wrong.run(start, 1)
@@ -124,4 +144,6 @@ def one_period_errors(
         "step_error_rms": np.sqrt(np.bincount(flat, np.mean(apart**2, axis=1), size) / count),
         "steps_per_period": np.bincount(flat, steps, size) / count,
     }
-    return {name: np.where(empty, np.nan, values).reshape(places) for name, values in fields.items()}
+    return {
+        name: np.where(empty, np.nan, values).reshape(places) for name, values in fields.items()
+    }

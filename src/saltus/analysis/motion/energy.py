@@ -49,19 +49,22 @@ def energy_balance(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Energy stored, supplied and dissipated, forcing period by forcing period; what is left over must be zero.
+    """Energy stored, supplied and dissipated, forcing period by forcing period; what is left over
+    must be zero.
 
-    The two powers are integrated along the motion as states of their own, so with the flow's precision: with :class:`saltus.Taylor` the
-    residual is rounding. A residual that is larger says that a term is missing in one of the three functions, or that the equations
-    aren't those of the system that one has in mind.
+    The two powers are integrated along the motion as states of their own, so with the flow's
+    precision: with :class:`saltus.Taylor` the residual is rounding. A residual that is larger says
+    that a term is missing in one of the three functions, or that the equations aren't those of the
+    system that one has in mind.
 
     Parameters
     ----------
     system, start, t_start, method, values, threads, progress
-        As for :func:`saltus.simulate`. ``ODE45`` controls the errors of the two integrals too, so its steps may differ from those without.
+        As for :func:`saltus.simulate`. ``ODE45`` controls the errors of the two integrals too, so
+        its steps may differ from those without.
     energy : callable
-        Stored energy [J], a function of (t, states, parameters); its arguments are found by name. Comparisons in it that are contacts of
-        the system read the same sides.
+        Stored energy [J], a function of (t, states, parameters); its arguments are found by name.
+        Comparisons in it that are contacts of the system read the same sides.
     supplied, dissipated : callable
         Power that flows in, and power that is lost [W], likewise.
     periods : int
@@ -71,14 +74,16 @@ def energy_balance(
     transient : int, or float or str
         Whole forcing periods before; of an unforced system a time [s].
     intervals : int
-        Equal intervals into which the run of an unforced system is cut (default 100); those that end in the transient are left out.
+        Equal intervals into which the run of an unforced system is cut (default 100); those that
+        end in the transient are left out.
 
     Returns
     -------
     Dataset
-        Dims ``period`` (at the end of each interval; of an unforced system ``time``), and ``trajectory`` for many. ``energy`` at the end
-        of the interval; ``change``, ``supplied``, ``dissipated`` in it, and ``residual`` = supplied - dissipated - change [J];
-        ``imbalance``: the largest residual relative to the largest of these; ``status``, counters.
+        Dims ``period`` (at the end of each interval; of an unforced system ``time``), and
+        ``trajectory`` for many. ``energy`` at the end of the interval; ``change``, ``supplied``,
+        ``dissipated`` in it, and ``residual`` = supplied - dissipated - change [J]; ``imbalance``:
+        the largest residual relative to the largest of these; ``status``, counters.
 
     Raises
     ------
@@ -103,13 +108,22 @@ def energy_balance(
     method = check_method(method)
     stored, guards = quantity(system, energy, "the energy")
     whole_system = with_integrals(
-        replace(system, guards=guards), {_SUPPLIED: supplied, _DISSIPATED: dissipated}, {_SUPPLIED: "J", _DISSIPATED: "J"}
+        replace(system, guards=guards),
+        {_SUPPLIED: supplied, _DISSIPATED: dissipated},
+        {_SUPPLIED: "J", _DISSIPATED: "J"},
     )
     seen = stretch(system, start, values, periods, t_end, t_start, transient)
     schedule = _schedule(seen, intervals)
 
     answer = partial(_dataset, system, method, seen, whole_system, stored, schedule)
-    result = computed(whole_system, method, seen.request(whole_system, schedule, record=False), answer, threads, progress)
+    result = computed(
+        whole_system,
+        method,
+        seen.request(whole_system, schedule, record=False),
+        answer,
+        threads,
+        progress,
+    )
     warn(result)
     return result
 
@@ -124,10 +138,16 @@ def _schedule(seen: Stretch, intervals: int | None) -> Schedule:
         index = index[index / count >= share - 1e-12]
         return Schedule(index // count, (index % count) / count)
     if intervals is not None:
-        raise ParameterError(f"{seen.system.name} is forced: its balance is drawn each forcing period. Leave intervals= out.")
+        raise ParameterError(
+            f"{seen.system.name} is forced: its balance is drawn each forcing "
+            f"period. Leave intervals= out."
+        )
     last = int(np.min(seen.length.count))
     if np.any(seen.length.phase > 0) or np.any(seen.length.count != last):
-        raise ParameterError("an energy balance of a forced system is drawn over whole forcing periods. Give periods= in place of t_end=.")
+        raise ParameterError(
+            "an energy balance of a forced system is drawn over whole forcing "
+            "periods. Give periods= in place of t_end=."
+        )
     _check_room(seen, last - seen.skipped)
     index = np.arange(seen.skipped, last + 1)
     return Schedule(index, np.zeros(len(index)))
@@ -136,11 +156,21 @@ def _schedule(seen: Stretch, intervals: int | None) -> Schedule:
 def _check_room(seen: Stretch, intervals: int) -> None:
     """Raise ParameterError if the balance of these intervals doesn't fit into memory."""
     numbers = seen.group.size * (2 * len(seen.system.states) + 8) + 2
-    check_room(8.0 * numbers * intervals, f"{seen.group.size} trajectories with {intervals} intervals each", "Draw the balance of fewer.")
+    check_room(
+        8.0 * numbers * intervals,
+        f"{seen.group.size} trajectories with {intervals} intervals each",
+        "Draw the balance of fewer.",
+    )
 
 
 def _dataset(
-    system: System, method: Method, seen: Stretch, extended: System, stored: Expr, schedule: Schedule, outcome: Outcome
+    system: System,
+    method: Method,
+    seen: Stretch,
+    extended: System,
+    stored: Expr,
+    schedule: Schedule,
+    outcome: Outcome,
 ) -> xr.Dataset:
     """What each interval holds, under its name."""
     samples = outcome.samples
@@ -154,15 +184,32 @@ def _dataset(
     supplied, dissipated = (np.diff(samples[:, :, len(system.states) + i], axis=1) for i in (0, 1))
     change = np.diff(energy, axis=1)
     residual = supplied - dissipated - change
-    parts = {"energy": energy[:, 1:], "change": change, "supplied": supplied, "dissipated": dissipated, "residual": residual}
+    parts = {
+        "energy": energy[:, 1:],
+        "change": change,
+        "supplied": supplied,
+        "dissipated": dissipated,
+        "residual": residual,
+    }
     forced = system.forced_at is not None
     intervals = {"period": schedule.count[1:]} if forced else {"time": time[0, 1:]}
     each = {**parts, "imbalance": _imbalance(parts)}
-    return dataset(schema.ENERGY, seen, system, method, outcome, intervals, each, along={} if forced else {"period": "time"})
+    return dataset(
+        schema.ENERGY,
+        seen,
+        system,
+        method,
+        outcome,
+        intervals,
+        each,
+        along={} if forced else {"period": "time"},
+    )
 
 
 def _imbalance(parts: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Largest residual of each trajectory relative to the largest of the other parts; NaN if it didn't reach the end."""
+    """Largest residual of each trajectory relative to the largest of the other parts; NaN if it
+    didn't reach the end.
+    """
     largest = {name: np.abs(part).max(axis=1, initial=0.0) for name, part in parts.items()}
     scale = np.max([size for name, size in largest.items() if name != "residual"], axis=0)
     return largest["residual"] / np.where(scale > 0, scale, 1.0)

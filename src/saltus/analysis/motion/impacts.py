@@ -22,7 +22,8 @@ from saltus.system.evaluate import evaluate
 from saltus.system.quantity import Quantity, with_integrals
 from saltus.system.system import System
 
-#: Blocks from whose scatter a standard error is taken: contacts that follow each other are not independent, blocks nearly are.
+#: Blocks from whose scatter a standard error is taken: contacts that follow each other are not
+#: independent, blocks nearly are.
 BLOCKS = 20
 #: Bins of the histogram of speeds.
 BINS = 20
@@ -47,7 +48,8 @@ def impact_statistics(
 ) -> xr.Dataset:
     """Rate, speed, duration and impulse of the contacts, guard by guard.
 
-    Runs the motion itself, since the impulse of a contact is an integral along it; no samples are kept, so runs may be long.
+    Runs the motion itself, since the impulse of a contact is an integral along it; no samples are
+    kept, so runs may be long.
 
     Parameters
     ----------
@@ -60,29 +62,35 @@ def impact_statistics(
     transient : int, or float or str
         Whole forcing periods before; of an unforced system a time [s].
     force : mapping of str to callable, optional
-        For guards by name: the force of that contact [N] as a function of (t, states, parameters), arguments found by name; it needs to be
-        right in contact only. Its integral from the beginning of a contact to its end is the impulse. ``ODE45`` controls the error of the
+        For guards by name: the force of that contact [N] as a function of (t, states, parameters),
+        arguments found by name; it needs to be right in contact only. Its integral from the
+        beginning of a contact to its end is the impulse. ``ODE45`` controls the error of the
         integral too, so its steps may differ from those without.
     contact_side : mapping of str to int, optional
-        For guards by name: the sign of the gap in contact. By default it is the side on which the state of rest (all states zero, t = 0)
-        does not lie; a gap of zero counts as a tiny one.
+        For guards by name: the sign of the gap in contact. By default it is the side on which the
+        state of rest (all states zero, t = 0) does not lie; a gap of zero counts as a tiny one.
     bins : int or sequence of float
-        Bins of the histogram of speeds: how many between zero and the largest one, or their edges [unit of the gap per second].
+        Bins of the histogram of speeds: how many between zero and the largest one, or their edges
+        [unit of the gap per second].
 
     Returns
     -------
     Dataset
-        Dims ``guard``, ``contact`` (one table for all trajectories: every contact that begins), ``speed_bin``, and ``trajectory`` for
-        many. For each guard ``contacts``, ``contacts_per_second``, ``contacts_per_period`` (if forced), ``speed_mean``, ``speed_rms``,
-        ``speed_max``, ``speed_histogram``, ``duration_mean``, ``duration_min``, ``duration_max``, ``share_in_contact``, with ``force=``
-        ``impulse_mean``, ``impulse_max``; ``<...>_error`` is the standard error by the means of 20 blocks (NaN where there are too few;
-        zero for a periodic response whose blocks hold whole responses). A contact whose beginning or end isn't seen counts in
-        ``share_in_contact``; without an end it has no duration (NaN). Touches without a crossing are no contacts.
+        Dims ``guard``, ``contact`` (one table for all trajectories: every contact that begins),
+        ``speed_bin``, and ``trajectory`` for many. For each guard ``contacts``,
+        ``contacts_per_second``, ``contacts_per_period`` (if forced), ``speed_mean``, ``speed_rms``,
+        ``speed_max``, ``speed_histogram``, ``duration_mean``, ``duration_min``, ``duration_max``,
+        ``share_in_contact``, with ``force=`` ``impulse_mean``, ``impulse_max``; ``<...>_error`` is
+        the standard error by the means of 20 blocks (NaN where there are too few; zero for a
+        periodic response whose blocks hold whole responses). A contact whose beginning or end isn't
+        seen counts in ``share_in_contact``; without an end it has no duration (NaN). Touches
+        without a crossing are no contacts.
 
     Raises
     ------
     ParameterError, UnitError
-        If an argument can't be used, the system has no guard, or the method doesn't locate contacts.
+        If an argument can't be used, the system has no guard, or the method doesn't locate
+        contacts.
     TraceError
         If a force can't be traced.
     Interrupted
@@ -90,7 +98,8 @@ def impact_statistics(
 
     References
     ----------
-    Standard errors: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992) 473-483, section 3.2 (batch means).
+    Standard errors: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992)
+    473-483, section 3.2 (batch means).
 
     Examples
     --------
@@ -104,22 +113,29 @@ def impact_statistics(
     method = check_method(method)
     if not method.records_contacts:
         raise ParameterError(
-            f'impact_statistics needs a method that locates contacts, and {method.name}(events="ignore") steps over them. Use sl.Taylor() '
+            f"impact_statistics needs a method that locates contacts, and "
+            f'{method.name}(events="ignore") steps over them. Use sl.Taylor() '
             f'or sl.ODE45(..., events="locate").'
         )
     if not system.guards:
         raise ParameterError(f"{system.name} has no guard, so there is no contact to count.")
     forces = _by_guard(system, force or {}, "force")
     sides = contact_sides(system, _by_guard(system, contact_side or {}, "contact_side"))
-    extended = with_integrals(system, {f"impulse_{guard}_": function for guard, function in forces.items()})
+    extended = with_integrals(
+        system, {f"impulse_{guard}_": function for guard, function in forces.items()}
+    )
     seen = stretch(system, start, values, periods, t_end, t_start, transient)
     begin = Schedule(np.array([seen.skipped]), np.zeros(1))
 
     def answer(outcome: Outcome) -> xr.Dataset:
-        found = touchdowns.find(seen, outcome, sides, {guard: len(system.states) + i for i, guard in enumerate(forces)})
+        found = touchdowns.find(
+            seen, outcome, sides, {guard: len(system.states) + i for i, guard in enumerate(forces)}
+        )
         return _dataset(system, method, seen, sides, found, bins, outcome)
 
-    result = computed(extended, method, seen.request(extended, begin, record=True), answer, threads, progress)
+    result = computed(
+        extended, method, seen.request(extended, begin, record=True), answer, threads, progress
+    )
     warn(result)
     return result
 
@@ -129,15 +145,23 @@ def _by_guard(system: System, given: Mapping[str, Any], argument: str) -> dict[i
     names = [guard.name for guard in system.guards]
     for name in given:
         if name not in names:
-            raise ParameterError(f"{argument}= names {shown(name)}, which is no guard of {system.name}. {nearest(name, names)}")
+            raise ParameterError(
+                f"{argument}= names {shown(name)}, which is no guard of "
+                f"{system.name}. {nearest(name, names)}"
+            )
     return {names.index(name): value for name, value in given.items()}
 
 
 def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
-    """Sign of each gap in contact, int8[guard]: as given, else opposite to that at rest. Gaps of zero are opened a little to ask."""
+    """Sign of each gap in contact, int8[guard]: as given, else opposite to that at rest. Gaps of
+    zero are opened a little to ask.
+    """
     for number, side in given.items():
         if side not in (-1, 1):
-            raise ParameterError(f"contact_side of {system.guards[number].name!r} must be 1 or -1, not {shown(side)}.")
+            raise ParameterError(
+                f"contact_side of {system.guards[number].name!r} must be 1 or -1, "
+                f"not {shown(side)}."
+            )
     values = {name: value or np.finfo(float).tiny for name, value in system.values.items()}
     rest = dict.fromkeys(system.states, 0.0)
     bits: list[bool] = []
@@ -146,17 +170,29 @@ def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
         if gap == 0:
             gap = evaluate([guard.gap], states=rest, values=values, bits=bits)[0]
         bits.append(bool(gap > 0))
-    return np.array([given.get(i, -1 if positive else 1) for i, positive in enumerate(bits)], dtype=np.int8)
+    return np.array(
+        [given.get(i, -1 if positive else 1) for i, positive in enumerate(bits)], dtype=np.int8
+    )
 
 
-# -- statistics ----------------------------------------------------------------------------------------------------------------
+# -- statistics ------------------------------------------------------------------------------------
 def _dataset(
-    system: System, method: Method, seen: Stretch, sides: np.ndarray, found: Touchdowns, bins: Any, outcome: Outcome
+    system: System,
+    method: Method,
+    seen: Stretch,
+    sides: np.ndarray,
+    found: Touchdowns,
+    bins: Any,
+    outcome: Outcome,
 ) -> xr.Dataset:
     """Contacts and what they have in common, under their names."""
     size, guards = seen.group.size, len(system.guards)
     ends = np.searchsorted(found.trajectory, np.arange(size + 1))
-    cells = [(i, g, ends[i] + np.flatnonzero(found.guard[ends[i] : ends[i + 1]] == g)) for i in range(size) for g in range(guards)]
+    cells = [
+        (i, g, ends[i] + np.flatnonzero(found.guard[ends[i] : ends[i + 1]] == g))
+        for i in range(size)
+        for g in range(guards)
+    ]
     edges = _edges(bins, found.speed)
     each: dict[str, np.ndarray] = {}
 
@@ -171,8 +207,10 @@ def _dataset(
             put(name, i, g, value)
     names = np.array([guard.name for guard in system.guards], dtype=np.str_)
     columns = {
-        "contact_time": found.begin, "contact_guard": names[found.guard], "contact_speed": found.speed,
-        "contact_exit_speed": found.exit_speed, "contact_duration": found.end - found.begin, "contact_trajectory": found.trajectory,
+        "contact_time": found.begin, "contact_guard": names[found.guard],
+        "contact_speed": found.speed,
+        "contact_exit_speed": found.exit_speed, "contact_duration": found.end - found.begin,
+        "contact_trajectory": found.trajectory,
     }  # fmt: skip
     if found.impulse is not None:
         columns["contact_impulse"] = found.impulse
@@ -184,7 +222,10 @@ def _edges(bins: Any, speed: np.ndarray) -> np.ndarray:
     """Edges of the bins of speed."""
     if np.ndim(bins) == 0:
         if isinstance(bins, bool) or bins != int(bins) or bins < 1:
-            raise ParameterError(f"bins must be a whole number of at least 1, or the edges of the bins, not {shown(bins)}.")
+            raise ParameterError(
+                f"bins must be a whole number of at least 1, or the edges of the "
+                f"bins, not {shown(bins)}."
+            )
         largest = float(speed.max(initial=0.0))
         return np.linspace(0.0, largest if largest > 0 else 1.0, int(bins) + 1)
     edges = np.asarray(bins, dtype=float)
@@ -194,9 +235,12 @@ def _edges(bins: Any, speed: np.ndarray) -> np.ndarray:
 
 
 def _rates(seen: Stretch, found: Touchdowns, i: int, g: int, rows: np.ndarray) -> dict[str, float]:
-    """Contacts per time and share of the time in contact, of one trajectory and guard, with standard errors by blocks of time."""
+    """Contacts per time and share of the time in contact, of one trajectory and guard, with
+    standard errors by blocks of time.
+    """
     borders = _borders(seen, i)
-    counts = np.histogram(found.begin[rows], borders)[0]  # (left edges belong to a block; a contact exactly there is a matter of rounding)
+    # (left edges belong to a block; a contact exactly there is a matter of rounding)
+    counts = np.histogram(found.begin[rows], borders)[0]
     covered = found.covered(i, g, borders)
     lengths = np.diff(borders)
     duration = float(seen.duration[i])
@@ -204,13 +248,21 @@ def _rates(seen: Stretch, found: Touchdowns, i: int, g: int, rows: np.ndarray) -
     result = {"contacts_per_second": rate, "contacts_per_second_error": error}
     if seen.system.forced_at is not None:
         period = float(seen.length.period[i])
-        result |= {"contacts_per_period": rate * period, "contacts_per_period_error": error * period}
-    share = float(found.covered(i, g, np.array([seen.begin[i], seen.begin[i] + duration]))[0]) / duration
+        result |= {
+            "contacts_per_period": rate * period,
+            "contacts_per_period_error": error * period,
+        }
+    share = (
+        float(found.covered(i, g, np.array([seen.begin[i], seen.begin[i] + duration]))[0])
+        / duration
+    )
     return result | {"share_in_contact": share, "share_in_contact_error": _error(covered / lengths)}
 
 
 def _borders(seen: Stretch, i: int) -> np.ndarray:
-    """Borders of equal blocks of time; of a forced system whole periods, as many as fit, at the end."""
+    """Borders of equal blocks of time; of a forced system whole periods, as many as fit, at the
+    end.
+    """
     begin, end = float(seen.begin[i]), float(seen.begin[i] + seen.duration[i])
     if seen.system.forced_at is None:
         return np.linspace(begin, end, BLOCKS + 1)

@@ -19,10 +19,17 @@ from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.results.dataset import schema
 from saltus.system.guards import equation_of
-from saltus.system.quantity import Quantity, acting_guards, turning_surface, with_level, with_surface
+from saltus.system.quantity import (
+    Quantity,
+    acting_guards,
+    turning_surface,
+    with_level,
+    with_surface,
+)
 from saltus.system.system import System
 
-#: Touches that are closer than this are one [forcing periods; the span if unforced]: where a gap is flat its minimum is that uncertain.
+#: Touches that are closer than this are one [forcing periods; the span if unforced]: where a gap is
+#: flat its minimum is that uncertain.
 SAME_TOUCH = 1e-9
 
 
@@ -44,17 +51,19 @@ def poincare(
 ) -> xr.Dataset:
     """Poincare section: the states at which a motion crosses a surface.
 
-    The surface is located as a contact is: no crossing is missed, and its time is exact to rounding. For the section at whole forcing
-    periods see :func:`saltus.stroboscope`.
+    The surface is located as a contact is: no crossing is missed, and its time is exact to
+    rounding. For the section at whole forcing periods see :func:`saltus.stroboscope`.
 
     Parameters
     ----------
     system, start, t_start, method, values, threads, progress
-        As for :func:`saltus.simulate`. The method must locate contacts. A Taylor flow isn't disturbed by the surface; ``ODE45`` restarts at
-        each crossing, as MATLAB does at a terminal event, so its steps and with them its errors are others than without the surface.
+        As for :func:`saltus.simulate`. The method must locate contacts. A Taylor flow isn't
+        disturbed by the surface; ``ODE45`` restarts at each crossing, as MATLAB does at a terminal
+        event, so its steps and with them its errors are others than without the surface.
     surface : callable, str or tuple
-        A function of (t, states, parameters), zero on the surface: ``lambda x, v: v + 10 * x``; its arguments are found by name. Or
-        ``("x", "0.3 mm")``, a level of a state; or ``"x turns"``, the turning points of a state; or the name of a guard of the system.
+        A function of (t, states, parameters), zero on the surface: ``lambda x, v: v + 10 * x``; its
+        arguments are found by name. Or ``("x", "0.3 mm")``, a level of a state; or ``"x turns"``,
+        the turning points of a state; or the name of a guard of the system.
     direction : {0, 1, -1}
         Keep all crossings, or only those where the function rises (1) or falls (-1).
     periods : int
@@ -67,12 +76,15 @@ def poincare(
     Returns
     -------
     Dataset
-        Dims ``crossing`` (one table for all trajectories, sorted by trajectory and time), ``guard`` (of the system itself), and
-        ``trajectory`` for many. Each state at the crossings, ``crossing_time``, ``crossing_phase`` (t/T mod 1, NaN if unforced),
-        ``crossing_period``, ``crossing_direction``, ``crossing_rate`` of the function (zero: a tangency), ``crossing_kind``
-        (``graze_unresolved``: too shallow to be sure of), ``crossing_trajectory``; per trajectory ``crossings``, ``tangencies``,
-        ``contacts``, ``status``, counters. The run covers the interval (begin, end]: a start on the surface is no crossing, an end on it
-        is. ``status`` and ``grazes_unresolved`` count doubtful touches of the surface too.
+        Dims ``crossing`` (one table for all trajectories, sorted by trajectory and time), ``guard``
+        (of the system itself), and ``trajectory`` for many. Each state at the crossings,
+        ``crossing_time``, ``crossing_phase`` (t/T mod 1, NaN if unforced), ``crossing_period``,
+        ``crossing_direction``, ``crossing_rate`` of the function (zero: a tangency),
+        ``crossing_kind`` (``graze_unresolved``: too shallow to be sure of),
+        ``crossing_trajectory``; per trajectory ``crossings``, ``tangencies``, ``contacts``,
+        ``status``, counters. The run covers the interval (begin, end]: a start on the surface is no
+        crossing, an end on it is. ``status`` and ``grazes_unresolved`` count doubtful touches of
+        the surface too.
 
     Raises
     ------
@@ -99,10 +111,15 @@ def poincare(
     method = check_method(method)
     if not method.records_contacts:
         raise ParameterError(
-            f'poincare needs a method that locates contacts, and {method.name}(events="ignore") steps over them: a crossing would be where '
+            f'poincare needs a method that locates contacts, and {method.name}(events="ignore") '
+            f"steps over them: a crossing would be where "
             f'a step happens to end. Use sl.Taylor() or sl.ODE45(..., events="locate").'
         )
-    if not isinstance(direction, int | float | np.integer | np.floating) or direction not in (-1, 0, 1):
+    if not isinstance(direction, int | float | np.integer | np.floating) or direction not in (
+        -1,
+        0,
+        1,
+    ):
         raise ParameterError(f"direction must be 0, 1 or -1, not {shown(direction)}.")
     found = crossed(system, surface, values if isinstance(values, Mapping) else {})
     seen = stretch(found.system, start, values, periods, t_end, t_start, transient)
@@ -121,7 +138,9 @@ def poincare(
 
 @dataclass(frozen=True)
 class Crossed:
-    """The system with the surface among its guards, which of them it is, and the unit of its function; the surface in words."""
+    """The system with the surface among its guards, which of them it is, and the unit of its
+    function; the surface in words.
+    """
 
     system: System
     guard: int
@@ -130,25 +149,41 @@ class Crossed:
 
 
 def crossed(system: System, surface: Any, values: Mapping[str, Any]) -> Crossed:
-    """What the user means by a surface; ``values`` may hold its level. Raises as :func:`poincare` does."""
+    """What the user means by a surface; ``values`` may hold its level. Raises as :func:`poincare`
+    does.
+    """
     if callable(surface):
         return _last(with_surface(system, surface), "", "")
     if isinstance(surface, tuple | list):
         if len(surface) != 2 or not isinstance(surface[0], str):
-            raise ParameterError(f'a surface at a level is a pair of a state and a value, such as ("x", "0.3 mm"), not {shown(surface)}.')
+            raise ParameterError(
+                f"a surface at a level is a pair of a state and a value, such as "
+                f'("x", "0.3 mm"), not {shown(surface)}.'
+            )
         leveled = with_level(system, surface[0], surface[1])
         level = leveled.guards[-1].name
-        return _last(leveled, system.units[surface[0]], "" if level in values else f"{surface[0]} = {leveled.parameter_text(level)}")
+        return _last(
+            leveled,
+            system.units[surface[0]],
+            "" if level in values else f"{surface[0]} = {leveled.parameter_text(level)}",
+        )
     names = [guard.name for guard in system.guards]
     if among(surface, names):
         owner = system.guards[names.index(surface)].state
         number = names.index(surface)
-        return Crossed(system, number, system.units[owner] if owner else "", equation_of(number, system.guards))
+        return Crossed(
+            system, number, system.units[owner] if owner else "", equation_of(number, system.guards)
+        )
     turns = {f"{name} turns": name for name in system.states}
     if among(surface, turns):
-        return _last(turning_surface(system, turns[surface]), schema.rate_unit(system.units[turns[surface]]), surface)
+        return _last(
+            turning_surface(system, turns[surface]),
+            schema.rate_unit(system.units[turns[surface]]),
+            surface,
+        )
     raise ParameterError(
-        f"{system.name} has no guard {shown(surface)}. {nearest(surface, (*names, *turns))} Or give a function, or a level such as "
+        f"{system.name} has no guard {shown(surface)}. {nearest(surface, (*names, *turns))} Or "
+        f"give a function, or a level such as "
         f'("{system.states[0]}", 0.0).'
     )
 
@@ -159,7 +194,14 @@ def _last(system: System, unit: str, text: str) -> Crossed:
     return Crossed(system, number, unit, text or equation_of(number, system.guards))
 
 
-def _dataset(system: System, method: Method, seen: Stretch, crossed: Crossed, direction: int, outcome: Outcome) -> xr.Dataset:
+def _dataset(
+    system: System,
+    method: Method,
+    seen: Stretch,
+    crossed: Crossed,
+    direction: int,
+    outcome: Outcome,
+) -> xr.Dataset:
     """The crossings that were asked for, under their names."""
     table = outcome.contacts
     who, guard, time, flips = table.trajectory, table.guard, table.time, table.changes_side
@@ -183,19 +225,28 @@ def _dataset(system: System, method: Method, seen: Stretch, crossed: Crossed, di
         "crossing_trajectory": rows,
     }
     contacts = late & flips & np.isin(guard, acting_guards(system))
-    counts = {"crossings": wanted, "tangencies": _distinct(seen, who, time, ours & ~flips), "contacts": contacts}
+    counts = {
+        "crossings": wanted,
+        "tangencies": _distinct(seen, who, time, ours & ~flips),
+        "contacts": contacts,
+    }
     return dataset(
-        schema.SECTION, seen, system, method, outcome, columns, {name: count(rows) for name, rows in counts.items()},
+        schema.SECTION, seen, system, method, outcome, columns,
+        {name: count(rows) for name, rows in counts.items()},
         {"surface": crossed.text, "direction": direction, "transient": _transient(seen)},
         words={"<surface rate>": schema.rate_unit(crossed.unit)},
     )  # fmt: skip
 
 
 def _distinct(seen: Stretch, who: np.ndarray, time: np.ndarray, touches: np.ndarray) -> np.ndarray:
-    """The touches without repeats: one in the instant of another event is seen from the step before it and from the step after it."""
+    """The touches without repeats: one in the instant of another event is seen from the step before
+    it and from the step after it.
+    """
     rows = np.flatnonzero(touches)
     again = np.zeros(len(rows), dtype=bool)
-    again[1:] = (np.diff(who[rows]) == 0) & (np.diff(time[rows]) <= SAME_TOUCH * seen.length.period[who[rows[1:]]])
+    again[1:] = (np.diff(who[rows]) == 0) & (
+        np.diff(time[rows]) <= SAME_TOUCH * seen.length.period[who[rows[1:]]]
+    )
     distinct = touches.copy()
     distinct[rows[again]] = False
     return distinct
@@ -211,4 +262,6 @@ def _phases(seen: Stretch, elapsed: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 def _transient(seen: Stretch) -> float:
     """The transient as the user gave it: forcing periods, or seconds."""
-    return float(seen.skipped if seen.system.forced_at is not None else seen.begin[0] - seen.length.t_start)
+    return float(
+        seen.skipped if seen.system.forced_at is not None else seen.begin[0] - seen.length.t_start
+    )

@@ -29,7 +29,8 @@ from saltus.system.system import System
 
 #: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
 PER_PERIOD = 200
-#: Samples over the whole span of an unforced system: a curve without corners over a hundred oscillations; fewer of many trajectories.
+#: Samples over the whole span of an unforced system: a curve without corners over a hundred
+#: oscillations; fewer of many trajectories.
 MOST_PER_SPAN, LEAST_PER_SPAN = 10_000, 2000
 
 
@@ -56,8 +57,8 @@ def simulate(
     system : System
         Equations, contacts and parameter values.
     start : sequence, mapping or array
-        State at the start: ``(0.0, 0.0)``, ``("1 mm", 0)``, ``{"x": [...], "v": [...]}`` or an array (trajectory, state). Numbers are
-        SI. Default: all zero.
+        State at the start: ``(0.0, 0.0)``, ``("1 mm", 0)``, ``{"x": [...], "v": [...]}`` or an
+        array (trajectory, state). Numbers are SI. Default: all zero.
     periods : int
         Whole forcing periods to run.
     t_end : float or str
@@ -67,26 +68,31 @@ def simulate(
     method : Method
         Default :class:`saltus.Taylor`; :class:`saltus.ODE45` for MATLAB's.
     samples : int
-        Samples per forcing period (default 200), or over the whole span if the system isn't forced (default 10 000, and down to
-        2000 for many trajectories).
+        Samples per forcing period (default 200), or over the whole span if the system isn't forced
+        (default 10 000, and down to 2000 for many trajectories).
     keep : int
         Number of periods at the end whose samples and contacts are kept (default all).
     values : mapping
-        Parameter values of this call: one each, or an array with one for each trajectory (the forcing frequency included).
+        Parameter values of this call: one each, or an array with one for each trajectory (the
+        forcing frequency included).
     time_errors : {"measured", "local"}
-        ``"measured"``: ``contact_time_error`` is estimated from three more runs of every trajectory, by a more exact method and nudged by
-        roundings. ``"local"``: the error of the step that holds the contact only, at a quarter of the cost.
+        ``"measured"``: ``contact_time_error`` is estimated from three more runs of every
+        trajectory, by a more exact method and nudged by roundings. ``"local"``: the error of the
+        step that holds the contact only, at a quarter of the cost.
     threads : int
         Default all processors. Results don't depend on it.
     progress : bool or callable
-        Default: a bar on the terminal if the work lasts more than two seconds. A callable gets the share done.
+        Default: a bar on the terminal if the work lasts more than two seconds. A callable gets the
+        share done.
 
     Returns
     -------
     Dataset
-        Dims ``time``, ``contact``, ``guard``, and ``trajectory`` for many starts or values. Variables: each state, ``mode``,
-        ``contact_time``, ``contact_time_error``, ``contact_guard``, ``contact_direction``, ``contact_velocity``, ``contact_kind``, ...,
-        ``status``, counters. If the trajectories have forcing periods of their own, samples lie along ``period``.
+        Dims ``time``, ``contact``, ``guard``, and ``trajectory`` for many starts or values.
+        Variables: each state, ``mode``, ``contact_time``, ``contact_time_error``,
+        ``contact_guard``, ``contact_direction``, ``contact_velocity``, ``contact_kind``, ...,
+        ``status``, counters. If the trajectories have forcing periods of their own, samples lie
+        along ``period``.
 
     Raises
     ------
@@ -97,7 +103,8 @@ def simulate(
 
     References
     ----------
-    Jorba & Zou, Exp. Math. 14 (2005) 99-117 (Taylor series); Shampine & Reichelt, SIAM J. Sci. Comput. 18 (1997) 1-22 (ode45).
+    Jorba & Zou, Exp. Math. 14 (2005) 99-117 (Taylor series); Shampine & Reichelt, SIAM J. Sci.
+    Comput. 18 (1997) 1-22 (ode45).
 
     Examples
     --------
@@ -112,7 +119,9 @@ def simulate(
     length = span(system, group, periods, t_end, t_start)
     plan = _plan(system, group, length, samples, keep)
     if not among(time_errors, ("measured", "local")):
-        raise ParameterError(f'time_errors must be "measured" or "local", not {shown(time_errors)}.')
+        raise ParameterError(
+            f'time_errors must be "measured" or "local", not {shown(time_errors)}.'
+        )
 
     def so_far(outcome: Outcome) -> xr.Dataset:
         return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
@@ -142,15 +151,25 @@ class _Plan:
     first: int
 
     def request(self, group: Ensemble, length: Span) -> Request:
-        return replace(length.request(group.start, group.parameters, self.schedule, self.first), t_end=length.t_end)
+        return replace(
+            length.request(group.start, group.parameters, self.schedule, self.first),
+            t_end=length.t_end,
+        )
 
 
-def _plan(system: System, group: Ensemble, length: Span, samples: int | None, keep: int | None) -> _Plan:
-    per = _whole(samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD)
+def _plan(
+    system: System, group: Ensemble, length: Span, samples: int | None, keep: int | None
+) -> _Plan:
+    per = _whole(
+        samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD
+    )
     last = int(np.max(length.count + length.phase / length.period))
     kept = _whole(keep, "keep", max(last, 1))
     if keep is not None and system.forced_at is None:
-        raise ParameterError(f"{system.name} has no forcing period, so keep= has no meaning. Start later, or take fewer samples=.")
+        raise ParameterError(
+            f"{system.name} has no forcing period, so keep= has no meaning. Start "
+            f"later, or take fewer samples=."
+        )
     first = max(int(np.min(length.count)) - kept, 0) if keep is not None else 0
     longest = np.max((length.count + length.phase / length.period) * per)
     count = int(longest + 1e-9) + 1 - first * per
@@ -160,11 +179,18 @@ def _plan(system: System, group: Ensemble, length: Span, samples: int | None, ke
         "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
     )
     periods = np.arange(first, first - (-count // per))
-    return _Plan(Schedule(np.repeat(periods, per)[:count], np.tile(np.arange(per) / per, len(periods))[:count]), first)
+    return _Plan(
+        Schedule(
+            np.repeat(periods, per)[:count], np.tile(np.arange(per) / per, len(periods))[:count]
+        ),
+        first,
+    )
 
 
 def _per_span(trajectories: int) -> int:
-    """Samples of a motion without forcing: enough for a smooth curve, fewer where there are many trajectories."""
+    """Samples of a motion without forcing: enough for a smooth curve, fewer where there are many
+    trajectories.
+    """
     return max(MOST_PER_SPAN // max(trajectories // 20, 1), LEAST_PER_SPAN)
 
 
@@ -173,7 +199,13 @@ def _whole(value: int | None, name: str, default: int) -> int:
 
 
 def _dataset(
-    system: System, method: Method, group: Ensemble, length: Span, plan: _Plan, outcome: Outcome, errors: np.ndarray
+    system: System,
+    method: Method,
+    group: Ensemble,
+    length: Span,
+    plan: _Plan,
+    outcome: Outcome,
+    errors: np.ndarray,
 ) -> xr.Dataset:
     """Everything under its name."""
     reached = slice(outcome.reached())
@@ -183,7 +215,10 @@ def _dataset(
     scale = length.period[:, None] if own_periods else length.period[0]
     time = np.minimum(length.t_start + (count * scale + fraction * scale), length.t_end)
     subject = dataset_parts.trajectories(
-        system, method, group, (length.period if own_periods else float(length.period[0])) if forced else None
+        system,
+        method,
+        group,
+        (length.period if own_periods else float(length.period[0])) if forced else None,
     )
     values = {
         "trajectory": np.arange(group.size),
@@ -197,4 +232,6 @@ def _dataset(
         "end_time": outcome.time,
         "end_<state>": outcome.state,
     }
-    return build(schema.TRAJECTORY, subject, values, along={"time": "period"} if own_periods else {})
+    return build(
+        schema.TRAJECTORY, subject, values, along={"time": "period"} if own_periods else {}
+    )

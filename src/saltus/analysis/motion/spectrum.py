@@ -19,63 +19,77 @@ from saltus.results import Subject, build
 from saltus.results.dataset import schema
 from saltus.results.dataset.reader import reader
 
-#: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the first).
+#: Windows by name: weights of n samples. Both are periodic (the sample after the last would be the
+#: first).
 WINDOWS = {
     "none": lambda n: np.ones(n),
     "hann": lambda n: 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n),
 }
-#: Fewest samples of an unforced run: a Hann line is four bins wide, and fewer than four lines are no spectrum.
+#: Fewest samples of an unforced run: a Hann line is four bins wide, and fewer than four lines are
+#: no spectrum.
 FEWEST = 16
-#: Largest difference of two sampling intervals, relative to the time of the samples: far above rounding.
+#: Largest difference of two sampling intervals, relative to the time of the samples: far above
+#: rounding.
 UNEVEN = 1e-9
 
 
 @verb
 @reader
 def spectrum(
-    run: xr.Dataset, state: str | Sequence[str] | None = None, *, window: str | None = None, last: int | None = None
+    run: xr.Dataset,
+    state: str | Sequence[str] | None = None,
+    *,
+    window: str | None = None,
+    last: int | None = None,
 ) -> xr.Dataset:
     """Amplitude spectrum of the states of a run.
 
-    The amplitude of a line is that of the cosine it stands for: ``x(t) = x_0 + sum of x_k cos(2 pi f_k t + phase_k)``. Where the response
-    repeats after n forcing periods (:func:`saltus.settled` tells), whole responses are taken without a window: the lines lie exactly on
-    multiples of 1/(nT), nothing leaks, and **Parseval's relation** holds to rounding::
+    The amplitude of a line is that of the cosine it stands for: ``x(t) = x_0 + sum of x_k cos(2 pi
+    f_k t + phase_k)``. Where the response repeats after n forcing periods (:func:`saltus.settled`
+    tells), whole responses are taken without a window: the lines lie exactly on multiples of
+    1/(nT), nothing leaks, and **Parseval's relation** holds to rounding::
 
-        mean of x^2 over the samples = x_0^2 + sum of x_k^2 / 2        (the last line of an even number of samples counts in full)
+        mean of x^2 over the samples = x_0^2 + sum of x_k^2 / 2
 
-    Where it doesn't, a Hann window is used and corrected by its coherent gain: a single line still has its amplitude, and the sum divided
-    by ``noise_bandwidth`` (1.5) is near the mean square. The mean is taken off before the window and stands in the line of frequency 0.
+    where the last line of an even number of samples counts in full.
+
+    Where it doesn't, a Hann window is used and corrected by its coherent gain: a single line still
+    has its amplitude, and the sum divided by ``noise_bandwidth`` (1.5) is near the mean square. The
+    mean is taken off before the window and stands in the line of frequency 0.
 
     Parameters
     ----------
     run : Dataset
-        What ``simulate`` returned. Take the transient off with its ``keep=``. Sampling folds what lies above half of the samples per
-        period back into the spectrum; forces of contact springs bend and their lines fall off as the third power of the order, so 200
-        samples a period leave some 1e-6 of the largest line.
+        What ``simulate`` returned. Take the transient off with its ``keep=``. Sampling folds what
+        lies above half of the samples per period back into the spectrum; forces of contact springs
+        bend and their lines fall off as the third power of the order, so 200 samples a period leave
+        some 1e-6 of the largest line.
     state : str or sequence of str, optional
         Which states; all of them by default.
     window : {"none", "hann"}, optional
         For all trajectories; by default ``"none"`` where the response repeats, else ``"hann"``.
     last : int, optional
-        Whole forcing periods at the end to transform, cut to whole responses; by default one response, or all periods
-        that were kept where one doesn't repeat.
+        Whole forcing periods at the end to transform, cut to whole responses; by default one
+        response, or all periods that were kept where one doesn't repeat.
 
     Returns
     -------
     Dataset
-        Dim ``frequency`` [Hz], with ``order`` = frequency / forcing frequency if forced; and ``trajectory`` for a batch (with forcing
-        periods of its own the dim is ``order``). ``<state>_amplitude`` [unit of the state], ``<state>_phase`` [rad, of the cosine, at
-        t = 0], ``window``, ``noise_bandwidth``, ``response_period``.
+        Dim ``frequency`` [Hz], with ``order`` = frequency / forcing frequency if forced; and
+        ``trajectory`` for a batch (with forcing periods of its own the dim is ``order``).
+        ``<state>_amplitude`` [unit of the state], ``<state>_phase`` [rad, of the cosine, at t = 0],
+        ``window``, ``noise_bandwidth``, ``response_period``.
 
     Raises
     ------
     ParameterError
-        If the samples are too few, not evenly spaced or missing, if an argument is unknown, or if no common stretch holds whole
-        responses of all trajectories.
+        If the samples are too few, not evenly spaced or missing, if an argument is unknown, or if
+        no common stretch holds whole responses of all trajectories.
 
     References
     ----------
-    F. J. Harris, On the use of windows for harmonic analysis with the discrete Fourier transform, Proc. IEEE 66 (1978) 51-83.
+    F. J. Harris, On the use of windows for harmonic analysis with the discrete Fourier transform,
+    Proc. IEEE 66 (1978) 51-83.
 
     Examples
     --------
@@ -83,7 +97,8 @@ def spectrum(
     >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
     >>> run = sl.simulate(rig, start=("0.75 mm", 0), periods=400, keep=100)
     >>> lines = sl.spectrum(run, "x")
-    >>> round(float(lines["order"][int(lines["x_amplitude"].argmax("frequency"))]), 3)  # the subharmonic at a third of 17 Hz
+    >>> largest = int(lines["x_amplitude"].argmax("frequency"))
+    >>> round(float(lines["order"][largest]), 3)  # the subharmonic at a third of 17 Hz
     0.333
     """
     schema.check(run, caller="spectrum", kinds=[schema.TRAJECTORY])
@@ -95,15 +110,26 @@ def spectrum(
     weights = np.array([WINDOWS[name](stretch.count) for name in chosen])
     lines = {name: _lines(run, name, stretch, weights) for name in names}
     batch = "trajectory" in run.dims
-    named = json.loads(run.attrs.get("varied_parameters", "[]")) if batch else []  # a varied frequency shows in the lines
-    varied = {name: run[name].values for name in named if name in run.coords and name not in ("frequency", "order")}
+    # a varied frequency shows in the lines
+    named = json.loads(run.attrs.get("varied_parameters", "[]")) if batch else []
+    varied = {
+        name: run[name].values
+        for name in named
+        if name in run.coords and name not in ("frequency", "order")
+    }
     own = stretch.frequency.ndim == 2
     subject = Subject(
         states=names,
         units={name: run[name].attrs.get("units", "") for name in (*names, *varied)},
-        forcing_period=np.atleast_1d(run["forcing_period"].values) if own else run.attrs.get("forcing_period_s"),
+        forcing_period=np.atleast_1d(run["forcing_period"].values)
+        if own
+        else run.attrs.get("forcing_period_s"),
         varied=varied,
-        attrs={key: value for key, value in run.attrs.items() if key not in ("result_hash", "forcing_period_s")},
+        attrs={
+            key: value
+            for key, value in run.attrs.items()
+            if key not in ("result_hash", "forcing_period_s")
+        },
         batch=batch,
     )
     places = {"trajectory": np.arange(len(chosen)), "frequency": stretch.frequency}
@@ -115,15 +141,25 @@ def spectrum(
         "response_period": stretch.response,
         "status": np.atleast_1d(run["status"].values),
     }
-    parts: dict[str, Callable[[np.ndarray], np.ndarray]] = {"<state>_amplitude": np.abs, "<state>_phase": np.angle}
+    parts: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "<state>_amplitude": np.abs,
+        "<state>_phase": np.angle,
+    }
     spectra = [(row, {name: of(line)}) for name, line in lines.items() for row, of in parts.items()]
-    return build(schema.SPECTRUM, subject, [*places.items(), *spectra, *each.items()], along={"frequency": "order"} if own else {})
+    return build(
+        schema.SPECTRUM,
+        subject,
+        [*places.items(), *spectra, *each.items()],
+        along={"frequency": "order"} if own else {},
+    )
 
 
-# -- which samples -------------------------------------------------------------------------------------------------------------
+# -- which samples ---------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class _Stretch:
-    """Samples ``first`` to ``first + count``: frequencies [Hz], orders, the time of the first [s]; the periods of the responses [T]."""
+    """Samples ``first`` to ``first + count``: frequencies [Hz], orders, the time of the first [s];
+    the periods of the responses [T].
+    """
 
     first: int
     count: int
@@ -135,24 +171,38 @@ class _Stretch:
 
 def _states(run: xr.Dataset, state: str | Sequence[str] | None) -> list[str]:
     known = schema.states_of(run)
-    names = list(known) if state is None else list(state) if isinstance(state, Sequence) and not isinstance(state, str) else [state]
+    names = (
+        list(known)
+        if state is None
+        else list(state)
+        if isinstance(state, Sequence) and not isinstance(state, str)
+        else [state]
+    )
     for name in names:
         if not among(name, known):
-            raise ParameterError(f"spectrum: this run has no state {shown(name)}. {nearest(name, known)}")
+            raise ParameterError(
+                f"spectrum: this run has no state {shown(name)}. {nearest(name, known)}"
+            )
     return names
 
 
 def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
-    """Whole forcing periods at the end of the run, as many as hold whole responses of all trajectories that repeat."""
+    """Whole forcing periods at the end of the run, as many as hold whole responses of all
+    trajectories that repeat.
+    """
     phases = np.asarray(run["period"].values, dtype=float)
     whole = np.flatnonzero(phases == np.round(phases))
     kept = max(whole.size - 1, 0)
     last = last if last is None else whole_number(last, "last")
     if last is not None and last > kept:
-        raise ParameterError(f"spectrum: last={shown(last)}, but {kept} whole forcing periods were kept. Simulate with more keep=.")
+        raise ParameterError(
+            f"spectrum: last={shown(last)}, but {kept} whole forcing periods were "
+            f"kept. Simulate with more keep=."
+        )
     if not kept:
         raise ParameterError(
-            "spectrum needs a whole forcing period of samples, its two ends included. Simulate longer, or give more keep=."
+            "spectrum needs a whole forcing period of samples, its two ends included. Simulate "
+            "longer, or give more keep=."
         )
     periods = kept if last is None else last
     _check_even(phases[whole[-periods - 1] :], "forcing periods")
@@ -162,8 +212,10 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     common = math.lcm(*(int(n) for n in response if n))
     if common > periods:
         raise ParameterError(
-            f"spectrum: the trajectories repeat after {sorted({int(n) for n in response if n})} forcing periods, so only {common} periods "
-            f"hold whole responses of all, and {periods} were kept. Give more keep=, or take them one by one: run.isel(trajectory=0)."
+            f"spectrum: the trajectories repeat after {sorted({int(n) for n in response if n})} "
+            f"forcing periods, so only {common} periods "
+            f"hold whole responses of all, and {periods} were kept. Give more keep=, or take them "
+            f"one by one: run.isel(trajectory=0)."
         )
     if last is None and response.all():
         periods = common  # more of the same would only put empty lines between
@@ -171,7 +223,9 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     first, count = int(whole[-periods - 1]), int(whole[-1] - whole[-periods - 1])
     order = np.arange(count // 2 + 1) / periods
     own = "forcing_period" in run.variables and run["forcing_period"].ndim == 1
-    period = run["forcing_period"].values[:, None] if own else np.float64(schema.forcing_period(run))
+    period = (
+        run["forcing_period"].values[:, None] if own else np.float64(schema.forcing_period(run))
+    )
     begin = np.atleast_1d(run["time"].values[..., first])
     return _Stretch(first, count, order / period, order, begin, response)
 
@@ -179,10 +233,16 @@ def _forced_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
 def _free_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
     """All samples of a system without forcing; the last one would be the first of a repeat."""
     if last is not None:
-        raise ParameterError("spectrum: last= counts forcing periods, and this system isn't forced. Select by time: run.sel(time=...).")
+        raise ParameterError(
+            "spectrum: last= counts forcing periods, and this system isn't "
+            "forced. Select by time: run.sel(time=...)."
+        )
     time = np.asarray(run["time"].values, dtype=float)
     if time.size < FEWEST:
-        raise ParameterError(f"spectrum needs {FEWEST} samples or more of a system that isn't forced; this run has {time.size}.")
+        raise ParameterError(
+            f"spectrum needs {FEWEST} samples or more of a system that isn't "
+            f"forced; this run has {time.size}."
+        )
     _check_even(time, "s")
     count = time.size - 1
     frequency = np.arange(count // 2 + 1) / (time[-1] - time[0])
@@ -192,20 +252,26 @@ def _free_stretch(run: xr.Dataset, last: int | None) -> _Stretch:
 
 def _check_even(places: np.ndarray, unit: str) -> None:
     steps = np.diff(places)
-    bad = np.flatnonzero(np.abs(steps - steps.mean()) > UNEVEN * max(1.0, float(np.abs(places).max())))
+    bad = np.flatnonzero(
+        np.abs(steps - steps.mean()) > UNEVEN * max(1.0, float(np.abs(places).max()))
+    )
     if bad.size:
         at = int(bad[0])
         raise ParameterError(
-            f"spectrum needs evenly spaced samples; after {places[at]:.6g} {unit} the next one comes {steps[at]:.6g} {unit} later, while "
-            f"the mean is {steps.mean():.6g}. Give it the run as simulate returned it, or a slice of it without gaps."
+            f"spectrum needs evenly spaced samples; after {places[at]:.6g} {unit} the next one "
+            f"comes {steps[at]:.6g} {unit} later, while "
+            f"the mean is {steps.mean():.6g}. Give it the run as simulate returned it, or a slice "
+            f"of it without gaps."
         )
 
 
-# -- lines ---------------------------------------------------------------------------------------------------------------------
+# -- lines -----------------------------------------------------------------------------------------
 def _lines(run: xr.Dataset, name: str, stretch: _Stretch, weights: np.ndarray) -> np.ndarray:
     """Complex amplitudes of the cosines of each trajectory, referred to t = 0."""
     dim = schema.sample_dim(run)
-    samples = run[name].transpose(..., dim).values[..., stretch.first : stretch.first + stretch.count]
+    samples = (
+        run[name].transpose(..., dim).values[..., stretch.first : stretch.first + stretch.count]
+    )
     samples = np.atleast_2d(samples)
     mean = samples.mean(axis=1, keepdims=True)
     lines = scipy.fft.rfft((samples - mean) * weights, axis=1) / weights.sum(axis=1, keepdims=True)

@@ -37,7 +37,8 @@ def stroboscope(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """States at whole forcing periods after the start (the stroboscopic map, iterated). The phase stays exact over millions of periods.
+    """States at whole forcing periods after the start (the stroboscopic map, iterated). The phase
+    stays exact over millions of periods.
 
     Parameters
     ----------
@@ -46,13 +47,14 @@ def stroboscope(
     periods : int
         Whole forcing periods to run.
     keep : int
-        How many of the last whole periods to keep (default all, the start included). A run of 1e6 starts that keeps one takes well under
-        1 GB.
+        How many of the last whole periods to keep (default all, the start included). A run of 1e6
+        starts that keeps one takes well under 1 GB.
 
     Returns
     -------
     Dataset
-        Dims ``trajectory``, ``period`` (whole periods since the start), ``guard``; a variable per state, ``status``, counters.
+        Dims ``trajectory``, ``period`` (whole periods since the start), ``guard``; a variable per
+        state, ``status``, counters.
 
     Raises
     ------
@@ -63,7 +65,8 @@ def stroboscope(
 
     References
     ----------
-    Guckenheimer & Holmes, Nonlinear Oscillations, Dynamical Systems, and Bifurcations of Vector Fields (1983), section 1.5.
+    Guckenheimer & Holmes, Nonlinear Oscillations, Dynamical Systems, and Bifurcations of Vector
+    Fields (1983), section 1.5.
 
     Examples
     --------
@@ -77,13 +80,18 @@ def stroboscope(
     method = check_method(method)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     if system.forced_at is None:
-        raise ParameterError(f"{system.name} has no forcing period to be seen once in. Take sl.simulate with t_end=, or sl.poincare.")
+        raise ParameterError(
+            f"{system.name} has no forcing period to be seen once in. Take "
+            f"sl.simulate with t_end=, or sl.poincare."
+        )
     length = span(system, group, periods, None, t_start)
     whole_periods = whole(periods, "periods")
     first = 0 if keep is None else max(whole_periods + 1 - whole(keep, "keep"), 0)
     count = whole_periods + 1 - first
     size = count * group.size * (16.0 * len(system.states) + 16.0)
-    check_room(size, f"{group.size} trajectories with {count} periods each", "Give keep= (last periods).")
+    check_room(
+        size, f"{group.size} trajectories with {count} periods each", "Give keep= (last periods)."
+    )
     kept = np.arange(first, whole_periods + 1, dtype=np.int64)
     schedule = Schedule(kept, np.zeros(len(kept)))
     request = length.request(group.start, group.parameters, schedule, None)
@@ -91,7 +99,9 @@ def stroboscope(
     def dataset(outcome: Outcome) -> xr.Dataset:
         reached = slice(outcome.reached())
         own_periods = bool(np.ptp(length.period) > 0)
-        subject = dataset_parts.trajectories(system, method, group, length.period if own_periods else float(length.period[0]))
+        subject = dataset_parts.trajectories(
+            system, method, group, length.period if own_periods else float(length.period[0])
+        )
         values = {
             "trajectory": np.arange(group.size),
             "period": kept[reached],

@@ -13,7 +13,8 @@ from saltus.flow.engine import Outcome
 
 @dataclass(frozen=True)
 class Touchdowns:
-    """Contacts that begin in a stretch of motion, one a row, by trajectory and time; and when each guard is in contact.
+    """Contacts that begin in a stretch of motion, one a row, by trajectory and time; and when each
+    guard is in contact.
 
     Attributes
     ----------
@@ -41,11 +42,16 @@ class Touchdowns:
     def covered(self, trajectory: int, guard: int, borders: np.ndarray) -> np.ndarray:
         """Time in contact in each of the blocks between borders float64[b + 1] [s]."""
         spells = self.spells[trajectory, guard]
-        behind = [np.clip(border - spells[:, 0], 0.0, spells[:, 1] - spells[:, 0]).sum() for border in borders]
+        behind = [
+            np.clip(border - spells[:, 0], 0.0, spells[:, 1] - spells[:, 0]).sum()
+            for border in borders
+        ]
         return np.diff(behind)
 
 
-def find(seen: Stretch, outcome: Outcome, sides: np.ndarray, integrals: Mapping[int, int]) -> Touchdowns:
+def find(
+    seen: Stretch, outcome: Outcome, sides: np.ndarray, integrals: Mapping[int, int]
+) -> Touchdowns:
     """Pair the entries and exits of every trajectory and guard.
 
     Parameters
@@ -99,14 +105,18 @@ def _pairs(rows: np.ndarray, enters: np.ndarray) -> np.ndarray:
 
 
 def _touching_first(outcome: Outcome, i: int, g: int, side: int, enters: np.ndarray) -> bool:
-    """Whether a guard is in contact when the stretch begins: the first event tells, else the mode, which then never changes."""
+    """Whether a guard is in contact when the stretch begins: the first event tells, else the mode,
+    which then never changes.
+    """
     if len(enters):
         return not enters[0]
     positive = (int(outcome.sample_mode[i, 0]) >> g) & 1 == 1
     return positive == (side > 0)
 
 
-def _spells(time: np.ndarray, enters: np.ndarray, touching: bool, begin: float, end: float) -> np.ndarray:
+def _spells(
+    time: np.ndarray, enters: np.ndarray, touching: bool, begin: float, end: float
+) -> np.ndarray:
     """Begin and end of all times in contact, float64[m, 2]."""
     starts, ends = time[enters], time[~enters]
     if touching:
@@ -116,7 +126,13 @@ def _spells(time: np.ndarray, enters: np.ndarray, touching: bool, begin: float, 
     return np.stack([starts, ends], axis=1)
 
 
-def _impulses(states: np.ndarray, guard: np.ndarray, first: np.ndarray, final: np.ndarray, integrals: Mapping[int, int]) -> np.ndarray:
+def _impulses(
+    states: np.ndarray,
+    guard: np.ndarray,
+    first: np.ndarray,
+    final: np.ndarray,
+    integrals: Mapping[int, int],
+) -> np.ndarray:
     """Difference of the integral of the force between the two ends of each contact."""
     impulse = np.full(len(first), np.nan)
     for g, number in integrals.items():

@@ -28,13 +28,14 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
     output, to : str
         Outputs of it, states or functions: numerator and denominator.
     by : {"amplitude", "rms", "rms_about_mean"}
-        First harmonics, or root mean squares, which count what a nonlinear response sends to other frequencies too.
+        First harmonics, or root mean squares, which count what a nonlinear response sends to other
+        frequencies too.
 
     Returns
     -------
     Dataset
-        ``ds`` with ``transmissibility`` on response, and ``transmissibility_phase`` [rad], by which the first harmonic of ``output`` leads
-        that of ``to``.
+        ``ds`` with ``transmissibility`` on response, and ``transmissibility_phase`` [rad], by which
+        the first harmonic of ``output`` leads that of ``to``.
 
     Raises
     ------
@@ -45,8 +46,10 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
     --------
     >>> import saltus as sl
     >>> rig = sl.models.delangre("a", force="4 N")
-    >>> force = {"spring_force": lambda x, *, mass, natural_frequency: mass * (2 * sl.pi * natural_frequency) ** 2 * x}
-    >>> responses = sl.frequency_response(rig, frequency=["16 Hz"], outputs=force)
+    >>> def spring_force(x, mass, natural_frequency):
+    ...     return mass * (2 * sl.pi * natural_frequency) ** 2 * x
+    >>> outputs = {"spring_force": spring_force}
+    >>> responses = sl.frequency_response(rig, frequency=["16 Hz"], outputs=outputs)
     >>> ratio = sl.transmissibility(responses, "spring_force", to="x")
     >>> round(float(ratio["transmissibility"][0]))  # a linear spring: its rate [N/m]
     2961
@@ -55,7 +58,10 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
     known = ds["output"].values.tolist() if "output" in ds else []
     for name in (output, to):
         if name not in known:
-            raise ParameterError(f"transmissibility: {shown(name)} is no output. {nearest(name, known)} Ask for functions by outputs=.")
+            raise ParameterError(
+                f"transmissibility: {shown(name)} is no output. "
+                f"{nearest(name, known)} Ask for functions by outputs=."
+            )
     if not among(by, get_args(By)):
         raise ParameterError(f"transmissibility: by={shown(by)}. Known: {', '.join(get_args(By))}.")
     upper, lower = ds.sel(output=output), ds.sel(output=to)
@@ -67,7 +73,11 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
     labels = {"units": unit, "long_name": f"{output} / {to}"}
     return ds.assign(
         transmissibility=("response", ratio, labels),
-        transmissibility_phase=("response", phase, {"units": "rad", "long_name": f"phase by which {output} leads {to}"}),
+        transmissibility_phase=(
+            "response",
+            phase,
+            {"units": "rad", "long_name": f"phase by which {output} leads {to}"},
+        ),
     )
 
 

@@ -1,4 +1,6 @@
-"""A stretch of motion after a transient: what sections, impact statistics and energy balances are taken from."""
+"""A stretch of motion after a transient: what sections, impact statistics and energy balances are
+taken from.
+"""
 
 from __future__ import annotations
 
@@ -49,29 +51,41 @@ class Stretch:
     @property
     def duration(self) -> np.ndarray:
         """Time that is looked at, float64[n] [s]."""
-        return self.length.t_start + self.length.count * self.length.period + self.length.phase - self.begin
+        return (
+            self.length.t_start
+            + self.length.count * self.length.period
+            + self.length.phase
+            - self.begin
+        )
 
     @property
     def forcing_period(self) -> float | np.ndarray | None:
         """One for all, or one each [s]; None for an unforced system."""
         if self.system.forced_at is None:
             return None
-        return self.length.period if np.ptp(self.length.period) > 0 else float(self.length.period[0])
+        return (
+            self.length.period if np.ptp(self.length.period) > 0 else float(self.length.period[0])
+        )
 
     def request(self, system: System, schedule: Schedule, record: bool) -> Request:
         """The request for this system, or one with more states: those start at zero."""
         more = len(system.states) - self.group.start.shape[1]
         start = np.pad(self.group.start, ((0, 0), (0, more)))
-        return self.length.request(start, self.group.parameters, schedule, self.skipped if record else None)
+        return self.length.request(
+            start, self.group.parameters, schedule, self.skipped if record else None
+        )
 
 
-def stretch(system: System, start: Any, values: Any, periods: Any, t_end: Any, t_start: Any, transient: Any) -> Stretch:
+def stretch(
+    system: System, start: Any, values: Any, periods: Any, t_end: Any, t_start: Any, transient: Any
+) -> Stretch:
     """What the user asked for.
 
     Raises
     ------
     ParameterError, UnitError
-        As :func:`saltus.simulate`; or if the transient isn't a number of periods (a time, if unforced), or outlasts the run.
+        As :func:`saltus.simulate`; or if the transient isn't a number of periods (a time, if
+        unforced), or outlasts the run.
     """
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     if system.forced_at is None:
@@ -79,13 +93,25 @@ def stretch(system: System, start: Any, values: Any, periods: Any, t_end: Any, t
         skip = to_si(transient, "s", "transient")
         begin = np.full(group.size, length.t_start + skip)
         if not 0 <= skip < float(length.period[0]):
-            raise ParameterError(f"transient = {shown(transient)} must be a time >= 0 s that ends before t_end = {shown(t_end)}.")
+            raise ParameterError(
+                f"transient = {shown(transient)} must be a time >= 0 s that ends "
+                f"before t_end = {shown(t_end)}."
+            )
         return Stretch(system, group, length, 0, begin)
     skipped = whole(transient, "transient", 0)
-    length = span(system, group, None if periods is None else whole(periods, "periods") + skipped, t_end, t_start)
+    length = span(
+        system,
+        group,
+        None if periods is None else whole(periods, "periods") + skipped,
+        t_end,
+        t_start,
+    )
     begin = length.t_start + skipped * length.period
     if np.any(skipped >= length.count + length.phase / length.period):
-        raise ParameterError(f"transient = {skipped} periods outlast the run up to t_end = {shown(t_end)}. Give a later t_end.")
+        raise ParameterError(
+            f"transient = {skipped} periods outlast the run up to t_end = "
+            f"{shown(t_end)}. Give a later t_end."
+        )
     return Stretch(system, group, length, skipped, begin)
 
 
@@ -106,21 +132,31 @@ def computed(
 
 
 def dataset(
-    kind: str, seen: Stretch, system: System, method: Method, outcome: Outcome, values: Mapping[str, Any], each: Mapping[str, Any],
+    kind: str, seen: Stretch, system: System, method: Method, outcome: Outcome,
+    values: Mapping[str, Any], each: Mapping[str, Any],
     attrs: Mapping[str, Any] | None = None, **options: Any,
 ) -> xr.Dataset:  # fmt: skip
-    """The Dataset of a stretch: of the system itself, not of the guards and states that were added to it.
+    """The Dataset of a stretch: of the system itself, not of the guards and states that were added
+    to it.
 
-    ``values`` are tables, ``each`` what belongs to each trajectory; how it ended stands between them. ``attrs`` are settings beside the
-    provenance, ``options`` as for :func:`saltus.results.build`.
+    ``values`` are tables, ``each`` what belongs to each trajectory; how it ended stands between
+    them. ``attrs`` are settings beside the provenance, ``options`` as for
+    :func:`saltus.results.build`.
     """
     own = dataset_parts.trajectories(seen.system, method, seen.group, seen.forcing_period)
     guards = None if own.guards is None else own.guards.first(len(system.guards))
-    subject = replace(own, states=system.states, guards=guards, attrs={**own.attrs, **(attrs or {})})
+    subject = replace(
+        own, states=system.states, guards=guards, attrs={**own.attrs, **(attrs or {})}
+    )
     counters = ("steps", "rejected_steps", "mode_violations", "grazes_unresolved")
     ending = {**dataset_parts.endings(outcome, counters), "end_time": outcome.time}
     ends = {"end_<state>": outcome.state[:, : len(system.states)]}
-    return build(kind, subject, {"trajectory": np.arange(seen.group.size), **values, **ending, **each, **ends}, **options)
+    return build(
+        kind,
+        subject,
+        {"trajectory": np.arange(seen.group.size), **values, **ending, **each, **ends},
+        **options,
+    )
 
 
 def extended(seen: Stretch, system: System) -> Stretch:

@@ -1,1 +1,3 @@
-"""What trajectories settle to: periodic orbits, equilibria, limit cycles, aperiodic attractors - found, verified and described."""
+"""What trajectories settle to: periodic orbits, equilibria, limit cycles, aperiodic attractors -
+found, verified and described.
+"""

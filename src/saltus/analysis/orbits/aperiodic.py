@@ -1,6 +1,8 @@
-"""Attractors that never repeat: quasi-periodic and chaotic ones, distinguished by their largest Lyapunov exponent, known by the region that they visit.
+"""Attractors that never repeat: quasi-periodic and chaotic ones, distinguished by their largest
+Lyapunov exponent, known by the region that they visit.
 
-Exponents: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980), one direction renormalised at every block.
+Exponents: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15 (1980), one direction renormalised
+at every block.
 """
 
 from __future__ import annotations
@@ -16,21 +18,26 @@ from saltus.analysis.statistics import BOUNDED, UNCLEAR
 from saltus.flow.maps import Map
 from saltus.results.dataset.kinds import Kind
 
-#: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its way.
+#: Iterates of one block of the exponent, blocks, and those of them in which the direction finds its
+#: way.
 BLOCK, BLOCKS, ALIGNING = 8, 192, 48
-#: Times that the exponent is measured at most, each time going on from where the last ended, until it says what the motion is.
+#: Times that the exponent is measured at most, each time going on from where the last ended, until
+#: it says what the motion is.
 MEASURED = 4
 #: Standard errors that an exponent must be from zero.
 SURE = 4.0
 #: Exponent [per iterate] that is taken for zero whatever its error.
 FLOOR = 2e-3
-#: Recurrence below 1e-6 of the scale means periodic; a recurrence that falls by 20 means converging.
+#: Recurrence below 1e-6 of the scale means periodic; a recurrence that falls by 20 means
+#: converging.
 REPEATS, SETTLING = 1e-6, 0.05
 #: Iterates by which such an attractor is known.
 SURVEY_ITERATES = 4096
-#: Boxes across the range of a state. The finest is taken at which one half of the points knows the places of the other.
+#: Boxes across the range of a state. The finest is taken at which one half of the points knows the
+#: places of the other.
 BOXES = (64, 32, 16, 8)
-#: Share of every second point that must lie in the boxes of the others. Attractors of a higher dimension need larger boxes.
+#: Share of every second point that must lie in the boxes of the others. Attractors of a higher
+#: dimension need larger boxes.
 KNOWN = 0.9
 #: Boxes away from zero beyond which nothing is on an attractor.
 FARTHEST = 2048
@@ -40,7 +47,8 @@ ALIKE = 0.6
 
 @dataclass(frozen=True)
 class SampledAttractor:
-    """An attractor that is known by points on it: one that never repeats, a limit cycle, or a noisy orbit.
+    """An attractor that is known by points on it: one that never repeats, a limit cycle, or a noisy
+    orbit.
 
     Attributes
     ----------
@@ -67,7 +75,9 @@ class SampledAttractor:
 
     @functools.cached_property
     def _places(self) -> tuple[int, np.ndarray]:
-        """Boxes across the range of a state, and the codes of those it visits and of their neighbours."""
+        """Boxes across the range of a state, and the codes of those it visits and of their
+        neighbours.
+        """
         for across in BOXES:
             half = _around(self.points[::2], self.scale, across)
             if _inside(self.points[None, 1::2], self.scale, across, half)[0] >= KNOWN:
@@ -75,16 +85,22 @@ class SampledAttractor:
         return across, _around(self.points, self.scale, across)
 
     def share(self, points: np.ndarray) -> np.ndarray:
-        """Share of the points of trajectories float64[k, n, D] that lie in its boxes, float64[k]."""
+        """Share of the points of trajectories float64[k, n, D] that lie in its boxes,
+        float64[k].
+        """
         across, boxes = self._places
         return _inside(points, self.scale, across, boxes)
 
 
 def _around(points: np.ndarray, scale: np.ndarray, across: int) -> np.ndarray:
-    """Codes of the boxes that points float64[n, D] visit and of their neighbours along each axis, ascending int64."""
+    """Codes of the boxes that points float64[n, D] visit and of their neighbours along each axis,
+    ascending int64.
+    """
     cells = np.unique(np.floor(points / scale * across).astype(np.int64), axis=0)
     size = cells.shape[1]
-    steps = np.concatenate([np.zeros((1, size), np.int64), np.eye(size, dtype=np.int64), -np.eye(size, dtype=np.int64)])
+    steps = np.concatenate(
+        [np.zeros((1, size), np.int64), np.eye(size, dtype=np.int64), -np.eye(size, dtype=np.int64)]
+    )
     return np.unique(_codes((cells[:, None] + steps).reshape(-1, size)))
 
 
@@ -98,11 +114,15 @@ def _inside(points: np.ndarray, scale: np.ndarray, across: int, boxes: np.ndarra
 
 
 def _codes(cells: np.ndarray) -> np.ndarray:
-    """One number for each box; boxes of more than five states may share one, which only makes the test for an attractor weaker."""
+    """One number for each box; boxes of more than five states may share one, which only makes the
+    test for an attractor weaker.
+    """
     return cells @ (2 * FARTHEST) ** np.arange(cells.shape[-1], dtype=np.int64)
 
 
-def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) -> list[SampledAttractor]:
+def survey(
+    map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray
+) -> list[SampledAttractor]:
     """The aperiodic attractors of trajectories that have not settled for long.
 
     Parameters
@@ -116,7 +136,11 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
     scale : float64[D]
         Range of each state.
     """
-    usable = [i for i in range(len(start)) if np.isfinite(points[i]).all() and not _settles(points[i], scale)]
+    usable = [
+        i
+        for i in range(len(start))
+        if np.isfinite(points[i]).all() and not _settles(points[i], scale)
+    ]
     if not usable:
         return []
     groups: list[list[int]] = []
@@ -128,11 +152,17 @@ def survey(map_: Map, start: np.ndarray, points: np.ndarray, scale: np.ndarray) 
         else:
             home.append(i)
     _, kinds = kinds_of(map_, start[usable], np.broadcast_to(scale, start[usable].shape), groups)
-    return [SampledAttractor(*kind, points[usable[group[0]]], scale) for group, kind in zip(groups, kinds, strict=True) if kind is not None]
+    return [
+        SampledAttractor(*kind, points[usable[group[0]]], scale)
+        for group, kind in zip(groups, kinds, strict=True)
+        if kind is not None
+    ]
 
 
 def _settles(iterates: np.ndarray, scale: np.ndarray) -> bool:
-    """Whether iterates float64[m, D] recur, or recur better and better: they are on an orbit, or on their way to one."""
+    """Whether iterates float64[m, D] recur, or recur better and better: they are on an orbit, or on
+    their way to one.
+    """
     part = len(iterates) // 16
     early, late = (mismatch(piece, scale) for piece in (iterates[:part], iterates[-part:]))
     return late < REPEATS or late < SETTLING * early
@@ -141,18 +171,27 @@ def _settles(iterates: np.ndarray, scale: np.ndarray) -> bool:
 def mismatch(iterates: np.ndarray, scale: np.ndarray) -> float:
     """Smallest n-step difference, n up to half of them: the largest of it over the last quarter."""
     last = len(iterates) // 4
-    return min(float(np.abs((iterates[-last:] - iterates[-last - n : -n]) / scale).max()) for n in range(1, len(iterates) // 2))
+    return min(
+        float(np.abs((iterates[-last:] - iterates[-last - n : -n]) / scale).max())
+        for n in range(1, len(iterates) // 2)
+    )
 
 
 def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
-    """(kind, exponent, its standard error) from growth rates per iterate, float64[blocks, members]; None if they don't say."""
+    """(kind, exponent, its standard error) from growth rates per iterate, float64[blocks, members];
+    None if they don't say.
+    """
     if not np.isfinite(blocks).all():
         return None
     first, second = np.array_split(blocks, 2)
-    exponent, error = float(blocks.mean()), float(blocks.mean(axis=1).std(ddof=1) / math.sqrt(len(blocks)))
+    exponent, error = (
+        float(blocks.mean()),
+        float(blocks.mean(axis=1).std(ddof=1) / math.sqrt(len(blocks))),
+    )
     if error > UNCLEAR:
         return None
-    if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():  # growth like t seems exponential at first
+    # growth like t seems exponential at first
+    if exponent > max(SURE * error, FLOOR) and second.mean() > 0.5 * first.mean():
         return Kind.CHAOTIC.word, exponent, error
     zero = max(FLOOR, min(SURE * error, BOUNDED / (len(second) * BLOCK)))
     return (Kind.QUASI_PERIODIC.word, exponent, error) if abs(second.mean()) <= zero else None
@@ -161,7 +200,8 @@ def kind_of_growth(blocks: np.ndarray) -> tuple[str, float, float] | None:
 def kinds_of(
     map_: Map, start: np.ndarray, scale: np.ndarray, groups: Sequence[Sequence[int]]
 ) -> tuple[np.ndarray, list[tuple[str, float, float] | None]]:
-    """What motions that never repeat are: their exponents are measured for longer while they could be zero as well as positive.
+    """What motions that never repeat are: their exponents are measured for longer while they could
+    be zero as well as positive.
 
     Parameters
     ----------
@@ -183,7 +223,11 @@ def kinds_of(
     rates = list(blocks.T)
     kinds = [kind_of_growth(np.stack([rates[i] for i in group], axis=1)) for group in groups]
     for _ in range(MEASURED - 1):
-        again = [n for n, kind in enumerate(kinds) if kind is None and all(np.isfinite(rates[i]).all() for i in groups[n])]
+        again = [
+            n
+            for n, kind in enumerate(kinds)
+            if kind is None and all(np.isfinite(rates[i]).all() for i in groups[n])
+        ]
         if not again:
             break
         rows = np.concatenate([groups[n] for n in again])
@@ -196,7 +240,9 @@ def kinds_of(
 
 
 def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction, block by block, float64[blocks, k]."""
+    """Ends float64[k, D] of trajectories, and growth rates per iterate of their largest direction,
+    block by block, float64[blocks, k].
+    """
     k, size = start.shape
     direction = np.zeros((k, size, size))
     direction[:, :, 0] = scale / math.sqrt(size)
@@ -213,7 +259,10 @@ def growth_rates(map_: Map, start: np.ndarray, scale: np.ndarray) -> tuple[np.nd
 
 def alike(one: SampledAttractor, other: SampledAttractor) -> bool:
     """Whether two attractors visit the same boxes."""
-    return min(float(other.share(one.points[None])[0]), float(one.share(other.points[None])[0])) > ALIKE
+    return (
+        min(float(other.share(one.points[None])[0]), float(one.share(other.points[None])[0]))
+        > ALIKE
+    )
 
 
 def merge(found: list[SampledAttractor]) -> list[SampledAttractor]:

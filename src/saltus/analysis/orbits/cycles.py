@@ -1,9 +1,12 @@
-"""Limit cycles of systems without forcing: periodic motions whose period is theirs, found by Newton's method on a state and the period.
+"""Limit cycles of systems without forcing: periodic motions whose period is theirs, found by
+Newton's method on a state and the period.
 
-A motion comes back to the plane through one of its states, across the flow, near that state: state and time are the first guess. Newton's
-method then solves phi_T(x) = x with x on that plane, for x and T; the derivative is the tangent flow, jumps at contacts included. Parker &
-Chua, Practical Numerical Algorithms for Chaotic Systems (1989), chapter 5. Of the multipliers one is 1, along the flow; the
-others are those of the monodromy matrix across it, so that none is mistaken for the trivial one.
+A motion comes back to the plane through one of its states, across the flow, near that state: state
+and time are the first guess. Newton's method then solves phi_T(x) = x with x on that plane, for x
+and T; the derivative is the tangent flow, jumps at contacts included. Parker & Chua, Practical
+Numerical Algorithms for Chaotic Systems (1989), chapter 5. Of the multipliers one is 1, along the
+flow; the others are those of the monodromy matrix across it, so that none is mistaken for the
+trivial one.
 """
 
 from __future__ import annotations
@@ -23,17 +26,21 @@ from saltus.flow.maps import Stroboscope
 SAMPLES, ZOOM = 4096, 8
 #: Most windows that are tried, from that of the samples on.
 MOST_WINDOWS = 6
-#: Samples follow the motion where its direction turns by less than 18 degrees from one to the next, for so large a share of them.
+#: Samples follow the motion where its direction turns by less than 18 degrees from one to the next,
+#: for so large a share of them.
 TURN, FOLLOWED = 0.95, 0.9
-#: A return farther than this, in units of the scale, may be none: a longer window is searched, unless this one holds this number of turns.
+#: A return farther than this, in units of the scale, may be none: a longer window is searched,
+#: unless this one holds this number of turns.
 FAR, ENOUGH = 0.05, 8
-#: Returns that samples can't tell apart: the error of the cubic between them, in units of the scale.
+#: Returns that samples can't tell apart: the error of the cubic between them, in units of the
+#: scale.
 SAMPLED = 1e-6
 #: Steps that locate the return.
 LOCATED = 3
 #: Farthest that a cycle found lies from where it was looked for, in units of the scale.
 FARTHEST = 1.0
-#: Most turns of a cycle that may have been taken for one: a return is seen in SAMPLES samples, of which a turn has 20 where they follow it.
+#: Most turns of a cycle that may have been taken for one: a return is seen in SAMPLES samples, of
+#: which a turn has 20 where they follow it.
 MOST_PARTS = SAMPLES // 16
 #: Range of the motion, in units of the scale, below which it is no cycle but rest.
 NO_CYCLE = 1e-7
@@ -58,9 +65,11 @@ class Returns:
     scale: np.ndarray
 
 
-# -- the first guess -----------------------------------------------------------------------------------------------------------
+# -- the first guess -------------------------------------------------------------------------------
 def returns(map_: Stroboscope, start: np.ndarray, window: float) -> Returns:
-    """The near returns of motions from float64[k, D], looked for over some ``window`` [s]: a finer or a longer one where that is needed."""
+    """The near returns of motions from float64[k, D], looked for over some ``window`` [s]: a finer
+    or a longer one where that is needed.
+    """
     k, size = start.shape
     result = Returns(np.full(k, np.nan), np.full(k, np.inf), np.ones((k, size)))
     length, rows, refined = np.full(k, float(window)), np.arange(k), np.zeros(k, bool)
@@ -82,14 +91,18 @@ def returns(map_: Stroboscope, start: np.ndarray, window: float) -> Returns:
 
 
 def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, ...]:
-    """From samples over a window each: time and distance of the return, range of the states, whether samples follow the motion, turns."""
+    """From samples over a window each: time and distance of the return, range of the states,
+    whether samples follow the motion, turns.
+    """
     k, size = start.shape
     samples = map_.with_period(length).run(start, 1, Schedule.even(1, SAMPLES)).samples
     values = {name: np.repeat(column, SAMPLES) for name, column in map_.values.items()}
     rates = field_of(map_.system, samples.reshape(-1, size), values).reshape(k, SAMPLES, size)
     with np.errstate(all="ignore"):
         ranges, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
-        scale = np.where(np.isfinite(ranges) & (ranges > RESTS * sizes), ranges, np.where(sizes > 0, sizes, 1.0))
+        scale = np.where(
+            np.isfinite(ranges) & (ranges > RESTS * sizes), ranges, np.where(sizes > 0, sizes, 1.0)
+        )
         scale = np.where(np.isfinite(scale), scale, 1.0)
         across = rates / scale[:, None]
         across /= np.linalg.norm(across, axis=2, keepdims=True)
@@ -100,17 +113,35 @@ def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.
         share = height[:, 1:-1] / (height[:, 1:-1] - height[:, 2:])
         rises = (height[:, 1:-1] < 0) & (height[:, 2:] >= 0)
         step = (length / SAMPLES)[:, None, None]
-        at = _cubic(offset[:, 1:-1], offset[:, 2:], step * rates[:, 1:-1] / scale[:, None], step * rates[:, 2:] / scale[:, None], share)
+        at = _cubic(
+            offset[:, 1:-1],
+            offset[:, 2:],
+            step * rates[:, 1:-1] / scale[:, None],
+            step * rates[:, 2:] / scale[:, None],
+            share,
+        )
         apart = np.where(rises, np.abs(at).max(axis=2), np.inf)
     apart = np.where(np.isfinite(apart), apart, np.inf)
     best = apart.min(axis=1)
     first = np.argmax(apart <= np.maximum(4.0 * best, SAMPLED)[:, None], axis=1)
     rows = np.arange(k)
-    time = (1 + first + np.where(np.isfinite(share[rows, first]), share[rows, first], 0.0)) * length / SAMPLES
-    return time, np.where(np.isfinite(best), apart[rows, first], np.inf), scale, followed, rises.sum(axis=1)
+    time = (
+        (1 + first + np.where(np.isfinite(share[rows, first]), share[rows, first], 0.0))
+        * length
+        / SAMPLES
+    )
+    return (
+        time,
+        np.where(np.isfinite(best), apart[rows, first], np.inf),
+        scale,
+        followed,
+        rises.sum(axis=1),
+    )
 
 
-def _cubic(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _cubic(
+    a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray, share: np.ndarray
+) -> np.ndarray:
     """Cubics with these values and slopes at the ends, at a share of the way."""
     s = share[..., None]
     return a + s * (da + s * ((3 * (b - a) - 2 * da - db) + s * (2 * (a - b) + da + db)))
@@ -132,8 +163,10 @@ def _locate(map_: Stroboscope, start: np.ndarray, which: np.ndarray, result: Ret
     result.time[which], result.apart[which] = time, np.where(np.isfinite(apart), apart, np.inf)
 
 
-# -- Newton's method -----------------------------------------------------------------------------------------------------------
-def find_cycles(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> tuple[OrbitBatch, np.ndarray]:
+# -- Newton's method -------------------------------------------------------------------------------
+def find_cycles(
+    map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray
+) -> tuple[OrbitBatch, np.ndarray]:
     """The limit cycles near states float64[k, D] that nearly recur after times float64[k] [s].
 
     Parameters
@@ -150,7 +183,8 @@ def find_cycles(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: n
     cycles : OrbitBatch
         Each by points in equal steps of its time, from where the first state that moves is least.
     moved : float64[k]
-        How far from the first guess Newton's method arrived, in units of the scale; NaN where it found none.
+        How far from the first guess Newton's method arrived, in units of the scale; NaN where it
+        found none.
     """
     result, moved = OrbitBatch.none(*start.shape), np.full(len(start), np.nan)
     x, time, found = _newton(map_, start, time, scale)
@@ -165,12 +199,17 @@ def find_cycles(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: n
     multipliers = _multipliers(mine.with_period(time), first)
     good = moves & np.isfinite(points).all(axis=(1, 2)) & np.isfinite(multipliers).all(axis=1)
     rows, period = rows[good], np.full(np.count_nonzero(good), LONGEST)
-    result.put(rows, OrbitBatch(period, points[good], multipliers[good], time[good], np.full(len(rows), np.nan)))
+    result.put(
+        rows,
+        OrbitBatch(period, points[good], multipliers[good], time[good], np.full(len(rows), np.nan)),
+    )
     moved[rows] = np.abs((x[rows] - start[rows]) / scale[rows]).max(axis=1)
     return result, moved
 
 
-def attracting_cycles(map_: Stroboscope, state: np.ndarray, window: float, near: float) -> tuple[OrbitBatch, np.ndarray, np.ndarray]:
+def attracting_cycles(
+    map_: Stroboscope, state: np.ndarray, window: float, near: float
+) -> tuple[OrbitBatch, np.ndarray, np.ndarray]:
     """The limit cycles of trajectories that nearly return.
 
     Parameters
@@ -182,7 +221,8 @@ def attracting_cycles(map_: Stroboscope, state: np.ndarray, window: float, near:
     window : float
         Time over which a return is looked for first [s].
     near : float
-        Distance of a return, in units of the range of the motion, that is worth a try by Newton's method.
+        Distance of a return, in units of the range of the motion, that is worth a try by Newton's
+        method.
 
     Returns
     -------
@@ -195,36 +235,57 @@ def attracting_cycles(map_: Stroboscope, state: np.ndarray, window: float, near:
     """
     seen = returns(map_, state, window)
     noise = map_.noise_of(seen.scale)
-    cycles, moved = find_cycles(map_, state, np.where(seen.apart < np.maximum(near, noise), seen.time, np.nan), seen.scale)
+    cycles, moved = find_cycles(
+        map_, state, np.where(seen.apart < np.maximum(near, noise), seen.time, np.nan), seen.scale
+    )
     with np.errstate(invalid="ignore"):
-        beside = cycles.stable & (moved <= BESIDE * np.maximum(np.maximum(seen.apart, ROUNDING), noise))
+        beside = cycles.stable & (
+            moved <= BESIDE * np.maximum(np.maximum(seen.apart, ROUNDING), noise)
+        )
     return cycles, beside, seen.scale
 
 
-def _newton(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States float64[k, D] and periods float64[k] [s] that solve phi_T(x) = x, and where the iteration converged, bool[k].
+def _newton(
+    map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States float64[k, D] and periods float64[k] [s] that solve phi_T(x) = x, and where the
+    iteration converged, bool[k].
 
-    The last unknown is the time in units of the first guess. The last equation keeps each step across the flow.
+    The last unknown is the time in units of the first guess. The last equation keeps each step
+    across the flow.
     """
     size = start.shape[1]
 
     def equations(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mine, x, unit, times = map_.rows(rows), z[:, :size], scale[rows], time[rows, None]
         end, matrix = mine.with_period(z[:, size] * time[rows]).tangent(x, 1)
-        residual, derivative = np.zeros((len(rows), size + 1)), np.zeros((len(rows), size + 1, size + 1))
+        residual, derivative = (
+            np.zeros((len(rows), size + 1)),
+            np.zeros((len(rows), size + 1, size + 1)),
+        )
         residual[:, :size] = (end - x) / unit
         derivative[:, :size, :size] = matrix * unit[:, None, :] / unit[:, :, None] - np.eye(size)
         derivative[:, :size, size] = field_of(mine.system, end, mine.values) / unit * times
         derivative[:, size, :size] = field_of(mine.system, x, mine.values) / unit * times
         return residual, derivative
 
-    guess, units = (np.concatenate([part, np.ones((len(start), 1))], axis=1) for part in (start, scale))
+    guess, units = (
+        np.concatenate([part, np.ones((len(start), 1))], axis=1) for part in (start, scale)
+    )
     guess[~np.isfinite(time)] = np.nan
-    z, found = newton(equations, guess, units, CONVERGED if map_.exact else map_.noise_of(scale), farthest=FARTHEST)
+    z, found = newton(
+        equations,
+        guess,
+        units,
+        CONVERGED if map_.exact else map_.noise_of(scale),
+        farthest=FARTHEST,
+    )
     return z[:, :size], z[:, size] * time, found
 
 
-def _least_period(map_: Stroboscope, x: np.ndarray, period: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def _least_period(
+    map_: Stroboscope, x: np.ndarray, period: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
     """The smallest part of each period after which the motion is back already."""
     parts = np.arange(MOST_PARTS, 1, -1)
     states = map_.with_period(period).run(x, 1, Schedule(0 * parts, 1.0 / parts)).samples
@@ -234,15 +295,22 @@ def _least_period(map_: Stroboscope, x: np.ndarray, period: np.ndarray, scale: n
 
 
 def _first(map_: Stroboscope, x: np.ndarray, period: np.ndarray) -> np.ndarray:
-    """The state of each cycle at which the first state that moves is least: where its points begin, whoever found it."""
+    """The state of each cycle at which the first state that moves is least: where its points begin,
+    whoever found it.
+    """
     samples = map_.with_period(period).run(x, 1, Schedule.even(1, SAMPLES)).samples
     ranges = np.ptp(samples, axis=1)
-    rows, column = np.arange(len(x)), np.argmax(ranges > RESTS * np.abs(samples).max(axis=1), axis=1)
+    rows, column = (
+        np.arange(len(x)),
+        np.argmax(ranges > RESTS * np.abs(samples).max(axis=1), axis=1),
+    )
     least = np.argmin(samples[rows, :, column], axis=1)
     state = samples[rows, least]
     for _ in range(LOCATED):  # where its rate vanishes
         rate = field_of(map_.system, state, map_.values)
-        slope = np.einsum("kj,kj->k", jacobian_of(map_.system, state, map_.values)[rows, column], rate)
+        slope = np.einsum(
+            "kj,kj->k", jacobian_of(map_.system, state, map_.values)[rows, column], rate
+        )
         with np.errstate(all="ignore"):
             step = -rate[rows, column] / slope
         step = np.where(np.abs(step) < 2 * period / SAMPLES, step, 0.0)
@@ -252,7 +320,9 @@ def _first(map_: Stroboscope, x: np.ndarray, period: np.ndarray) -> np.ndarray:
 
 
 def _multipliers(map_: Stroboscope, x: np.ndarray) -> np.ndarray:
-    """1, and the eigenvalues of the monodromy matrix across the flow, the largest first; complex128[k, D]."""
+    """1, and the eigenvalues of the monodromy matrix across the flow, the largest first;
+    complex128[k, D].
+    """
     _, matrices = map_.tangent(x, 1)
     rates = field_of(map_.system, x, map_.values)
     size = x.shape[1]

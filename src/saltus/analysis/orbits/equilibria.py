@@ -1,8 +1,10 @@
-"""Equilibria of systems without forcing: where the field vanishes, by Newton's method on the field itself, and where they capture.
+"""Equilibria of systems without forcing: where the field vanishes, by Newton's method on the field
+itself, and where they capture.
 
-Stability is that of the linear part: the eigenvalues of the Jacobian, which are the exponents. An equilibrium captures inside an
-ellipsoid (x - c)'P(x - c) <= r^2, P from the Lyapunov equation of the Jacobian, in which the field was seen to point inwards at points on
-many shells: a check at points, not a proof. Khalil, Nonlinear Systems (2002), chapter 4.
+Stability is that of the linear part: the eigenvalues of the Jacobian, which are the exponents. An
+equilibrium captures inside an ellipsoid (x - c)'P(x - c) <= r^2, P from the Lyapunov equation of
+the Jacobian, in which the field was seen to point inwards at points on many shells: a check at
+points, not a proof. Khalil, Nonlinear Systems (2002), chapter 4.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from saltus.system.evaluate import evaluate
 from saltus.system.expression import depends_on
 from saltus.system.system import System
 
-#: Longest step of Newton's method, in units of the scale: the field of a motion that has escaped points anywhere.
+#: Longest step of Newton's method, in units of the scale: the field of a motion that has escaped
+#: points anywhere.
 FARTHEST_STEP = 1e6
 #: Share of the norm of the Jacobian that a real part must lie below zero: more than rounding.
 MARGINAL = 1e-10
@@ -30,9 +33,13 @@ SHELLS = 0.5 ** np.arange(0.0, 12.0)
 
 
 def autonomous(system: System) -> bool:
-    """Whether nothing in the equations and contacts depends on time, so that equilibria and limit cycles may be asked for."""
+    """Whether nothing in the equations and contacts depends on time, so that equilibria and limit
+    cycles may be asked for.
+    """
     everything = (*system.field, *(guard.gap for guard in system.guards))
-    return system.forced_at is None and not any(depends_on(entry, ("time",)) for entry in everything)
+    return system.forced_at is None and not any(
+        depends_on(entry, ("time",)) for entry in everything
+    )
 
 
 @dataclass
@@ -70,7 +77,10 @@ class Equilibria:
     def holds(self, states: np.ndarray) -> np.ndarray:
         """Which of states float64[k, D] lie where their equilibrium captures, bool[k]."""
         with np.errstate(invalid="ignore"):
-            return np.linalg.norm(np.einsum("kij,kj->ki", self.reach, states - self.place), axis=1) <= 1.0
+            return (
+                np.linalg.norm(np.einsum("kij,kj->ki", self.reach, states - self.place), axis=1)
+                <= 1.0
+            )
 
 
 def field_of(system: System, states: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -79,12 +89,18 @@ def field_of(system: System, states: np.ndarray, values: Mapping[str, np.ndarray
 
 
 def jacobian_of(system: System, states: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Derivative of the rates float64[k, D, D]; on a boundary that of the side where its gap isn't positive."""
+    """Derivative of the rates float64[k, D, D]; on a boundary that of the side where its gap isn't
+    positive.
+    """
     size = len(system.states)
-    return _evaluated(system, tuple(entry for row in system.jacobian for entry in row), states, values).reshape(len(states), size, size)
+    return _evaluated(
+        system, tuple(entry for row in system.jacobian for entry in row), states, values
+    ).reshape(len(states), size, size)
 
 
-def _evaluated(system: System, entries: tuple, states: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:
+def _evaluated(
+    system: System, entries: tuple, states: np.ndarray, values: Mapping[str, np.ndarray]
+) -> np.ndarray:
     named = dict(zip(system.states, states.T, strict=True))
     bits: list[np.ndarray] = []
     for guard in system.guards:
@@ -92,11 +108,16 @@ def _evaluated(system: System, entries: tuple, states: np.ndarray, values: Mappi
         bits.append(np.broadcast_to(gap, len(states)) > 0)
     with np.errstate(all="ignore"):
         columns = evaluate(entries, states=named, values=values, bits=bits)
-    return np.stack([np.broadcast_to(np.asarray(column, float), len(states)) for column in columns], axis=1)
+    return np.stack(
+        [np.broadcast_to(np.asarray(column, float), len(states)) for column in columns], axis=1
+    )
 
 
-def find_equilibria(map_: Stroboscope, start: np.ndarray, scale: np.ndarray, captures: bool = True) -> Equilibria:
-    """The equilibria near states float64[k, D] at the parameter values of each row; float64[k, D] is the range of each state.
+def find_equilibria(
+    map_: Stroboscope, start: np.ndarray, scale: np.ndarray, captures: bool = True
+) -> Equilibria:
+    """The equilibria near states float64[k, D] at the parameter values of each row; float64[k, D]
+    is the range of each state.
 
     ``captures``: whether to ask where they capture.
     """
@@ -112,30 +133,52 @@ def find_equilibria(map_: Stroboscope, start: np.ndarray, scale: np.ndarray, cap
     eigenvalues = np.full(x.shape, np.nan + 0j)
     reach = np.full((*x.shape, x.shape[1]), np.nan)
     rows = np.flatnonzero(found)
-    for i, matrix in zip(rows, jacobian_of(system, x[rows], {n: v[rows] for n, v in values.items()}), strict=True):
+    for i, matrix in zip(
+        rows, jacobian_of(system, x[rows], {n: v[rows] for n, v in values.items()}), strict=True
+    ):
         if np.isfinite(matrix).all():
             own = np.linalg.eigvals(matrix)
             eigenvalues[i] = own[np.lexsort((-own.imag, -own.real))]
             if captures and eigenvalues[i, 0].real < -MARGINAL * np.linalg.norm(matrix, 2):
-                reach[i] = _reach(system, {n: v[[i]] for n, v in values.items()}, x[i], matrix, scale[i])
+                reach[i] = _reach(
+                    system, {n: v[[i]] for n, v in values.items()}, x[i], matrix, scale[i]
+                )
     return Equilibria(place, eigenvalues, reach)
 
 
-def _reach(system: System, values: Mapping[str, np.ndarray], place: np.ndarray, matrix: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """W of the largest ellipsoid, of those tried, at whose shells the field points inwards; NaN if there is none."""
+def _reach(
+    system: System,
+    values: Mapping[str, np.ndarray],
+    place: np.ndarray,
+    matrix: np.ndarray,
+    scale: np.ndarray,
+) -> np.ndarray:
+    """W of the largest ellipsoid, of those tried, at whose shells the field points inwards; NaN if
+    there is none.
+    """
     scaled = matrix * scale / scale[:, None]
     slowest = -float(np.linalg.eigvals(scaled).real.max())
-    shifted = scaled + 0.5 * slowest * np.eye(len(scale))  # contracts at half the slowest rate: fast directions don't flatten it
+    # contracts at half the slowest rate: fast directions don't flatten it
+    shifted = scaled + 0.5 * slowest * np.eye(len(scale))
     try:
-        form = solve_continuous_lyapunov(shifted.T, -np.eye(len(scale)) * max(slowest, np.finfo(float).tiny))
+        form = solve_continuous_lyapunov(
+            shifted.T, -np.eye(len(scale)) * max(slowest, np.finfo(float).tiny)
+        )
         root = np.linalg.cholesky(0.5 * (form + form.T)).T
     except (np.linalg.LinAlgError, ValueError):
         return np.full(matrix.shape, np.nan)
-    root = root / np.linalg.norm(root, -2)  # |root y| >= |y|: inside, no state is farther than the radius
-    steps = (SHELLS[:, None, None] * (sphere(len(scale)) @ np.linalg.inv(root).T)).reshape(-1, len(scale))
+    # |root y| >= |y|: inside, no state is farther than the radius
+    root = root / np.linalg.norm(root, -2)
+    steps = (SHELLS[:, None, None] * (sphere(len(scale)) @ np.linalg.inv(root).T)).reshape(
+        -1, len(scale)
+    )
     for radius in RADII:
         states = place + radius * steps * scale
-        inward = np.einsum("ki,ki->k", (states - place) / scale @ (root.T @ root), field_of(system, states, values) / scale)
+        inward = np.einsum(
+            "ki,ki->k",
+            (states - place) / scale @ (root.T @ root),
+            field_of(system, states, values) / scale,
+        )
         if (inward < 0).all():
             return np.asarray(SAFETY * root / radius / scale)
     return np.full(matrix.shape, np.nan)

@@ -1,4 +1,6 @@
-"""From trajectories of a map to its attractors: let them settle, close what recurs, and find out what never does."""
+"""From trajectories of a map to its attractors: let them settle, close what recurs, and find out
+what never does.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from saltus.analysis.orbits.aperiodic import REPEATS, SURVEY_ITERATES, SampledAttractor, merge, mismatch, survey
+from saltus.analysis.orbits.aperiodic import (
+    REPEATS,
+    SURVEY_ITERATES,
+    SampledAttractor,
+    merge,
+    mismatch,
+    survey,
+)
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.orbits.found import INSIDE, Found, is_about
@@ -69,12 +78,38 @@ def find_attractors(
     while len(going) and travel.age < most:
         points = travel.advance(ROUND)
         here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
-        here = here[~_keeping(found, Kind.NOISY_PERIODIC.word, points[here], going[here], travel.age, owner, settled)]
+        here = here[
+            ~_keeping(
+                found,
+                Kind.NOISY_PERIODIC.word,
+                points[here],
+                going[here],
+                travel.age,
+                owner,
+                settled,
+            )
+        ]
         while len(here) and _add_orbits(map_, points[here], scale, found, most):
-            here = here[~_keeping(found, Kind.NOISY_PERIODIC.word, points[here], going[here], travel.age, owner, settled)]
-            here = here[~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)]
+            here = here[
+                ~_keeping(
+                    found,
+                    Kind.NOISY_PERIODIC.word,
+                    points[here],
+                    going[here],
+                    travel.age,
+                    owner,
+                    settled,
+                )
+            ]
+            here = here[
+                ~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)
+            ]
         if turns and len(here):
-            here = here[~_on_cycles(map_, found, points[here], going[here], travel, here, scale, owner, settled)]
+            here = here[
+                ~_on_cycles(
+                    map_, found, points[here], going[here], travel, here, scale, owner, settled
+                )
+            ]
         stay = np.zeros(len(going), bool)
         stay[here] = travel.going[here]
         travel.keep(stay)
@@ -88,7 +123,9 @@ def find_attractors(
     return result, label, settled
 
 
-def _captured(found: Found, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray) -> np.ndarray:
+def _captured(
+    found: Found, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray
+) -> np.ndarray:
     """Note which of the trajectories are captured, and after how many iterates."""
     label, when = found.near.capture(points)
     caught = label >= 0
@@ -97,8 +134,18 @@ def _captured(found: Found, points: np.ndarray, who: np.ndarray, age: int, owner
     return caught
 
 
-def _keeping(found: Found, kind: str, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray) -> np.ndarray:
-    """Note which trajectories float64[k, m, D] keep to an attractor of a kind that is known by where it goes, bool[k]."""
+def _keeping(
+    found: Found,
+    kind: str,
+    points: np.ndarray,
+    who: np.ndarray,
+    age: int,
+    owner: list,
+    settled: np.ndarray,
+) -> np.ndarray:
+    """Note which trajectories float64[k, m, D] keep to an attractor of a kind that is known by
+    where it goes, bool[k].
+    """
     ones = [one for one in found.sampled if one.kind == kind]
     on = keep_to(ones, points, INSIDE)
     for i in np.flatnonzero(on >= 0):
@@ -107,19 +154,29 @@ def _keeping(found: Found, kind: str, points: np.ndarray, who: np.ndarray, age: 
 
 
 def _add_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, most: int) -> bool:
-    """Add the attracting orbits not known yet that some of the trajectories float64[k, ROUND, D] follow; whether there are any."""
+    """Add the attracting orbits not known yet that some of the trajectories float64[k, ROUND, D]
+    follow; whether there are any.
+    """
     period, apart = recurrence(points, scale)
     near = max(NEAR, map_.noise)
     tried: list[int] = []
     for i in np.argsort(apart, kind="stable")[: np.count_nonzero(apart < near)]:
-        known = any(_lies_on(points[i, -1], orbit, scale, 10 * apart[i]) for orbit in found.unstable)
-        if not known and not any(np.abs((points[i, -1] - points[j, -1]) / scale).max() < near for j in tried):
+        known = any(
+            _lies_on(points[i, -1], orbit, scale, 10 * apart[i]) for orbit in found.unstable
+        )
+        if not known and not any(
+            np.abs((points[i, -1] - points[j, -1]) / scale).max() < near for j in tried
+        ):
             tried.append(i)
         if len(tried) == MAX_CANDIDATES:
             break
     place, k = points[tried, -1], len(tried)
-    orbits = find_orbits(map_, place, period[tried], np.broadcast_to(scale, place.shape), np.full(k, map_.noise))
-    right = (orbits.period > 0) & (orbits.distance(place, np.broadcast_to(scale, place.shape)) < 100 * near)
+    orbits = find_orbits(
+        map_, place, period[tried], np.broadcast_to(scale, place.shape), np.full(k, map_.noise)
+    )
+    right = (orbits.period > 0) & (
+        orbits.distance(place, np.broadcast_to(scale, place.shape)) < 100 * near
+    )
     added = False
     for i in np.flatnonzero(right).tolist():
         orbit = orbits[i]
@@ -141,7 +198,9 @@ def _add_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, 
 
 
 def _behind(map_: Map, orbit: Orbit, scale: np.ndarray, most: int) -> Noisy | None:
-    """The exact orbit of another period about which an inexact map's orbit is scatter: its loops are made, or lost, by errors."""
+    """The exact orbit of another period about which an inexact map's orbit is scatter: its loops
+    are made, or lost, by errors.
+    """
     exact = _exactly(map_, orbit.points[:1], scale, most)[0] if _blurs(map_) else None
     noisy = None if exact is None or exact.period == orbit.period else blurred(map_, exact, scale)
     return noisy if noisy is not None and is_about(noisy, orbit) else None
@@ -149,7 +208,9 @@ def _behind(map_: Map, orbit: Orbit, scale: np.ndarray, most: int) -> Noisy | No
 
 def _blurs(map_: Map) -> bool:
     """Whether errors of a map are more than rounding, and periods are there to be blurred."""
-    return map_.exact_map is not None and not (isinstance(map_, Stroboscope) and autonomous(map_.system))
+    return map_.exact_map is not None and not (
+        isinstance(map_, Stroboscope) and autonomous(map_.system)
+    )
 
 
 def _exactly(map_: Map, state: np.ndarray, scale: np.ndarray, most: int) -> list[Orbit | None]:
@@ -164,13 +225,22 @@ def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: floa
 
 
 def _on_cycles(
-    map_: Map, found: Found, points: np.ndarray, who: np.ndarray, travel: Travel, rows: np.ndarray, scale: np.ndarray, owner: list,
+    map_: Map, found: Found, points: np.ndarray, who: np.ndarray, travel: Travel, rows: np.ndarray,
+    scale: np.ndarray, owner: list,
     settled: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are looked for. Notes their owners."""
+    """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are
+    looked for. Notes their owners.
+    """
     cycles = [one for one in found.sampled if one.kind == Kind.LIMIT_CYCLE.word]
     alone = np.flatnonzero(keep_to(cycles, points, INSIDE) < 0)
-    some = alone[np.unique(np.linspace(0, len(alone) - 1, min(MAX_CANDIDATES, len(alone))).astype(int))] if len(alone) else alone
+    some = (
+        alone[
+            np.unique(np.linspace(0, len(alone) - 1, min(MAX_CANDIDATES, len(alone))).astype(int))
+        ]
+        if len(alone)
+        else alone
+    )
     some = some[travel.going[rows[some]]]
     if len(some) and isinstance(map_, Stroboscope):
         fresh = limit_cycles(map_, points[some, -1], ROUND * float(map_.period[0]), scale)
@@ -179,38 +249,56 @@ def _on_cycles(
 
 
 def _survey(
-    map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: Found, owner: list, settled: np.ndarray, most: int
+    map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: Found, owner: list,
+    settled: np.ndarray, most: int
 ) -> None:  # fmt: skip
-    """Find out what the trajectories do that never settled: watch them much longer, and call an attractor only what none of them leaves.
+    """Find out what the trajectories do that never settled: watch them much longer, and call an
+    attractor only what none of them leaves.
 
-    A chaotic saddle holds trajectories for thousands of periods too; what is seen to leave it betrays it.
+    A chaotic saddle holds trajectories for thousands of periods too; what is seen to leave it
+    betrays it.
     """
     survivors, points, leavers = _watch(travel, going, found, owner, settled)
     if not len(survivors):
         return
-    chosen = np.unique(np.linspace(0, len(survivors) - 1, min(MAX_SURVEYED, len(survivors))).astype(int))
+    chosen = np.unique(
+        np.linspace(0, len(survivors) - 1, min(MAX_SURVEYED, len(survivors))).astype(int)
+    )
     noisy, strays = _blurred(map_, travel.state[chosen], points[chosen], scale, most)
     keeps = keep_to(noisy, points[chosen], INSIDE) >= 0
-    rests = np.array([mismatch(points[i, -ROUND:], scale) < ARRIVED for i in chosen])  # stays on an orbit that doesn't attract
+    # stays on an orbit that doesn't attract
+    rests = np.array([mismatch(points[i, -ROUND:], scale) < ARRIVED for i in chosen])
     free = chosen[~keeps & ~rests]
     seen = [*noisy, *survey(map_, travel.state[free], points[free], scale)]
     if seen:
         moves = chosen[keeps | ~rests]
-        leavers.append(points[moves][_leave(map_, travel.state[moves], found, noisy, scale), -ROUND:])
+        leavers.append(
+            points[moves][_leave(map_, travel.state[moves], found, noisy, scale), -ROUND:]
+        )
     for one in seen:
         if not any((one.share(iterates) >= INSIDE).any() for iterates in leavers if len(iterates)):
             found.add_sampled(one)
-    label = keeps_to_sampled(found, points[:, -ROUND:], scale) if found.sampled else np.full(len(survivors), -1)
+    label = (
+        keeps_to_sampled(found, points[:, -ROUND:], scale)
+        if found.sampled
+        else np.full(len(survivors), -1)
+    )
     for i, one in zip(going[survivors], label, strict=True):
         if one >= 0:
             owner[i] = found.sampled[one]
-    found.astray = [stray for stray, one in zip(strays, label[chosen], strict=True) if one < 0] if strays else []
+    found.astray = (
+        [stray for stray, one in zip(strays, label[chosen], strict=True) if one < 0]
+        if strays
+        else []
+    )
 
 
 def _watch(
     travel: Travel, going: np.ndarray, found: Found, owner: list, settled: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
-    """Trajectories that don't settle for SURVEY_ITERATES more, int64[k], their iterates, and those of the ones that do."""
+    """Trajectories that don't settle for SURVEY_ITERATES more, int64[k], their iterates, and those
+    of the ones that do.
+    """
     survivors = np.arange(len(going))
     runs: list[np.ndarray] = []
     leavers: list[np.ndarray] = []
@@ -226,28 +314,42 @@ def _watch(
     return survivors, np.concatenate(runs, axis=1), leavers
 
 
-def _blurred(map_: Map, state: np.ndarray, runs: np.ndarray, scale: np.ndarray, most: int) -> tuple[list[Noisy], list[Stray]]:
-    """The noisy orbits that trajectories float64[k, SURVEY_ITERATES, D] keep to, and how far each strays from an exact one.
+def _blurred(
+    map_: Map, state: np.ndarray, runs: np.ndarray, scale: np.ndarray, most: int
+) -> tuple[list[Noisy], list[Stray]]:
+    """The noisy orbits that trajectories float64[k, SURVEY_ITERATES, D] keep to, and how far each
+    strays from an exact one.
 
     They stand at float64[k, D]. Nothing of an exact map.
     """
     if not _blurs(map_):
         return [], []
     orbits = _exactly(map_, state, scale, most)
-    strays = [stray_of(map_, orbit, iterates, scale) for orbit, iterates in zip(orbits, runs, strict=True)]
-    about = [blurred(map_, orbit, scale) for orbit in {id(orbit): orbit for orbit in orbits if orbit is not None}.values()]
+    strays = [
+        stray_of(map_, orbit, iterates, scale) for orbit, iterates in zip(orbits, runs, strict=True)
+    ]
+    about = [
+        blurred(map_, orbit, scale)
+        for orbit in {id(orbit): orbit for orbit in orbits if orbit is not None}.values()
+    ]
     return [one for one in about if one is not None and (one.share(runs) >= INSIDE).any()], strays
 
 
-def _leave(map_: Map, state: np.ndarray, found: Found, noisy: list[Noisy], scale: np.ndarray) -> np.ndarray:
-    """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]; those beside a noisy one don't."""
+def _leave(
+    map_: Map, state: np.ndarray, found: Found, noisy: list[Noisy], scale: np.ndarray
+) -> np.ndarray:
+    """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]; those
+    beside a noisy one don't.
+    """
     travel, going = map_.launch(state, WATCHING_ITERATES), np.arange(len(state))
     left = np.zeros(len(state), bool)
     while len(going) and travel.age < WATCHING_ITERATES:
         points = travel.advance(ROUND)
         arrives = found.near.capture(points)[0] >= 0
         if travel.age % (8 * ROUND) == 0:
-            arrives |= [mismatch(iterates, scale) < ARRIVED for iterates in points] & (keep_to(noisy, points, INSIDE) < 0)
+            arrives |= [mismatch(iterates, scale) < ARRIVED for iterates in points] & (
+                keep_to(noisy, points, INSIDE) < 0
+            )
         left[going[arrives]] = True
         stays = ~arrives & travel.going
         travel.keep(stays)
@@ -256,7 +358,9 @@ def _leave(map_: Map, state: np.ndarray, found: Found, noisy: list[Noisy], scale
 
 
 def keeps_to_sampled(found: Found, runs: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """For trajectories float64[k, m, D]: which attractor of those that never repeat each keeps to, -1 if none; none if it repeats."""
+    """For trajectories float64[k, m, D]: which attractor of those that never repeat each keeps to,
+    -1 if none; none if it repeats.
+    """
     shares = np.stack([one.share(runs) for one in found.sampled], axis=1)
     _, apart = recurrence(runs, scale)
     best = shares.argmax(axis=1)

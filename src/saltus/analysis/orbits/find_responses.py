@@ -1,8 +1,10 @@
-"""What many trajectories settle to, each with parameter values of its own: the engine of frequency responses and bifurcation diagrams.
+"""What many trajectories settle to, each with parameter values of its own: the engine of frequency
+responses and bifurcation diagrams.
 
-A basin map asks one system of a great many starts, and capture by known attractors answers. Here every trajectory may have an attractor of
-its own: each is followed until it nearly recurs, Newton's method closes the orbit, its multipliers say that it attracts, and the
-trajectory must lie beside it. What never recurs is typed by its largest Lyapunov exponent.
+A basin map asks one system of a great many starts, and capture by known attractors answers. Here
+every trajectory may have an attractor of its own: each is followed until it nearly recurs, Newton's
+method closes the orbit, its multipliers say that it attracts, and the trajectory must lie beside
+it. What never recurs is typed by its largest Lyapunov exponent.
 """
 
 from __future__ import annotations
@@ -68,8 +70,10 @@ class SettledMotions:
         """Nothing computed yet."""
         nothing = np.full(count, np.nan)
         return cls(
-            np.full(count, Kind.NOT_COMPUTED, np.int64), OrbitBatch.none(count, size), nothing.copy(), nothing.copy(),
-            np.full(count, -1, np.int64), np.ones((count, size)), {}, np.full((count, size), np.nan),
+            np.full(count, Kind.NOT_COMPUTED, np.int64), OrbitBatch.none(count, size),
+            nothing.copy(), nothing.copy(),
+            np.full(count, -1, np.int64), np.ones((count, size)), {},
+            np.full((count, size), np.nan),
         )  # fmt: skip
 
     def put(self, where: np.ndarray, other: SettledMotions) -> None:
@@ -88,13 +92,16 @@ def find_responses(
     progress: Callable[[float], None] | None = None,
     result: SettledMotions | None = None,
 ) -> SettledMotions:
-    """What each trajectory settles to: start float64[k, D], row i by row i of the map, followed for ``most`` iterates at the longest.
+    """What each trajectory settles to: start float64[k, D], row i by row i of the map, followed for
+    ``most`` iterates at the longest.
 
-    What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't depend on the other trajectories, nor on
-    threads.
+    What is known when Ctrl-C ends it stands in ``result``, if that is given. The result doesn't
+    depend on the other trajectories, nor on threads.
     """
     result = SettledMotions.empty(len(start), start.shape[1]) if result is None else result
-    pieces = [np.arange(first, min(first + PIECE, len(start))) for first in range(0, len(start), PIECE)]
+    pieces = [
+        np.arange(first, min(first + PIECE, len(start))) for first in range(0, len(start), PIECE)
+    ]
 
     def work(piece: np.ndarray) -> SettledMotions:
         return _settle(map_.rows(piece, threads=1), start[piece], most)
@@ -118,15 +125,26 @@ def _settle(map_: Stroboscope, start: np.ndarray, most: int) -> SettledMotions:
     return result
 
 
-def _follow(map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, result: SettledMotions, near: float) -> np.ndarray:
-    """Follow trajectories until they settle on an orbit; writes what is known, returns those that haven't."""
+def _follow(
+    map_: Stroboscope,
+    start: np.ndarray,
+    who: np.ndarray,
+    most: int,
+    result: SettledMotions,
+    near: float,
+) -> np.ndarray:
+    """Follow trajectories until they settle on an orbit; writes what is known, returns those that
+    haven't.
+    """
     flight = map_.rows(who).launch(start[who], most + ROUND)
     while len(who) and flight.age < most:
         points = flight.advance(ROUND)
         going = flight.going
         result.end[who] = flight.state
         ended = who[~going]
-        result.kind[ended] = np.where(flight.status[~going] == st.NONFINITE, Kind.ESCAPED, Kind.FAILED)
+        result.kind[ended] = np.where(
+            flight.status[~going] == st.NONFINITE, Kind.ESCAPED, Kind.FAILED
+        )
         stay = going.copy()
         if going.any():
             rows = np.flatnonzero(going)
@@ -139,8 +157,12 @@ def _follow(map_: Stroboscope, start: np.ndarray, who: np.ndarray, most: int, re
     return who
 
 
-def _settled(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: SettledMotions) -> np.ndarray:
-    """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes the orbits."""
+def _settled(
+    map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: SettledMotions
+) -> np.ndarray:
+    """Which of the trajectories float64[k, ROUND, D] lie on an attracting orbit, bool[k]; writes
+    the orbits.
+    """
     if autonomous(map_.system):
         return _settled_unforced(map_.rows(who), points, who, near, result)
     orbits, apart, noise = recurring_orbits(map_.rows(who), points, result.scale[who], near)
@@ -149,12 +171,18 @@ def _settled(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float
     result.orbits.put(who[done], orbits.rows(done))
     result.kind[who[done]], result.exponent_error[who[done]] = Kind.PERIODIC, 0.0
     with np.errstate(divide="ignore"):
-        result.exponent[who[done]] = np.log(np.abs(orbits.multipliers[done, 0])) / orbits.period[done]
+        result.exponent[who[done]] = (
+            np.log(np.abs(orbits.multipliers[done, 0])) / orbits.period[done]
+        )
     return done
 
 
-def _settled_unforced(map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: SettledMotions) -> np.ndarray:
-    """As :func:`_settled` for rows of a system without forcing: which rest, or go round a limit cycle."""
+def _settled_unforced(
+    map_: Stroboscope, points: np.ndarray, who: np.ndarray, near: float, result: SettledMotions
+) -> np.ndarray:
+    """As :func:`_settled` for rows of a system without forcing: which rest, or go round a limit
+    cycle.
+    """
     state, window = points[:, -1], ROUND * float(map_.period[0])
     result.scale[who] = np.maximum(result.scale[who], np.ptp(points, axis=1))
     found = unforced.attracted(map_, state, result.scale[who], window, near)
@@ -163,19 +191,30 @@ def _settled_unforced(map_: Stroboscope, points: np.ndarray, who: np.ndarray, ne
     result.orbits.put(chosen, found.orbits.rows(done))
     result.scale[chosen] = found.scale[done]
     rests = found.orbits.time[done] == 0
-    result.kind[chosen], result.exponent_error[chosen] = np.where(rests, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE), 0.0
+    result.kind[chosen], result.exponent_error[chosen] = (
+        np.where(rests, Kind.EQUILIBRIUM, Kind.LIMIT_CYCLE),
+        0.0,
+    )
     leading = found.orbits.multipliers[done, 0].real * map_.period[done]
-    result.exponent[chosen] = np.where(rests, leading, 0.0)  # along a limit cycle nothing grows or dies
+    # along a limit cycle nothing grows or dies
+    result.exponent[chosen] = np.where(rests, leading, 0.0)
     return done
 
 
-def _classify_aperiodic(map_: Stroboscope, start: np.ndarray, who: np.ndarray, result: SettledMotions) -> np.ndarray:
-    """Classify trajectories that don't recur by their exponents; writes what is known, returns those that stay unclear."""
+def _classify_aperiodic(
+    map_: Stroboscope, start: np.ndarray, who: np.ndarray, result: SettledMotions
+) -> np.ndarray:
+    """Classify trajectories that don't recur by their exponents; writes what is known, returns
+    those that stay unclear.
+    """
     maps = map_.rows(who)
     state, kinds = kinds_of(maps, start[who], result.scale[who], [[i] for i in range(len(who))])
     flight = maps.launch(state, KEPT_ITERATES)
     iterates = flight.advance(KEPT_ITERATES)
-    recurs = recurrence(iterates[:, -ROUND:], result.scale[who])[1] < np.maximum(NEAR, maps.noise_of(result.scale[who]))  # by now
+    # by now
+    recurs = recurrence(iterates[:, -ROUND:], result.scale[who])[1] < np.maximum(
+        NEAR, maps.noise_of(result.scale[who])
+    )
     result.end[who] = flight.state
     unclear = np.ones(len(who), bool)
     if autonomous(map_.system):  # a limit cycle that is reached slowly, and no torus
@@ -197,8 +236,12 @@ def _classify_aperiodic(map_: Stroboscope, start: np.ndarray, who: np.ndarray, r
 
 
 def motion_range(map_: Stroboscope, state: np.ndarray) -> np.ndarray:
-    """Range of each state in the motion from states float64[k, D] on, float64[k, D]; its size where it rests, 1 where that is 0."""
-    samples = map_.run(state, RANGE_PERIODS, Schedule.even(RANGE_PERIODS, SAMPLES_PER_PERIOD)).samples
+    """Range of each state in the motion from states float64[k, D] on, float64[k, D]; its size where
+    it rests, 1 where that is 0.
+    """
+    samples = map_.run(
+        state, RANGE_PERIODS, Schedule.even(RANGE_PERIODS, SAMPLES_PER_PERIOD)
+    ).samples
     with np.errstate(all="ignore"):
         lengths, sizes = np.ptp(samples, axis=1), np.abs(samples).max(axis=1)
     scale = np.where(lengths > RESTS * sizes, lengths, sizes)

@@ -12,7 +12,8 @@ from saltus.analysis.orbits.noisy import Noisy, Stray
 from saltus.analysis.orbits.orbits import Orbit
 from saltus.flow.maps import Map
 
-#: Share of a trajectory's points that must lie in an attractor's boxes, or beside its orbit, to belong to it.
+#: Share of a trajectory's points that must lie in an attractor's boxes, or beside its orbit, to
+#: belong to it.
 INSIDE = 0.9
 
 
@@ -49,7 +50,9 @@ class Found:
         self.orbits.append(orbit)
 
     def add_sampled(self, one: SampledAttractor) -> None:
-        """One more that is known by where it goes, unless it is there. Orbits that turn out to be scatter about it are no longer others."""
+        """One more that is known by where it goes, unless it is there. Orbits that turn out to be
+        scatter about it are no longer others.
+        """
         self.sampled = merge([*self.sampled, one])
         kept = [i for i, orbit in enumerate(self.orbits) if not is_about(one, orbit)]
         self.near = self.near.of(np.array(kept, np.int64))
@@ -64,8 +67,13 @@ class Found:
         raise AssertionError("an attractor that wasn't found")
 
     def ordered(self, scale: np.ndarray) -> Found:
-        """The same with ids that don't depend on the order of discovery: by period, then by size, then by place."""
-        order = sorted(range(len(self.orbits)), key=lambda i: (self.orbits[i].period, *_rounded(self.orbits[i], scale)))
+        """The same with ids that don't depend on the order of discovery: by period, then by size,
+        then by place.
+        """
+        order = sorted(
+            range(len(self.orbits)),
+            key=lambda i: (self.orbits[i].period, *_rounded(self.orbits[i], scale)),
+        )
         sampled = sorted(self.sampled, key=lambda w: (w.kind, *w.first))
         near = self.near.renumbered(np.argsort(np.array(order, np.int64)))
         return Found(near, [self.orbits[i] for i in order], sampled, self.unstable, self.astray)

@@ -1,4 +1,6 @@
-"""Limit cycles among the attractors of a flow without forcing: found from where trajectories stand, known by the places they pass."""
+"""Limit cycles among the attractors of a flow without forcing: found from where trajectories stand,
+known by the places they pass.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,11 @@ from saltus.flow.maps import Stroboscope
 from saltus.results.dataset.kinds import Kind
 
 
-def limit_cycles(map_: Stroboscope, state: np.ndarray, window: float, scale: np.ndarray) -> list[SampledAttractor]:
-    """Attracting limit cycles on which some trajectories float64[k, D] lie, each by places in equal steps of its time.
+def limit_cycles(
+    map_: Stroboscope, state: np.ndarray, window: float, scale: np.ndarray
+) -> list[SampledAttractor]:
+    """Attracting limit cycles on which some trajectories float64[k, D] lie, each by places in equal
+    steps of its time.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""Newton's method on many small systems of equations at once: fixed points of maps, limit cycles, equilibria."""
+"""Newton's method on many small systems of equations at once: fixed points of maps, limit cycles,
+equilibria.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,8 @@ import numpy as np
 
 from saltus.analysis.orbits.tolerances import AMPLIFIED, CONVERGED, MAX_NEWTON_STEPS, SINGULAR, SLOW
 
-#: Residuals float64[m, d] and derivatives float64[m, d, d] of the rows int64[m], at float64[m, d]; all in units of the scale.
+#: Residuals float64[m, d] and derivatives float64[m, d, d] of the rows int64[m], at float64[m, d];
+#: all in units of the scale.
 Equations = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
@@ -36,20 +39,36 @@ def newton(
     max_slow : int
         Rows are given up after more slow steps.
     """
-    x, found, rows = np.array(start, float), np.zeros(len(start), bool), np.flatnonzero(np.isfinite(start).all(axis=1))
-    before, slow, enough = np.full(len(start), np.inf), np.zeros(len(start), np.int64), np.broadcast_to(enough, len(start))
+    x, found, rows = (
+        np.array(start, float),
+        np.zeros(len(start), bool),
+        np.flatnonzero(np.isfinite(start).all(axis=1)),
+    )
+    before, slow, enough = (
+        np.full(len(start), np.inf),
+        np.zeros(len(start), np.int64),
+        np.broadcast_to(enough, len(start)),
+    )
     for _ in range(MAX_NEWTON_STEPS):
         if not len(rows):
             break
         residual, derivative = equations(x[rows], rows)
-        good = np.flatnonzero(np.isfinite(derivative).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1))
+        good = np.flatnonzero(
+            np.isfinite(derivative).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
+        )
         good = good[np.linalg.cond(derivative[good]) < SINGULAR]
         rows, residual, derivative = rows[good], residual[good], derivative[good]
         step = -np.linalg.solve(derivative, residual[:, :, None])[:, :, 0]
         x[rows] += step * scale[rows]
         length = np.abs(step).max(axis=1)
-        rounding = np.all(np.abs(step * scale[rows]) <= 4 * np.finfo(float).eps * np.abs(x[rows]), axis=1)
-        done = (length < enough[rows]) | ((length < AMPLIFIED) & (length > 0.5 * before[rows])) | rounding
+        rounding = np.all(
+            np.abs(step * scale[rows]) <= 4 * np.finfo(float).eps * np.abs(x[rows]), axis=1
+        )
+        done = (
+            (length < enough[rows])
+            | ((length < AMPLIFIED) & (length > 0.5 * before[rows]))
+            | rounding
+        )
         found[rows[done]] = True
         slow[rows] += length > SLOW * before[rows]
         before[rows] = length
@@ -59,7 +78,9 @@ def newton(
 
 
 def leading_first(matrices: np.ndarray) -> np.ndarray:
-    """Eigenvalues complex128[k, d] of float64[k, d, d], the largest first and of a pair the upper one; NaN where a matrix isn't finite."""
+    """Eigenvalues complex128[k, d] of float64[k, d, d], the largest first and of a pair the upper
+    one; NaN where a matrix isn't finite.
+    """
     finite = np.isfinite(matrices).all(axis=(1, 2))
     values = np.full(matrices.shape[:2], np.nan + 0j)
     values[finite] = np.linalg.eigvals(matrices[finite])

@@ -1,8 +1,10 @@
-"""The numbers of an orbit: its largest and smallest values, means, first harmonics, contacts, and how near it comes to a graze.
+"""The numbers of an orbit: its largest and smallest values, means, first harmonics, contacts, and
+how near it comes to a graze.
 
-All come from the motion as the flow computed it, in pieces that are polynomials (flow/pieces.py). Turning points are roots of these
-polynomials, so they are located, not sampled; means are sums by Gauss's rule, which is exact for polynomials. An orbit of a method that
-locates no contacts is known at its samples and by the cubics between them.
+All come from the motion as the flow computed it, in pieces that are polynomials (flow/pieces.py).
+Turning points are roots of these polynomials, so they are located, not sampled; means are sums by
+Gauss's rule, which is exact for polynomials. An orbit of a method that locates no contacts is known
+at its samples and by the cubics between them.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from saltus.flow.pieces import nodes_of, pieces
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
 
-#: Forcing periods of a motion that never repeats from which its numbers are taken, where there are many such motions.
+#: Forcing periods of a motion that never repeats from which its numbers are taken, where there are
+#: many such motions.
 APERIODIC_PERIODS = 64
 #: Nodes that a thread holds at a time: some 20 MB.
 HELD = 8192
@@ -33,7 +36,8 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Measures:
-    """The numbers of m motions of D states and K outputs, each over its period, or over many forcing periods if it never repeats.
+    """The numbers of m motions of D states and K outputs, each over its period, or over many
+    forcing periods if it never repeats.
 
     Attributes
     ----------
@@ -42,15 +46,18 @@ class Measures:
     deviation : float64[m, K]
         Root mean square about the mean.
     harmonic : complex128[m, K]
-        First harmonic: ``A exp(i phi)`` of ``A cos(2 pi t/T + phi)``, T the forcing period, t the time of the equations; NaN if unforced.
+        First harmonic: ``A exp(i phi)`` of ``A cos(2 pi t/T + phi)``, T the forcing period, t the
+        time of the equations; NaN if unforced.
     margin : float64[m]
-        Smallest size of a gap where it turns [unit of the gap]; zero if it is within rounding, inf without gaps.
+        Smallest size of a gap where it turns [unit of the gap]; zero if it is within rounding, inf
+        without gaps.
     span : float64[m]
         Largest range of a gap [its unit].
     contacts : float64[m]
         Contacts per forcing period; NaN where the method doesn't locate them.
     itinerary : list of str
-        Guards met, with + where the gap becomes positive, in the order of time; empty for a motion that never repeats.
+        Guards met, with + where the gap becomes positive, in the order of time; empty for a motion
+        that never repeats.
     turning : list of float64[n, D]
         States where the first one turns, in the order of time.
     """
@@ -79,7 +86,8 @@ class Measures:
     def by_name(self) -> dict[str, np.ndarray]:
         """What is read off each motion, float64[m, K] by the names that results use."""
         return {
-            "maximum": self.maximum, "minimum": self.minimum, "peak": self.peak, "peak_to_peak": self.maximum - self.minimum,
+            "maximum": self.maximum, "minimum": self.minimum, "peak": self.peak,
+            "peak_to_peak": self.maximum - self.minimum,
             "mean": self.mean, "rms": self.rms, "rms_about_mean": self.deviation,
             "amplitude": np.abs(self.harmonic), "phase": np.angle(self.harmonic),
         }  # fmt: skip
@@ -101,11 +109,17 @@ def unknown(m: int, size: int, outputs: int | None = None) -> Measures:
     maximum, minimum, mean, deviation = np.full((4, m, wide), np.nan)
     margin, span, contacts = np.full((3, m), np.nan)
     harmonic, turning = np.full((m, wide), np.nan + 0j), [np.zeros((0, size)) for _ in range(m)]
-    return Measures(maximum, minimum, mean, deviation, harmonic, margin, span, contacts, [""] * m, turning)
+    return Measures(
+        maximum, minimum, mean, deviation, harmonic, margin, span, contacts, [""] * m, turning
+    )
 
 
 def measure(
-    map_: Stroboscope, start: np.ndarray, periods: np.ndarray, window: int = APERIODIC_PERIODS, outputs: Outputs | None = None
+    map_: Stroboscope,
+    start: np.ndarray,
+    periods: np.ndarray,
+    window: int = APERIODIC_PERIODS,
+    outputs: Outputs | None = None,
 ) -> Measures:
     """The numbers of the motions from states float64[m, D], row i by row i of the map.
 
@@ -137,7 +151,9 @@ def measure(
     return result
 
 
-def _measured(map_: Stroboscope, start: np.ndarray, span: int, closed: bool, outputs: Outputs) -> Measures:
+def _measured(
+    map_: Stroboscope, start: np.ndarray, span: int, closed: bool, outputs: Outputs
+) -> Measures:
     """The numbers of some motions over ``periods`` periods, after which they repeat or don't."""
     size, wide = start.shape[1], len(outputs)
     whole, outcome = pieces(map_, start, span, outputs.formulas, outputs.guards)
@@ -145,13 +161,19 @@ def _measured(map_: Stroboscope, start: np.ndarray, span: int, closed: bool, out
     if map_.method.records_contacts:
         result.contacts[:] = outcome.counters[:, st.EVENTS] / span
         if closed:
-            result.itinerary[:] = _itineraries([guard.name for guard in map_.system.guards], outcome)
+            result.itinerary[:] = _itineraries(
+                [guard.name for guard in map_.system.guards], outcome
+            )
     known = np.unique(whole.motion)
     if len(known):
         first = np.flatnonzero(np.diff(whole.motion, prepend=-1))
-        turns = [_Turns.of(whole, first, quantity, closed) for quantity in range(whole.terms.shape[1])]
+        turns = [
+            _Turns.of(whole, first, quantity, closed) for quantity in range(whole.terms.shape[1])
+        ]
         for output in range(wide):
-            result.maximum[known, output], result.minimum[known, output] = _extremes(whole, first, turns[output], output)
+            result.maximum[known, output], result.minimum[known, output] = _extremes(
+                whole, first, turns[output], output
+            )
             _means(map_, whole, first, output, result)
         gaps = range(wide, whole.terms.shape[1])
         margins = [_margin(whole, first, turns[gap], gap) for gap in gaps]
@@ -165,14 +187,18 @@ def _measured(map_: Stroboscope, start: np.ndarray, span: int, closed: bool, out
 
 @dataclass(frozen=True)
 class _Turns:
-    """Where a quantity turns: pieces int64[r], ascending, and places on them, float64[r] in [0, 1]."""
+    """Where a quantity turns: pieces int64[r], ascending, and places on them,
+    float64[r] in [0, 1].
+    """
 
     piece: np.ndarray
     place: np.ndarray
 
     @classmethod
     def of(cls, whole: Pieces, first: np.ndarray, quantity: int, closed: bool) -> _Turns:
-        """Inside pieces, and where one ends and the next begins; a closed motion goes on with its first piece after its last."""
+        """Inside pieces, and where one ends and the next begins; a closed motion goes on with its
+        first piece after its last.
+        """
         rates = polynomials.derivative(whole.terms[:, quantity])
         piece, place = polynomials.sign_changes(rates)
         after, before = polynomials.leading_signs(rates)
@@ -180,8 +206,12 @@ class _Turns:
         arrives = np.roll(before, 1)
         arrives[first] = before[last] if closed else 0.0
         joints = np.flatnonzero(arrives * after < 0.0)
-        resting = first[(np.add.reduceat(after != 0.0, first) == 0)]  # it turns nowhere, or everywhere
-        piece, place = np.concatenate([piece, joints, resting]), np.concatenate([place, np.zeros(len(joints) + len(resting))])
+        # it turns nowhere, or everywhere
+        resting = first[(np.add.reduceat(after != 0.0, first) == 0)]
+        piece, place = (
+            np.concatenate([piece, joints, resting]),
+            np.concatenate([place, np.zeros(len(joints) + len(resting))]),
+        )
         order = np.lexsort((place, piece))
         return cls(piece[order], place[order])
 
@@ -189,26 +219,44 @@ class _Turns:
         """The quantity there, float64[r]."""
         return polynomials.value(whole.terms[:, quantity, self.piece], self.place)
 
-    def states(self, map_: Stroboscope, whole: Pieces, first: np.ndarray, size: int) -> list[np.ndarray]:
+    def states(
+        self, map_: Stroboscope, whole: Pieces, first: np.ndarray, size: int
+    ) -> list[np.ndarray]:
         """All states there, float64[n, D] for each motion, each turn once."""
         period, motion = map_.period[whole.motion[self.piece]], whole.motion[self.piece]
-        time = whole.period[self.piece] * period + whole.phase[self.piece] + self.place * whole.length[self.piece]
-        again = np.append(False, (np.diff(motion) == 0) & (np.diff(time) < SAME * period[1:]))[: len(motion)]
+        time = (
+            whole.period[self.piece] * period
+            + whole.phase[self.piece]
+            + self.place * whole.length[self.piece]
+        )
+        again = np.append(False, (np.diff(motion) == 0) & (np.diff(time) < SAME * period[1:]))[
+            : len(motion)
+        ]
         points = polynomials.value(whole.terms[:, :size][:, :, self.piece], self.place).T[~again]
         return np.split(points, np.searchsorted(motion[~again], whole.motion[first])[1:])
 
 
-def _extremes(whole: Pieces, first: np.ndarray, turns: _Turns, quantity: int) -> tuple[np.ndarray, np.ndarray]:
-    """Largest and smallest value of each motion: at its turns, and at the ends of its pieces, where it may jump."""
+def _extremes(
+    whole: Pieces, first: np.ndarray, turns: _Turns, quantity: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Largest and smallest value of each motion: at its turns, and at the ends of its pieces, where
+    it may jump.
+    """
     begin, end = whole.terms[0, quantity], whole.terms[:, quantity].sum(axis=0)
-    high, low, inside = np.maximum(begin, end), np.minimum(begin, end), turns.values(whole, quantity)
+    high, low, inside = (
+        np.maximum(begin, end),
+        np.minimum(begin, end),
+        turns.values(whole, quantity),
+    )
     np.maximum.at(high, turns.piece, inside)
     np.minimum.at(low, turns.piece, inside)
     return np.maximum.reduceat(high, first), np.minimum.reduceat(low, first)
 
 
 def _margin(whole: Pieces, first: np.ndarray, turns: _Turns, gap: int) -> np.ndarray:
-    """Smallest size of a gap where it turns, of each motion; zero where it is below the rounding error of the gap."""
+    """Smallest size of a gap where it turns, of each motion; zero where it is below the rounding
+    error of the gap.
+    """
     sizes = np.abs(turns.values(whole, gap))
     sizes = np.where(sizes <= whole.noise[gap, turns.piece], 0.0, sizes)
     least = np.full(len(whole.motion), np.inf)
@@ -216,26 +264,40 @@ def _margin(whole: Pieces, first: np.ndarray, turns: _Turns, gap: int) -> np.nda
     return np.minimum.reduceat(least, first)
 
 
-def _means(map_: Stroboscope, whole: Pieces, first: np.ndarray, output: int, result: Measures) -> None:
-    """Mean, root mean square about it and first harmonic of an output, over the whole of each motion."""
+def _means(
+    map_: Stroboscope, whole: Pieces, first: np.ndarray, output: int, result: Measures
+) -> None:
+    """Mean, root mean square about it and first harmonic of an output, over the whole of each
+    motion.
+    """
     motion, count = whole.motion, np.diff(np.append(first, len(whole.motion)))
     places, weights = polynomials.gauss(PLACES)
     total = np.add.reduceat(whole.length, first)
     values = places[:, None] ** np.arange(len(whole.terms)) @ whole.terms[:, output]
     share = weights[:, None] * (whole.length / np.repeat(total, count))
-    origin = np.repeat(whole.terms[0, output, first], count)  # a small motion about a large mean keeps its digits
+    # a small motion about a large mean keeps its digits
+    origin = np.repeat(whole.terms[0, output, first], count)
     mean = np.add.reduceat((share * (values - origin)).sum(axis=0), first)
     values -= origin + np.repeat(mean, count)
     angle = 2.0 * np.pi * (whole.phase + places[:, None] * whole.length) / map_.period[motion]
     known = motion[first]
     result.mean[known, output] = whole.terms[0, output, first] + mean
-    result.deviation[known, output] = np.sqrt(np.add.reduceat((share * values**2).sum(axis=0), first))
+    result.deviation[known, output] = np.sqrt(
+        np.add.reduceat((share * values**2).sum(axis=0), first)
+    )
     if map_.system.forced_at is not None:
-        result.harmonic[known, output] = 2.0 * np.add.reduceat((share * values * np.exp(-1j * angle)).sum(axis=0), first)
+        result.harmonic[known, output] = 2.0 * np.add.reduceat(
+            (share * values * np.exp(-1j * angle)).sum(axis=0), first
+        )
 
 
 def _itineraries(names: list[str], outcome: Outcome) -> list[str]:
     """Guards met by each motion and the ways they were crossed; grazes left out."""
     contacts = outcome.contacts.rows(outcome.contacts.kind != st.GRAZE)
-    texts = [f"{names[guard]}{'+' if way > 0 else '-'}" for guard, way in zip(contacts.guard, contacts.direction, strict=True)]
-    return [" ".join(texts[i:j]) for i, j in itertools.pairwise(contacts.begins(len(outcome.status)))]
+    texts = [
+        f"{names[guard]}{'+' if way > 0 else '-'}"
+        for guard, way in zip(contacts.guard, contacts.direction, strict=True)
+    ]
+    return [
+        " ".join(texts[i:j]) for i, j in itertools.pairwise(contacts.begins(len(outcome.status)))
+    ]

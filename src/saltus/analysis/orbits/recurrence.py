@@ -1,4 +1,6 @@
-"""Periods of trajectories of a map, by how nearly they recur, and the orbits that these are on their way to."""
+"""Periods of trajectories of a map, by how nearly they recur, and the orbits that these are on
+their way to.
+"""
 
 from __future__ import annotations
 
@@ -9,22 +11,30 @@ from saltus.flow.maps import Map
 
 
 def recurrence(points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For trajectories float64[k, m, D]: the smallest n that repeats nearly as well as the best, and how well, in units of the scale."""
+    """For trajectories float64[k, m, D]: the smallest n that repeats nearly as well as the best,
+    and how well, in units of the scale.
+    """
     last = points[:, -1]
     candidates = []
     with np.errstate(invalid="ignore"):  # those that ran away
         for n in range(1, points.shape[1] // 2 + 1):
             now = np.abs((points[:, -1] - points[:, -1 - n]) / scale).max(axis=1)
-            before = np.abs((points[:, -1 - n // 2] - points[:, -1 - n - n // 2]) / scale).max(axis=1)
+            before = np.abs((points[:, -1 - n // 2] - points[:, -1 - n - n // 2]) / scale).max(
+                axis=1
+            )
             candidates.append(np.maximum(now, before))
     apart = np.stack(candidates, axis=1)
     apart = np.where(np.isfinite(apart), apart, np.inf)
     best = apart.min(axis=1)
     period = 1 + np.argmax(apart <= np.maximum(4.0 * best, 1e-12)[:, None], axis=1)
-    return period, np.where(np.isfinite(last).all(axis=1), apart[np.arange(len(points)), period - 1], np.inf)
+    return period, np.where(
+        np.isfinite(last).all(axis=1), apart[np.arange(len(points)), period - 1], np.inf
+    )
 
 
-def recurring_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, near: float) -> tuple[OrbitBatch, np.ndarray, np.ndarray]:
+def recurring_orbits(
+    map_: Map, points: np.ndarray, scale: np.ndarray, near: float
+) -> tuple[OrbitBatch, np.ndarray, np.ndarray]:
     """The orbits of trajectories that nearly recur.
 
     Parameters
@@ -36,7 +46,8 @@ def recurring_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, near: flo
     scale : float64[k, D]
         Range of each state in the motion.
     near : float
-        Recurrence that is worth a try by Newton's method; more where errors of the map keep orbits from closing.
+        Recurrence that is worth a try by Newton's method; more where errors of the map keep orbits
+        from closing.
 
     Returns
     -------
@@ -48,5 +59,8 @@ def recurring_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, near: flo
     period, apart = recurrence(points, scale)
     noise, result = map_.noise_of(scale), OrbitBatch.none(len(points), points.shape[2])
     ready = np.flatnonzero(apart < np.maximum(near, noise))
-    result.put(ready, find_orbits(map_.rows(ready), points[ready, -1], period[ready], scale[ready], noise[ready]))
+    result.put(
+        ready,
+        find_orbits(map_.rows(ready), points[ready, -1], period[ready], scale[ready], noise[ready]),
+    )
     return result, apart, noise

@@ -1,4 +1,6 @@
-"""What motions without forcing come to: equilibria and limit cycles, found and verified in the same way for many trajectories at once."""
+"""What motions without forcing come to: equilibria and limit cycles, found and verified in the same
+way for many trajectories at once.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.flow.maps import Stroboscope
 from saltus.system.evaluate import evaluate
 
-#: Parts of a motion that must each be larger than the one before, and how much the last must be larger than the first, to run away.
+#: Parts of a motion that must each be larger than the one before, and how much the last must be
+#: larger than the first, to run away.
 EIGHTHS, GROWN = 8, 3.0
 #: Returns farther than this, in units of the range, are no sign of a limit cycle.
 TORUS = 1e-2
@@ -35,8 +38,11 @@ class Attracted:
     scale: np.ndarray
 
 
-def attracted(map_: Stroboscope, state: np.ndarray, scale: np.ndarray, window: float, near: float) -> Attracted:
-    """Which trajectories have come to an equilibrium that captures where they are, or to an attracting limit cycle.
+def attracted(
+    map_: Stroboscope, state: np.ndarray, scale: np.ndarray, window: float, near: float
+) -> Attracted:
+    """Which trajectories have come to an equilibrium that captures where they are, or to an
+    attracting limit cycle.
 
     Parameters
     ----------
@@ -66,19 +72,27 @@ def attracted(map_: Stroboscope, state: np.ndarray, scale: np.ndarray, window: f
 
 
 def nearly_recurs(map_: Stroboscope, state: np.ndarray, window: float) -> np.ndarray:
-    """Which motions come back so near to where they were that they may be on their way to a limit cycle, bool[k]."""
+    """Which motions come back so near to where they were that they may be on their way to a limit
+    cycle, bool[k].
+    """
     return np.asarray(returns(map_, state, window).apart < TORUS)
 
 
 def runs_away(iterates: np.ndarray) -> np.ndarray:
-    """Which motions float64[k, m, D] only grow: in each eighth of them more than before, and much in all, bool[k]."""
-    sizes = np.stack([np.abs(part).max(axis=(1, 2)) for part in np.array_split(iterates, EIGHTHS, axis=1)])
+    """Which motions float64[k, m, D] only grow: in each eighth of them more than before, and much
+    in all, bool[k].
+    """
+    sizes = np.stack(
+        [np.abs(part).max(axis=(1, 2)) for part in np.array_split(iterates, EIGHTHS, axis=1)]
+    )
     with np.errstate(invalid="ignore"):
         return np.asarray((np.diff(sizes, axis=0) > 0).all(axis=0) & (sizes[-1] > GROWN * sizes[0]))
 
 
 def rest(map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measures) -> None:
-    """Fill in the rows int64[m] of equilibria float64[m, D]: the size of their states, and the distance to the nearest boundary."""
+    """Fill in the rows int64[m] of equilibria float64[m, D]: the size of their states, and the
+    distance to the nearest boundary.
+    """
     size = place.shape[1]
     numbers.maximum[rows, :size] = numbers.minimum[rows, :size] = numbers.mean[rows, :size] = place
     numbers.deviation[rows, :size], numbers.span[rows] = 0.0, 0.0
@@ -94,12 +108,20 @@ def rest(map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measur
         numbers.turning[row] = one[None]
 
 
-def multipliers_and_eigenvalues(values: np.ndarray, rests: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Floquet multipliers, and eigenvalues [1/s] of what rests, complex128[m, D]; each NaN where it is the other."""
-    return np.where(rests[:, None], np.nan + 0j, values), np.where(rests[:, None], values, np.nan + 0j)
+def multipliers_and_eigenvalues(
+    values: np.ndarray, rests: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Floquet multipliers, and eigenvalues [1/s] of what rests, complex128[m, D]; each NaN where it
+    is the other.
+    """
+    return np.where(rests[:, None], np.nan + 0j, values), np.where(
+        rests[:, None], values, np.nan + 0j
+    )
 
 
-def close_again(map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray) -> OrbitBatch:
+def close_again(
+    map_: Stroboscope, start: np.ndarray, time: np.ndarray, scale: np.ndarray
+) -> OrbitBatch:
     """Equilibria (time 0) and limit cycles (their period) from those at other parameter values."""
     result = OrbitBatch.none(len(start), start.shape[1])
     rests, turns = np.flatnonzero(time == 0), np.flatnonzero(time > 0)

@@ -1,7 +1,8 @@
 """Delay embedding: the states behind one recorded quantity.
 
-Delay: the first minimum of the mutual information, Fraser & Swinney, Physical Review A 33 (1986) 1134-1140. Dimension: the least that
-leaves no false neighbours, Kennel, Brown & Abarbanel, Physical Review A 45 (1992) 3403-3411.
+Delay: the first minimum of the mutual information, Fraser & Swinney, Physical Review A 33 (1986)
+1134-1140. Dimension: the least that leaves no false neighbours, Kennel, Brown & Abarbanel, Physical
+Review A 45 (1992) 3403-3411.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from scipy.spatial import cKDTree
 LONGEST = 0.05
 #: Samples for each cell of the histogram of the mutual information.
 PER_CELL = 40
-#: Growth of a distance by one more coordinate, and size of it relative to the series, from which a neighbour is false: Kennel's values.
+#: Growth of a distance by one more coordinate, and size of it relative to the series, from which a
+#: neighbour is false: Kennel's values.
 STRETCHED, SPREAD = 15.0, 2.0
 #: Share of false neighbours that is taken for none, and the largest dimension tried.
 NONE_FALSE, MOST = 0.01, 10
@@ -22,23 +24,31 @@ ASKED = 4000
 
 
 def embed(series: np.ndarray, dimension: int, delay: int) -> np.ndarray:
-    """Points float64[n - (m - 1) delay, m] whose coordinates are the series now and one, two, ... delays later."""
+    """Points float64[n - (m - 1) delay, m] whose coordinates are the series now and one, two, ...
+    delays later.
+    """
     count = len(series) - (dimension - 1) * delay
     return np.stack([series[i * delay : i * delay + count] for i in range(dimension)], axis=1)
 
 
 def mutual_information(series: np.ndarray, lag: int) -> float:
-    """What a sample says about the one ``lag`` later [nat], by a histogram of cells of equal chance."""
+    """What a sample says about the one ``lag`` later [nat], by a histogram of cells of equal
+    chance.
+    """
     cells = max(int(np.sqrt(len(series) / PER_CELL)), 4)
     rank = np.argsort(np.argsort(series, kind="stable"), kind="stable") * cells // len(series)
-    joint = np.bincount(rank[:-lag] * cells + rank[lag:], minlength=cells * cells).reshape(cells, cells) / (len(series) - lag)
+    joint = np.bincount(rank[:-lag] * cells + rank[lag:], minlength=cells * cells).reshape(
+        cells, cells
+    ) / (len(series) - lag)
     product = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
     there = joint > 0
     return float((joint[there] * np.log(joint[there] / product[there])).sum())
 
 
 def first_minimum(series: np.ndarray) -> int:
-    """Delay in samples: the first minimum of the mutual information, the least over two neighbours on either side."""
+    """Delay in samples: the first minimum of the mutual information, the least over two neighbours
+    on either side.
+    """
     longest = max(int(LONGEST * len(series)), 3)
     values: list[float] = []
     for lag in range(1, longest + 3):
@@ -49,7 +59,9 @@ def first_minimum(series: np.ndarray) -> int:
 
 
 def false_neighbours(series: np.ndarray, dimension: int, delay: int, exclude: int) -> float:
-    """Share of nearest neighbours in this dimension that one more coordinate shows to be none; NaN if nothing has a neighbour."""
+    """Share of nearest neighbours in this dimension that one more coordinate shows to be none; NaN
+    if nothing has a neighbour.
+    """
     longer = embed(series, dimension + 1, delay)
     points = longer[:, :dimension]
     asked = np.unique(np.linspace(0, len(points) - 1, min(ASKED, len(points))).round().astype(int))
@@ -57,21 +69,30 @@ def false_neighbours(series: np.ndarray, dimension: int, delay: int, exclude: in
     some = place >= 0
     near, partner = distance[some], place[some]
     step = np.abs(longer[asked[some], dimension] - longer[partner, dimension])
-    floor = 1e-9 * np.ptp(series)  # neighbours on a motion that repeats lie on one another but for rounding
-    false = (step > STRETCHED * np.maximum(near, floor)) | (np.hypot(step, near) > SPREAD * series.std())
+    # neighbours on a motion that repeats lie on one another but for rounding
+    floor = 1e-9 * np.ptp(series)
+    false = (step > STRETCHED * np.maximum(near, floor)) | (
+        np.hypot(step, near) > SPREAD * series.std()
+    )
     return float(false.mean()) if some.any() else float("nan")
 
 
-def _nearest_allowed(points: np.ndarray, asked: np.ndarray, exclude: int) -> tuple[np.ndarray, np.ndarray]:
-    """Distance and index of the nearest point more than ``exclude`` samples away from each that is asked for; inf and -1 if there is none.
+def _nearest_allowed(
+    points: np.ndarray, asked: np.ndarray, exclude: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distance and index of the nearest point more than ``exclude`` samples away from each that is
+    asked for; inf and -1 if there is none.
 
-    The few nearest are looked at first, four times as many where all of them are too near in time: for most points a few are enough.
+    The few nearest are looked at first, four times as many where all of them are too near in time:
+    for most points a few are enough.
     """
     tree, most = cKDTree(points), min(2 * exclude + 2, len(points))
     distance, place = np.full(len(asked), np.inf), np.full(len(asked), -1)
     left, count = np.arange(len(asked)), min(8, most)
     while True:
-        near, who = (each.reshape(len(left), count) for each in tree.query(points[asked[left]], k=count))
+        near, who = (
+            each.reshape(len(left), count) for each in tree.query(points[asked[left]], k=count)
+        )
         allowed = np.abs(who - asked[left, None]) > exclude
         rows, first = np.flatnonzero(allowed.any(axis=1)), allowed.argmax(axis=1)
         distance[left[rows]], place[left[rows]] = near[rows, first[rows]], who[rows, first[rows]]
@@ -92,6 +113,8 @@ def least_dimension(series: np.ndarray, delay: int, exclude: int) -> int:
 
 
 def hardly_correlated(series: np.ndarray) -> bool:
-    """Whether neighbouring samples tell little of each other, as those of a map do: autocorrelation below 1/e in magnitude."""
+    """Whether neighbouring samples tell little of each other, as those of a map do: autocorrelation
+    below 1/e in magnitude.
+    """
     centred = series - series.mean()
     return bool(abs(np.dot(centred[:-1], centred[1:])) < np.dot(centred, centred) / np.e)

@@ -1,8 +1,10 @@
-"""Growth of the distance between neighbours on a trajectory: the fixed evolution time program of Wolf et al.
+"""Growth of the distance between neighbours on a trajectory: the fixed evolution time program of
+Wolf et al.
 
-A point of the trajectory and a neighbour of it are followed for a fixed time, one evolution, and the growth of their distance is noted.
-Then a new neighbour takes over, close to the point and in the direction in which the old one lies. Wolf, Swift, Swinney & Vastano, Physica
-D 16 (1985) 285-317, section 5 and appendix B.
+A point of the trajectory and a neighbour of it are followed for a fixed time, one evolution, and
+the growth of their distance is noted. Then a new neighbour takes over, close to the point and in
+the direction in which the old one lies. Wolf, Swift, Swinney & Vastano, Physica D 16 (1985)
+285-317, section 5 and appendix B.
 """
 
 from __future__ import annotations
@@ -13,11 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-#: Neighbours that a point has within the default of the largest distance: enough that one of them lies in the old direction.
+#: Neighbours that a point has within the default of the largest distance: enough that one of them
+#: lies in the old direction.
 CROWD = 20
 #: Points that are asked for it, evenly spread.
 ASKED = 200
-#: Angle that a replacement may turn by at first [rad], and how often the largest distance grows before the angle is doubled: Wolf's.
+#: Angle that a replacement may turn by at first [rad], and how often the largest distance grows
+#: before the angle is doubled: Wolf's.
 ANGLE, WIDENINGS = 0.3, 5
 
 
@@ -67,12 +71,16 @@ def crowd_distance(points: np.ndarray, smallest: float, exclude: int) -> float:
         distance = np.linalg.norm(points - points[here], axis=1)
         distance[max(here - exclude, 0) : here + exclude + 1] = np.inf
         distance[distance < smallest] = np.inf
-        distances.append(np.partition(distance, CROWD - 1)[CROWD - 1] if len(points) > CROWD else np.inf)
+        distances.append(
+            np.partition(distance, CROWD - 1)[CROWD - 1] if len(points) > CROWD else np.inf
+        )
     return float(np.median(distances))
 
 
 def follow(points: np.ndarray, search: Search) -> Evolutions:
-    """The evolutions of the trajectory float64[n, m], from its first point on that has a neighbour; empty if none has."""
+    """The evolutions of the trajectory float64[n, m], from its first point on that has a neighbour;
+    empty if none has.
+    """
     return _Chase(points, search).run()
 
 
@@ -81,7 +89,8 @@ class _Chase:
 
     def __init__(self, points: np.ndarray, search: Search):
         self._points, self._search = points, search
-        self._tree = cKDTree(points[: len(points) - search.evolve])  # a neighbour must be able to go on
+        # a neighbour must be able to go on
+        self._tree = cKDTree(points[: len(points) - search.evolve])
 
     def run(self) -> Evolutions:
         search, points = self._search, self._points
@@ -95,7 +104,8 @@ class _Chase:
             there = here + search.evolve, neighbour + search.evolve
             before, after = points[neighbour] - points[here], points[there[1]] - points[there[0]]
             distance, later = float(np.linalg.norm(before)), float(np.linalg.norm(after))
-            if later == 0.0 or distance == 0.0:  # on one another: no growth to be seen, and no direction
+            # on one another: no growth to be seen, and no direction
+            if later == 0.0 or distance == 0.0:
                 neighbour = None
                 continue
             rows.append((math.log(later / distance), distance, angle))
@@ -112,8 +122,12 @@ class _Chase:
             radius += self._search.largest
         return None
 
-    def _replacement(self, there: tuple[int, int], direction: np.ndarray) -> tuple[int | None, float]:
-        """The neighbour that takes over: the one that turns least, close by if it can be; the old one if there is no other."""
+    def _replacement(
+        self, there: tuple[int, int], direction: np.ndarray
+    ) -> tuple[int | None, float]:
+        """The neighbour that takes over: the one that turns least, close by if it can be; the old
+        one if there is no other.
+        """
         here, old = there
         if here >= len(self._points) - self._search.evolve:
             return None, math.nan

@@ -24,23 +24,32 @@ def columns_of(series: Any, embed: bool | None) -> np.ndarray:
     try:
         array = np.asarray(series, float)
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError("the series must be an array of numbers, (samples,) or (samples, states).") from None
+        raise ParameterError(
+            "the series must be an array of numbers, (samples,) or (samples, states)."
+        ) from None
     array = array[:, None] if array.ndim == 1 else array
     if array.ndim != 2 or not array.shape[1]:
-        raise ParameterError(f"the series must have shape (samples,) or (samples, states), not {array.shape}.")
+        raise ParameterError(
+            f"the series must have shape (samples,) or (samples, states), not {array.shape}."
+        )
     if embed and array.shape[1] != 1:
         raise ParameterError(
-            f"a delay embedding takes one quantity; this series has {array.shape[1]} columns. Choose one, or leave embed= out."
+            f"a delay embedding takes one quantity; this series has {array.shape[1]} columns. "
+            f"Choose one, or leave embed= out."
         )
     check_length(len(array), 1, 10)
     bad = ~np.isfinite(array).all(axis=1)
     if bad.any():
         raise ParameterError(
-            f"the series isn't finite at {int(bad.sum())} samples (first at {int(bad.argmax())}). Cut it there, or fill the gaps."
+            f"the series isn't finite at {int(bad.sum())} samples (first at {int(bad.argmax())}). "
+            f"Cut it there, or fill the gaps."
         )
     wide = np.ptp(array, axis=0)
     if not (wide > 0).all():
-        raise ParameterError(f"column {int((wide > 0).argmin())} of the series is constant. There is no motion to measure: leave it out.")
+        raise ParameterError(
+            f"column {int((wide > 0).argmin())} of the series is constant. There "
+            f"is no motion to measure: leave it out."
+        )
     return array / wide
 
 
@@ -54,14 +63,21 @@ def interval_of(given: Any, count: int) -> float:
     try:
         times = np.asarray(given, float)
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"sampling_interval is one time, or the times of all {count} samples, not {shown(given)}.") from None
+        raise ParameterError(
+            f"sampling_interval is one time, or the times of all {count} samples, "
+            f"not {shown(given)}."
+        ) from None
     if times.shape != (count,):
-        raise ParameterError(f"sampling_interval is one time, or the times of all {count} samples; this has shape {times.shape}.")
+        raise ParameterError(
+            f"sampling_interval is one time, or the times of all {count} samples; "
+            f"this has shape {times.shape}."
+        )
     steps, interval = np.diff(times), (times[-1] - times[0]) / (count - 1)
     off = np.abs(steps - interval)
     if not off.max() <= EVEN * abs(interval) or not interval > 0:
         raise ParameterError(
-            f"the samples aren't evenly spaced: {steps.min():g} s to {steps.max():g} s between them. Neighbours must move for the same "
+            f"the samples aren't evenly spaced: {steps.min():g} s to {steps.max():g} s between "
+            f"them. Neighbours must move for the same "
             "time: resample the series to even times."
         )
     return float(interval)
@@ -71,11 +87,20 @@ def samples_of(value: Any, interval: float, name: str, least: int = 1) -> int:
     """Samples from a number of them, or a time with its unit; 0 for None."""
     if value is None:
         return 0
-    return max(round(to_si(value, "s", name) / interval), least) if isinstance(value, str) else whole(value, name, least)
+    return (
+        max(round(to_si(value, "s", name) / interval), least)
+        if isinstance(value, str)
+        else whole(value, name, least)
+    )
 
 
 def check_length(count: int, evolve: int, exclude: int) -> None:
-    """Raise ParameterError unless the points give enough evolutions, and neighbours beside those that are excluded."""
+    """Raise ParameterError unless the points give enough evolutions, and neighbours beside those
+    that are excluded.
+    """
     least = max(LEAST_POINTS, 2 * LEAST * evolve, 2 * exclude + LEAST_POINTS)
     if count < least:
-        raise ParameterError(f"{count} points are too few: {least} are the least here, and some thousand are needed for a chaotic motion.")
+        raise ParameterError(
+            f"{count} points are too few: {least} are the least here, and some "
+            f"thousand are needed for a chaotic motion."
+        )

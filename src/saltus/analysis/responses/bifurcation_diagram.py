@@ -1,4 +1,6 @@
-"""`bifurcation_diagram`: steady responses against one parameter, or a map of their types over two."""
+"""`bifurcation_diagram`: steady responses against one parameter, or a map of their
+types over two.
+"""
 
 from __future__ import annotations
 
@@ -34,35 +36,40 @@ def bifurcation_diagram(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """How the steady responses change with a parameter: their turning points, periods, kinds, and what happens to them on the way.
+    """How the steady responses change with a parameter: their turning points, periods, kinds, and
+    what happens to them on the way.
 
     Parameters
     ----------
     system : System
         Any system; one without forcing with ``every``.
     vary : mapping
-        One parameter, or two for a map of types: a range, such as ``{"contact_stiffness": ("1e3 N/m", "1e9 N/m", 2000, "log")}``, or a
-        list or array of values.
+        One parameter, or two for a map of types: a range, such as ``{"contact_stiffness": ("1e3
+        N/m", "1e9 N/m", 2000, "log")}``, or a list or array of values.
     start : sequence, mapping, array or str
         As for :func:`saltus.frequency_response`.
     sample : {"turning_points", "stroboscope", "contacts"}
-        What is kept of each response over one period of its own: ``"turning_points"`` (where the rate of the first state is zero),
-        ``"stroboscope"`` (at whole forcing periods) or ``"contacts"``. Not with two parameters.
+        What is kept of each response over one period of its own: ``"turning_points"`` (where the
+        rate of the first state is zero), ``"stroboscope"`` (at whole forcing periods) or
+        ``"contacts"``. Not with two parameters.
     follow : bool
-        Whether each start goes on, from the lowest value upwards, where it stood at the value before; otherwise each value starts afresh.
+        Whether each start goes on, from the lowest value upwards, where it stood at the value
+        before; otherwise each value starts afresh.
     every : float or str, optional
-        Time between two samples of the motion of a system without forcing [s], about a turn of it. Equilibria, limit cycles, their periods,
-        sizes and stability don't depend on it.
+        Time between two samples of the motion of a system without forcing [s], about a turn of it.
+        Equilibria, limit cycles, their periods, sizes and stability don't depend on it.
     box, values, outputs, method, periods, seed, threads, progress
         As for :func:`saltus.frequency_response`.
 
     Returns
     -------
     Dataset
-        As :func:`saltus.frequency_response` over the parameters in ``vary``, and ``sample_<state>`` on (response, sample), filled up with
-        NaN. Without forcing responses are of type ``equilibrium`` (with ``response_eigenvalue_real`` and ``_imag`` of the Jacobian [1/s]),
-        ``limit_cycle`` (with its period ``response_cycle`` [s] and multipliers, one of which is 1), ``quasi_periodic`` or ``chaotic``;
-        ``response_<state>`` then has points of a limit cycle in equal steps of its time.
+        As :func:`saltus.frequency_response` over the parameters in ``vary``, and ``sample_<state>``
+        on (response, sample), filled up with NaN. Without forcing responses are of type
+        ``equilibrium`` (with ``response_eigenvalue_real`` and ``_imag`` of the Jacobian [1/s]),
+        ``limit_cycle`` (with its period ``response_cycle`` [s] and multipliers, one of which is 1),
+        ``quasi_periodic`` or ``chaotic``; ``response_<state>`` then has points of a limit cycle in
+        equal steps of its time.
 
     Raises
     ------
@@ -85,9 +92,14 @@ def bifurcation_diagram(
     [1, 3, 1, 2]
     """
     if not isinstance(vary, Mapping):
-        raise ParameterError('vary must be a mapping, such as vary={"contact_stiffness": ("1e3 N/m", "1e9 N/m", 200, "log")}.')
+        raise ParameterError(
+            'vary must be a mapping, such as vary={"contact_stiffness": ("1e3 '
+            'N/m", "1e9 N/m", 200, "log")}.'
+        )
     method = check_method(method)
     check_sample(sample, method)
     grid = grid_of(system, vary, start, box, values, seed, follow, every)
     check_unforced_sample(sample, grid.system)
-    return respond(grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "", outputs)
+    return respond(
+        grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "", outputs
+    )

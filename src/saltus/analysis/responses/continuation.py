@@ -1,9 +1,12 @@
-"""Natural continuation: orbits followed from one value of a parameter to another, in steps as short as each of them needs.
+"""Natural continuation: orbits followed from one value of a parameter to another, in steps as short
+as each of them needs.
 
-Newton's method, started on an orbit at the next value, may arrive at another one: of a chaotic motion there are unrelated orbits of every
-period nearby. So a step counts only if it arrives at an orbit of the same period that attracts, not far away. Where the orbit moved by more
-than a little, two steps of half the length must arrive at the same orbit, the middle one about halfway. A step that doesn't count is
-halved; two that do in a row are doubled. Allgower & Georg, Introduction to Numerical Continuation Methods (2003), chapter 6.
+Newton's method, started on an orbit at the next value, may arrive at another one: of a chaotic
+motion there are unrelated orbits of every period nearby. So a step counts only if it arrives at an
+orbit of the same period that attracts, not far away. Where the orbit moved by more than a little,
+two steps of half the length must arrive at the same orbit, the middle one about halfway. A step
+that doesn't count is halved; two that do in a row are doubled. Allgower & Georg, Introduction to
+Numerical Continuation Methods (2003), chapter 6.
 """
 
 from __future__ import annotations
@@ -21,25 +24,34 @@ from saltus.flow.methods import Method
 
 #: Farthest that an orbit moves in one step, in units of its own range.
 LINK = 0.35
-#: An orbit that moves less than this in one step is taken for the same one without a step at the middle.
+#: An orbit that moves less than this in one step is taken for the same one without a step at the
+#: middle.
 SURE = 0.02
-#: Farthest that the middle of a step lies from halfway, in units of the step: 0.21 right at a fold, half if one of the steps is a jump.
+#: Farthest that the middle of a step lies from halfway, in units of the step: 0.21 right at a fold,
+#: half if one of the steps is a jump.
 ASTRAY = 0.25
 #: How often the distance to the target is halved at most, and steps towards it at most.
 HALVINGS, STEPS = 14, 400
-#: Farthest that a response of an inexact method lies from the exact orbit that it stands for, in units of its range.
+#: Farthest that a response of an inexact method lies from the exact orbit that it stands for, in
+#: units of its range.
 INEXACT = 0.05
 
 
-def closed_near(map_: Stroboscope, start: np.ndarray, period: np.ndarray, time: np.ndarray, scale: np.ndarray) -> OrbitBatch:
-    """Orbits of the stroboscope (time NaN), limit cycles and equilibria (time 0) near states float64[k, D], as a map_ has them."""
+def closed_near(
+    map_: Stroboscope, start: np.ndarray, period: np.ndarray, time: np.ndarray, scale: np.ndarray
+) -> OrbitBatch:
+    """Orbits of the stroboscope (time NaN), limit cycles and equilibria (time 0) near states
+    float64[k, D], as a map_ has them.
+    """
     if np.isnan(time).all():
         return find_orbits(map_, start, period, scale, map_.noise_of(scale), max_slow=1)
     return close_again(map_, start, time, scale)
 
 
 def _in_phase(orbits: OrbitBatch, others: OrbitBatch, scale: np.ndarray) -> np.ndarray:
-    """Let each orbit begin with the point that lies by the first of another; how far they are apart, float64[k], inf if they can't be."""
+    """Let each orbit begin with the point that lies by the first of another; how far they are
+    apart, float64[k], inf if they can't be.
+    """
     apart = np.full(len(scale), np.inf)
     for i in np.flatnonzero((orbits.period == others.period) & (orbits.period > 0)):
         n = int(orbits.period[i])
@@ -50,14 +62,16 @@ def _in_phase(orbits: OrbitBatch, others: OrbitBatch, scale: np.ndarray) -> np.n
 
 
 class Follower:
-    """Some periodic orbits, limit cycles or equilibria among the responses of a grid with one axis, each followed on its own.
+    """Some periodic orbits, limit cycles or equilibria among the responses of a grid with one axis,
+    each followed on its own.
 
     Parameters
     ----------
     found : Found
         The responses.
     grid, method, threads
-        As they were computed. Responses of an inexact method are followed by the exact orbits that they stand for.
+        As they were computed. Responses of an inexact method are followed by the exact orbits that
+        they stand for.
     rows : int64[k]
         Which responses.
 
@@ -68,32 +82,48 @@ class Follower:
     value : float64[k]
         The value of the parameter [SI] that it is of.
     step : float64[k]
-        The last step that didn't count, where one as short as steps may be didn't, else the next one [SI].
+        The last step that didn't count, where one as short as steps may be didn't, else the next
+        one [SI].
     narrow : bool[k]
         Whether it was that short.
     known : bool[k]
         Whether there is an exact orbit to follow.
     """
 
-    def __init__(self, found: Found, grid: Grid, method: Method, rows: np.ndarray, threads: int | None = None):
+    def __init__(
+        self, found: Found, grid: Grid, method: Method, rows: np.ndarray, threads: int | None = None
+    ):
         ((name, values),) = grid.axes.items()
         self._column = list(grid.system.values).index(name)
         self._map = Stroboscope(
-            grid.system, method if method.exact else method.companion(), grid.rows[found.place[rows]], grid.every, threads
+            grid.system,
+            method if method.exact else method.companion(),
+            grid.rows[found.place[rows]],
+            grid.every,
+            threads,
         )
         self._every = grid.every
         self._scale = found.motions.scale[found.row[rows]]
-        self.orbits, self.value = found.motions.orbits.rows(found.row[rows]), values[found.place[rows]]
-        self.step, self.narrow, self.known = np.zeros(len(rows)), np.zeros(len(rows), bool), np.ones(len(rows), bool)
+        self.orbits, self.value = (
+            found.motions.orbits.rows(found.row[rows]),
+            values[found.place[rows]],
+        )
+        self.step, self.narrow, self.known = (
+            np.zeros(len(rows)),
+            np.zeros(len(rows), bool),
+            np.ones(len(rows), bool),
+        )
         if not method.exact and len(rows):
             exact, apart = self._near(np.arange(len(rows)), self.value, self.orbits)
             self.known = apart < INEXACT
             self.orbits.put(np.flatnonzero(self.known), exact.rows(self.known))
 
     def to(self, target: np.ndarray, which: np.ndarray, halvings: int = HALVINGS) -> np.ndarray:
-        """Follow those of ``which``, bool[k], to values float64[k] while they attract; which arrive, bool[k].
+        """Follow those of ``which``, bool[k], to values float64[k] while they attract; which
+        arrive, bool[k].
 
-        The others stay at the last value that they were followed to. The distance is halved a limited number of times.
+        The others stay at the last value that they were followed to. The distance is halved a
+        limited number of times.
         """
         going, in_a_row = which & self.known, np.zeros(len(which), np.int64)
         self.step = np.where(going, target - self.value, self.step)
@@ -107,14 +137,20 @@ class Follower:
             counts = self._try(rows, np.where(step == left, target[rows], self.value[rows] + step))
             in_a_row[rows] = np.where(counts, in_a_row[rows] + 1, 0)
             self.narrow[rows] = ~counts & (np.abs(step) < 1.5 * least[rows])
-            factor = np.where(counts, np.where(in_a_row[rows] > 1, 2.0, 1.0), np.where(self.narrow[rows], 1.0, 0.5))
+            factor = np.where(
+                counts,
+                np.where(in_a_row[rows] > 1, 2.0, 1.0),
+                np.where(self.narrow[rows], 1.0, 0.5),
+            )
             self.step[rows] = factor * step
             going[rows] = (self.value[rows] != target[rows]) & ~self.narrow[rows]
             self._measure(rows[counts & going[rows]])
         return np.asarray(which & self.known & (self.value == target))
 
     def at(self, rows: np.ndarray, value: np.ndarray) -> tuple[OrbitBatch, np.ndarray]:
-        """What Newton's method finds near some rows int64[m] at values float64[m], and which of it is the same orbit, moved, bool[m]."""
+        """What Newton's method finds near some rows int64[m] at values float64[m], and which of it
+        is the same orbit, moved, bool[m].
+        """
         found, apart = self._near(rows, value, self.orbits.rows(rows))
         return found, apart < LINK
 
@@ -123,17 +159,25 @@ class Follower:
         n = int(self.orbits.period[row])
         return orbit_distance(self.orbits.points[row, :n], points, self._scale[row])
 
-    def _near(self, rows: np.ndarray, value: np.ndarray, orbits: OrbitBatch) -> tuple[OrbitBatch, np.ndarray]:
-        """The orbits at values float64[m] that Newton's method finds from others, in phase with these, and how far these lie apart."""
+    def _near(
+        self, rows: np.ndarray, value: np.ndarray, orbits: OrbitBatch
+    ) -> tuple[OrbitBatch, np.ndarray]:
+        """The orbits at values float64[m] that Newton's method finds from others, in phase with
+        these, and how far these lie apart.
+        """
         scale = self._scale[rows]
-        arrived = closed_near(self._at(rows, value), orbits.points[:, 0], orbits.period, orbits.time, scale)
+        arrived = closed_near(
+            self._at(rows, value), orbits.points[:, 0], orbits.period, orbits.time, scale
+        )
         return arrived, _in_phase(arrived, orbits, scale)
 
     def _at(self, rows: np.ndarray, value: np.ndarray) -> Stroboscope:
         """The maps of some rows at other values of the parameter."""
         parameters = self._map.parameters[rows]
         parameters[:, self._column] = value
-        return Stroboscope(self._map.system, self._map.method, parameters, self._every, self._map.threads)
+        return Stroboscope(
+            self._map.system, self._map.method, parameters, self._every, self._map.threads
+        )
 
     def _try(self, rows: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Go on to values float64[m] where the step counts; where it did, bool[m]."""
@@ -142,20 +186,35 @@ class Follower:
         counts = there.stable & (moved < LINK)
         unsure = np.flatnonzero(counts & (moved > SURE))
         if len(unsure):
-            counts[unsure] = self._by_halves(rows[unsure], value[unsure], here.rows(unsure), there.rows(unsure), moved[unsure])
+            counts[unsure] = self._by_halves(
+                rows[unsure], value[unsure], here.rows(unsure), there.rows(unsure), moved[unsure]
+            )
         self.orbits.put(rows[counts], there.rows(counts))
         self.value[rows[counts]] = value[counts]
         return counts
 
-    def _by_halves(self, rows: np.ndarray, value: np.ndarray, here: OrbitBatch, there: OrbitBatch, moved: np.ndarray) -> np.ndarray:
-        """Whether two steps of half the length arrive where one does, the middle one about halfway, bool[m]."""
+    def _by_halves(
+        self,
+        rows: np.ndarray,
+        value: np.ndarray,
+        here: OrbitBatch,
+        there: OrbitBatch,
+        moved: np.ndarray,
+    ) -> np.ndarray:
+        """Whether two steps of half the length arrive where one does, the middle one about halfway,
+        bool[m].
+        """
         middle, apart = self._near(rows, 0.5 * (self.value[rows] + value), here)
         off = np.abs(middle.points - 0.5 * (here.points + there.points)) / self._scale[rows, None]
-        astray = np.nan_to_num(off).max(axis=(1, 2))  # beyond the last point of each there is nothing
+        # beyond the last point of each there is nothing
+        astray = np.nan_to_num(off).max(axis=(1, 2))
         right = np.flatnonzero(middle.stable & (apart < LINK) & (astray <= ASTRAY * moved))
         if len(right):
             again, _ = self._near(rows[right], value[right], middle.rows(right))
-            right = right[again.stable & (_in_phase(again, there.rows(right), self._scale[rows[right]]) < SAME)]
+            right = right[
+                again.stable
+                & (_in_phase(again, there.rows(right), self._scale[rows[right]]) < SAME)
+            ]
         result = np.zeros(len(rows), bool)
         result[right] = True
         return result
@@ -165,7 +224,9 @@ class Follower:
         if not len(rows):
             return
         if self._every is None:
-            self._scale[rows] = motion_range(self._at(rows, self.value[rows]), self.orbits.points[rows, 0])
+            self._scale[rows] = motion_range(
+                self._at(rows, self.value[rows]), self.orbits.points[rows, 0]
+            )
         else:
             turning = rows[self.orbits.time[rows] > 0]
             self._scale[turning] = np.ptp(self.orbits.points[turning], axis=1)

@@ -1,4 +1,6 @@
-"""Where every response of a grid goes from its value of the parameter: up and down, to the next value and on."""
+"""Where every response of a grid goes from its value of the parameter: up and down, to the next
+value and on.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from saltus.results.dataset.kinds import CLOSED
 
 #: Values over which a response is followed at most to meet one that was found.
 FARTHEST = 16
-#: How often the distance to a value beyond the next is halved: where the branch ends there isn't asked.
+#: How often the distance to a value beyond the next is halved: where the branch ends there isn't
+#: asked.
 COARSE = 6
 #: Directions.
 WAYS = (+1, -1)
@@ -27,7 +30,8 @@ class Followed:
     follower : Follower
         Those that aren't followed to the next value stand where they were followed to.
     goes_on : bool[k]
-        Which are followed to the next value: each in both directions. None of an inexact method is, though its exact orbit may be.
+        Which are followed to the next value: each in both directions. None of an inexact method is,
+        though its exact orbit may be.
     met : int64[k]
         The first response that each becomes; -1 where it becomes none.
     """
@@ -42,15 +46,30 @@ class Followed:
         self._near = SAME if method.exact else INEXACT
         arrived = self._follow(found, grid, rows, ways, 1, np.ones(len(rows), bool))
         self.goes_on = arrived & method.exact
-        last = np.array([_last(found, int(row), int(way)) for row, way in zip(rows, ways, strict=True)], np.int64)
+        last = np.array(
+            [_last(found, int(row), int(way)) for row, way in zip(rows, ways, strict=True)],
+            np.int64,
+        )
         for ahead in range(2, int(last.max(initial=0)) + 1):
-            arrived = self._follow(found, grid, rows, ways, ahead, arrived & (self.met < 0) & (ahead <= last))
+            arrived = self._follow(
+                found, grid, rows, ways, ahead, arrived & (self.met < 0) & (ahead <= last)
+            )
 
     def index(self, responses: np.ndarray, way: int) -> np.ndarray:
-        """Where responses int64[m], followed up (way 1) or down (-1), stand in the arrays int64[m]; -1 for what never repeats."""
+        """Where responses int64[m], followed up (way 1) or down (-1), stand in the arrays int64[m];
+        -1 for what never repeats.
+        """
         return np.asarray(self._index[WAYS.index(way), responses])
 
-    def _follow(self, found: Found, grid: Grid, rows: np.ndarray, ways: np.ndarray, ahead: int, which: np.ndarray) -> np.ndarray:
+    def _follow(
+        self,
+        found: Found,
+        grid: Grid,
+        rows: np.ndarray,
+        ways: np.ndarray,
+        ahead: int,
+        which: np.ndarray,
+    ) -> np.ndarray:
         """Follow some on to a value ahead, and note what they meet there; which arrive, bool[k]."""
         (values,) = grid.axes.values()
         place = found.place[rows] + ahead * ways
@@ -60,7 +79,11 @@ class Followed:
             HALVINGS if ahead == 1 else COARSE,
         )
         for i in np.flatnonzero(arrived):
-            others = [int(other) for other in _alike(found, int(rows[i])) if found.place[other] == place[i]]
+            others = [
+                int(other)
+                for other in _alike(found, int(rows[i]))
+                if found.place[other] == place[i]
+            ]
             apart = [self.follower.beside(int(i), found.points(other)) for other in others]
             if min(apart, default=np.inf) < self._near:
                 self.met[i] = others[int(np.argmin(apart))]
@@ -69,7 +92,9 @@ class Followed:
 
 def _alike(found: Found, response: int) -> np.ndarray:
     """The responses of the kind and period of one, int64[n]."""
-    return np.flatnonzero((found.kind == found.kind[response]) & (found.period == found.period[response]))
+    return np.flatnonzero(
+        (found.kind == found.kind[response]) & (found.period == found.period[response])
+    )
 
 
 def _last(found: Found, response: int, way: int) -> int:

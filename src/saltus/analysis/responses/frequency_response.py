@@ -1,4 +1,6 @@
-"""`frequency_response`: all steady responses against the forcing frequency, each branch kept apart."""
+"""`frequency_response`: all steady responses against the forcing frequency, each
+branch kept apart.
+"""
 
 from __future__ import annotations
 
@@ -32,21 +34,25 @@ def frequency_response(
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Steady responses against the forcing frequency: which there are, and which start leads to which.
+    """Steady responses against the forcing frequency: which there are, and which start leads to
+    which.
 
-    Every start is followed at every frequency until it has settled on an orbit that is closed by Newton's method and attracts by its
-    Floquet multipliers; what never repeats is typed by its largest Lyapunov exponent. Coexisting responses are distinguished by their orbits,
-    not by their amplitudes, and followed from frequency to frequency as branches.
+    Every start is followed at every frequency until it has settled on an orbit that is closed by
+    Newton's method and attracts by its Floquet multipliers; what never repeats is typed by its
+    largest Lyapunov exponent. Coexisting responses are distinguished by their orbits, not by their
+    amplitudes, and followed from frequency to frequency as branches.
 
     Parameters
     ----------
     system : System
         A forced system.
     frequency : (first, last, count), (first, last, count, "log"), or a list or array of values
-        Forcing frequencies: text with a unit, or numbers in the unit of the system's parameter [Hz, or rad/s where it says so].
+        Forcing frequencies: text with a unit, or numbers in the unit of the system's parameter [Hz,
+        or rad/s where it says so].
     start : sequence, mapping, array or str
-        Starts as for :func:`saltus.simulate`, one or many, the same at every frequency; ``"random 20"`` with ``box``; ``"sweep_up"`` or
-        ``"sweep_down"``: from rest, then at each frequency from where the last one ended, as in an experiment. Default: at rest.
+        Starts as for :func:`saltus.simulate`, one or many, the same at every frequency; ``"random
+        20"`` with ``box``; ``"sweep_up"`` or ``"sweep_down"``: from rest, then at each frequency
+        from where the last one ended, as in an experiment. Default: at rest.
     box : mapping, optional
         Range (low, high) of each state for random starts.
     follow : bool
@@ -54,8 +60,9 @@ def frequency_response(
     values : mapping, optional
         Other values of parameters.
     outputs : mapping of str to callable, or to (callable, unit), optional
-        What to read off each response besides the states: functions of (t, states, parameters), their arguments found by name, such as
-        ``{"acceleration": (lambda x, v, k, c, m: -(k*x + c*v)/m, "m/s^2")}``. Comparisons that are contacts of the system read their sides.
+        What to read off each response besides the states: functions of (t, states, parameters),
+        their arguments found by name, such as ``{"acceleration": (lambda x, v, k, c, m: -(k*x +
+        c*v)/m, "m/s^2")}``. Comparisons that are contacts of the system read their sides.
     method : Method
         Default :class:`saltus.Taylor`.
     periods : int
@@ -70,15 +77,19 @@ def frequency_response(
     Returns
     -------
     Dataset
-        Dims: the frequency parameter, ``start``, ``response``, ``multiplier``, ``phase``, ``event``. On (frequency, start):
-        ``response_of``, ``rms``, ``peak``, ``period``, ``type``, ``contacts_per_period``. On response: ``response_<parameter>``,
-        ``response_branch``, ``response_type``, ``response_period``, ``response_rms``, ``response_peak``, ``response_margin``, multipliers,
-        exponent, stroboscopic points, and for random starts ``response_share`` with its 95 % Wilson interval. ``event_kind`` and
-        ``event_branch`` tell what happens to branches between two frequencies. On (response, output): ``output_maximum``, ``_minimum``,
-        ``_peak``, ``_peak_to_peak``, ``_mean``, ``_rms``, ``_rms_about_mean`` of every state and output, over whole responses (64 forcing
-        periods of one that never repeats), and ``output_amplitude``, ``output_phase`` [rad] of the first harmonic: A cos(2 pi f t + phase),
-        f the forcing frequency and t the time of the equations, also where the response repeats after several periods only.
-        Turning points are located and means exact: nothing comes from samples.
+        Dims: the frequency parameter, ``start``, ``response``, ``multiplier``, ``phase``,
+        ``event``. On (frequency, start): ``response_of``, ``rms``, ``peak``, ``period``, ``type``,
+        ``contacts_per_period``. On response: ``response_<parameter>``, ``response_branch``,
+        ``response_type``, ``response_period``, ``response_rms``, ``response_peak``,
+        ``response_margin``, multipliers, exponent, stroboscopic points, and for random starts
+        ``response_share`` with its 95 % Wilson interval. ``event_kind`` and ``event_branch`` tell
+        what happens to branches between two frequencies. On (response, output): ``output_maximum``,
+        ``_minimum``, ``_peak``, ``_peak_to_peak``, ``_mean``, ``_rms``, ``_rms_about_mean`` of
+        every state and output, over whole responses (64 forcing periods of one that never repeats),
+        and ``output_amplitude``, ``output_phase`` [rad] of the first harmonic: A cos(2 pi f t +
+        phase), f the forcing frequency and t the time of the equations, also where the response
+        repeats after several periods only. Turning points are located and means exact: nothing
+        comes from samples.
 
     Raises
     ------
@@ -89,20 +100,25 @@ def frequency_response(
 
     References
     ----------
-    Nayfeh & Balachandran, Applied Nonlinear Dynamics (1995), chapters 3 and 5; Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212.
+    Nayfeh & Balachandran, Applied Nonlinear Dynamics (1995), chapters 3 and 5; Wilson, J. Am. Stat.
+    Assoc. 22 (1927) 209-212.
 
     Examples
     --------
     >>> import saltus as sl
     >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
-    >>> responses = sl.frequency_response(rig, frequency=("15 Hz", "18 Hz", 4), start={"x": ["0 mm", "5 mm"], "v": 0})
-    >>> responses["response_frequency"].values.tolist(), responses["response_branch"].values.tolist()
-    ([15.0, 15.0, 16.0, 16.0, 17.0, 18.0], [0, 1, 0, 1, 1, 1])
+    >>> start = {"x": ["0 mm", "5 mm"], "v": 0}
+    >>> responses = sl.frequency_response(rig, frequency=("15 Hz", "18 Hz", 4), start=start)
+    >>> responses["response_frequency"].values.tolist()
+    [15.0, 15.0, 16.0, 16.0, 17.0, 18.0]
+    >>> responses["response_branch"].values.tolist()
+    [0, 1, 0, 1, 1, 1]
     """
     check_system(system)
     if system.forced_at is None:
         raise ParameterError(
-            f"{system.name} has no forcing, so no frequency to vary. Take sl.bifurcation_diagram over another parameter, with every=; "
+            f"{system.name} has no forcing, so no frequency to vary. Take sl.bifurcation_diagram "
+            f"over another parameter, with every=; "
             "if a parameter is the frequency of a forcing, declare forced_at= in @sl.system."
         )
     grid = grid_of(system, {system.forced_at: frequency}, start, box, values, seed, follow)

@@ -1,4 +1,6 @@
-"""A grid of parameter values, and starts that are followed at each: what frequency responses and bifurcation diagrams run over."""
+"""A grid of parameter values, and starts that are followed at each: what frequency responses and
+bifurcation diagrams run over.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +72,9 @@ class Grid:
         """Parameter values at every point of the grid, float64[places, P]."""
         names = list(self.system.values)
         rows = np.tile(np.array(list(self.system.values.values())), (self.places, 1))
-        for name, column in zip(self.axes, np.meshgrid(*self.axes.values(), indexing="ij"), strict=True):
+        for name, column in zip(
+            self.axes, np.meshgrid(*self.axes.values(), indexing="ij"), strict=True
+        ):
             rows[:, names.index(name)] = column.ravel()
         return rows
 
@@ -80,7 +84,14 @@ class Grid:
 
 
 def grid_of(
-    system: System, axes: Mapping[str, Any], start: Any, box: Any, values: Any, seed: int, follow: bool | None, every: Any = None
+    system: System,
+    axes: Mapping[str, Any],
+    start: Any,
+    box: Any,
+    values: Any,
+    seed: int,
+    follow: bool | None,
+    every: Any = None,
 ) -> Grid:
     """A grid from what users write, checked.
 
@@ -89,7 +100,8 @@ def grid_of(
     system : System
         Its values, but for those in ``values``, are those of the parameters that don't vary.
     axes : mapping
-        For each parameter a range (first, last, count) or (first, last, count, "log"), or a list or array of values.
+        For each parameter a range (first, last, count) or (first, last, count, "log"), or a list or
+        array of values.
     start : sequence, mapping, array or str
         As for :func:`saltus.simulate`; ``"random 20"``; ``"sweep_up"`` or ``"sweep_down"``.
     box : mapping or None
@@ -123,22 +135,30 @@ def grid_of(
     if follow:
         sweeps = sweeps or ("up",) * len(starts)
     if sweeps and len(points) > 1:
-        raise ParameterError("a sweep follows one parameter; this grid has two. Leave follow= and sweeps out.")
+        raise ParameterError(
+            "a sweep follows one parameter; this grid has two. Leave follow= and sweeps out."
+        )
     grid = Grid(system, points, starts, sweeps, drawn, seconds)
     check_room(
-        grid.places * (len(starts) * (400.0 + RESPONSE * len(system.states)) + 16.0 * len(system.values)),
+        grid.places
+        * (len(starts) * (400.0 + RESPONSE * len(system.states)) + 16.0 * len(system.values)),
         f"{grid.places} values with {len(starts)} starts each",
         "Take a coarser grid or fewer starts.",
     )
     corners = {name: np.array([column.min(), column.max()]) for name, column in points.items()}
-    ensemble(system, np.zeros(len(system.states)), corners)  # ranges and periodicity of the forcing are checked there
+    # ranges and periodicity of the forcing are checked there
+    ensemble(system, np.zeros(len(system.states)), corners)
     return grid
 
 
 def axis(system: System, name: str, given: Any) -> np.ndarray:
-    """Values along one parameter [SI], ascending, from (first, last, count[, scale]) or a list or array of values."""
+    """Values along one parameter [SI], ascending, from (first, last, count[, scale]) or a list or
+    array of values.
+    """
     if name not in system.values:
-        raise ParameterError(f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}")
+        raise ParameterError(
+            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
+        )
     example = f"{name}=({_text(system, name, 0.5)}, {_text(system, name, 2.0)}, 200)"
     values = along(name, given, lambda value: single(system, name, value), "values", example)
     if not len(values) or not np.isfinite(values).all() or not (np.diff(values) > 0).all():
@@ -147,41 +167,65 @@ def axis(system: System, name: str, given: Any) -> np.ndarray:
 
 
 def _text(system: System, name: str, factor: float) -> str:
-    """A multiple of a parameter's value as it is written in Python; of 1 where the value is zero."""
+    """A multiple of a parameter's value as it is written in Python; of 1 where the
+    value is zero.
+    """
     value = factor * (system.values[name] or 1.0)
-    return repr(from_si(value, system.units[name])) if system.units[name] not in ("", "1") else f"{value:g}"
+    return (
+        repr(from_si(value, system.units[name]))
+        if system.units[name] not in ("", "1")
+        else f"{value:g}"
+    )
 
 
-def _starts(system: System, start: Any, box: Any, seed: int) -> tuple[np.ndarray, tuple[str, ...], bool]:
+def _starts(
+    system: System, start: Any, box: Any, seed: int
+) -> tuple[np.ndarray, tuple[str, ...], bool]:
     """Starts, the directions of their sweeps, and whether they are random."""
     if isinstance(start, str) and start in SWEEPS:
         return np.zeros((1, len(system.states))), (SWEEPS[start],), False
     if isinstance(start, str):
         word, _, number = start.partition(" ")
         if word != "random" or not re.fullmatch("0*[1-9][0-9]{0,11}", number.strip()):
-            raise ParameterError(f"start={shown(start)} isn't known. {nearest(start, (*SWEEPS, 'random 20'))} Or give states.")
+            raise ParameterError(
+                f"start={shown(start)} isn't known. "
+                f"{nearest(start, (*SWEEPS, 'random 20'))} Or give states."
+            )
         return _random(system, int(number), box, seed), (), True
     if box is not None:
         raise ParameterError('box= is for random starts: start="random 20".')
-    return ensemble(system, np.zeros(len(system.states)) if start is None else start, None).start, (), False
+    return (
+        ensemble(system, np.zeros(len(system.states)) if start is None else start, None).start,
+        (),
+        False,
+    )
 
 
 def _random(system: System, count: int, box: Any, seed: int) -> np.ndarray:
     """Starts uniform in a box; states without a range start at zero."""
     if not isinstance(box, Mapping) or not box:
-        example = ", ".join(f'"{name}": ("-1 {system.units[name]}", "1 {system.units[name]}")' for name in system.states[:2])
+        example = ", ".join(
+            f'"{name}": ("-1 {system.units[name]}", "1 {system.units[name]}")'
+            for name in system.states[:2]
+        )
         raise ParameterError(f"random starts need a box to be drawn from: box={{{example}}}.")
     unit = np.random.default_rng(whole(seed, "seed", 0)).random((count, len(system.states)))
     starts = np.zeros((count, len(system.states)))
     for name, ends in box.items():
         if name not in system.states:
-            raise ParameterError(f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}")
+            raise ParameterError(
+                f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}"
+            )
         try:
             low, high = (to_si(end, system.units[name], name) for end in ends)
         except (TypeError, ValueError):
-            raise ParameterError(f"the range of {name} must be (low, high), not {shown(ends)}.") from None
+            raise ParameterError(
+                f"the range of {name} must be (low, high), not {shown(ends)}."
+            ) from None
         if not (np.isfinite([low, high]).all() and low < high):
-            raise ParameterError(f"the range of {name} must ascend and be finite, not {shown(ends)}.")
+            raise ParameterError(
+                f"the range of {name} must ascend and be finite, not {shown(ends)}."
+            )
         column = system.states.index(name)
         starts[:, column] = low + (high - low) * unit[:, column]
     return starts

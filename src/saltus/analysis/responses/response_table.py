@@ -1,4 +1,6 @@
-"""From a grid to the Dataset of its responses: what `frequency_response` and `bifurcation_diagram` share."""
+"""From a grid to the Dataset of its responses: what `frequency_response` and `bifurcation_diagram`
+share.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ def respond(
     sample: str = "",
     outputs: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
-    """The Dataset of a grid's responses. Raises Interrupted, with the Dataset of what is known, on Ctrl-C."""
+    """The Dataset of a grid's responses. Raises Interrupted, with the Dataset of what is known, on
+    Ctrl-C.
+    """
     method, periods = check_method(method), whole(periods, "periods")
     wanted = outputs_of(grid.system, outputs)
     with reporting(progress) as show:
@@ -45,7 +49,15 @@ def respond(
     return _dataset(grid, method, periods, found, threads, sample, wanted)
 
 
-def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: int | None, sample: str, outputs: Outputs) -> xr.Dataset:
+def _dataset(
+    grid: Grid,
+    method: Method,
+    periods: int,
+    found: Found,
+    threads: int | None,
+    sample: str,
+    outputs: Outputs,
+) -> xr.Dataset:
     numbers = numbers_of(found, outputs, grid, method, threads)
     table = table_of(found, numbers, grid, method)
     branch, happened = np.full(len(found), -1, np.int64), []
@@ -57,7 +69,9 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
     fixed = {key: value for key, value in system.values.items() if key not in grid.axes}
     varied = dict(zip(grid.axes, np.meshgrid(*grid.axes.values(), indexing="ij"), strict=True))
     place = np.unravel_index(found.place, grid.shape)
-    at = {name: values[index] for (name, values), index in zip(grid.axes.items(), place, strict=True)}
+    at = {
+        name: values[index] for (name, values), index in zip(grid.axes.items(), place, strict=True)
+    }
     values = {
         "<parameter>": grid.axes,
         "start": np.arange(len(grid.starts)),
@@ -68,14 +82,24 @@ def _dataset(grid: Grid, method: Method, periods: int, found: Found, threads: in
         "output": list(outputs.names),
         "output_units": list(outputs.units),
         **{f"output_{name}": column for name, column in numbers.by_name().items()},
-        **({"sample_<state>": padded(sampled(sample, numbers, grid, method, found, threads), size)} if sample else {}),
-        **(_events(happened, grid) if len(table) else {}),  # netCDF-3 has room for one empty dim only
+        **(
+            {"sample_<state>": padded(sampled(sample, numbers, grid, method, found, threads), size)}
+            if sample
+            else {}
+        ),
+        # netCDF-3 has room for one empty dim only
+        **(_events(happened, grid) if len(table) else {}),
     }
     output = outputs.units[0] if len(set(outputs.units)) == 1 else ""
     words = {"<when>": table.points_when, "<output>": output, "<sampled>": SAMPLES.get(sample, "")}
-    attrs = provenance(system, method, fixed, grid.axes) | {"periods": periods, "random_starts": int(grid.drawn)}
+    attrs = provenance(system, method, fixed, grid.axes) | {
+        "periods": periods,
+        "random_starts": int(grid.drawn),
+    }
     about = subject(
-        system, attrs | ({"sample": sample} if sample else {}), guards_over(system, fixed | varied, grid.shape) if system.guards else None
+        system,
+        attrs | ({"sample": sample} if sample else {}),
+        guards_over(system, fixed | varied, grid.shape) if system.guards else None,
     )
     return build(schema.RESPONSES, about, values, grid=tuple(grid.axes), words=words)
 
@@ -86,5 +110,7 @@ def _events(happened: list[Event], grid: Grid) -> dict[str, Any]:
         "event": np.arange(len(happened)),
         "event_kind": [event.kind for event in happened],
         "event_branch": np.array([event.branch for event in happened], np.int64),
-        "event_<parameter>": {name: np.array([event.value for event in happened], float) for name in grid.axes},
+        "event_<parameter>": {
+            name: np.array([event.value for event in happened], float) for name in grid.axes
+        },
     }

@@ -1,4 +1,6 @@
-"""What a bifurcation diagram shows of each response: where it turns, where it is at whole periods, or where it meets a boundary."""
+"""What a bifurcation diagram shows of each response: where it turns, where it is at whole periods,
+or where it meets a boundary.
+"""
 
 from __future__ import annotations
 
@@ -25,30 +27,48 @@ def check_sample(sample: str, method: Method) -> str:
     if not among(sample, SAMPLES):
         raise ParameterError(f"sample={shown(sample)} isn't known. {nearest(sample, SAMPLES)}")
     if sample == "contacts" and not method.records_contacts:
-        raise ParameterError(f'{method.name} with events="ignore" locates no contacts. Take sample="turning_points".')
+        raise ParameterError(
+            f'{method.name} with events="ignore" locates no contacts. Take sample="turning_points".'
+        )
     return sample
 
 
 def check_unforced_sample(sample: str, system: System) -> None:
     """Raises ParameterError if a system without forcing can't show it."""
     if sample == "stroboscope" and system.forced_at is None:
-        raise ParameterError(f'{system.name} has no forcing period: it has no stroboscope. Take sample="turning_points" or "contacts".')
+        raise ParameterError(
+            f"{system.name} has no forcing period: it has no stroboscope. Take "
+            f'sample="turning_points" or "contacts".'
+        )
 
 
-def sampled(sample: str, numbers: Measures, grid: Grid, method: Method, found: Found, threads: int | None = None) -> list[np.ndarray]:
-    """The sampled states of each response, float64[n, D], over one period of a response, or many of one that never repeats."""
+def sampled(
+    sample: str,
+    numbers: Measures,
+    grid: Grid,
+    method: Method,
+    found: Found,
+    threads: int | None = None,
+) -> list[np.ndarray]:
+    """The sampled states of each response, float64[n, D], over one period of a response, or many of
+    one that never repeats.
+    """
     spans = np.where(found.period > 0, spans_of(found), APERIODIC_PERIODS)
     if sample == "stroboscope":
         return [found.points(i)[:span] for i, span in enumerate(spans)]
     if sample == "turning_points":
         return numbers.turning
     start, result = found.start(), [np.zeros((0, len(grid.system.states)))] * len(found)
-    everything = Stroboscope(grid.system, method, grid.rows[found.place], own_times(found, grid), threads)
+    everything = Stroboscope(
+        grid.system, method, grid.rows[found.place], own_times(found, grid), threads
+    )
     for span in np.unique(spans):
         rows = np.flatnonzero(spans == span)
         for first in range(0, len(rows), PIECE):
             some = rows[first : first + PIECE]
-            parts = _crossings(everything.rows(some).run(start[some], int(span), record=0), len(some))
+            parts = _crossings(
+                everything.rows(some).run(start[some], int(span), record=0), len(some)
+            )
             for row, part in zip(some, parts, strict=True):
                 result[row] = part
     return result

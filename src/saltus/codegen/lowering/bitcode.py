@@ -1,4 +1,6 @@
-"""One module of the templates as bitcode: made smaller by what doesn't depend on sizes or on the processor, with names for people."""
+"""One module of the templates as bitcode: made smaller by what doesn't depend on sizes or on the
+processor, with names for people.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +8,22 @@ import re
 
 import llvmlite.binding as llvm
 
-#: Functions that run at breaks of time, touches, starts and ends only: LLVM takes no trouble over them, a quarter of its time saved.
+#: Functions that run at breaks of time, touches, starts and ends only: LLVM takes no trouble over
+#: them, a quarter of its time saved.
 COLD = {
-    "place_clocks", "set_clocks", "follow_clocks", "first_guess", "begin_of", "hold_piece", "hold_polynomial", "on_from_to", "knots",
-    "knot", "repeats", "is_cyclic", "rate_of", "place_of", "place_at_base", "turned", "two_product", "touches_exactly", "touch_error",
-    "note_touch", "note_touches", "is_exact_zero", "final_contacts", "start_sides", "fill", "empty", "refill", "set_period", "is_broken",
+    "place_clocks", "set_clocks", "follow_clocks", "first_guess", "begin_of", "hold_piece",
+    "hold_polynomial", "on_from_to", "knots",
+    "knot", "repeats", "is_cyclic", "rate_of", "place_of", "place_at_base", "turned", "two_product",
+    "touches_exactly", "touch_error",
+    "note_touch", "note_touches", "is_exact_zero", "final_contacts", "start_sides", "fill", "empty",
+    "refill", "set_period", "is_broken",
     "record", "saltate", "overflowed", "end_stretch", "is_slow", "periods_behind", "write_samples",
 }  # fmt: skip
-#: Functions of lanes that few equations need: never inlined, so that they are out of the way of the others.
+#: Functions of lanes that few equations need: never inlined, so that they are out of the way of the
+#: others.
 NOINLINE = {"probed", "look_ahead", "negligible_step", "add_what_was_left_out"}
-#: Functions that run once a contact: inlined only where LLVM's cost model says so. Always would take time to compile, and gain none.
+#: Functions that run once a contact: inlined only where LLVM's cost model says so. Always would
+#: take time to compile, and gain none.
 _BY_COST_MODEL = {"attend", "change_side", "land_all"}
 _MANGLED = re.compile(r"_ZN8template(\d+)(\w+)")
 
@@ -30,13 +38,17 @@ def bitcode(module: llvm.ModuleRef, entry: str, symbol: str, inlined: set[str]) 
     entry : str
         Its function that is to be called.
     symbol : str
-        Name that this function gets. Its arguments are read one after the other from the memory that it is given.
+        Name that this function gets. Its arguments are read one after the other from the memory
+        that it is given.
     inlined : set of str
         Functions that are to be inlined, by the names that they have in the templates.
     """
     names = _names(module, symbol)
-    text = str(module).replace("alwaysinline", "nounwind")  # Numba hands it down from callers to callees; kernels raise nothing
-    text = re.sub(r'@("[^"]+"|[\w.$]+)', lambda name: f"@{names.get(name[1].strip(chr(34)), name[1])}", text)
+    # Numba hands it down from callers to callees; kernels raise nothing
+    text = str(module).replace("alwaysinline", "nounwind")
+    text = re.sub(
+        r'@("[^"]+"|[\w.$]+)', lambda name: f"@{names.get(name[1].strip(chr(34)), name[1])}", text
+    )
     clean = llvm.parse_assembly(text + _caller(module.get_function(entry), symbol, names[entry]))
     for function in clean.functions:
         if not function.is_declaration:
@@ -63,21 +75,31 @@ def _advise(function: llvm.ValueRef, inlined: set[str]) -> None:
 
 
 def _names(module: llvm.ModuleRef, symbol: str) -> dict[str, str]:
-    """What the functions of a module are called from now on: their name in the templates, and a number."""
+    """What the functions of a module are called from now on: their name in the templates, and a
+    number.
+    """
     names = {}
     for i, function in enumerate(module.functions):
         if not function.is_declaration:
             own = _MANGLED.match(function.name)
-            names[function.name] = f"{symbol}.{own[2][: int(own[1])]}.{i}" if own else f"{symbol}.numba.{i}"
+            names[function.name] = (
+                f"{symbol}.{own[2][: int(own[1])]}.{i}" if own else f"{symbol}.numba.{i}"
+            )
     return names
 
 
 def _caller(function: llvm.ValueRef, symbol: str, name: str) -> str:
-    """``i64 symbol(ptr values)``: calls a function of Numba's with arguments that stand one after the other in memory; -1 if it fails."""
-    kinds = [str(argument.type) for argument in function.arguments][2:]  # its result, an exception, and its arguments
+    """``i64 symbol(ptr values)``: calls a function of Numba's with arguments that stand one after
+    the other in memory; -1 if it fails.
+    """
+    # its result, an exception, and its arguments
+    kinds = [str(argument.type) for argument in function.arguments][2:]
     lines = ["%result = alloca i64", "%raised = alloca ptr"]
     for i, kind in enumerate(kinds):
-        lines += [f"%p{i} = getelementptr i64, ptr %values, i64 {i}", f"%a{i} = load {kind}, ptr %p{i}"]
+        lines += [
+            f"%p{i} = getelementptr i64, ptr %values, i64 {i}",
+            f"%a{i} = load {kind}, ptr %p{i}",
+        ]
     given = "".join(f", {kind} %a{i}" for i, kind in enumerate(kinds))
     lines += [
         f"%code = call i32 @{name}(ptr %result, ptr %raised{given})",
@@ -86,7 +108,11 @@ def _caller(function: llvm.ValueRef, symbol: str, name: str) -> str:
         "%answer = select i1 %fine, i64 %value, i64 -1",
         "ret i64 %answer",
     ]
-    return f"\ndefine i64 @{symbol}(ptr %values) {{\n" + "\n".join(f"  {line}" for line in lines) + "\n}\n"
+    return (
+        f"\ndefine i64 @{symbol}(ptr %values) {{\n"
+        + "\n".join(f"  {line}" for line in lines)
+        + "\n}\n"
+    )
 
 
 def _shrink(module: llvm.ModuleRef) -> None:

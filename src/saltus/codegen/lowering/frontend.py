@@ -1,4 +1,6 @@
-"""The kernel templates as one LLVM module with open names, by Numba's front end: typed and lowered, neither optimised nor compiled."""
+"""The kernel templates as one LLVM module with open names, by Numba's front end: typed and lowered,
+neither optimised nor compiled.
+"""
 
 from __future__ import annotations
 
@@ -19,9 +21,14 @@ from saltus.codegen.lowering import lane_types, open_names  # noqa: F401  (lane_
 from saltus.codegen.templates import open_names_of, text
 from saltus.kernels import batch, clocks_layout, lanes, parts, status
 
-_OPTIONS = dict(nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+_OPTIONS = dict(
+    nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True
+)
 #: Modules that hold no kernels of their own: numbers, and operations that lane_types.py lowers.
-_PLAIN = {module.__name__.rsplit(".", 1)[-1]: vars(module) for module in (batch, clocks_layout, lanes, parts, status)}
+_PLAIN = {
+    module.__name__.rsplit(".", 1)[-1]: vars(module)
+    for module in (batch, clocks_layout, lanes, parts, status)
+}
 
 
 class _Opener(ast.NodeTransformer):
@@ -64,7 +71,13 @@ class _Space:
             "entry": njit(f"int64({', '.join(arguments)})", **_OPTIONS),
         }  # fmt: skip
         operations = {name: value for name, value in vars(lanes).items() if callable(value)}
-        self.names: dict[str, Any] = {"math": math, "np": np, "__name__": "template", **marks, **operations}
+        self.names: dict[str, Any] = {
+            "math": math,
+            "np": np,
+            "__name__": "template",
+            **marks,
+            **operations,
+        }
         self.inlined: set[str] = set()
         self._built: dict[str, dict[str, Any]] = {}
 
@@ -74,7 +87,9 @@ class _Space:
             return _PLAIN[module]
         if module not in self._built:
             common = ("math", "np", "__name__", "kernel", "inner", "entry")
-            self._built[module] = self.fill({name: self.names[name] for name in common}, module, _Opener(set(), set()))
+            self._built[module] = self.fill(
+                {name: self.names[name] for name in common}, module, _Opener(set(), set())
+            )
         return self._built[module]
 
     def fill(self, names: dict[str, Any], module: str, opener: _Opener) -> dict[str, Any]:
@@ -85,10 +100,18 @@ class _Space:
                 home = str(node.module).removeprefix("saltus.kernels.")
                 if home != "marks":
                     source = self.imported(home)
-                    names.update({alias.asname or alias.name: source[alias.name] for alias in node.names})
+                    names.update(
+                        {alias.asname or alias.name: source[alias.name] for alias in node.names}
+                    )
         kernels = ast.Module(list(_kernels_only(tree)), [])
-        self.inlined |= {node.name for node in kernels.body if isinstance(node, ast.FunctionDef) and _mark(node) == "inner"}
-        exec(compile(ast.fix_missing_locations(opener.visit(kernels)), f"{module}.py", "exec"), names)
+        self.inlined |= {
+            node.name
+            for node in kernels.body
+            if isinstance(node, ast.FunctionDef) and _mark(node) == "inner"
+        }
+        exec(
+            compile(ast.fix_missing_locations(opener.visit(kernels)), f"{module}.py", "exec"), names
+        )
         return names
 
 
@@ -105,11 +128,16 @@ def module_of(interface: Interface, lanes: int) -> tuple[llvm.ModuleRef, str, se
     Returns
     -------
     (ModuleRef, str, set of str)
-        The module; the name of the entry in it; the templates' names of the functions that are to be inlined.
+        The module; the name of the entry in it; the templates' names of the functions that are to
+        be inlined.
     """
     space = _Space(interface.arguments)
     layout, derived = _layout(interface, lanes)
-    kinds = dict.fromkeys(interface.sizes, int) | dict.fromkeys(interface.flags, bool) | {name: type(layout[name]) for name in derived}
+    kinds = (
+        dict.fromkeys(interface.sizes, int)
+        | dict.fromkeys(interface.flags, bool)
+        | {name: type(layout[name]) for name in derived}
+    )
     space.names |= layout
     space.names |= {name: open_names.size(name, kind) for name, kind in kinds.items()}
     space.names |= {name: open_names.table(name, kind) for name, kind in interface.tables.items()}
@@ -128,7 +156,11 @@ def module_of(interface: Interface, lanes: int) -> tuple[llvm.ModuleRef, str, se
 
 def _layout(interface: Interface, lanes: int) -> tuple[dict[str, Any], list[str]]:
     """The names of a layout for some sizes, and those among them that change with the sizes."""
-    space: dict[str, Any] = dict.fromkeys(interface.sizes, 20) | dict.fromkeys(interface.flags, False) | {"LANES": lanes}
+    space: dict[str, Any] = (
+        dict.fromkeys(interface.sizes, 20)
+        | dict.fromkeys(interface.flags, False)
+        | {"LANES": lanes}
+    )
     if not interface.layout:
         return space, []
     exec(compile(text(interface.layout), f"{interface.layout}.py", "exec"), space)
@@ -139,7 +171,9 @@ def _layout(interface: Interface, lanes: int) -> tuple[dict[str, Any], list[str]
 def _front_end_only() -> Iterator[None]:
     """Numba types and lowers, and leaves out all that follows: passes, machine code, loading."""
     replaced = {
-        (codegen.CPUCodeLibrary, "_optimize_functions"): lambda self, module: setattr(module, "data_layout", self._codegen._data_layout),
+        (codegen.CPUCodeLibrary, "_optimize_functions"): lambda self, module: setattr(
+            module, "data_layout", self._codegen._data_layout
+        ),
         (codegen.CPUCodeLibrary, "_optimize_final_module"): lambda self: None,
         (codegen.CPUCodegen, "_add_module"): lambda self, module: None,
         (codegen.CPUCodegen, "_scan_and_fix_unresolved_refs"): lambda self, module: None,

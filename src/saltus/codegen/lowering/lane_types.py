@@ -1,4 +1,6 @@
-"""The operations on lanes (kernels/lanes.py) as Numba types and LLVM instructions: for the build of the templates only."""
+"""The operations on lanes (kernels/lanes.py) as Numba types and LLVM instructions: for the build of
+the templates only.
+"""
 
 from __future__ import annotations
 
@@ -69,11 +71,13 @@ class _MaskModel(models.PrimitiveModel):
         super().__init__(dmm, fe_type, ir.VectorType(ir.IntType(1), fe_type.width))
 
 
-# -- typing --------------------------------------------------------------------------------------------------------------------
+# -- typing ----------------------------------------------------------------------------------------
 
 
 def _lane_of(args):
-    """The lane type among the arguments if every other one is the same lane or a scalar number, else None."""
+    """The lane type among the arguments if every other one is the same lane or a scalar number,
+    else None.
+    """
     lanes = {a for a in args if isinstance(a, LaneType)}
     if len(lanes) != 1 or not all(isinstance(a, LaneType | types.Number) for a in args):
         return None
@@ -95,7 +99,11 @@ def _register(function, typer, literal=False):
 
 def _elementwise(args):
     lane = _lane_of(args)
-    return signature(lane, *[lane if isinstance(a, LaneType) else types.float64 for a in args]) if lane else None
+    return (
+        signature(lane, *[lane if isinstance(a, LaneType) else types.float64 for a in args])
+        if lane
+        else None
+    )
 
 
 def _comparison(args):
@@ -112,29 +120,47 @@ def _type_select(args):
     lane = _lane_of(values)
     if not isinstance(mask, MaskType) or lane is None:
         return None
-    return signature(lane, mask, *[lane if isinstance(a, LaneType) else types.float64 for a in values])
+    return signature(
+        lane, mask, *[lane if isinstance(a, LaneType) else types.float64 for a in values]
+    )
 
 
 _register(
     load,
     lambda a: (
-        signature(LaneType(a[2].literal_value), types.unliteral(a[0]), types.intp, types.intp) if isinstance(a[2], types.Literal) else None
+        signature(LaneType(a[2].literal_value), types.unliteral(a[0]), types.intp, types.intp)
+        if isinstance(a[2], types.Literal)
+        else None
     ),
     literal=True,
 )
-_register(store, lambda a: signature(types.none, a[0], types.intp, a[2]) if isinstance(a[2], LaneType) else None)
+_register(
+    store,
+    lambda a: signature(types.none, a[0], types.intp, a[2]) if isinstance(a[2], LaneType) else None,
+)
 _register(
     splat,
-    lambda a: signature(LaneType(a[1].literal_value), types.float64, types.intp) if isinstance(a[1], types.Literal) else None,
+    lambda a: (
+        signature(LaneType(a[1].literal_value), types.float64, types.intp)
+        if isinstance(a[1], types.Literal)
+        else None
+    ),
     literal=True,
 )
 _register(select, _type_select)
-_register(any_lane, lambda a: signature(types.boolean, a[0]) if isinstance(a[0], MaskType) else None)
+_register(
+    any_lane, lambda a: signature(types.boolean, a[0]) if isinstance(a[0], MaskType) else None
+)
 _register(lowest_bit, lambda a: signature(types.int64, types.int64))
 _register(spacing, lambda a: signature(types.float64, types.float64))
 _register(bits, lambda a: signature(types.int64, a[0]) if isinstance(a[0], MaskType) else None)
 
-_ARITHMETIC = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul", operator.truediv: "fdiv"}
+_ARITHMETIC = {
+    operator.add: "fadd",
+    operator.sub: "fsub",
+    operator.mul: "fmul",
+    operator.truediv: "fdiv",
+}
 _COMPARE = {operator.lt: "<", operator.le: "<=", operator.gt: ">", operator.ge: ">="}
 _LOGIC = {operator.and_: "and_", operator.or_: "or_"}
 _LIBM = {
@@ -147,19 +173,33 @@ _LIBM = {
     libm_tanh: math.tanh,
     libm_pow: math.pow,
 }
-for _f in (*_ARITHMETIC, fma, smaller, larger, magnitude, root, nearest_integer, coarse_log2, coarse_exp2, operator.neg, *_LIBM):
+for _f in (
+    *_ARITHMETIC,
+    fma,
+    smaller,
+    larger,
+    magnitude,
+    root,
+    nearest_integer,
+    coarse_log2,
+    coarse_exp2,
+    operator.neg,
+    *_LIBM,
+):
     _register(_f, _elementwise)
 for _f in _COMPARE:
     _register(_f, _comparison)
 for _f in (*_LOGIC, operator.invert):
     _register(_f, _mask_logic)
 
-# -- lowering to LLVM -----------------------------------------------------------------------------------------------------------
+# -- lowering to LLVM ------------------------------------------------------------------------------
 
 
 def _splat(builder, value, width):
     vector = ir.VectorType(value.type, width)
-    one = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
+    one = builder.insert_element(
+        ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0)
+    )
     zeros = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
     return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
 
@@ -167,7 +207,10 @@ def _splat(builder, value, width):
 def _vectors(builder, sig, args):
     """The arguments with scalars spread over the lanes."""
     width = next(t.width for t in sig.args if isinstance(t, LaneType))
-    return [a if isinstance(t, LaneType) else _splat(builder, a, width) for a, t in zip(args, sig.args, strict=True)]
+    return [
+        a if isinstance(t, LaneType) else _splat(builder, a, width)
+        for a, t in zip(args, sig.args, strict=True)
+    ]
 
 
 def _any_kinds(count):
@@ -191,14 +234,18 @@ def _intrinsic(name):
     def emit(builder, sig, v):
         module, vector = builder.module, v[0].type
         suffix = f"v{vector.count}f64"
-        function = cgutils.get_or_insert_function(module, ir.FunctionType(vector, [vector] * len(v)), f"llvm.{name}.{suffix}")
+        function = cgutils.get_or_insert_function(
+            module, ir.FunctionType(vector, [vector] * len(v)), f"llvm.{name}.{suffix}"
+        )
         return builder.call(function, v)
 
     return emit
 
 
 def _pick(sign):
-    return lambda builder, sig, v: builder.select(builder.fcmp_ordered(sign, v[0], v[1]), v[0], v[1])
+    return lambda builder, sig, v: builder.select(
+        builder.fcmp_ordered(sign, v[0], v[1]), v[0], v[1]
+    )
 
 
 for _f, _name in _ARITHMETIC.items():
@@ -253,7 +300,11 @@ def _lower_libm(function, scalar, count):
             result = ir.Constant(vectors[0].type, ir.Undefined)
             for i in range(vectors[0].type.count):
                 index = ir.Constant(ir.IntType(32), i)
-                result = builder.insert_element(result, call(builder, [builder.extract_element(x, index) for x in vectors]), index)
+                result = builder.insert_element(
+                    result,
+                    call(builder, [builder.extract_element(x, index) for x in vectors]),
+                    index,
+                )
             return result
 
 
@@ -262,16 +313,21 @@ for _f, _scalar in _LIBM.items():
 
 
 def _align_stack(builder):
-    """Lanes that don't fit the registers go to the stack: each to one cache line, not across two (measured: 5 % of a step)."""
+    """Lanes that don't fit the registers go to the stack: each to one cache line, not across two
+    (measured: 5 % of a step).
+    """
     builder.function.attributes.alignstack = 64
-    builder.function.attributes.add("nounwind")  # llvmlite prints no alignment without another attribute; kernels raise nothing
+    # llvmlite prints no alignment without another attribute; kernels raise nothing
+    builder.function.attributes.add("nounwind")
 
 
 def _pointer(context, builder, array_type, array, row, width):
     """Pointer to the first lane of a row, as a pointer to a vector."""
     _align_stack(builder)
     view = context.make_array(array_type)(context, builder, array)
-    first = cgutils.get_item_pointer(context, builder, array_type, view, [row, ir.Constant(row.type, 0)], wraparound=False)
+    first = cgutils.get_item_pointer(
+        context, builder, array_type, view, [row, ir.Constant(row.type, 0)], wraparound=False
+    )
     return builder.bitcast(first, ir.VectorType(ir.DoubleType(), width).as_pointer())
 
 
@@ -300,7 +356,10 @@ for _kinds in ((LaneType, LaneType), (LaneType, types.Float), (types.Float, Lane
     @lower_builtin(select, MaskType, *_kinds)
     def _lower_select(context, builder, sig, args):
         width = sig.return_type.width
-        a, b = (x if isinstance(t, LaneType) else _splat(builder, x, width) for x, t in zip(args[1:], sig.args[1:], strict=True))
+        a, b = (
+            x if isinstance(t, LaneType) else _splat(builder, x, width)
+            for x, t in zip(args[1:], sig.args[1:], strict=True)
+        )
         return builder.select(args[0], a, b)
 
 
@@ -343,12 +402,16 @@ def _lower_spacing(context, builder, sig, args):
     return builder.fsub(builder.bitcast(following, args[0].type), args[0])
 
 
-# -- parts of a work array ---------------------------------------------------------------------------------------------------------
+# -- parts of a work array -------------------------------------------------------------------------
 @infer_global(part)
 class _PartType(AbstractTemplate):
     def generic(self, args, kws):
         view = types.Array(types.float64, 1, "C")
-        return signature(view, args[0], types.intp, types.intp) if args[0] == view and not kws else None
+        return (
+            signature(view, args[0], types.intp, types.intp)
+            if args[0] == view and not kws
+            else None
+        )
 
 
 @lower_builtin(part, types.Array, types.intp, types.intp)
@@ -359,5 +422,7 @@ def _lower_part(context, builder, signature, arguments):
     itemsize = context.get_constant(types.intp, 8)
     unowned = ir.Constant(view.meminfo.type, None)
     first = builder.gep(whole.data, [start])
-    populate_array(view, data=first, shape=[length], strides=[itemsize], itemsize=itemsize, meminfo=unowned)
+    populate_array(
+        view, data=first, shape=[length], strides=[itemsize], itemsize=itemsize, meminfo=unowned
+    )
     return view._getvalue()

@@ -1,4 +1,6 @@
-"""Names that the templates leave open: loads from symbols and calls of functions that an equation brings later."""
+"""Names that the templates leave open: loads from symbols and calls of functions that an equation
+brings later.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ def _symbol(builder: Any, name: str, kind: Any) -> Any:
 
 
 def size(name: str, kind: type = int) -> Any:
-    """A function without arguments that gives the constant of this name: a whole number, a double or a truth value."""
+    """A function without arguments that gives the constant of this name: a whole number, a double
+    or a truth value.
+    """
     numba_type, llvm_type = (types.float64, _REAL) if kind is float else (types.int64, _WHOLE)
 
     def generate(_context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
@@ -61,10 +65,20 @@ def function(name: str, arguments: tuple[str, ...], returns: bool) -> Any:
     def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         values = []
         for value, kind in zip(given, signature.args, strict=True):
-            first = context.make_array(kind)(context, builder, value).data if isinstance(kind, types.Array) else value
-            values.append(builder.bitcast(first, _POINTER) if isinstance(kind, types.Array) else value)
-        kind = ir.FunctionType(_WHOLE if returns else ir.VoidType(), [value.type for value in values])
-        answer = builder.call(cgutils.get_or_insert_function(builder.module, kind, f"saltus_{name}"), values)
+            first = (
+                context.make_array(kind)(context, builder, value).data
+                if isinstance(kind, types.Array)
+                else value
+            )
+            values.append(
+                builder.bitcast(first, _POINTER) if isinstance(kind, types.Array) else value
+            )
+        kind = ir.FunctionType(
+            _WHOLE if returns else ir.VoidType(), [value.type for value in values]
+        )
+        answer = builder.call(
+            cgutils.get_or_insert_function(builder.module, kind, f"saltus_{name}"), values
+        )
         return answer if returns else context.get_dummy_value()
 
     def typed(given: tuple) -> Any:

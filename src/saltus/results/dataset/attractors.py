@@ -1,4 +1,6 @@
-"""Tables of what ``basins``, ``attractors``, ``basin_fractions`` and ``compare`` return, and what is known of attractors."""
+"""Tables of what ``basins``, ``attractors``, ``basin_fractions`` and ``compare`` return, and what
+is known of attractors.
+"""
 
 from __future__ import annotations
 
@@ -23,25 +25,46 @@ _MULTIPLIER = ("attractor", "multiplier")
 ATTRACTOR_VARIABLES = {
     "attractor": Variable(_EACH, "1", "attractor", "i8", coord=True),
     "attractor_type": Variable(_EACH, "", "kind of motion", "str"),
-    "attractor_period": Variable(_EACH, "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
-    "attractor_contacts": Variable(_EACH, "1", "contacts in one period of the response (in a forcing period if it doesn't repeat)"),
-    "attractor_itinerary": Variable(_EACH, "", "modes in the order in which they are visited", "str"),
+    "attractor_period": Variable(
+        _EACH, "1", "period in forcing periods, 0 if it doesn't repeat", "i8"
+    ),
+    "attractor_contacts": Variable(
+        _EACH,
+        "1",
+        "contacts in one period of the response (in a forcing period if it doesn't repeat)",
+    ),
+    "attractor_itinerary": Variable(
+        _EACH, "", "modes in the order in which they are visited", "str"
+    ),
     "attractor_peak": Variable(_EACH, "<first>", "largest magnitude of the first state"),
     "attractor_rms": Variable(_EACH, "<first>", "root mean square of the first state"),
-    "attractor_margin": Variable(_EACH, "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"),
+    "attractor_margin": Variable(
+        _EACH, "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"
+    ),
     "attractor_multiplier_real": Variable(_MULTIPLIER, "1", "Floquet multiplier, real part"),
     "attractor_multiplier_imag": Variable(_MULTIPLIER, "1", "Floquet multiplier, imaginary part"),
     "attractor_scatter": Variable(
-        _EACH, "<first>", "root mean square distance of a noisy motion from its exact orbit, first state; NaN of others"
+        _EACH,
+        "<first>",
+        "root mean square distance of a noisy motion from its exact orbit, first "
+        "state; NaN of others",
     ),
     "attractor_cycle": Variable(_EACH, "s", "period of a limit cycle"),
-    "attractor_eigenvalue_real": Variable(_MULTIPLIER, "1/s", "eigenvalue of the Jacobian of an equilibrium, real part"),
-    "attractor_eigenvalue_imag": Variable(_MULTIPLIER, "1/s", "eigenvalue of the Jacobian of an equilibrium, imaginary part"),
+    "attractor_eigenvalue_real": Variable(
+        _MULTIPLIER, "1/s", "eigenvalue of the Jacobian of an equilibrium, real part"
+    ),
+    "attractor_eigenvalue_imag": Variable(
+        _MULTIPLIER, "1/s", "eigenvalue of the Jacobian of an equilibrium, imaginary part"
+    ),
     "attractor_exponent": Variable(_EACH, "1/s", "largest Lyapunov exponent"),
     "attractor_exponent_error": Variable(_EACH, "1/s", "error of the largest Lyapunov exponent"),
     "attractor_fraction": Variable(_EACH, "1", "share of the starts"),
-    "attractor_fraction_low": Variable(_EACH, "1", "share of the starts, lower end of the 95 % interval"),
-    "attractor_fraction_high": Variable(_EACH, "1", "share of the starts, upper end of the 95 % interval"),
+    "attractor_fraction_low": Variable(
+        _EACH, "1", "share of the starts, lower end of the 95 % interval"
+    ),
+    "attractor_fraction_high": Variable(
+        _EACH, "1", "share of the starts, upper end of the 95 % interval"
+    ),
     "attractor_<state>": Variable(("attractor", "phase"), "<state>", "<state> <when>"),
 }
 #: The two states that a map is drawn over.
@@ -51,9 +74,13 @@ _AXES = {"<state>": Variable(("<state>",), "<state>", "<state> at the start", co
 BASINS_VARIABLES = {
     **_AXES,
     "basin": Variable(("...",), "1", "attractor", "i2"),
-    "periods_to_settle": Variable(("...",), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"),
+    "periods_to_settle": Variable(
+        ("...",), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"
+    ),
     "status": Variable(("...",), "1", "how the trajectory ended", "i1"),
-    "grazes_unresolved": Variable(("...",), "1", "grazes shallower than the local error", "i2", clipped=True),
+    "grazes_unresolved": Variable(
+        ("...",), "1", "grazes shallower than the local error", "i2", clipped=True
+    ),
     **ATTRACTOR_VARIABLES,
 }
 
@@ -61,7 +88,9 @@ BASINS_VARIABLES = {
 ATTRACTORS_VARIABLES = {
     **TRAJECTORY_NUMBER,
     "basin": Variable(("trajectory",), "1", "attractor", "i2"),
-    "periods_to_settle": Variable(("trajectory",), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"),
+    "periods_to_settle": Variable(
+        ("trajectory",), "1", "forcing periods until it had settled, -1 if it hadn't", "i4"
+    ),
     **ATTRACTOR_VARIABLES,
 }
 
@@ -70,16 +99,28 @@ AGREEMENT_VARIABLES = {
     **_AXES,
     "agreement": Variable(("...",), "1", "whether the two maps agree", "i1", flags=AGREEING),
     "basin_a": Variable(("...",), "1", "attractor in the first map", "i2"),
-    "basin_b": Variable(("...",), "1", "attractor in the second map, in the numbers of the first", "i2"),
-    "pair": Variable(("pair",), "1", "attractor: those of the first map, then those that only the second has", "i8", coord=True),
+    "basin_b": Variable(
+        ("...",), "1", "attractor in the second map, in the numbers of the first", "i2"
+    ),
+    "pair": Variable(
+        ("pair",),
+        "1",
+        "attractor: those of the first map, then those that only the second has",
+        "i8",
+        coord=True,
+    ),
     "match_a": Variable(("pair",), "1", "number in the first map, -1 if it isn't there", "i8"),
     "match_b": Variable(("pair",), "1", "number in the second map, -1 if it isn't there", "i8"),
     "match_type": Variable(("pair",), "", "kind of motion", "str"),
-    "match_period": Variable(("pair",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"),
+    "match_period": Variable(
+        ("pair",), "1", "period in forcing periods, 0 if it doesn't repeat", "i8"
+    ),
     "match_fraction_a": Variable(("pair",), "1", "share of the starts in the first map"),
     "match_fraction_b": Variable(("pair",), "1", "share of the starts in the second map"),
     "match_agreeing_cells": Variable(("pair",), "1", "starts that lead to it in both maps", "i8"),
-    "match_orbit_distance": Variable(("pair",), "1", "distance of the two orbits in units of the axis ranges"),
+    "match_orbit_distance": Variable(
+        ("pair",), "1", "distance of the two orbits in units of the axis ranges"
+    ),
 }
 
 
@@ -90,8 +131,9 @@ class AttractorTable:
     Attributes
     ----------
     kind : sequence of str, length m
-        ``periodic``, ``quasi_periodic`` or ``chaotic``; ``noisy_periodic`` where errors of the method keep an orbit from closing; of a
-        system without forcing ``equilibrium`` or ``limit_cycle`` too.
+        ``periodic``, ``quasi_periodic`` or ``chaotic``; ``noisy_periodic`` where errors of the
+        method keep an orbit from closing; of a system without forcing ``equilibrium`` or
+        ``limit_cycle`` too.
     period : array of int, shape (m,)
         Period [forcing periods], 0 where the motion doesn't repeat, or nothing forces it.
     contacts : array, shape (m,)
@@ -107,15 +149,19 @@ class AttractorTable:
     exponent, exponent_error : array, shape (m,)
         Largest Lyapunov exponent and its error [1/s].
     points : sequence of array, shape (n, D) each
-        Stroboscopic points in the order in which they are visited [units of the states]; n may differ between attractors.
+        Stroboscopic points in the order in which they are visited [units of the states]; n may
+        differ between attractors.
     fractions : tuple of three arrays, shape (m,), optional
-        Share of the starts, and the lower and upper end of its interval: what :func:`saltus.analysis.basins.uncertainty.fractions` returns.
+        Share of the starts, and the lower and upper end of its interval: what
+        :func:`saltus.analysis.basins.uncertainty.fractions` returns.
     cycle : array, shape (m,), optional
         Of a system without forcing: period of each limit cycle [s], else NaN.
     eigenvalues : array of complex, shape (m, D), optional
-        Of a system without forcing: eigenvalues of the Jacobian of each equilibrium [1/s], else NaN.
+        Of a system without forcing: eigenvalues of the Jacobian of each equilibrium [1/s], else
+        NaN.
     scatter : array, shape (m,), optional
-        Where one is noisy: root mean square distance of its points from the exact orbit, first state [its unit]; NaN of the others.
+        Where one is noisy: root mean square distance of its points from the exact orbit, first
+        state [its unit]; NaN of the others.
     """
 
     kind: Sequence[str]
@@ -143,11 +189,15 @@ class AttractorTable:
         return "at whole forcing periods" if self.cycle is None else "in equal steps of time"
 
     def columns(self, size: int) -> dict[str, Any]:
-        """What is known of each attractor, by the names of the variables without ``attractor_``. ``size``: D, where there are none."""
+        """What is known of each attractor, by the names of the variables without ``attractor_``.
+        ``size``: D, where there are none.
+        """
         real, imag = _parts(self.multipliers, len(self), size)
         found = {
-            "type": list(self.kind), "period": self.period, "contacts": self.contacts, "itinerary": list(self.itinerary),
-            "peak": self.peak, "rms": self.rms, "margin": self.margin, "multiplier_real": real, "multiplier_imag": imag,
+            "type": list(self.kind), "period": self.period, "contacts": self.contacts,
+            "itinerary": list(self.itinerary),
+            "peak": self.peak, "rms": self.rms, "margin": self.margin, "multiplier_real": real,
+            "multiplier_imag": imag,
             "exponent": self.exponent, "exponent_error": self.exponent_error,
         }  # fmt: skip
         if self.cycle is not None and self.eigenvalues is not None:
@@ -157,18 +207,24 @@ class AttractorTable:
 
     def values(self, size: int) -> dict[str, Any]:
         """The variables of the attractors of a result."""
-        found = {"attractor": np.arange(len(self)), **{f"attractor_{name}": column for name, column in self.columns(size).items()}}
+        found = {
+            "attractor": np.arange(len(self)),
+            **{f"attractor_{name}": column for name, column in self.columns(size).items()},
+        }
         if self.scatter is not None:
             found["attractor_scatter"] = self.scatter
         if self.fractions is not None:
-            found |= dict(zip((f"attractor_fraction{end}" for end in ENDS), self.fractions, strict=True))
+            found |= dict(
+                zip((f"attractor_fraction{end}" for end in ENDS), self.fractions, strict=True)
+            )
         return found | {"attractor_<state>": padded(self.points, size)}
 
 
 def _parts(both: np.ndarray, count: int, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Real and imaginary parts, shape (count, D) each."""
     both = np.asarray(both, dtype=complex).reshape(count, -1 if count else size)
-    return both.real, np.where(np.isnan(both), np.nan, both.imag)  # a plain NaN has the imaginary part 0
+    # a plain NaN has the imaginary part 0
+    return both.real, np.where(np.isnan(both), np.nan, both.imag)
 
 
 def padded(points: Sequence[np.ndarray], size: int) -> np.ndarray:

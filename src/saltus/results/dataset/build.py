@@ -1,7 +1,8 @@
 """Arrays in, a Dataset out: every result is made here, by the table of its kind.
 
-Everything that goes in is an array of NumPy. Of anything else xarray asks whether an array is one of dask, pint, cupy or sparse, and
-imports for it those that are installed: dask.array alone takes 0.4 s.
+Everything that goes in is an array of NumPy. Of anything else xarray asks whether an array is one
+of dask, pint, cupy or sparse, and imports for it those that are installed: dask.array alone takes
+0.4 s.
 """
 
 from __future__ import annotations
@@ -21,15 +22,20 @@ from saltus.results.dataset.result import Result
 from saltus.results.dataset.variable import Variable
 from saltus.results.provenance import hash_of, to_json
 
-_TWICE = "{!r} would stand for two things in the result. Rename the state, or the parameter, of this name."
+_TWICE = (
+    "{!r} would stand for two things in the result. Rename the state, or the parameter, of "
+    "this name."
+)
 #: Where a name of the system would collide with one of the table, another is taken.
 _NAMES = {
-    "contact_<state>": schema.contact_name, "attractor_<state>": schema.attractor_name, "start_<state>": schema.start_name,
-    "response_<state>": schema.response_name, "response_<parameter>": schema.response_name, "event_<parameter>": schema.event_name,
+    "contact_<state>": schema.contact_name, "attractor_<state>": schema.attractor_name,
+    "start_<state>": schema.start_name,
+    "response_<state>": schema.response_name, "response_<parameter>": schema.response_name,
+    "event_<parameter>": schema.event_name,
 }  # fmt: skip
 
 
-# -- what the caller hands over ------------------------------------------------------------------------------------------------
+# -- what the caller hands over --------------------------------------------------------------------
 @dataclass(frozen=True)
 class Guards:
     """The guards of a system.
@@ -41,7 +47,8 @@ class Guards:
     states : sequence of str or None
         State that the guard bounds, where its gap is that state minus a value.
     boundaries : array, shape (guard,) or (guard, ...)
-        That value [unit of the state], NaN where there is none. With the trajectories, or the grid, where it differs between them.
+        That value [unit of the state], NaN where there is none. With the trajectories, or the grid,
+        where it differs between them.
     units : sequence of str
         Coherent SI unit of each gap, ``""`` where it isn't known; empty for those of the states.
     """
@@ -57,7 +64,9 @@ class Guards:
 
     def first(self, count: int) -> Guards:
         """Their number."""
-        return Guards(self.names[:count], self.states[:count], self.boundaries[:count], self.units[:count])
+        return Guards(
+            self.names[:count], self.states[:count], self.boundaries[:count], self.units[:count]
+        )
 
     def values(self, states: Mapping[str, str]) -> dict[str, Any]:
         """Their variables, given the units of the states."""
@@ -78,7 +87,8 @@ class Subject:
     units : mapping of str to str
         Units of states and parameters; missing ones are unknown.
     attrs : mapping
-        Provenance (:func:`saltus.results.provenance.attributes`) and settings; what is neither text nor number becomes JSON text.
+        Provenance (:func:`saltus.results.provenance.attributes`) and settings; what is neither text
+        nor number becomes JSON text.
     guards : Guards, optional
         Kept where the table of the kind has them.
     gap_unit : str
@@ -121,9 +131,10 @@ def build(
     subject : Subject
         What it is about.
     values : mapping of str to array, or its items
-        Variables in the order of the result, under their names in the table and with all dims that it names: with ``trajectory`` also
-        where that is dropped. A row for all states or parameters takes a mapping by their names; for all states, an array whose last axis
-        is the state will do.
+        Variables in the order of the result, under their names in the table and with all dims that
+        it names: with ``trajectory`` also where that is dropped. A row for all states or parameters
+        takes a mapping by their names; for all states, an array whose last axis is the state will
+        do.
     grid : sequence of str
         Dims that ``...`` stands for.
     along : mapping of str to str, optional
@@ -138,14 +149,20 @@ def build(
     Raises
     ------
     ParameterError
-        If a state or a parameter has the name of something else in the result, or a number is too large for its variable.
+        If a state or a parameter has the name of something else in the result, or a number is too
+        large for its variable.
     """
     work = _Building(kind, subject, tuple(grid), along or {}, words or {}, flags or {})
     work.coords |= carried or {}
     given = list(values.items() if isinstance(values, Mapping) else values)
     if subject.guards is not None and "guard" in work.table:
         given += subject.guards.values(subject.units).items()
-    attrs = {**subject.attrs, "saltus_result": kind, "schema_version": schema.VERSION, "states": " ".join(subject.states)}
+    attrs = {
+        **subject.attrs,
+        "saltus_result": kind,
+        "schema_version": schema.VERSION,
+        "states": " ".join(subject.states),
+    }
     period = subject.forcing_period
     if period is not None and subject.batch and np.ndim(period):
         given.append(("forcing_period", period))
@@ -158,7 +175,7 @@ def build(
     return finish(work.data, work.coords, attrs)
 
 
-# -- assembly ------------------------------------------------------------------------------------------------------------------
+# -- assembly --------------------------------------------------------------------------------------
 class _Building:
     """The variables of one Dataset, as they are taken."""
 
@@ -171,8 +188,16 @@ class _Building:
         words: Mapping[str, str],
         flags: Mapping[str, Any],
     ) -> None:
-        self.table, self.subject, self.grid, self.along, self.flags = schema.TABLES[kind], subject, grid, along, flags
-        gap = subject.gap_unit or _common(subject.guards.units_among(subject.units) if subject.guards else ())
+        self.table, self.subject, self.grid, self.along, self.flags = (
+            schema.TABLES[kind],
+            subject,
+            grid,
+            along,
+            flags,
+        )
+        gap = subject.gap_unit or _common(
+            subject.guards.units_among(subject.units) if subject.guards else ()
+        )
         first = subject.units.get(subject.states[0], "") if subject.states else ""
         self.words = {"<gap>": gap, "<gap rate>": schema.rate_unit(gap), "<first>": first, **words}
         self.data: dict[str, xr.Variable] = {}
@@ -186,20 +211,39 @@ class _Building:
                 self._put(row, spec, values)
             return
         what = "state" if "<state>" in row else "parameter"
-        of_each = values.items() if isinstance(values, Mapping) else zip(self.subject.states, np.moveaxis(values, -1, 0), strict=True)
+        of_each = (
+            values.items()
+            if isinstance(values, Mapping)
+            else zip(self.subject.states, np.moveaxis(values, -1, 0), strict=True)
+        )
         for name, one in of_each:
             if row == f"<{what}>" and name in self._reserved():
-                rename = "Rename the state in the system." if what == "state" else "Rename it in the system."
-                raise ParameterError(f"the {what} {name!r} has the name of something else in the result. {rename}")
+                rename = (
+                    "Rename the state in the system."
+                    if what == "state"
+                    else ("Rename it in the system.")
+                )
+                raise ParameterError(
+                    f"the {what} {name!r} has the name of something else in the result. {rename}"
+                )
             own = _NAMES[row](name) if row in _NAMES else row.replace(f"<{what}>", name)
             text = name if what == "state" else name.replace("_", " ")
             self._put(own, spec, one, {f"<{what}>": (name, self.subject.units.get(name, ""), text)})
 
     def _reserved(self) -> set[str]:
         """Names of the table, and of its dims."""
-        return {*self.table, *(dim.rstrip("?") for spec in self.table.values() for dim in spec.dims)}
+        return {
+            *self.table,
+            *(dim.rstrip("?") for spec in self.table.values() for dim in spec.dims),
+        }
 
-    def _put(self, name: str, spec: Variable, values: Any, of: Mapping[str, tuple[str, str, str]] | None = None) -> None:
+    def _put(
+        self,
+        name: str,
+        spec: Variable,
+        values: Any,
+        of: Mapping[str, tuple[str, str, str]] | None = None,
+    ) -> None:
         if name in self.data or name in self.coords:
             raise ParameterError(_TWICE.format(name))
         array = _array(name, spec, values)
@@ -217,10 +261,15 @@ class _Building:
         meanings = self.flags.get(name) or spec.flags
         if meanings:
             codes = sorted(meanings)
-            attrs |= {"flag_values": np.array(codes, array.dtype), "flag_meanings": " ".join(meanings[code] for code in codes)}
+            attrs |= {
+                "flag_values": np.array(codes, array.dtype),
+                "flag_meanings": " ".join(meanings[code] for code in codes),
+            }
         (self.coords if spec.coord else self.data)[name] = array_variable(dims, array, attrs)
 
-    def _dims(self, dims: tuple[str, ...], of: Mapping[str, tuple[str, str, str]] | None, count: int) -> tuple[str, ...]:
+    def _dims(
+        self, dims: tuple[str, ...], of: Mapping[str, tuple[str, str, str]] | None, count: int
+    ) -> tuple[str, ...]:
         """The dims of a row for an array with this number of axes."""
         if _is_plain(dims) and not self.along:
             return dims
@@ -230,7 +279,9 @@ class _Building:
                 found = tuple(one for one in found if one != dim)
         return tuple(dim.rstrip("?") for dim in found)
 
-    def _named(self, dims: tuple[str, ...], of: Mapping[str, tuple[str, str, str]] | None) -> Iterator[str]:
+    def _named(
+        self, dims: tuple[str, ...], of: Mapping[str, tuple[str, str, str]] | None
+    ) -> Iterator[str]:
         for dim in dims:
             if dim.startswith("..."):
                 yield from (one + dim[3:] for one in self.grid)
@@ -249,8 +300,15 @@ def _array(name: str, spec: Variable, values: Any) -> np.ndarray:
     if spec.clipped:
         values = np.minimum(values, np.iinfo(spec.dtype).max)
     array = np.asarray(values, dtype=np.str_ if spec.dtype == "str" else spec.dtype)
-    if array.dtype.kind == "i" and getattr(values, "dtype", None) != array.dtype and not np.array_equal(array, values):
-        raise ParameterError(f"{name} holds {np.max(np.abs(values))}, which {array.dtype} can't. Split the work into smaller parts.")
+    if (
+        array.dtype.kind == "i"
+        and getattr(values, "dtype", None) != array.dtype
+        and not np.array_equal(array, values)
+    ):
+        raise ParameterError(
+            f"{name} holds {np.max(np.abs(values))}, which {array.dtype} can't. "
+            f"Split the work into smaller parts."
+        )
     return array
 
 
@@ -258,7 +316,10 @@ def _only(array: np.ndarray, dims: tuple[str, ...]) -> tuple[np.ndarray, tuple[s
     """The array of the one trajectory."""
     axis = dims.index("trajectory")
     if array.shape[axis] != 1:
-        raise ParameterError(f"a Dataset without the dim trajectory holds one trajectory, not {array.shape[axis]}. Pass batch=True.")
+        raise ParameterError(
+            f"a Dataset without the dim trajectory holds one trajectory, not "
+            f"{array.shape[axis]}. Pass batch=True."
+        )
     return np.asarray(array[(slice(None),) * axis + (0,)]), (*dims[:axis], *dims[axis + 1 :])
 
 
@@ -268,21 +329,34 @@ def _common(units: Iterable[str]) -> str:
     return found.pop() if len(found) == 1 else ""
 
 
-def array_variable(dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str, Any]) -> xr.Variable:
+def array_variable(
+    dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str, Any]
+) -> xr.Variable:
     """A variable that holds this very array."""
     return xr.Variable(dims, values, attrs, fastpath=True)
 
 
-def finish(data: dict[str, xr.Variable], coords: dict[str, xr.Variable], attrs: Mapping[str, Any]) -> Result:
-    """The Dataset of these variables; attributes that are neither text nor number become JSON text."""
-    plain = {key: value if isinstance(value, str | int | float) else to_json(value) for key, value in attrs.items()}
-    plain["result_hash"] = hash_of({name: (one.dims, one.values) for name, one in (data | coords).items()})
+def finish(
+    data: dict[str, xr.Variable], coords: dict[str, xr.Variable], attrs: Mapping[str, Any]
+) -> Result:
+    """The Dataset of these variables; attributes that are neither text nor number
+    become JSON text.
+    """
+    plain = {
+        key: value if isinstance(value, str | int | float) else to_json(value)
+        for key, value in attrs.items()
+    }
+    plain["result_hash"] = hash_of(
+        {name: (one.dims, one.values) for name, one in (data | coords).items()}
+    )
     return Result(data, indexed(coords), plain)
 
 
 def indexed(coords: Mapping[str, xr.Variable]) -> xr.Coordinates:
     """Coordinates, with an index for each that has the name of its dim."""
-    indexes = {name: _index(name, one.values) for name, one in coords.items() if one.dims == (name,)}
+    indexes = {
+        name: _index(name, one.values) for name, one in coords.items() if one.dims == (name,)
+    }
     variables: dict[str, Any] = dict(coords)
     for name, index in indexes.items():
         variables |= index.create_variables({name: coords[name]})
@@ -296,6 +370,7 @@ def _index(name: str, values: np.ndarray) -> xr.indexes.PandasIndex:
     return xr.indexes.PandasIndex(pd.Index(values, copy=False), name, values.dtype)
 
 
-@lru_cache(maxsize=64)  # the names of guards are the same in every run, and take longer to index than all numbers
+# the names of guards are the same in every run, and take longer to index than all numbers
+@lru_cache(maxsize=64)
 def _text_index(name: str, dtype: np.dtype, words: tuple[str, ...]) -> xr.indexes.PandasIndex:
     return xr.indexes.PandasIndex(pd.Index(np.array(words, dtype)), name, dtype)

@@ -1,4 +1,6 @@
-"""Kinds of motion, and why a start may lead to none: one code and one word for each, wherever they are named."""
+"""Kinds of motion, and why a start may lead to none: one code and one word for each, wherever they
+are named.
+"""
 
 from __future__ import annotations
 
@@ -43,6 +45,8 @@ WITHOUT_WORDS = {int(kind): kind.word for kind in WITHOUT}
 
 
 def sentences(labels: np.ndarray) -> list[str]:
-    """A sentence for each reason why starts lead to no attractor, with how many they are: labels int[...] of attractors, or codes."""
+    """A sentence for each reason why starts lead to no attractor, with how many they are: labels
+    int[...] of attractors, or codes.
+    """
     counts = {kind: int(np.count_nonzero(labels == kind)) for kind in WITHOUT}
     return [f"{count} starts {WITHOUT[kind]}." for kind, count in counts.items() if count]

@@ -17,10 +17,12 @@ R = TypeVar("R")
 
 
 def reader(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that takes Datasets of saltus: where it fails over one that was changed since, or forged, it says so.
+    """A function that takes Datasets of saltus: where it fails over one that was changed since, or
+    forged, it says so.
 
-    A variable that was renamed, a dim that was cut to nothing, an attribute of another kind fail anywhere. What ``result_hash`` says is
-    asked only then. A failure over Datasets as they were returned is raised as it is: it is a mistake of saltus, or of other arguments.
+    A variable that was renamed, a dim that was cut to nothing, an attribute of another kind fail
+    anywhere. What ``result_hash`` says is asked only then. A failure over Datasets as they were
+    returned is raised as it is: it is a mistake of saltus, or of other arguments.
     """
 
     @functools.wraps(function)
@@ -29,12 +31,21 @@ def reader(function: Callable[P, R]) -> Callable[P, R]:
             return function(*args, **kwargs)
         except SaltusError:
             raise
-        except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
+        except (
+            LookupError,
+            ValueError,
+            TypeError,
+            AttributeError,
+            ArithmeticError,
+            RecursionError,
+        ) as error:
             if not any(_is_changed(ds) for ds in _datasets([*args, *kwargs.values()])):
                 raise
             raise ParameterError(
-                f"{function.__name__} ends in {type(error).__name__}: {shown(str(error), 200)}. A Dataset that it was given isn't "
-                "as saltus made it: variables, dims or attributes were dropped or changed. Give it as it was, or a selection of it."
+                f"{function.__name__} ends in {type(error).__name__}: {shown(str(error), 200)}. A "
+                f"Dataset that it was given isn't "
+                "as saltus made it: variables, dims or attributes were dropped or changed. Give it "
+                "as it was, or a selection of it."
             ) from error
 
     return called
@@ -51,10 +62,23 @@ def _datasets(given: Any) -> Iterator[xr.Dataset]:
 
 
 def _is_changed(ds: xr.Dataset) -> bool:
-    """Whether the variables, or the attributes that are JSON, aren't those that a function of saltus returned."""
+    """Whether the variables, or the attributes that are JSON, aren't those that a function of
+    saltus returned.
+    """
     try:
-        kinds = {"equations": list, "varied_parameters": list, "parameters": dict, "units": dict, "method_options": dict, "versions": dict}
-        plain = all(isinstance(json.loads(ds.attrs[name]), kind) for name, kind in kinds.items() if name in ds.attrs)
+        kinds = {
+            "equations": list,
+            "varied_parameters": list,
+            "parameters": dict,
+            "units": dict,
+            "method_options": dict,
+            "versions": dict,
+        }
+        plain = all(
+            isinstance(json.loads(ds.attrs[name]), kind)
+            for name, kind in kinds.items()
+            if name in ds.attrs
+        )
     except (ValueError, TypeError, RecursionError):
         plain = False
     return not plain or ds.attrs.get("result_hash") != content_hash(ds)

@@ -14,15 +14,17 @@ from saltus.errors import ParameterError
 class Result(xr.Dataset):
     """A Dataset in every respect but one: what would make the product of all its dims is refused.
 
-    A result holds several tables: a run has samples, contacts and guards, a map cells and attractors. ``to_dataframe`` of a Dataset makes a
-    row for every combination of them, which for an ordinary run is more than a computer can hold. Of variables that are one table,
-    ``run[["x", "v"]]``, it makes what it always makes. See docs/decisions/0021.
+    A result holds several tables: a run has samples, contacts and guards, a map cells and
+    attractors. ``to_dataframe`` of a Dataset makes a row for every combination of them, which for
+    an ordinary run is more than a computer can hold. Of variables that are one table, ``run[["x",
+    "v"]]``, it makes what it always makes. See docs/decisions/0021.
     """
 
     __slots__ = ()
 
     def to_dataframe(self, dim_order: Sequence[Hashable] | None = None) -> Any:
-        """A pandas.DataFrame with a row for each point of the dims, as that of a Dataset; of one table only.
+        """A pandas.DataFrame with a row for each point of the dims, as that of a Dataset; of one
+        table only.
 
         Raises
         ------
@@ -32,12 +34,16 @@ class Result(xr.Dataset):
         self._refuse_product("to_dataframe")
         return super().to_dataframe(dim_order)
 
-    def to_dask_dataframe(self, dim_order: Sequence[Hashable] | None = None, set_index: bool = False) -> Any:
+    def to_dask_dataframe(
+        self, dim_order: Sequence[Hashable] | None = None, set_index: bool = False
+    ) -> Any:
         """As :meth:`to_dataframe`, for dask."""
         self._refuse_product("to_dask_dataframe")
         return super().to_dask_dataframe(dim_order, set_index)
 
-    def to_dataarray(self, dim: Hashable = "variable", name: Hashable | None = None) -> xr.DataArray:
+    def to_dataarray(
+        self, dim: Hashable = "variable", name: Hashable | None = None
+    ) -> xr.DataArray:
         """One array of all variables, as that of a Dataset; of one table only."""
         self._refuse_product("to_dataarray")
         return super().to_dataarray(dim, name)
@@ -51,13 +57,23 @@ class Result(xr.Dataset):
         for name, variable in self.data_vars.items():
             if variable.dims:
                 tables.setdefault(variable.dims, []).append(str(name))
-        some, name = ", ".join(map(repr, next(iter(tables.values()), [])[:2])), "run" if "contact" in dims else "ds"
+        some, name = (
+            ", ".join(map(repr, next(iter(tables.values()), [])[:2])),
+            "run" if "contact" in dims else "ds",
+        )
         empty = [str(name) for name, size in self.sizes.items() if size == 0]
-        product = f"multiply its tables ({' and '.join(map(_dims, tables))}) to {math.prod(self.sizes.values())} rows"
-        lost = f"lose its tables ({' and '.join(map(_dims, tables))}), because there is no {' and no '.join(empty)}"
+        product = (
+            f"multiply its tables ({' and '.join(map(_dims, tables))}) to "
+            f"{math.prod(self.sizes.values())} rows"
+        )
+        lost = (
+            f"lose its tables ({' and '.join(map(_dims, tables))}), because there is no "
+            f"{' and no '.join(empty)}"
+        )
+        tables_of_run = "sl.samples(run), sl.contacts(run) or " if name == "run" else ""
         raise ParameterError(
             f"{caller} of this result would {lost if empty else product}. "
-            f"Take one: {'sl.samples(run), sl.contacts(run) or ' if name == 'run' else ''}{name}[[{some}]].{caller}()."
+            f"Take one: {tables_of_run}{name}[[{some}]].{caller}()."
         )
 
 

@@ -1,6 +1,8 @@
-"""What every variable of a result is: one table for each kind of Dataset, and what is read off a Dataset by them.
+"""What every variable of a result is: one table for each kind of Dataset, and what is read off a
+Dataset by them.
 
-The rows are :class:`saltus.results.dataset.variable.Variable`; :func:`saltus.results.dataset.build.build` makes Datasets by them.
+The rows are :class:`saltus.results.dataset.variable.Variable`;
+:func:`saltus.results.dataset.build.build` makes Datasets by them.
 """
 
 from __future__ import annotations
@@ -15,7 +17,12 @@ import xarray as xr
 
 from saltus.errors import ParameterError
 from saltus.results.dataset import motions
-from saltus.results.dataset.attractors import AGREEMENT_VARIABLES, ATTRACTOR_VARIABLES, ATTRACTORS_VARIABLES, BASINS_VARIABLES
+from saltus.results.dataset.attractors import (
+    AGREEMENT_VARIABLES,
+    ATTRACTOR_VARIABLES,
+    ATTRACTORS_VARIABLES,
+    BASINS_VARIABLES,
+)
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.methods import METHODS_VARIABLES
@@ -31,9 +38,13 @@ METHODS, EXPONENTS = "methods", "exponents"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
-    TRAJECTORY: "sl.simulate", STROBOSCOPE: "sl.stroboscope", BASINS: "sl.basins", ATTRACTORS: "sl.attractors or sl.basin_fractions",
-    AGREEMENT: "sl.compare", RESPONSES: "sl.frequency_response or sl.bifurcation_diagram", METHODS: "sl.compare_methods",
-    SECTION: "sl.poincare", SPECTRUM: "sl.spectrum", IMPACTS: "sl.impact_statistics", ENERGY: "sl.energy_balance",
+    TRAJECTORY: "sl.simulate", STROBOSCOPE: "sl.stroboscope", BASINS: "sl.basins",
+    ATTRACTORS: "sl.attractors "
+        "or sl.basin_fractions",
+    AGREEMENT: "sl.compare", RESPONSES: "sl.frequency_response or sl.bifurcation_diagram",
+    METHODS: "sl.compare_methods",
+    SECTION: "sl.poincare", SPECTRUM: "sl.spectrum", IMPACTS: "sl.impact_statistics",
+    ENERGY: "sl.energy_balance",
     EXPONENTS: "sl.lyapunov or sl.wolf",
 }  # fmt: skip
 
@@ -54,30 +65,43 @@ TABLES = {
 }
 
 
-# -- names and units -----------------------------------------------------------------------------------------------------------
+# -- names and units -------------------------------------------------------------------------------
 def contact_name(state: str) -> str:
-    """Name of the variable that holds a state at the contacts: ``contact_x``; ``contact_state_velocity`` where the name is taken."""
+    """Name of the variable that holds a state at the contacts: ``contact_x``;
+    ``contact_state_velocity`` where the name is taken.
+    """
     name = f"contact_{state}"
     return f"contact_state_{state}" if name in TRAJECTORY_VARIABLES else name
 
 
 def attractor_name(state: str) -> str:
-    """Name of the variable that holds the points of the attractors: ``attractor_x``; ``attractor_state_type`` where the name is taken."""
+    """Name of the variable that holds the points of the attractors: ``attractor_x``;
+    ``attractor_state_type`` where the name is taken.
+    """
     name = f"attractor_{state}"
     return f"attractor_state_{state}" if name in ATTRACTOR_VARIABLES else name
 
 
 def response_name(name: str) -> str:
-    """Name of the variable that holds a parameter, or the points of a state, of each response: ``response_frequency``, ``response_x``.
+    """Name of the variable that holds a parameter, or the points of a state, of each response:
+    ``response_frequency``, ``response_x``.
 
     ``response_own_peak`` where the name is taken.
     """
-    return f"response_own_{name}" if f"response_{name}" in RESPONSES_VARIABLES else f"response_{name}"
+    return (
+        f"response_own_{name}" if f"response_{name}" in RESPONSES_VARIABLES else f"response_{name}"
+    )
 
 
 def event_name(parameter: str) -> str:
-    """Name of the variable that holds the parameter at the events: ``event_frequency``; ``event_own_kind`` where the name is taken."""
-    return f"event_own_{parameter}" if f"event_{parameter}" in RESPONSES_VARIABLES else f"event_{parameter}"
+    """Name of the variable that holds the parameter at the events: ``event_frequency``;
+    ``event_own_kind`` where the name is taken.
+    """
+    return (
+        f"event_own_{parameter}"
+        if f"event_{parameter}" in RESPONSES_VARIABLES
+        else f"event_{parameter}"
+    )
 
 
 def sample_name(state: str) -> str:
@@ -86,7 +110,9 @@ def sample_name(state: str) -> str:
 
 
 def start_name(state: str) -> str:
-    """Name of the coordinate that holds a state at the starts: ``start_x``; ``start_own_direction`` where the name is taken."""
+    """Name of the coordinate that holds a state at the starts: ``start_x``; ``start_own_direction``
+    where the name is taken.
+    """
     return f"start_own_{state}" if f"start_{state}" in RESPONSES_VARIABLES else f"start_{state}"
 
 
@@ -96,14 +122,18 @@ def end_name(state: str) -> str:
 
 
 def rate_unit(unit: str) -> str:
-    """Unit of a rate of change: ``m`` gives ``m/s``, ``m/s`` gives ``m/s^2``; an unknown one stays unknown."""
+    """Unit of a rate of change: ``m`` gives ``m/s``, ``m/s`` gives ``m/s^2``; an unknown one stays
+    unknown.
+    """
     if not unit or unit.endswith("/s"):
         return f"{unit}^2" if unit else ""
     return f"{unit}/s"
 
 
 def kind_of(ds: Any) -> str:
-    """A key of :data:`TABLES`, such as ``"trajectory"``; ``""`` for anything that isn't a result of saltus."""
+    """A key of :data:`TABLES`, such as ``"trajectory"``; ``""`` for anything that isn't a result of
+    saltus.
+    """
     kind = ds.attrs.get("saltus_result", "") if isinstance(ds, xr.Dataset) else ""
     return kind if kind in TABLES else ""
 
@@ -114,7 +144,9 @@ def period_text(n: int, none: str = "not periodic") -> str:
 
 
 def kind_text(kind: str, n: int) -> str:
-    """A motion in a word: ``T``, ``3T``, ``noisy 24T``, ``quasi-periodic``, ``chaotic``, ``equilibrium``, ``limit cycle``."""
+    """A motion in a word: ``T``, ``3T``, ``noisy 24T``, ``quasi-periodic``, ``chaotic``,
+    ``equilibrium``, ``limit cycle``.
+    """
     if n > 0:
         return f"noisy {period_text(n)}" if kind == Kind.NOISY_PERIODIC.word else period_text(n)
     return kind.replace("_", " " if kind == Kind.LIMIT_CYCLE.word else "-")
@@ -123,12 +155,17 @@ def kind_text(kind: str, n: int) -> str:
 def states_of(ds: xr.Dataset) -> tuple[str, ...]:
     """Names of the states, in the order of the system."""
     if not isinstance(ds.attrs.get("states"), str):
-        raise ParameterError("this Dataset has lost the attribute 'states'. Give it as saltus returned it, or a selection of it.")
+        raise ParameterError(
+            "this Dataset has lost the attribute 'states'. Give it as saltus "
+            "returned it, or a selection of it."
+        )
     return tuple(ds.attrs["states"].split())
 
 
 def equations_of(ds: xr.Dataset) -> list[str]:
-    """The equations that made a result, one text each, such as ``dx/dt = v``; none if they aren't known."""
+    """The equations that made a result, one text each, such as ``dx/dt = v``; none if they aren't
+    known.
+    """
     return list(json.loads(ds.attrs.get("equations", "[]")))
 
 
@@ -144,12 +181,16 @@ def parameters_of(ds: xr.Dataset) -> tuple[str, ...]:
 
 
 def sample_dim(ds: xr.Dataset) -> str:
-    """The dim along which the states are sampled: ``time``, or ``period`` where only the phases are shared."""
+    """The dim along which the states are sampled: ``time``, or ``period`` where only the phases are
+    shared.
+    """
     return "time" if "time" in ds.dims else "period"
 
 
 def forcing_period(ds: xr.Dataset) -> float:
-    """Forcing period of a single trajectory (a batch: select one first) [s]; NaN for a system that isn't forced."""
+    """Forcing period of a single trajectory (a batch: select one first) [s]; NaN for a system that
+    isn't forced.
+    """
     if "forcing_period" in ds:
         return float(ds["forcing_period"])
     return float(ds.attrs.get("forcing_period_s", math.nan))
@@ -160,19 +201,32 @@ def check(ds: Any, *, caller: str, kinds: Sequence[str] = (TRAJECTORY, STROBOSCO
     *makers, last = " or ".join(MAKERS[kind] for kind in kinds).split(" or ")
     wanted = f"{', '.join(makers)} or {last}" if makers else last
     if not isinstance(ds, xr.Dataset):
-        hint = " A DataArray holds one variable: give the whole Dataset." if isinstance(ds, xr.DataArray) else ""
-        raise ParameterError(f"{caller} takes the Dataset that {wanted} returns, not {a_or_an(type(ds).__name__)}.{hint}")
+        hint = (
+            " A DataArray holds one variable: give the whole Dataset."
+            if isinstance(ds, xr.DataArray)
+            else ""
+        )
+        raise ParameterError(
+            f"{caller} takes the Dataset that {wanted} returns, not "
+            f"{a_or_an(type(ds).__name__)}.{hint}"
+        )
     kind = kind_of(ds)
     if not kind:
         raise ParameterError(
-            f"{caller} takes the Dataset that {wanted} returns. This one has no attribute 'saltus_result': it is from elsewhere, or its "
+            f"{caller} takes the Dataset that {wanted} returns. This one has no attribute "
+            f"'saltus_result': it is from elsewhere, or its "
             f"attributes were dropped on the way (xarray.set_options(keep_attrs=True) keeps them)."
         )
     if kind not in kinds:
-        raise ParameterError(f"{caller} takes what {wanted} returns; this Dataset is from {MAKERS[kind]}.")
+        raise ParameterError(
+            f"{caller} takes what {wanted} returns; this Dataset is from {MAKERS[kind]}."
+        )
     missing = [name for name in _needed(ds, kind) if name not in ds]
     if missing:
-        raise ParameterError(f"{caller} misses {', '.join(missing)} in this Dataset. Give it the whole Dataset, not some variables of it.")
+        raise ParameterError(
+            f"{caller} misses {', '.join(missing)} in this Dataset. Give it the "
+            f"whole Dataset, not some variables of it."
+        )
 
 
 def a_or_an(word: str) -> str:
@@ -199,9 +253,11 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
     }[kind]
 
 
-# -- after reading a file ------------------------------------------------------------------------------------------------------
+# -- after reading a file --------------------------------------------------------------------------
 def restore(ds: xr.Dataset) -> xr.Dataset:
-    """The Dataset with the types of the tables: netCDF-3 keeps 32-bit integers, and readers differ on text and attributes."""
+    """The Dataset with the types of the tables: netCDF-3 keeps 32-bit integers, and readers differ
+    on text and attributes.
+    """
     table = TABLES[kind_of(ds)]
     dtypes = {name: table[name].dtype for name in map(str, ds.variables) if name in table}
     variables = {}
@@ -209,7 +265,8 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
         dtype = dtypes.get(str(name), "f8")
         data = np.asarray(variable.values).astype(np.str_ if dtype == "str" else dtype)
         attrs = {key: _plain(value) for key, value in variable.attrs.items()}
-        if "flag_values" in attrs:  # a single number comes back as such, and the codes have the type of their variable
+        # a single number comes back as such, and the codes have the type of their variable
+        if "flag_values" in attrs:
             attrs["flag_values"] = np.atleast_1d(np.asarray(attrs["flag_values"], dtype=data.dtype))
         variables[name] = xr.Variable(variable.dims, data, attrs)
     coords = {name: variables.pop(name) for name in ds.coords}

@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-from saltus.results.dataset.variable import COUNTERS, END_STATES, END_TIME, GUARDS, MINIMA, SHARED, STATUS, Variable
+from saltus.results.dataset.variable import (
+    COUNTERS,
+    END_STATES,
+    END_TIME,
+    GUARDS,
+    MINIMA,
+    SHARED,
+    STATUS,
+    Variable,
+)
 
 _CONTACT = ("contact",)
 
-#: Variables of what ``simulate`` returns. Trajectories with forcing periods of their own share phases, not times: their samples lie along
-#: ``period`` in place of ``time``. Contacts are one table for all trajectories.
+#: Variables of what ``simulate`` returns. Trajectories with forcing periods of their own share
+#: phases, not times: their samples lie along ``period`` in place of ``time``. Contacts are one
+#: table for all trajectories.
 TRAJECTORY_VARIABLES = {
     "<state>": Variable(("trajectory", "time"), "<state>", "<state>"),
     "time": Variable(("trajectory?", "time"), "s", "time", coord=True),
     "period": Variable(("time",), "1", "time in forcing periods", coord=True),
-    "mode": Variable(("trajectory", "time"), "1", "sides of the guards: bit i is set where gap i is positive", "i8"),
+    "mode": Variable(
+        ("trajectory", "time"),
+        "1",
+        "sides of the guards: bit i is set where gap i is positive",
+        "i8",
+    ),
     "contact_time": Variable(_CONTACT, "s", "time of the contact"),
     "contact_time_error": Variable(_CONTACT, "s", "estimated error of the time of the contact"),
     "contact_guard": Variable(_CONTACT, "", "guard that was met", "str"),
-    "contact_direction": Variable(_CONTACT, "1", "+1 where the gap becomes positive, -1 where it becomes negative", "i1"),
+    "contact_direction": Variable(
+        _CONTACT, "1", "+1 where the gap becomes positive, -1 where it becomes negative", "i1"
+    ),
     "contact_velocity": Variable(_CONTACT, "<gap rate>", "rate of the gap at the contact"),
     "contact_kind": Variable(_CONTACT, "", "kind of contact", "str"),
     "contact_mode_before": Variable(_CONTACT, "1", "mode before the contact", "i8"),

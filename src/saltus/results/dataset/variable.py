@@ -10,15 +10,18 @@ from dataclasses import dataclass
 class Variable:
     """What one variable of a result is: a row of the table of its kind.
 
-    The name of a row may hold ``<state>`` or ``<parameter>``: it then stands for one variable a state, or a parameter.
+    The name of a row may hold ``<state>`` or ``<parameter>``: it then stands for one variable a
+    state, or a parameter.
 
     Attributes
     ----------
     dims : tuple of str
-        Its dims. ``trajectory`` is left out of a result that holds one trajectory only; ``...`` stands for those of the grid, which are
-        named after its states or parameters; one with ``?`` is there only where the values need it.
+        Its dims. ``trajectory`` is left out of a result that holds one trajectory only; ``...``
+        stands for those of the grid, which are named after its states or parameters; one with ``?``
+        is there only where the values need it.
     units : str
-        SI unit, ``"1"`` for a plain number, ``""`` for text. In angle brackets, what follows the system or the caller.
+        SI unit, ``"1"`` for a plain number, ``""`` for text. In angle brackets, what follows the
+        system or the caller.
     long_name : str
         A few words, as on an axis.
     dtype : str
@@ -50,11 +53,15 @@ COUNTERS = {
     "grazes_unresolved": Variable(_EACH, "1", "grazes shallower than the local error", "i8"),
     "steps": Variable(_EACH, "1", "accepted steps", "i8"),
     "rejected_steps": Variable(_EACH, "1", "rejected steps", "i8"),
-    "mode_violations": Variable(_EACH, "1", "accepted steps that ended on the wrong side of a guard", "i8"),
+    "mode_violations": Variable(
+        _EACH, "1", "accepted steps that ended on the wrong side of a guard", "i8"
+    ),
 }
 MINIMA = {
     "smallest_contact_speed": Variable(_EACH, "<gap rate>", "smallest gap rate at a contact"),
-    "smallest_gap_margin": Variable(_EACH, "<gap>", "smallest distance of a turning point of the gap from a guard"),
+    "smallest_gap_margin": Variable(
+        _EACH, "<gap>", "smallest distance of a turning point of the gap from a guard"
+    ),
 }
 END_TIME = {"end_time": Variable(_EACH, "s", "time at the end")}
 END_STATES = {"end_<state>": Variable(_EACH, "<state>", "<state> at the end")}
@@ -63,7 +70,14 @@ GUARDS = {
     "guard": Variable(("guard",), "", "guard", "str", coord=True),
     "guard_state": Variable(("guard",), "", "state that the guard bounds", "str"),
     "guard_units": Variable(("guard",), "", "unit of the gap", "str"),
-    "guard_boundary": Variable(("guard", "trajectory?"), "<gap>", "value of the state on the guard"),
+    "guard_boundary": Variable(
+        ("guard", "trajectory?"), "<gap>", "value of the state on the guard"
+    ),
 }
-#: What stands at the end of every table of trajectories: a period that all share is the attribute ``forcing_period_s``.
-SHARED = {"forcing_period": Variable(_EACH, "s", "forcing period", coord=True), **VARIED, **TRAJECTORY_NUMBER}
+#: What stands at the end of every table of trajectories: a period that all share is the attribute
+#: ``forcing_period_s``.
+SHARED = {
+    "forcing_period": Variable(_EACH, "s", "forcing period", coord=True),
+    **VARIED,
+    **TRAJECTORY_NUMBER,
+}

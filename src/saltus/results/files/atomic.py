@@ -24,7 +24,9 @@ class ResultFileError(SaltusError, OSError):
 def path_of(given: object) -> Path:
     """What a caller gave as the path of a file. Raises ParameterError if it is none."""
     if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
-        raise ParameterError(f"{shown(given)} isn't the path of a file. Write it as text, such as 'run.nc'.")
+        raise ParameterError(
+            f"{shown(given)} isn't the path of a file. Write it as text, such as 'run.nc'."
+        )
     return Path(given)
 
 
@@ -32,8 +34,8 @@ def path_of(given: object) -> Path:
 def replacing(*paths: Path) -> Iterator[list[Path]]:
     """Temporary files beside ``paths``, which take their places together when the block ends.
 
-    They are flushed to the disk first. If the block, the flush or the change of places fails, the temporary files are removed and what
-    stood under the names before stays.
+    They are flushed to the disk first. If the block, the flush or the change of places fails, the
+    temporary files are removed and what stood under the names before stays.
 
     Parameters
     ----------
@@ -48,7 +50,8 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
     Raises
     ------
     ResultFileError
-        If the disk is full, the folder is missing or may not be written to, or a path is a link to a file in another folder.
+        If the disk is full, the folder is missing or may not be written to, or a path is a link to
+        a file in another folder.
     """
     paths = tuple(_target(path) for path in paths)
     temporary = [path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part") for path in paths]
@@ -61,7 +64,8 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
         _flush(paths[-1].parent)
     except OSError as error:
         raise ResultFileError(
-            f"{paths[-1]} can't be written: {error.strerror or error}. Nothing was left behind. Free some space or choose another folder."
+            f"{paths[-1]} can't be written: {error.strerror or error}. Nothing was left behind. "
+            f"Free some space or choose another folder."
         ) from error
     finally:
         for part in temporary:
@@ -69,32 +73,46 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
 
 
 def _target(path: Path) -> Path:
-    """Where a path leads: through a link, so that the link stays, but not out of its folder, where it might lead to anything."""
+    """Where a path leads: through a link, so that the link stays, but not out of its folder, where
+    it might lead to anything.
+    """
     try:
         target = path.resolve()
         if path.is_symlink() and not target.is_relative_to(path.parent.resolve()):
             raise ResultFileError(
-                f"{path} is a link to {target}, in another folder: nothing is written through it. Remove it, or name the file."
+                f"{path} is a link to {target}, in another folder: nothing is written through it. "
+                f"Remove it, or name the file."
             )
         if not target.parent.is_dir():
-            raise ResultFileError(f"{path} can't be written: there is no folder {path.parent}. Make it first.")
+            raise ResultFileError(
+                f"{path} can't be written: there is no folder {path.parent}. Make it first."
+            )
     except OSError as error:
         if isinstance(error, ResultFileError):
             raise
-        raise ResultFileError(f"{shown(str(path))} can't be written: {error.strerror or error}. Choose another name.") from None
+        raise ResultFileError(
+            f"{shown(str(path))} can't be written: {error.strerror or error}. Choose another name."
+        ) from None
     return target
 
 
 def remove_old_drafts(folder: Path) -> None:
-    """Remove the drafts that processes left in a folder which were killed while they wrote: those older than a day."""
+    """Remove the drafts that processes left in a folder which were killed while they wrote: those
+    older than a day.
+    """
     for draft in folder.glob(".*.part"):
         with suppress(OSError):  # it isn't ours to remove, or has just taken its place
-            if _DRAFT.fullmatch(draft.name) and draft.is_file() and time.time() - draft.stat().st_mtime > _DRAFT_AGE:
+            if (
+                _DRAFT.fullmatch(draft.name)
+                and draft.is_file()
+                and time.time() - draft.stat().st_mtime > _DRAFT_AGE
+            ):
                 draft.unlink()
 
 
 def usable_folder(path: Path) -> Path:
-    """A folder that can be written to, made if it isn't there: asked before long work, not after it.
+    """A folder that can be written to, made if it isn't there: asked before long work, not after
+    it.
 
     Raises
     ------
@@ -109,7 +127,8 @@ def usable_folder(path: Path) -> Path:
         probe.unlink()
     except OSError as error:
         raise ResultFileError(
-            f"{path} can't hold results: {error.strerror or error}. Nothing was computed; choose another folder."
+            f"{path} can't hold results: {error.strerror or error}. Nothing was computed; choose "
+            f"another folder."
         ) from error
     return path
 

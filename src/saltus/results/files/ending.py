@@ -1,8 +1,10 @@
-"""The end of a result file: a checksum of all bytes before it, asked before any parser sees the file.
+"""The end of a result file: a checksum of all bytes before it, asked before any parser sees the
+file.
 
-netCDF-4 and netCDF-3 both say where their data end, and readers stop there: what follows is ours. A damaged HDF5 file can keep the HDF5
-library busy for ever, so a checksum inside comes too late. It says that a file is whole, not who wrote it: what this user's saltus didn't
-write here is tried in a process of its own first (see :mod:`saltus.results.files.known`).
+netCDF-4 and netCDF-3 both say where their data end, and readers stop there: what follows is ours. A
+damaged HDF5 file can keep the HDF5 library busy for ever, so a checksum inside comes too late. It
+says that a file is whole, not who wrote it: what this user's saltus didn't write here is tried in a
+process of its own first (see :mod:`saltus.results.files.known`).
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from saltus.results.files.atomic import ResultFileError
 
 _ENDING = re.compile(rb"\nsaltus-sha256:([0-9a-f]{64})\n")
 _LENGTH = 80
-#: Time that reading a file without an ending may take [s], and how much of it is read in a second at the least [byte].
+#: Time that reading a file without an ending may take [s], and how much of it is read in a second
+#: at the least [byte].
 PATIENCE, SLOWEST = 60.0, 1e7
 #: Memory that it may take: multiple of its size, and least value [byte].
 TIMES, LEAST = 8, 4 << 30
@@ -48,7 +51,9 @@ dict(getattr(file, "attrs", {}))
 
 def with_ending(content: bytes | memoryview) -> bytes:
     """The bytes of a file with its ending."""
-    return bytes(content) + b"\nsaltus-sha256:" + hashlib.sha256(content).hexdigest().encode() + b"\n"
+    return (
+        bytes(content) + b"\nsaltus-sha256:" + hashlib.sha256(content).hexdigest().encode() + b"\n"
+    )
 
 
 def checksum_in(ended: bytes) -> str:
@@ -79,12 +84,16 @@ def checksum(path: Path) -> str | None:
             digest.update(part)
             left -= len(part)
     if digest.hexdigest().encode() != ending[1]:
-        raise ResultFileError(f"{path} is damaged: the checksum at its end doesn't match. Restore it from a copy or compute it again.")
+        raise ResultFileError(
+            f"{path} is damaged: the checksum at its end doesn't match. Restore "
+            f"it from a copy or compute it again."
+        )
     return ending[1].decode()
 
 
 def try_elsewhere(path: Path, engine: str) -> None:
-    """Read a file of unknown origin in a process that can be stopped, and that has not more memory than a result takes.
+    """Read a file of unknown origin in a process that can be stopped, and that has not more memory
+    than a result takes.
 
     Raises
     ------
@@ -93,18 +102,39 @@ def try_elsewhere(path: Path, engine: str) -> None:
     """
     size = path.stat().st_size
     patience = PATIENCE + size / SLOWEST
-    command = [sys.executable, "-P", "-c", _TRIAL, str(path.resolve()), engine, str(max(TIMES * size, LEAST))]
+    command = [
+        sys.executable,
+        "-P",
+        "-c",
+        _TRIAL,
+        str(path.resolve()),
+        engine,
+        str(max(TIMES * size, LEAST)),
+    ]
     known = os.pathsep.join(place for place in sys.path if place)
     try:
         done = subprocess.run(
-            command, capture_output=True, timeout=patience, check=False, env={**os.environ, "PYTHONPATH": known}, stdin=subprocess.DEVNULL
+            command,
+            capture_output=True,
+            timeout=patience,
+            check=False,
+            env={**os.environ, "PYTHONPATH": known},
+            stdin=subprocess.DEVNULL,
         )
     except subprocess.TimeoutExpired:
         raise ResultFileError(
-            f"{path} is damaged: reading it came to no end within {patience:.0f} s. Restore it from a copy or compute it again."
+            f"{path} is damaged: reading it came to no end within {patience:.0f} s. Restore it "
+            f"from a copy or compute it again."
         ) from None
     except OSError as error:
-        raise ResultFileError(f"{path} can't be tried: {error.strerror or error}. Compute it again.") from error
+        raise ResultFileError(
+            f"{path} can't be tried: {error.strerror or error}. Compute it again."
+        ) from error
     if done.returncode:
-        why = (done.stderr.decode(errors="replace").strip().splitlines() or ["the reader crashed"])[-1]
-        raise ResultFileError(f"{path} is damaged: {shown(printable(why), 200)}. Restore it from a copy or compute it again.")
+        why = (done.stderr.decode(errors="replace").strip().splitlines() or ["the reader crashed"])[
+            -1
+        ]
+        raise ResultFileError(
+            f"{path} is damaged: {shown(printable(why), 200)}. Restore it from a "
+            f"copy or compute it again."
+        )

@@ -27,7 +27,8 @@ from saltus.results.provenance import file_hash
 Target = str | os.PathLike[str]
 
 _MATLAB_KEYWORDS = frozenset(
-    ("break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if", "otherwise", "parfor",
+    ("break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function",
+        "global", "if", "otherwise", "parfor",
      "persistent", "return", "spmd", "switch", "try", "while")
 )  # fmt: skip
 _MATLAB_LENGTH = 31  # the longest name that savemat writes as it stands
@@ -36,8 +37,9 @@ _MATLAB_LENGTH = 31  # the longest name that savemat writes as it stands
 def save(ds: xr.Dataset, path: Target) -> Path:
     """Write a result to a file: ``.nc``, ``.csv`` or ``.mat`` by its name.
 
-    The file is there in full or not at all, and the same result gives the same bytes. A ``.nc`` file keeps everything and is read back by
-    :func:`saltus.results.load`; it is netCDF-4 where h5netcdf and h5py are installed (``pip install "saltus[io]"``), else netCDF-3.
+    The file is there in full or not at all, and the same result gives the same bytes. A ``.nc``
+    file keeps everything and is read back by :func:`saltus.results.load`; it is netCDF-4 where
+    h5netcdf and h5py are installed (``pip install "saltus[io]"``), else netCDF-3.
 
     Parameters
     ----------
@@ -69,22 +71,33 @@ def save(ds: xr.Dataset, path: Target) -> Path:
     path = path_of(path)
     writers = {".nc": to_netcdf, ".csv": to_csv, ".mat": to_mat}
     if path.suffix not in writers:
-        raise ParameterError(f"the file {shown(path.name)} has no suffix that says how to write it. {nearest(path.suffix, writers)}")
+        raise ParameterError(
+            f"the file {shown(path.name)} has no suffix that says how to write "
+            f"it. {nearest(path.suffix, writers)}"
+        )
     return writers[path.suffix](ds, path)
 
 
 @reader
 def to_netcdf(ds: xr.Dataset, path: Target) -> Path:
-    """Write a result to a netCDF file; see :func:`save`. A checksum of the numbers goes with it, and one of the file, at its end."""
+    """Write a result to a netCDF file; see :func:`save`. A checksum of the numbers goes with it,
+    and one of the file, at its end.
+    """
     _check(ds, "to_netcdf", list(TABLES))
-    engine: Literal["h5netcdf", "scipy"] = "h5netcdf" if _has("h5netcdf") and _has("h5py") else "scipy"
+    engine: Literal["h5netcdf", "scipy"] = (
+        "h5netcdf" if _has("h5netcdf") and _has("h5py") else "scipy"
+    )
     marked = ds.assign_attrs(file_hash=file_hash(ds))
     try:
-        content = marked.to_netcdf(engine=engine)  # to memory: the HDF5 library crashes the process when it meets a full disk
+        # to memory: the HDF5 library crashes the process when it meets a full disk
+        content = marked.to_netcdf(engine=engine)
     except ValueError as error:
         if "safely cast" not in str(error):
             raise
-        raise ParameterError(f'{path}: a count is too large for netCDF-3. Install "saltus[io]", which writes netCDF-4.') from error
+        raise ParameterError(
+            f'{path}: a count is too large for netCDF-3. Install "saltus[io]", '
+            f"which writes netCDF-4."
+        ) from error
     data = with_ending(content)
     with replacing(Path(path)) as (part,):
         part.write_bytes(data)
@@ -97,28 +110,34 @@ def _check(ds: xr.Dataset, caller: str, kinds: Sequence[str]) -> None:
     check(ds, caller=caller, kinds=kinds)
     place = place_of_control(ds)
     if place:
-        raise ParameterError(f"{caller}: {place} holds control characters, which a terminal would obey. Write plain text.")
+        raise ParameterError(
+            f"{caller}: {place} holds control characters, which a terminal would "
+            f"obey. Write plain text."
+        )
 
 
 def _has(package: str) -> bool:
     return importlib.util.find_spec(package) is not None
 
 
-# -- CSV -----------------------------------------------------------------------------------------------------------------------
+# -- CSV -------------------------------------------------------------------------------------------
 @reader
 def to_csv(ds: xr.Dataset, path: Target) -> Path:
     """Write a result as CSV, numbers with all their digits.
 
-    ``run.csv`` holds a row for each sample (of a batch: trajectory after trajectory), ``run_contacts.csv`` a row for each contact, and
-    for a batch ``run_trajectories.csv`` a row for each trajectory. The header row has units (``x [m]``). Lines that start with ``#`` say
-    where the result comes from; ``pandas.read_csv(path, comment="#")`` skips them.
+    ``run.csv`` holds a row for each sample (of a batch: trajectory after trajectory),
+    ``run_contacts.csv`` a row for each contact, and for a batch ``run_trajectories.csv`` a row for
+    each trajectory. The header row has units (``x [m]``). Lines that start with ``#`` say where the
+    result comes from; ``pandas.read_csv(path, comment="#")`` skips them.
 
-    Of responses the file holds a row for each response, and ``NAME_events.csv`` one for each thing that happens to a branch.
+    Of responses the file holds a row for each response, and ``NAME_events.csv`` one for each thing
+    that happens to a branch.
 
     Parameters
     ----------
     ds : Dataset
-        What ``simulate``, ``stroboscope``, ``frequency_response`` or ``bifurcation_diagram`` returned.
+        What ``simulate``, ``stroboscope``, ``frequency_response`` or ``bifurcation_diagram``
+        returned.
     path : str or path
         The file of samples, or of responses; the others get their names from it.
 
@@ -148,7 +167,8 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
         if not isinstance(ds, xr.Dataset) or "saltus_result" not in ds.attrs:
             raise
         raise ParameterError(
-            f"{error} Write .nc or .mat; or one table of it, ds[['...']].to_dataframe().to_csv({str(path)!r}). "
+            f"{error} Write .nc or .mat; or one table of it, "
+            f"ds[['...']].to_dataframe().to_csv({str(path)!r}). "
             "A study writes its tables as CSV."
         ) from None
     path = path_of(path)
@@ -156,8 +176,15 @@ def to_csv(ds: xr.Dataset, path: Target) -> Path:
         main, side = tables.responses(ds), {"events": tables.events(ds)}
     else:
         main = tables.samples(ds)
-        side = {"contacts": tables.contacts(ds), "trajectories": tables.trajectories(ds) if "trajectory" in ds.dims else {}}
-    sheets = {path.with_name(f"{path.stem}_{name}{path.suffix}"): table for name, table in side.items() if table}
+        side = {
+            "contacts": tables.contacts(ds),
+            "trajectories": tables.trajectories(ds) if "trajectory" in ds.dims else {},
+        }
+    sheets = {
+        path.with_name(f"{path.stem}_{name}{path.suffix}"): table
+        for name, table in side.items()
+        if table
+    }
     sheets[path] = main
     with replacing(*sheets) as parts:
         for part, table in zip(parts, sheets.values(), strict=True):
@@ -170,17 +197,22 @@ def _write_table(path: Path, table: tables.Table, ds: xr.Dataset) -> None:
         file.writelines(f"# {line}\n" for line in tables.notes(ds))
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(map(csv_cell, table))
-        writer.writerows(map(csv_cell, row) for row in zip(*(column.tolist() for column in table.values()), strict=True))
+        writer.writerows(
+            map(csv_cell, row)
+            for row in zip(*(column.tolist() for column in table.values()), strict=True)
+        )
 
 
-# -- MATLAB --------------------------------------------------------------------------------------------------------------------
+# -- MATLAB ----------------------------------------------------------------------------------------
 @reader
 def to_mat(ds: xr.Dataset, path: Target) -> Path:
     """Write a result as a MATLAB file: ``run = load("run.mat"); plot(run.time, run.x)``.
 
-    Variables: ``time``, ``period``, each state and ``mode`` as columns (a batch: one column a trajectory), ``status`` and the counters; the
-    structs ``contact`` (``run.contact.time``, ...), ``guard``, ``units`` and ``provenance``. Texts are character arrays, lists of texts
-    cell arrays. A name that MATLAB can't take (a keyword, not ASCII, over 31 characters) is changed and the change kept in ``names``.
+    Variables: ``time``, ``period``, each state and ``mode`` as columns (a batch: one column a
+    trajectory), ``status`` and the counters; the structs ``contact`` (``run.contact.time``, ...),
+    ``guard``, ``units`` and ``provenance``. Texts are character arrays, lists of texts cell arrays.
+    A name that MATLAB can't take (a keyword, not ASCII, over 31 characters) is changed and the
+    change kept in ``names``.
 
     Parameters
     ----------
@@ -218,8 +250,11 @@ def to_mat(ds: xr.Dataset, path: Target) -> Path:
         try:
             savemat(part, _matlab(ds), appendmat=False, oned_as="column")
         except MatWriteError as error:
-            raise ParameterError(f"{path}: {error}. Write '.nc', which has no limit, or keep fewer samples.") from error
-        with part.open("r+b") as file:  # the header is 116 bytes of text, in which scipy puts the time of day
+            raise ParameterError(
+                f"{path}: {error}. Write '.nc', which has no limit, or keep fewer samples."
+            ) from error
+        # the header is 116 bytes of text, in which scipy puts the time of day
+        with part.open("r+b") as file:
             file.write(b"MATLAB 5.0 MAT-file, written by saltus".ljust(116))
     return path
 
@@ -241,23 +276,41 @@ def _matlab(ds: xr.Dataset) -> dict[str, Any]:
         "provenance": _matlab_names(ds.attrs, changed),
     }
     top = _matlab_names(groups[""], changed, taken=(*structs, "names"))
-    return {**top, **{name: struct for name, struct in structs.items() if struct}, **({"names": changed} if changed else {})}
+    return {
+        **top,
+        **{name: struct for name, struct in structs.items() if struct},
+        **({"names": changed} if changed else {}),
+    }
 
 
 def _matlab_value(variable: xr.Variable) -> Any:
-    """Samples run down the rows, trajectories across; texts become cells, a single one a character array."""
-    values = variable.transpose(..., "trajectory").values if "trajectory" in variable.dims else variable.values
+    """Samples run down the rows, trajectories across; texts become cells, a single one a character
+    array.
+    """
+    values = (
+        variable.transpose(..., "trajectory").values
+        if "trajectory" in variable.dims
+        else variable.values
+    )
     if values.dtype.kind in "fiu":
         return values
     return values.astype(object) if values.ndim else str(values)
 
 
-def _matlab_names(values: Mapping[Any, Any], changed: dict[str, str], taken: Sequence[str] = ()) -> dict[str, Any]:
-    """The mapping under names that MATLAB takes, in the same order; changed ones are noted as new name to old name."""
+def _matlab_names(
+    values: Mapping[Any, Any], changed: dict[str, str], taken: Sequence[str] = ()
+) -> dict[str, Any]:
+    """The mapping under names that MATLAB takes, in the same order; changed ones are noted as new
+    name to old name.
+    """
     result: dict[str, Any] = {}
     for name, value in values.items():
         base = re.sub(r"\W", "_", str(name), flags=re.ASCII)
-        base = base if re.match(r"[A-Za-z]", base) and base not in _MATLAB_KEYWORDS else f"v_{base.lstrip('_')}"
+        base = (
+            base
+            if re.match(r"[A-Za-z]", base) and base not in _MATLAB_KEYWORDS
+            else f"v_{base.lstrip('_')}"
+        )
         valid, number = base[:_MATLAB_LENGTH], 1
         while valid in result or valid in taken:
             number += 1

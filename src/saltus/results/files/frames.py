@@ -26,11 +26,14 @@ def contacts(run: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        In the order of trajectory and time, with the columns ``trajectory`` (of a batch: its number), ``time`` and ``time_error`` [s],
-        ``guard`` (name of the boundary that was met), ``direction`` (+1 where the gap becomes positive, -1 where it becomes negative),
-        ``velocity`` (rate of the gap: the speed of the impact and its sign), ``kind`` (``crossing``, ``graze``, ``graze_unresolved``),
-        ``mode_before`` and ``mode_after`` (bit i is set where gap i is positive), ``steps``, and each state at the contact under its name
-        (``state_NAME`` where that is taken). SI; ``frame.attrs["units"]`` has the unit of each column.
+        In the order of trajectory and time, with the columns ``trajectory`` (of a batch: its
+        number), ``time`` and ``time_error`` [s], ``guard`` (name of the boundary that was met),
+        ``direction`` (+1 where the gap becomes positive, -1 where it becomes negative),
+        ``velocity`` (rate of the gap: the speed of the impact and its sign), ``kind``
+        (``crossing``, ``graze``, ``graze_unresolved``), ``mode_before`` and ``mode_after`` (bit i
+        is set where gap i is positive), ``steps``, and each state at the contact under its name
+        (``state_NAME`` where that is taken). SI; ``frame.attrs["units"]`` has the unit of each
+        column.
 
     Raises
     ------
@@ -60,8 +63,9 @@ def samples(run: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Trajectory after trajectory, with the columns ``trajectory`` (of a batch), ``time`` [s], ``period`` (time in forcing periods, of a
-        forced system), each state under its name, and ``mode``. SI; ``frame.attrs["units"]`` has the unit of each column.
+        Trajectory after trajectory, with the columns ``trajectory`` (of a batch), ``time`` [s],
+        ``period`` (time in forcing periods, of a forced system), each state under its name, and
+        ``mode``. SI; ``frame.attrs["units"]`` has the unit of each column.
 
     Raises
     ------
@@ -85,5 +89,7 @@ def _frame(run: xr.Dataset, columns: dict[str, tuple[str, Any]]) -> pd.DataFrame
     import pandas as pd
 
     frame = pd.DataFrame({name: values for name, (_, values) in columns.items()})
-    frame.attrs["units"] = {name: run[variable].attrs.get("units", "") for name, (variable, _) in columns.items()}
+    frame.attrs["units"] = {
+        name: run[variable].attrs.get("units", "") for name, (variable, _) in columns.items()
+    }
     return frame

@@ -1,6 +1,8 @@
-"""Result files that need no trial: those that this user's saltus wrote here, or has tried before; by the checksums at their ends.
+"""Result files that need no trial: those that this user's saltus wrote here, or has tried before;
+by the checksums at their ends.
 
-Each is an empty file of that name in a folder of the user's alone. The folder is safe to lose: what it held is tried again.
+Each is an empty file of that name in a folder of the user's alone. The folder is safe to lose: what
+it held is tried again.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ from pathlib import Path
 
 from saltus.cache import folder as cache_folder
 
-#: Names that are kept: where there are more when a process writes its first, all of them are forgotten.
+#: Names that are kept: where there are more when a process writes its first, all of them are
+#: forgotten.
 MOST = 20_000
 _HERE: set[str] = set()
 
@@ -42,7 +45,11 @@ def note(digest: str) -> None:
         place.mkdir(parents=True, exist_ok=True, mode=0o700)
         if _ours(place):
             _sweep(place)
-            os.close(os.open(place / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600))
+            os.close(
+                os.open(
+                    place / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600
+                )
+            )
 
 
 def count() -> int:
@@ -54,7 +61,9 @@ def count() -> int:
 
 
 def forget() -> int:
-    """Forget all of them; returns how many there were. Each file is tried once more when it is loaded next."""
+    """Forget all of them; returns how many there were. Each file is tried once more when it is
+    loaded next.
+    """
     before, place = count(), folder()
     _HERE.clear()
     with suppress(OSError):
@@ -68,7 +77,9 @@ def forget() -> int:
 def _ours(place: Path) -> bool:
     """Whether a folder is this user's, and nobody else may write to it."""
     seen = os.lstat(place)
-    mine = not hasattr(os, "geteuid") or (seen.st_uid == os.geteuid() and not seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
+    mine = not hasattr(os, "geteuid") or (
+        seen.st_uid == os.geteuid() and not seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    )
     return stat.S_ISDIR(seen.st_mode) and mine
 
 

@@ -22,14 +22,17 @@ from saltus.units import coherent_unit, to_si
 _HEADER = re.compile(r"\s*(?P<name>.*?)\s*\[(?P<unit>[^]]*)\]\s*")
 
 
-def read_measured(path: str | os.PathLike[str], axis: str, axis_unit: str, amplitude_unit: str) -> xr.Dataset:
+def read_measured(
+    path: str | os.PathLike[str], axis: str, axis_unit: str, amplitude_unit: str
+) -> xr.Dataset:
     """Points that somebody measured, in SI.
 
     Parameters
     ----------
     path : str or path
-        A CSV file with a column of ``axis`` and one called ``amplitude``, in any order, units in the header: ``frequency [Hz], amplitude
-        [mm]``. Other columns are passed over, lines that begin with # are comments.
+        A CSV file with a column of ``axis`` and one called ``amplitude``, in any order, units in
+        the header: ``frequency [Hz], amplitude [mm]``. Other columns are passed over, lines that
+        begin with # are comments.
     axis : str
         What the points are measured over, such as ``frequency``.
     axis_unit, amplitude_unit : str
@@ -53,20 +56,34 @@ def read_measured(path: str | os.PathLike[str], axis: str, axis_unit: str, ampli
     return measured_points(data, path, axis, axis_unit, amplitude_unit)
 
 
-def measured_points(data: bytes, path: Path, axis: str, axis_unit: str, amplitude_unit: str) -> xr.Dataset:
-    """The same from what is in the file; ``path`` is for messages, in which nothing of the file is repeated."""
+def measured_points(
+    data: bytes, path: Path, axis: str, axis_unit: str, amplitude_unit: str
+) -> xr.Dataset:
+    """The same from what is in the file; ``path`` is for messages, in which nothing of the file is
+    repeated.
+    """
     units = {axis: axis_unit, "amplitude": amplitude_unit}
     rows = _rows(data, path)
     header = next(rows, None)
     if header is None:
-        raise ResultFileError(f"{path} is empty. Its first line names the columns: {_wanted(units)}.")
+        raise ResultFileError(
+            f"{path} is empty. Its first line names the columns: {_wanted(units)}."
+        )
     place = {name: _column(path, header[1], name, unit, units) for name, unit in units.items()}
-    points = np.array([[_number(path, line, row, *place[name]) for name in units] for line, row in rows]).reshape(-1, 2)
-    return xr.Dataset({name: ("point", points[:, i], {"units": unit}) for i, (name, unit) in enumerate(units.items())})
+    points = np.array(
+        [[_number(path, line, row, *place[name]) for name in units] for line, row in rows]
+    ).reshape(-1, 2)
+    return xr.Dataset(
+        {
+            name: ("point", points[:, i], {"units": unit})
+            for i, (name, unit) in enumerate(units.items())
+        }
+    )
 
 
 def columns(data: bytes, path: Path) -> np.ndarray:
-    """The first two columns of a CSV file, float64[2, n], in SI by the units in their headings; ``path`` is for messages.
+    """The first two columns of a CSV file, float64[2, n], in SI by the units in their headings;
+    ``path`` is for messages.
 
     Raises
     ------
@@ -76,18 +93,30 @@ def columns(data: bytes, path: Path) -> np.ndarray:
     rows = _rows(data, path)
     header = next(rows, (0, []))[1]
     if len(header) < 2:
-        raise ResultFileError(f"{path} has no two columns. Its first line names them, with their units: time [s], force [N].")
+        raise ResultFileError(
+            f"{path} has no two columns. Its first line names them, with their "
+            f"units: time [s], force [N]."
+        )
     factors = []
     for text in header[:2]:
         match = _HEADER.fullmatch(text)
         unit = match["unit"].strip() if match else ""
         try:
-            factors.append(to_si(f"1 {unit}", coherent_unit(f"1 {unit}", "a heading"), "a heading") if unit not in ("", "1", "-") else 1.0)
+            factors.append(
+                to_si(f"1 {unit}", coherent_unit(f"1 {unit}", "a heading"), "a heading")
+                if unit not in ("", "1", "-")
+                else 1.0
+            )
         except UnitError as error:
             raise ResultFileError(f"{path}: {error}") from None
     if _is_number(header[0]):
-        raise ResultFileError(f"{path} begins with numbers. Its first line names the columns, with their units: time [s], force [N].")
-    found = [[_number(path, line, row, i, str(i + 1), "", "") for i in (0, 1)] for line, row in rows]
+        raise ResultFileError(
+            f"{path} begins with numbers. Its first line names the columns, with "
+            f"their units: time [s], force [N]."
+        )
+    found = [
+        [_number(path, line, row, i, str(i + 1), "", "") for i in (0, 1)] for line, row in rows
+    ]
     return np.array(found, float).reshape(-1, 2).T * np.array(factors)[:, None]
 
 
@@ -115,31 +144,47 @@ def _rows(data: bytes, path: Path) -> Iterator[tuple[int, list[str]]]:
         raise ResultFileError(f"{path} can't be read: {error}.") from None
 
 
-def _column(path: Path, header: list[str], name: str, unit: str, units: dict[str, str]) -> tuple[int, str, str, str]:
+def _column(
+    path: Path, header: list[str], name: str, unit: str, units: dict[str, str]
+) -> tuple[int, str, str, str]:
     """Where a column is, its name, the unit it is in, and the one it is wanted in."""
     found: dict[str, tuple[int, str]] = {}
     for i, text in enumerate(header):
         match = _HEADER.fullmatch(text)
-        found[match["name"] if match else text.strip()] = (i, match["unit"].strip() if match else "")
+        found[match["name"] if match else text.strip()] = (
+            i,
+            match["unit"].strip() if match else "",
+        )
     if name not in found:
-        raise ResultFileError(f"{path} has no column {shown(name)}. The first line must be like {_wanted(units)}.")
+        raise ResultFileError(
+            f"{path} has no column {shown(name)}. The first line must be like {_wanted(units)}."
+        )
     index, given = found[name]
     if not given and unit not in ("", "1"):
-        raise ResultFileError(f"{path}: the column {name!r} has no unit. Write it in the header: {_wanted(units)}.")
+        raise ResultFileError(
+            f"{path}: the column {name!r} has no unit. Write it in the header: {_wanted(units)}."
+        )
     return index, name, given, unit
 
 
-def _number(path: Path, line: int, row: list[str], index: int, name: str, given: str, unit: str) -> float:
+def _number(
+    path: Path, line: int, row: list[str], index: int, name: str, given: str, unit: str
+) -> float:
     try:
         value = float(row[index].strip() if index < len(row) else "")
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise ResultFileError(f"{path}, line {line}: what stands in the column {name!r} is no finite number.")
+        raise ResultFileError(
+            f"{path}, line {line}: what stands in the column {name!r} is no finite number."
+        )
     if not given:
         return value
     try:
         return to_si(f"{value!r} {given}", unit, name)
     except UnitError:
         wanted = "mm" if unit == "m" else unit
-        raise ResultFileError(f"{path}: the column {name!r} has the wrong unit in its header. Write {name} [{wanted}].") from None
+        raise ResultFileError(
+            f"{path}: the column {name!r} has the wrong unit in its header. "
+            f"Write {name} [{wanted}]."
+        ) from None

@@ -1,4 +1,6 @@
-"""Texts of a result: none holds what a terminal would obey, neither when it is written nor when it is read."""
+"""Texts of a result: none holds what a terminal would obey, neither when it is written nor when it
+is read.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from saltus.fence import has_control
 
 
 def place_of_control(ds: xr.Dataset) -> str:
-    """Where the first control character stands among names, texts and attributes, such as ``the attribute 'source'``; "" if nowhere."""
+    """Where the first control character stands among names, texts and attributes, such as ``the
+    attribute 'source'``; "" if nowhere.
+    """
     for place, text in _texts(ds):
         if has_control(text):
             return place

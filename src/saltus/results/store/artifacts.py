@@ -1,4 +1,6 @@
-"""Small values that belong to all chunks of a store: one file each, with its name, the hash of its store and a checksum inside."""
+"""Small values that belong to all chunks of a store: one file each, with its name, the hash of its
+store and a checksum inside.
+"""
 
 from __future__ import annotations
 
@@ -25,18 +27,27 @@ def put_artifact(
 
     ``made_under`` is the hash of the store's head, ``shard`` the lock that this process holds.
     """
-    content = {"base64": base64.b64encode(value).decode()} if isinstance(value, bytes) else {"value": value}
+    content = (
+        {"base64": base64.b64encode(value).decode()}
+        if isinstance(value, bytes)
+        else {"value": value}
+    )
     data = seal({"name": name, "store": made_under, **content})
     file = _file(store, name)
-    with exclusive(store / "locks" / "artifacts", patience=10.0):  # shards may put at the same moment
+    # shards may put at the same moment
+    with exclusive(store / "locks" / "artifacts", patience=10.0):
         earlier = read(file)
         intact = _opened(earlier, made_under, name) is not None
         if intact and earlier == data:
             return
         if intact and existing == "same":
-            raise StoreError(f"{store} keeps another {name!r} already. Use that one: get({name!r}).")
+            raise StoreError(
+                f"{store} keeps another {name!r} already. Use that one: get({name!r})."
+            )
         if intact and existing == "replace" and shard != WHOLE:
-            raise StoreError(f"{name!r} of {store} can only be replaced under the lock of the whole store.")
+            raise StoreError(
+                f"{name!r} of {store} can only be replaced under the lock of the whole store."
+            )
         if not intact or existing == "replace":
             write_whole(file, data, store / "parts", "artifact")
 
@@ -59,7 +70,11 @@ def has_artifact(store: Path, made_under: str, name: str) -> bool:
 def _opened(data: bytes | None, made_under: str, name: str) -> dict[str, Any] | None:
     """What an artifact holds; None if it is damaged, or is another one, or another store's."""
     values = unseal(data or b"")
-    return values if values is not None and (values.get("name"), values.get("store")) == (name, made_under) else None
+    return (
+        values
+        if values is not None and (values.get("name"), values.get("store")) == (name, made_under)
+        else None
+    )
 
 
 def _file(store: Path, name: str) -> Path:

@@ -1,8 +1,10 @@
-"""The grid of a map, cut into chunks, and a chunk as bytes that know what they are. Nothing here touches the disk.
+"""The grid of a map, cut into chunks, and a chunk as bytes that know what they are. Nothing here
+touches the disk.
 
-A chunk is one file: its arrays in the order of their names, as little-endian numbers; then its number and the hash of its store; then the
-SHA-256 of all that. In another place, or another store, it doesn't fit, and no bit of it can change unseen. The same numbers give the same
-bytes on every machine and version.
+A chunk is one file: its arrays in the order of their names, as little-endian numbers; then its
+number and the hash of its store; then the SHA-256 of all that. In another place, or another store,
+it doesn't fit, and no bit of it can change unseen. The same numbers give the same bytes on every
+machine and version.
 """
 
 from __future__ import annotations
@@ -53,11 +55,17 @@ class Chunks:
         """
         shape = tuple(int(size) for size in shape)
         if not shape or min(shape) < 1 or chunk < 1:
-            raise ParameterError(f"a grid of shape {shape} can't be cut into chunks of {chunk} cells. Give sizes of at least 1.")
+            raise ParameterError(
+                f"a grid of shape {shape} can't be cut into chunks of {chunk} "
+                f"cells. Give sizes of at least 1."
+            )
         types = {name: np.dtype(dtype).newbyteorder("=") for name, dtype in sorted(arrays.items())}
         for name, dtype in types.items():
             if not name.isidentifier() or dtype.kind not in "biufc":
-                raise ParameterError(f"array {name!r} of {dtype} can't be stored: names are words, values plain numbers.")
+                raise ParameterError(
+                    f"array {name!r} of {dtype} can't be stored: names are words, "
+                    f"values plain numbers."
+                )
         if not types:
             raise ParameterError("a store needs at least one array.")
         return cls(shape, min(int(chunk), math.prod(shape)), types)
@@ -81,7 +89,9 @@ class Chunks:
             If there is no such chunk.
         """
         if not 0 <= index < self.count:
-            raise ParameterError(f"there is no chunk {index}: they are numbered from 0 to {self.count - 1}.")
+            raise ParameterError(
+                f"there is no chunk {index}: they are numbered from 0 to {self.count - 1}."
+            )
         return slice(index * self.chunk, min((index + 1) * self.chunk, self.cells))
 
     def as_text(self) -> dict[str, str]:
@@ -95,7 +105,9 @@ class Chunks:
     def size(self, index: int) -> int:
         """Bytes of the file of a chunk."""
         extent = self.extent(index)
-        return (extent.stop - extent.start) * sum(dtype.itemsize for dtype in self.arrays.values()) + TRAILER
+        return (extent.stop - extent.start) * sum(
+            dtype.itemsize for dtype in self.arrays.values()
+        ) + TRAILER
 
     def encode(self, index: int, values: Mapping[str, np.ndarray], store: str) -> bytes:
         """The file of a chunk.
@@ -112,25 +124,38 @@ class Chunks:
         Raises
         ------
         ParameterError
-            If an array is missing or unknown, there are too few or too many values, or their dtype would lose digits.
+            If an array is missing or unknown, there are too few or too many values, or their dtype
+            would lose digits.
         """
         if set(values) != set(self.arrays):
-            raise ParameterError(f"chunk {index} has the arrays {sorted(values)}, the store keeps {sorted(self.arrays)}.")
+            raise ParameterError(
+                f"chunk {index} has the arrays {sorted(values)}, the store keeps "
+                f"{sorted(self.arrays)}."
+            )
         extent = self.extent(index)
         parts = []
         for name, dtype in self.arrays.items():
             array = np.asarray(values[name])
-            if array.shape != (extent.stop - extent.start,) or not np.can_cast(array.dtype, dtype, "safe"):
+            if array.shape != (extent.stop - extent.start,) or not np.can_cast(
+                array.dtype, dtype, "safe"
+            ):
                 raise ParameterError(
-                    f"chunk {index} of {name!r} has {extent.stop - extent.start} values of {dtype}, not {array.shape} of {array.dtype}."
+                    f"chunk {index} of {name!r} has {extent.stop - extent.start} values of "
+                    f"{dtype}, not {array.shape} of {array.dtype}."
                 )
             parts.append(array.astype(dtype.newbyteorder("<")).tobytes())
         content = b"".join([*parts, _place(index, store)])
         return content + hashlib.sha256(content).digest()
 
     def decode(self, index: int, data: bytes, store: str) -> dict[str, np.ndarray] | None:
-        """Values of a chunk, by array; None if the file isn't this chunk of this store, bit by bit."""
-        if len(data) != self.size(index) or not self.fits(index, data[-TRAILER:], store) or not is_whole(data):
+        """Values of a chunk, by array; None if the file isn't this chunk of this
+        store, bit by bit.
+        """
+        if (
+            len(data) != self.size(index)
+            or not self.fits(index, data[-TRAILER:], store)
+            or not is_whole(data)
+        ):
             return None
         extent, values, begin = self.extent(index), {}, 0
         for name, dtype in self.arrays.items():

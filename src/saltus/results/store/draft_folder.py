@@ -1,4 +1,6 @@
-"""A folder that appears under its name with everything in it, or not at all, and what is left of it when its maker is killed."""
+"""A folder that appears under its name with everything in it, or not at all, and what is left of it
+when its maker is killed.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,11 @@ from pathlib import Path
 from saltus.results.store.durable import StoreError, flush_names, write
 from saltus.results.store.lock import exclusive, is_held
 
-#: A folder takes a moment to make: a draft of one that is older than this [s], and not locked, was left by a process that was killed.
+#: A folder takes a moment to make: a draft of one that is older than this [s], and not locked, was
+#: left by a process that was killed.
 _DRAFT_AGE = 60.0
-#: Lock file in a draft, held while it is filled: a clock that jumps ahead makes it seem old, but not abandoned.
+#: Lock file in a draft, held while it is filled: a clock that jumps ahead makes it seem old, but
+#: not abandoned.
 _LOCK = Path("locks") / "draft"
 
 
@@ -50,21 +54,28 @@ def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str])
         flush_names(path.parent)
     except OSError as error:
         raise StoreError(
-            f"{path} can't be made: {error.strerror or error}. Nothing was left behind; make room or choose another folder."
+            f"{path} can't be made: {error.strerror or error}. Nothing was left behind; make room "
+            f"or choose another folder."
         ) from error
     finally:
         shutil.rmtree(draft, ignore_errors=True)
 
 
 def _locked(draft: Path) -> AbstractContextManager[object]:
-    """Hold the lock of a draft. Windows renames no folder with an open file in it: there the age alone must do."""
+    """Hold the lock of a draft. Windows renames no folder with an open file in it: there the age
+    alone must do.
+    """
     return nullcontext() if os.name == "nt" else exclusive(draft / _LOCK)
 
 
 def remove_old_drafts(path: Path) -> None:
     """Remove what processes left that were killed within :func:`write_folder`."""
     for draft in path.parent.iterdir():
-        if draft.name.startswith(f".{path.name}.") and draft.name.endswith(".part") and _abandoned(draft):
+        if (
+            draft.name.startswith(f".{path.name}.")
+            and draft.name.endswith(".part")
+            and _abandoned(draft)
+        ):
             shutil.rmtree(draft, ignore_errors=True)
 
 

@@ -1,4 +1,6 @@
-"""Files that reach the disk complete or not at all, and JSON that knows when it was damaged. The ground under a store."""
+"""Files that reach the disk complete or not at all, and JSON that knows when it was damaged. The
+ground under a store.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,11 @@ class StoreError(SaltusError, OSError):
 
 
 def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
-    """Write a file that appears under its name complete or not at all, whatever befalls the process or the disk.
+    """Write a file that appears under its name complete or not at all, whatever befalls the process
+    or the disk.
 
-    The bytes are on the disk before the name appears, and the name is before this returns. A disk that fills up leaves all as it was.
+    The bytes are on the disk before the name appears, and the name is before this returns. A disk
+    that fills up leaves all as it was.
 
     Parameters
     ----------
@@ -47,7 +51,8 @@ def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
         flush_names(path.parent)
     except OSError as error:
         raise StoreError(
-            f"{path} can't be written: {error.strerror or error}. Nothing half-written was left behind, and what was done stays done: "
+            f"{path} can't be written: {error.strerror or error}. Nothing half-written was left "
+            f"behind, and what was done stays done: "
             "make room or mend the disk, then start again."
         ) from error
     finally:
@@ -75,13 +80,17 @@ def flush_names(folder: Path) -> None:
 
 
 def read(path: Path, most: int = fence.STORED_BYTES) -> bytes | None:
-    """What is in a file; None if it isn't there, isn't one of at most ``most`` bytes, or the disk can't read it any more."""
+    """What is in a file; None if it isn't there, isn't one of at most ``most`` bytes, or the disk
+    can't read it any more.
+    """
     try:
         return fence.content(path, most)
     except fence.RefusedError as refused:
         if refused.errno in (None, errno.ENOENT, errno.ENOTDIR, errno.EIO):
             return None
-        raise StoreError(f"{path} {refused} Mend its permissions or the disk, or remove it.") from refused
+        raise StoreError(
+            f"{path} {refused} Mend its permissions or the disk, or remove it."
+        ) from refused
 
 
 def size(path: Path) -> int | None:
@@ -108,7 +117,9 @@ def sha256(data: bytes) -> str:
 
 
 def seal(values: Mapping[str, Any]) -> bytes:
-    """JSON text with a checksum of itself; the same values give the same bytes, whatever their order."""
+    """JSON text with a checksum of itself; the same values give the same bytes, whatever their
+    order.
+    """
     return _text({**values, "checksum": sha256(_text(values))})
 
 
@@ -116,7 +127,11 @@ def unseal(data: bytes) -> dict[str, Any] | None:
     """What :func:`seal` was given; None if one bit of it is not what it was."""
     try:
         values = json.loads(data)
-        return values if seal({name: value for name, value in values.items() if name != "checksum"}) == data else None
+        return (
+            values
+            if seal({name: value for name, value in values.items() if name != "checksum"}) == data
+            else None
+        )
     except (ValueError, AttributeError, RecursionError):
         return None
 
@@ -126,5 +141,6 @@ def _text(values: Mapping[str, Any]) -> bytes:
         return json.dumps(values, indent=1, sort_keys=True).encode() + b"\n"
     except TypeError as error:
         raise ParameterError(
-            f"only plain values can be stored: None, booleans, numbers, text, lists, dicts with text keys ({error})."
+            f"only plain values can be stored: None, booleans, numbers, text, lists, dicts with "
+            f"text keys ({error})."
         ) from None

@@ -1,4 +1,6 @@
-"""``store.json``: what a store holds and what it was made from. Its hash stands in every record, so that chunks know where they belong."""
+"""``store.json``: what a store holds and what it was made from. Its hash stands in every record, so
+that chunks know where they belong.
+"""
 
 from __future__ import annotations
 
@@ -34,14 +36,19 @@ _TYPES = {
 def head_of(identity: Mapping[str, str], note: Mapping[str, Any], chunks: Chunks) -> dict[str, Any]:
     """What ``store.json`` says."""
     return {
-        "format": FORMAT, "identity": dict(identity), "note": dict(note), "shape": list(chunks.shape), "chunk": chunks.chunk,
+        "format": FORMAT, "identity": dict(identity), "note": dict(note),
+        "shape": list(chunks.shape), "chunk": chunks.chunk,
         "arrays": {name: dtype.name for name, dtype in chunks.arrays.items()},
     }  # fmt: skip
 
 
 def fingerprint(head: Mapping[str, Any]) -> str:
-    """SHA-256 of a head without its note, which is for people: equal for stores whose chunks may stand for each other."""
-    return sha256(seal({name: head[name] for name in ("format", "identity", "shape", "chunk", "arrays")}))
+    """SHA-256 of a head without its note, which is for people: equal for stores whose chunks may
+    stand for each other.
+    """
+    return sha256(
+        seal({name: head[name] for name in ("format", "identity", "shape", "chunk", "arrays")})
+    )
 
 
 def read_head(path: Path) -> dict[str, Any]:
@@ -54,20 +61,31 @@ def read_head(path: Path) -> dict[str, Any]:
     """
     data = read(path / HEAD)
     if data is None:
-        what = "there is no store" if not path.exists() else "this is not a store of saltus, and it was left alone"
+        what = (
+            "there is no store"
+            if not path.exists()
+            else ("this is not a store of saltus, and it was left alone")
+        )
         raise StoreError(f"{path}: {what}. Choose another path.")
     head = _opened(data)
     if head is None:
-        raise StoreError(f"{path / HEAD} is damaged. Go on with the study that made it: the file is written again, and all chunks stay.")
+        raise StoreError(
+            f"{path / HEAD} is damaged. Go on with the study that made it: the file "
+            f"is written again, and all chunks stay."
+        )
     if head["format"] != FORMAT:
         age = "a later" if head["format"] > FORMAT else "an earlier"
         layout = f"layout {head['format']}, known: {FORMAT}"
-        raise StoreError(f"{path} was made by {age} saltus ({layout}). Use that one, or choose another path.")
+        raise StoreError(
+            f"{path} was made by {age} saltus ({layout}). Use that one, or choose another path."
+        )
     return head
 
 
 def _opened(data: bytes) -> dict[str, Any] | None:
-    """What a head says; None if it is damaged, or holds what no head does. Another layout may say anything."""
+    """What a head says; None if it is damaged, or holds what no head does. Another layout may say
+    anything.
+    """
     head = unseal(data)
     if head is None or not isinstance(head.get("format"), int):
         return None
@@ -76,11 +94,22 @@ def _opened(data: bytes) -> dict[str, Any] | None:
 
 def _says_what_a_head_says(head: Mapping[str, Any]) -> bool:
     shape, chunk, arrays = head.get("shape"), head.get("chunk"), head.get("arrays")
-    if not (_texts(head.get("identity")) and isinstance(head.get("note"), dict) and isinstance(shape, list)):
+    if not (
+        _texts(head.get("identity"))
+        and isinstance(head.get("note"), dict)
+        and isinstance(shape, list)
+    ):
         return False
-    if not (shape and all(isinstance(one, int) and 0 < one <= MOST_CELLS for one in (*shape, chunk))):
+    if not (
+        shape and all(isinstance(one, int) and 0 < one <= MOST_CELLS for one in (*shape, chunk))
+    ):
         return False
-    return math.prod(shape) <= MOST_CELLS and isinstance(arrays, dict) and _texts(arrays) and set(arrays.values()) <= _TYPES
+    return (
+        math.prod(shape) <= MOST_CELLS
+        and isinstance(arrays, dict)
+        and _texts(arrays)
+        and set(arrays.values()) <= _TYPES
+    )
 
 
 def _texts(values: Any) -> bool:
@@ -88,7 +117,8 @@ def _texts(values: Any) -> bool:
 
 
 def mend_head(path: Path, head: Mapping[str, Any]) -> None:
-    """Write ``store.json`` again where it is damaged, gone or another store's, if the chunks beside it were made under ``head``.
+    """Write ``store.json`` again where it is damaged, gone or another store's, if the chunks beside
+    it were made under ``head``.
 
     Raises
     ------
@@ -96,7 +126,9 @@ def mend_head(path: Path, head: Mapping[str, Any]) -> None:
         If it is damaged and the chunks were made from something else.
     """
     there = _opened(read(path / HEAD) or b"")
-    if there is not None and (there.get("format") != FORMAT or fingerprint(there) == fingerprint(head)):
+    if there is not None and (
+        there.get("format") != FORMAT or fingerprint(there) == fingerprint(head)
+    ):
         return
     if there is not None and (_made_under(path, there) or not _made_under(path, head)):
         return  # an intact head that differs: the caller compares the two and says how
@@ -104,21 +136,27 @@ def mend_head(path: Path, head: Mapping[str, Any]) -> None:
         return  # an empty folder, or something else: not ours to write to
     if _made_under(path, head) is False:
         raise StoreError(
-            f"{path / HEAD} is damaged, and the chunks beside it were made from something else than what is asked for here. Nothing was "
-            "changed. Go on with the study that made them, which writes the file again, or choose another path."
+            f"{path / HEAD} is damaged, and the chunks beside it were made from something else "
+            f"than what is asked for here. Nothing was "
+            "changed. Go on with the study that made them, which writes the file again, or choose "
+            "another path."
         )
     with exclusive(path / "locks" / "head", patience=10.0):
         write_whole(path / HEAD, seal(head), path / "parts", "head")
 
 
 def _made_under(path: Path, head: Mapping[str, Any]) -> bool | None:
-    """Whether an intact chunk or artifact in a folder was made under a head; None if there is no intact one at all."""
+    """Whether an intact chunk or artifact in a folder was made under a head; None if there is no
+    intact one at all.
+    """
     chunks = Chunks.checked(tuple(head["shape"]), head["chunk"], head["arrays"])
     wanted, strangers = fingerprint(head), False
     for file in numbered(path).values() if (path / CHUNKS).is_dir() else ():
         data = read(file) or b""
         if is_whole(data):
-            if int(file.stem) < chunks.count and chunks.fits(int(file.stem), data[-TRAILER:], wanted):
+            if int(file.stem) < chunks.count and chunks.fits(
+                int(file.stem), data[-TRAILER:], wanted
+            ):
                 return True
             strangers = True
     for file in sorted((path / "artifacts").glob("*.json")):
@@ -133,4 +171,7 @@ def _made_under(path: Path, head: Mapping[str, Any]) -> bool | None:
 def numbered(path: Path) -> dict[int, Path]:
     """The files of chunks in a store's folder, by number, in rising order."""
     names = [name for name in os.listdir(path / CHUNKS) if re.fullmatch(r"\d+\.chunk", name)]
-    return {number: path / CHUNKS / f"{number}.chunk" for number in sorted(int(name[:-6]) for name in names)}
+    return {
+        number: path / CHUNKS / f"{number}.chunk"
+        for number in sorted(int(name[:-6]) for name in names)
+    }

@@ -19,7 +19,10 @@ def texts(identity: Mapping[str, str]) -> dict[str, str]:
     """
     for name, value in identity.items():
         if not isinstance(value, str):
-            raise ParameterError(f"identity {name!r} is {shown(value)}. Give it as text, so that it can be compared without doubt.")
+            raise ParameterError(
+                f"identity {name!r} is {shown(value)}. Give it as text, so that "
+                f"it can be compared without doubt."
+            )
     return dict(sorted(identity.items()))
 
 
@@ -33,9 +36,13 @@ def agree(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None
     """
     differ = [name for name in dict.fromkeys([*there, *here]) if there.get(name) != here.get(name)]
     if differ:
-        both = [(name, _near(there.get(name), here.get(name)), _near(here.get(name), there.get(name))) for name in differ]
+        both = [
+            (name, _near(there.get(name), here.get(name)), _near(here.get(name), there.get(name)))
+            for name in differ
+        ]
         raise StoreError(
-            f"{path} was made from something else: {'; '.join(f'{name} was {old}, is {new}' for name, old, new in both)}. "
+            f"{path} was made from something else: "
+            f"{'; '.join(f'{name} was {old}, is {new}' for name, old, new in both)}. "
             "Nothing was changed. Choose another path, or go back to what made it."
         )
 
@@ -44,6 +51,11 @@ def _near(text: str | None, other: str | None) -> str:
     """A text, shortened to where it differs from another."""
     if text is None:
         return "not set"
-    same = next((i for i, (a, b) in enumerate(zip(text, other or "", strict=False)) if a != b), min(len(text), len(other or "")))
+    same = next(
+        (i for i, (a, b) in enumerate(zip(text, other or "", strict=False)) if a != b),
+        min(len(text), len(other or "")),
+    )
     start = max(0, same - 12)
-    return repr(("…" if start else "") + text[start : start + 40] + ("…" if len(text) > start + 40 else ""))
+    return repr(
+        ("…" if start else "") + text[start : start + 40] + ("…" if len(text) > start + 40 else "")
+    )

@@ -1,8 +1,10 @@
-"""One writer at a time: locks of the operating system, which end with the process that holds them, however it ends.
+"""One writer at a time: locks of the operating system, which end with the process that holds them,
+however it ends.
 
-A lock is for one shard k of n: the chunks k, k + n, k + 2n ... The whole store is shard 0 of 1. Two shards exclude each other if they have
-a chunk in common. Each has a file of its own, and the rule is: take your own lock, then check that no overlapping one is held. Two
-processes that do this at the same moment may both be refused, never both be let in.
+A lock is for one shard k of n: the chunks k, k + n, k + 2n ... The whole store is shard 0 of 1. Two
+shards exclude each other if they have a chunk in common. Each has a file of its own, and the rule
+is: take your own lock, then check that no overlapping one is held. Two processes that do this at
+the same moment may both be refused, never both be let in.
 """
 
 from __future__ import annotations
@@ -24,12 +26,14 @@ from saltus.results.store.durable import StoreError
 
 #: All chunks, as a shard.
 WHOLE = (0, 1)
-#: How long to wait for a lock [s]: longer than another process's check of it takes, too short to be taken for queueing.
+#: How long to wait for a lock [s]: longer than another process's check of it takes, too short to be
+#: taken for queueing.
 _PATIENCE = 0.5
 #: Most bytes of the note of who holds a lock.
 _NOTE = 10_000
 
-#: Open lock files of this process. A forked child closes its copies, else it would go on holding the locks of a parent that was killed.
+#: Open lock files of this process. A forked child closes its copies, else it would go on holding
+#: the locks of a parent that was killed.
 _HANDLES: set[int] = set()
 
 
@@ -47,7 +51,8 @@ def locked(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
     Raises
     ------
     StoreError
-        If another process, or another part of this one, holds a lock that overlaps: names host, process and time.
+        If another process, or another part of this one, holds a lock that overlaps: names host,
+        process and time.
     """
     own = folder / "{}-of-{}".format(*shard)
     _refuse_if_held(folder, shard, others_only=False)
@@ -62,7 +67,8 @@ def locked(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
 def exclusive(file: Path, patience: float = _PATIENCE) -> Iterator[int]:
     """Hold the operating system's lock on one file, made if need be; gives the open file.
 
-    The file is emptied but stays: if it were removed, two processes could hold locks on two files of the same name.
+    The file is emptied but stays: if it were removed, two processes could hold locks on two files
+    of the same name.
 
     Raises
     ------
@@ -80,14 +86,17 @@ def exclusive(file: Path, patience: float = _PATIENCE) -> Iterator[int]:
         if os.getpid() == process:
             os.ftruncate(handle, 0)
     finally:
-        if os.getpid() == process:  # in a forked child the file is closed already, and its number may be another's
+        # in a forked child the file is closed already, and its number may be another's
+        if os.getpid() == process:
             _HANDLES.discard(handle)
             os.close(handle)  # which gives the lock back
 
 
 def holders(folder: Path) -> list[str]:
     """Who holds a lock: a text each, in the order of the shards."""
-    return [_holder(file) for _, file in sorted(_locks(folder).items()) if is_held(file, patience=0.0)]
+    return [
+        _holder(file) for _, file in sorted(_locks(folder).items()) if is_held(file, patience=0.0)
+    ]
 
 
 def overlap(one: tuple[int, int], other: tuple[int, int]) -> bool:
@@ -95,21 +104,30 @@ def overlap(one: tuple[int, int], other: tuple[int, int]) -> bool:
     return (one[0] - other[0]) % math.gcd(one[1], other[1]) == 0
 
 
-# -- who holds what ------------------------------------------------------------------------------------------------------------
+# -- who holds what --------------------------------------------------------------------------------
 def _locks(folder: Path) -> dict[tuple[int, int], Path]:
     """The lock files of shards, held or not."""
-    found = {file: re.fullmatch(r"(\d+)-of-(\d+)", file.name) for file in (folder.iterdir() if folder.is_dir() else ())}
+    found = {
+        file: re.fullmatch(r"(\d+)-of-(\d+)", file.name)
+        for file in (folder.iterdir() if folder.is_dir() else ())
+    }
     return {(int(match[1]), int(match[2])): file for file, match in found.items() if match}
 
 
 def _refuse_if_held(folder: Path, shard: tuple[int, int], *, others_only: bool) -> None:
     for other, file in _locks(folder).items():
-        if overlap(other, shard) and not (others_only and other == shard) and is_held(file, _PATIENCE):
+        if (
+            overlap(other, shard)
+            and not (others_only and other == shard)
+            and is_held(file, _PATIENCE)
+        ):
             raise StoreError(_refusal(file))
 
 
 def is_held(file: Path, patience: float = 0.0) -> bool:
-    """Whether somebody holds the lock on a file, and goes on holding it for ``patience`` seconds."""
+    """Whether somebody holds the lock on a file, and goes on holding it for
+    ``patience`` seconds.
+    """
     handle = _open(file, os.O_RDONLY)  # so that anyone who may read the store may ask
     try:
         return not _wait(handle, shared=True, patience=patience)
@@ -118,39 +136,55 @@ def is_held(file: Path, patience: float = 0.0) -> bool:
 
 
 def _refusal(file: Path) -> str:
-    return f"{file.parent.parent} is being written by {_holder(file)}. Wait for it, stop it, or choose another path."
+    return (
+        f"{file.parent.parent} is being written by {_holder(file)}. Wait for it, stop it, or "
+        f"choose another path."
+    )
 
 
 def _this_process() -> bytes:
     since = datetime.now(UTC).isoformat(sep=" ", timespec="seconds")
-    return json.dumps({"host": socket.gethostname(), "process": os.getpid(), "since": since}).encode()
+    return json.dumps(
+        {"host": socket.gethostname(), "process": os.getpid(), "since": since}
+    ).encode()
 
 
 def _holder(file: Path) -> str:
     """``process 4711 on node7 since 2026-01-01 12:00:00+00:00, shard 0 of 4``."""
     k, n = file.name.split("-of-") if "-of-" in file.name else ("0", "1")
     part = "" if n == "1" else f", shard {k} of {n}"
-    with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):  # it may be about to write who it is
+    # it may be about to write who it is
+    with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
         who = json.loads(fence.content(file, _NOTE))
         return f"process {who['process']} on {who['host']} since {who['since']}{part}"
     return f"another process{part}"
 
 
-# -- the operating system ------------------------------------------------------------------------------------------------------
+# -- the operating system --------------------------------------------------------------------------
 def _open(file: Path, flags: int = os.O_RDWR | os.O_CREAT) -> int:
-    """Open a lock file: without waiting for the other end of a pipe, and not through a link, whose end would be emptied."""
+    """Open a lock file: without waiting for the other end of a pipe, and not through a link, whose
+    end would be emptied.
+    """
     try:
         if file.is_symlink() or (file.exists() and not file.is_file()):
-            raise StoreError(f"{file} can't be locked: it is no regular file. Remove it, then start again.")
-        return os.open(file, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0), 0o666)
+            raise StoreError(
+                f"{file} can't be locked: it is no regular file. Remove it, then start again."
+            )
+        return os.open(
+            file, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0), 0o666
+        )
     except StoreError:
         raise
     except OSError as error:
-        raise StoreError(f"{file} can't be locked: {error.strerror}. Choose a folder that can be written to.") from error
+        raise StoreError(
+            f"{file} can't be locked: {error.strerror}. Choose a folder that can be written to."
+        ) from error
 
 
 def _wait(handle: int, *, shared: bool, patience: float) -> bool:
-    """Try to lock until it works or ``patience`` is spent: another process's check takes a moment and is no reason to give up."""
+    """Try to lock until it works or ``patience`` is spent: another process's check takes a moment
+    and is no reason to give up.
+    """
     end = time.monotonic() + patience
     while not _try(handle, shared=shared):
         if time.monotonic() >= end:
@@ -163,7 +197,9 @@ if sys.platform == "win32":
     import msvcrt
 
     def _try(handle: int, *, shared: bool) -> bool:  # noqa: ARG001
-        """Without shared locks: checks exclude each other for a moment. Locked bytes can't be read: take one far behind the text."""
+        """Without shared locks: checks exclude each other for a moment. Locked bytes can't be read:
+        take one far behind the text.
+        """
         os.lseek(handle, 1 << 30, os.SEEK_SET)
         try:
             msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
@@ -183,7 +219,8 @@ else:
             return False
         except OSError as error:
             raise StoreError(
-                f"this file system has no locks ({error.strerror}), so two writers could not be kept apart. Put the store on another disk."
+                f"this file system has no locks ({error.strerror}), so two writers could not be "
+                f"kept apart. Put the store on another disk."
             ) from error
         return True
 

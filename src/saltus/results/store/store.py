@@ -1,14 +1,16 @@
-"""A store: a map computed chunk by chunk, by one process or many, killed and resumed as often as need be, with one outcome.
+"""A store: a map computed chunk by chunk, by one process or many, killed and resumed as often as
+need be, with one outcome.
 
 ::
 
-    store.json          identity, shape, what is kept                   written once, at creation
-    chunks/7.chunk      all arrays of chunk 7                           a checksum inside; that it is there says that it is done
-    artifacts/          small values that all chunks share              a checksum inside
-    locks/, parts/      who is writing; drafts that a kill left behind  no part of the outcome
+    store.json      identity, shape, what is kept                   written once, at creation
+    chunks/7.chunk  all arrays of chunk 7                           a checksum inside
+    artifacts/      small values that all chunks share              a checksum inside
+    locks/, parts/  who is writing; drafts that a kill left behind  no part of the outcome
 
-Chunks and artifacts hold their number or name and the hash of ``store.json``: in another place, or another store, they count as damaged.
-No file holds a time, a host or an order, so a finished store is the same bit by bit however it came about.
+Chunks and artifacts hold their number or name and the hash of ``store.json``: in another place, or
+another store, they count as damaged. No file holds a time, a host or an order, so a finished store
+is the same bit by bit however it came about.
 """
 
 from __future__ import annotations
@@ -36,7 +38,15 @@ from saltus.results.store.durable import (
     tail,
     write_whole,
 )
-from saltus.results.store.head import CHUNKS, HEAD, fingerprint, head_of, mend_head, numbered, read_head
+from saltus.results.store.head import (
+    CHUNKS,
+    HEAD,
+    fingerprint,
+    head_of,
+    mend_head,
+    numbered,
+    read_head,
+)
 from saltus.results.store.identity import agree, texts
 from saltus.results.store.lock import WHOLE, holders, locked
 
@@ -78,7 +88,8 @@ class StoreStatus:
 
 
 class Store:
-    """One map on the disk. Made by :meth:`create`, :meth:`open` or :meth:`create_or_resume`; reading needs no lock, writing does.
+    """One map on the disk. Made by :meth:`create`, :meth:`open` or :meth:`create_or_resume`;
+    reading needs no lock, writing does.
 
     Attributes
     ----------
@@ -97,7 +108,7 @@ class Store:
         self._shard: tuple[int, int] | None = None
         self._process = 0
 
-    # -- making and opening ------------------------------------------------------------------------------------------------
+    # -- making and opening ------------------------------------------------------------------------
     @classmethod
     def create(
         cls,
@@ -116,7 +127,8 @@ class Store:
         path : str or path
             A folder that isn't there yet, in one that is.
         identity : mapping of str to str
-            What a process must agree on to add chunks: hashes of study and system, versions, options.
+            What a process must agree on to add chunks: hashes of study and system, versions,
+            options.
         shape : tuple of int
             Size of the grid along each dim.
         chunk : int
@@ -129,7 +141,8 @@ class Store:
         Raises
         ------
         StoreError
-            If something stands under the name, the folder around it is missing, or the disk is full.
+            If something stands under the name, the folder around it is missing, or the disk is
+            full.
         ParameterError
             If sizes, names or types can't be stored.
         """
@@ -137,9 +150,14 @@ class Store:
         chunks = Chunks.checked(shape, chunk, arrays)
         head = head_of(texts(identity), note or {}, chunks)
         if not path.parent.is_dir():
-            raise StoreError(f"{path} can't be made: there is no folder {path.parent}. Make it first.")
+            raise StoreError(
+                f"{path} can't be made: there is no folder {path.parent}. Make it first."
+            )
         if path.exists():
-            raise StoreError(f"{path} is there already. Resume it if it is a store, or choose another path; nothing is overwritten.")
+            raise StoreError(
+                f"{path} is there already. Resume it if it is a store, or choose "
+                f"another path; nothing is overwritten."
+            )
         store = cls(path, head)
         write_folder(path, {HEAD: seal(head)}, _FOLDERS)
         return store
@@ -158,7 +176,8 @@ class Store:
         Raises
         ------
         StoreError
-            If there is no store, its head is damaged, or the identity differs: names each value that does.
+            If there is no store, its head is damaged, or the identity differs: names each value
+            that does.
         """
         path = Path(path).resolve()
         store = cls(path, read_head(path))
@@ -177,33 +196,41 @@ class Store:
         arrays: Mapping[str, Any],
         note: Mapping[str, Any] | None = None,
     ) -> Store:
-        """:meth:`create` if there is nothing yet, else :meth:`open`; ``shape``, ``chunk`` and ``arrays`` must agree too.
+        """:meth:`create` if there is nothing yet, else :meth:`open`; ``shape``, ``chunk`` and
+        ``arrays`` must agree too.
 
-        A ``store.json`` that is damaged is written again if the chunks beside it were made from the same.
+        A ``store.json`` that is damaged is written again if the chunks beside it were made from the
+        same.
         """
         if not Path(path).exists():
             try:
-                return cls.create(path, identity, shape=shape, chunk=chunk, arrays=arrays, note=note)
+                return cls.create(
+                    path, identity, shape=shape, chunk=chunk, arrays=arrays, note=note
+                )
             except StoreError:
                 if not Path(path).exists():  # else another process was faster
                     raise
         wanted = Chunks.checked(shape, chunk, arrays)
         mend_head(Path(path).resolve(), head_of(texts(identity), note or {}, wanted))
         store = cls.open(path)
-        agree(store.path, store.identity | store.chunks.as_text(), texts(identity) | wanted.as_text())
+        agree(
+            store.path, store.identity | store.chunks.as_text(), texts(identity) | wanted.as_text()
+        )
         return store
 
-    # -- one writer --------------------------------------------------------------------------------------------------------
+    # -- one writer --------------------------------------------------------------------------------
     @contextmanager
     def lock(self, shard: tuple[int, int] | None = None) -> Iterator[Store]:
         """Be the only one who writes the store, or one shard of it, within a ``with`` block.
 
-        The operating system keeps the lock: it ends with the process, however that ends. What a killed writer left half-done is removed.
+        The operating system keeps the lock: it ends with the process, however that ends. What a
+        killed writer left half-done is removed.
 
         Parameters
         ----------
         shard : tuple of int, optional
-            (k, n): the chunks i with i % n == k. Writers of different shards may work at the same time.
+            (k, n): the chunks i with i % n == k. Writers of different shards may work at the same
+            time.
 
         Raises
         ------
@@ -221,14 +248,21 @@ class Store:
                 self._shard = None
 
     def _make_folders(self) -> None:
-        """Make those that are gone again: tools that copy trees leave empty ones out. A store that was deleted stays so."""
+        """Make those that are gone again: tools that copy trees leave empty ones out. A store that
+        was deleted stays so.
+        """
         if not (self.path / HEAD).exists():
-            raise StoreError(f"{self.path} holds no {HEAD} any more. Was it moved or deleted? Start again to make it anew.")
+            raise StoreError(
+                f"{self.path} holds no {HEAD} any more. Was it moved or deleted? "
+                f"Start again to make it anew."
+            )
         try:
             for name in _FOLDERS:
                 (self.path / name).mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise StoreError(f"{self.path} can't be written to: {error}. Mend its permissions or the disk.") from error
+            raise StoreError(
+                f"{self.path} can't be written to: {error}. Mend its permissions or the disk."
+            ) from error
 
     def _sweep(self, shard: tuple[int, int]) -> None:
         """Remove drafts of killed writers: those that only the holder of this lock may write."""
@@ -240,10 +274,12 @@ class Store:
 
     def _held(self) -> tuple[int, int]:
         if self._shard is None or self._process != os.getpid():
-            raise StoreError(f"{self.path} isn't locked by this process. Write within `with store.lock():`.")
+            raise StoreError(
+                f"{self.path} isn't locked by this process. Write within `with store.lock():`."
+            )
         return self._shard
 
-    # -- chunks ------------------------------------------------------------------------------------------------------------
+    # -- chunks ------------------------------------------------------------------------------------
     def commit(self, index: int, values: Mapping[str, np.ndarray]) -> None:
         """Write one chunk: all of it is there, or none of it.
 
@@ -266,30 +302,41 @@ class Store:
         k, n = self._held()
         index = int(index)
         if index % n != k:
-            raise StoreError(f"chunk {index} of {self.path} belongs to shard {index % n} of {n}, and the lock is for shard {k}.")
+            raise StoreError(
+                f"chunk {index} of {self.path} belongs to shard {index % n} of {n}, "
+                f"and the lock is for shard {k}."
+            )
         data = self.chunks.encode(index, values, self._made_under)
         earlier = read(self._file(index))
         if earlier == data:
             return
         if earlier is not None:
             raise StoreError(
-                f"chunk {index} of {self.path} is done, with other values. Either its file is damaged (verify() tells), "
-                "or the same cells came out differently on two machines: then compute all chunks on one kind of machine."
+                f"chunk {index} of {self.path} is done, with other values. Either its file is "
+                f"damaged (verify() tells), "
+                "or the same cells came out differently on two machines: then compute all chunks "
+                "on one kind of machine."
             )
         write_whole(self._file(index), data, self.path / "parts", str(index))
 
     def done(self) -> np.ndarray:
-        """Which chunks are committed: bool (chunks,). One listing of a folder, so it serves as progress, from any machine too."""
+        """Which chunks are committed: bool (chunks,). One listing of a folder, so it serves as
+        progress, from any machine too.
+        """
         done = np.zeros(self.chunks.count, dtype=bool)
         try:
             there = numbered(self.path)
         except OSError as error:
-            raise StoreError(f"{self.path} can't be read: {error.strerror}. Was it moved or deleted?") from error
+            raise StoreError(
+                f"{self.path} can't be read: {error.strerror}. Was it moved or deleted?"
+            ) from error
         done[[index for index in there if index < len(done)]] = True
         return done
 
     def missing(self, shard: tuple[int, int] | None = None) -> list[int]:
-        """Chunks that are not committed, those of one shard (k, n) only if given, in rising order."""
+        """Chunks that are not committed, those of one shard (k, n) only if given, in
+        rising order.
+        """
         k, n = _checked(shard)
         return [int(index) for index in np.flatnonzero(~self.done()) if index % n == k]
 
@@ -305,9 +352,14 @@ class Store:
         data = read(self._file(index), self.chunks.size(index))
         values = self.chunks.decode(index, data, self._made_under) if data is not None else None
         if values is None and not self._file(index).exists():
-            raise StoreError(f"chunk {index} of {self.path} isn't computed yet. Resume the store to compute it.")
+            raise StoreError(
+                f"chunk {index} of {self.path} isn't computed yet. Resume the store to compute it."
+            )
         if values is None:
-            raise StoreError(f"chunk {index} of {self.path} is damaged. verify() marks it as missing, so that resuming computes it again.")
+            raise StoreError(
+                f"chunk {index} of {self.path} is damaged. verify() marks it as "
+                f"missing, so that resuming computes it again."
+            )
         return values
 
     def read_all(self) -> dict[str, np.ndarray]:
@@ -321,16 +373,20 @@ class Store:
         missing = self.missing()
         if missing:
             raise StoreError(
-                f"{self.path} isn't complete: {len(missing)} of {self.chunks.count} chunks are missing (first: {missing[0]}). Resume it."
+                f"{self.path} isn't complete: {len(missing)} of {self.chunks.count} chunks are "
+                f"missing (first: {missing[0]}). Resume it."
             )
-        values = {name: np.empty(self.chunks.cells, dtype) for name, dtype in self.chunks.arrays.items()}
+        values = {
+            name: np.empty(self.chunks.cells, dtype) for name, dtype in self.chunks.arrays.items()
+        }
         for index in range(self.chunks.count):
             for name, part in self.read(index).items():
                 values[name][self.chunks.extent(index)] = part
         return values
 
     def verify(self) -> list[int]:
-        """Check every committed chunk (of the shard whose lock is held) against its checksums; damaged ones become missing again.
+        """Check every committed chunk (of the shard whose lock is held) against its checksums;
+        damaged ones become missing again.
 
         Returns
         -------
@@ -346,7 +402,9 @@ class Store:
         return damaged
 
     def damaged(self, *, checksums: bool = True) -> list[int]:
-        """Committed chunks whose files aren't what was committed; without ``checksums`` only their sizes and last bytes are read."""
+        """Committed chunks whose files aren't what was committed; without ``checksums`` only their
+        sizes and last bytes are read.
+        """
         intact = self._is_intact if checksums else self._seems_intact
         return [int(index) for index in np.flatnonzero(self.done()) if not intact(int(index))]
 
@@ -356,14 +414,19 @@ class Store:
 
     def _seems_intact(self, index: int) -> bool:
         file = self._file(index)
-        return size(file) == self.chunks.size(index) and self.chunks.fits(index, tail(file, TRAILER), self._made_under)
+        return size(file) == self.chunks.size(index) and self.chunks.fits(
+            index, tail(file, TRAILER), self._made_under
+        )
 
     def _file(self, index: int) -> Path:
         return self.path / CHUNKS / f"{index}.chunk"
 
-    # -- artifacts ---------------------------------------------------------------------------------------------------------
-    def put(self, name: str, value: Any, *, existing: Literal["same", "keep", "replace"] = "same") -> Any:
-        """Keep a small value that belongs to all chunks: the table of attractors, what follows from the finished map.
+    # -- artifacts ---------------------------------------------------------------------------------
+    def put(
+        self, name: str, value: Any, *, existing: Literal["same", "keep", "replace"] = "same"
+    ) -> Any:
+        """Keep a small value that belongs to all chunks: the table of attractors, what follows from
+        the finished map.
 
         Parameters
         ----------
@@ -372,8 +435,8 @@ class Store:
         value : bytes or plain values
             As JSON has them: None, booleans, numbers, text, lists, dicts with text keys.
         existing : {"same", "keep", "replace"}
-            If there is one: it must be the same; the first one stays; the new one takes its place (whole lock only). A damaged one counts
-            as none.
+            If there is one: it must be the same; the first one stays; the new one takes its place
+            (whole lock only). A damaged one counts as none.
 
         Returns
         -------
@@ -385,29 +448,36 @@ class Store:
         StoreError
             If the lock isn't held, the disk is full, or another value is kept.
         """
-        put_artifact(self.path, self._made_under, name, value, existing=existing, shard=self._held())
+        put_artifact(
+            self.path, self._made_under, name, value, existing=existing, shard=self._held()
+        )
         return self.get(name)
 
     def get(self, name: str) -> Any:
-        """What :meth:`put` kept, lists where tuples were put; :class:`StoreError` if there is none, or it is damaged."""
+        """What :meth:`put` kept, lists where tuples were put; :class:`StoreError` if there is none,
+        or it is damaged.
+        """
         return get_artifact(self.path, self._made_under, name)
 
     def has(self, name: str) -> bool:
         """Whether :meth:`get` would return something: kept, and not damaged."""
         return has_artifact(self.path, self._made_under, name)
 
-    # -- for people --------------------------------------------------------------------------------------------------------
+    # -- for people --------------------------------------------------------------------------------
     def status(self, *, checksums: bool = False) -> StoreStatus:
         """How far the store is; no lock needed.
 
         Parameters
         ----------
         checksums : bool
-            Read everything to count damaged chunks. Otherwise only files that are gone or too short are counted.
+            Read everything to count damaged chunks. Otherwise only files that are gone or too short
+            are counted.
         """
         return StoreStatus(
-            path=self.path, identity=self.identity, note=self.note, done=int(self.done().sum()), total=self.chunks.count,
-            damaged=len(self.damaged(checksums=checksums)), bytes=sum(size(file) or 0 for file in self.path.rglob("*")),
+            path=self.path, identity=self.identity, note=self.note, done=int(self.done().sum()),
+            total=self.chunks.count,
+            damaged=len(self.damaged(checksums=checksums)),
+            bytes=sum(size(file) or 0 for file in self.path.rglob("*")),
             last_written=self._last_written(), writers=tuple(holders(self.path / "locks")),
         )  # fmt: skip
 

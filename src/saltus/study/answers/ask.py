@@ -27,9 +27,14 @@ if TYPE_CHECKING:
     from saltus.system import System
 
 #: Tables that one question answers.
-_ONE: dict[str, type[OneVerb]] = {one.place: one for one in (Section, Lines, Statistics, Balance, Exponents, Response, Diagram)}
+_ONE: dict[str, type[OneVerb]] = {
+    one.place: one for one in (Section, Lines, Statistics, Balance, Exponents, Response, Diagram)
+}
 #: Tables that may be several questions.
-_SEVERAL: dict[str, Callable[[Any, Setting], list[Question]]] = {"simulate": simulate.questions, "basins": basins.questions}
+_SEVERAL: dict[str, Callable[[Any, Setting], list[Question]]] = {
+    "simulate": simulate.questions,
+    "basins": basins.questions,
+}
 
 
 @dataclass(frozen=True)
@@ -94,8 +99,8 @@ def ask(
     StudyError, UnitError, ParameterError
         If it isn't a study, or doesn't fit its system, before anything is computed.
     Interrupted
-        On Ctrl-C, or where the work is asked to stop (:class:`saltus.interrupt.Stop`); its ``partial`` is the Dataset of the question that
-        was being answered.
+        On Ctrl-C, or where the work is asked to stop (:class:`saltus.interrupt.Stop`); its
+        ``partial`` is the Dataset of the question that was being answered.
     """
     read = parse(study) if isinstance(study, str) else study_of(study)
     asked = questions_of(read, own, inputs or NoInputs(), only)
@@ -109,7 +114,9 @@ def ask(
 
         with naming_table(question.place):
             found[question.stem] = question.compute(found, threads, show)
-            answers.append(Answer(question, found[question.stem], question.rows(found[question.stem], found)))
+            answers.append(
+                Answer(question, found[question.stem], question.rows(found[question.stem], found))
+            )
     return answers
 
 
@@ -120,7 +127,10 @@ class NoInputs(Inputs):
         super().__init__(Path())
 
     def _find(self, name: str, place: str) -> Path:
-        raise StudyError(f"[{place}] names the file {name!r}, and no file may be read here. Leave it out, or run the study as a file.")
+        raise StudyError(
+            f"[{place}] names the file {name!r}, and no file may be read here. Leave "
+            f"it out, or run the study as a file."
+        )
 
 
 @contextmanager
@@ -132,7 +142,9 @@ def naming_table(table: str) -> Iterator[None]:
         raise fault(table, error) from error
 
 
-def questions_of(study: Study, own: System | None, inputs: Inputs, only: Sequence[str] = ()) -> list[Question]:
+def questions_of(
+    study: Study, own: System | None, inputs: Inputs, only: Sequence[str] = ()
+) -> list[Question]:
     """The questions of a study, or some of them, checked against its system.
 
     Raises
@@ -145,16 +157,28 @@ def questions_of(study: Study, own: System | None, inputs: Inputs, only: Sequenc
     asked: list[Question] = []
     for name, table in study.questions():
         with naming_table(name):
-            asked += [_ONE[name](table, setting)] if name in _ONE else _SEVERAL[name](table, setting)
+            asked += (
+                [_ONE[name](table, setting)] if name in _ONE else _SEVERAL[name](table, setting)
+            )
     stems = [stem for question in asked for stem in question.stems]
     twice = sorted({stem for stem in stems if stems.count(stem) > 1})
     if twice:
-        raise StudyError(f"names of this study give the same file names, such as {twice[0]}. Let them differ in letters or digits.")
+        raise StudyError(
+            f"names of this study give the same file names, such as {twice[0]}. Let "
+            f"them differ in letters or digits."
+        )
     known = {name for question in asked for name in _names(question)}
     for name in only:
         if name not in known:
-            raise StudyError(f"--only {name}: this study has no such question. {nearest(name, known)}")
-    chosen = {stem for question in asked if not only or _names(question) & set(only) for stem in (question.stem, *question.needs)}
+            raise StudyError(
+                f"--only {name}: this study has no such question. {nearest(name, known)}"
+            )
+    chosen = {
+        stem
+        for question in asked
+        if not only or _names(question) & set(only)
+        for stem in (question.stem, *question.needs)
+    }
     for question in asked:
         question.inputs = [*of_system, *question.inputs]
     return [question for question in asked if question.stem in chosen]
@@ -162,4 +186,6 @@ def questions_of(study: Study, own: System | None, inputs: Inputs, only: Sequenc
 
 def _names(question: Question) -> set[str]:
     """What a question may be called."""
-    return {name for name in (question.place, question.group, question.title, question.stem) if name}
+    return {
+        name for name in (question.place, question.group, question.title, question.stem) if name
+    }

@@ -1,4 +1,6 @@
-"""[basins]: which attractor each start of a grid leads to; one map, or several and where they agree."""
+"""[basins]: which attractor each start of a grid leads to; one map, or several and where they
+agree.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +29,21 @@ ATTRACTORS, AGREEMENT = "-attractors", "-agreement"
 
 
 def questions(table: Any, setting: Setting) -> list[Question]:
-    """The maps of the table, then where those agree that are compared. Raises StudyError, UnitError or ParameterError."""
-    maps = [BasinMap(table, one, setting) for one in table.map or [Map(name=setting.study.study.name)]]
+    """The maps of the table, then where those agree that are compared. Raises StudyError, UnitError
+    or ParameterError.
+    """
+    maps = [
+        BasinMap(table, one, setting) for one in table.map or [Map(name=setting.study.study.name)]
+    ]
     stems = {one.title: one.stem for one in maps}
-    return [*maps, *(Agreement(one, one.compare, stems[one.compare]) for one in maps if one.compare is not None)]
+    return [
+        *maps,
+        *(
+            Agreement(one, one.compare, stems[one.compare])
+            for one in maps
+            if one.compare is not None
+        ),
+    ]
 
 
 class BasinMap(Question):
@@ -53,7 +66,12 @@ class BasinMap(Question):
         axes = quantities.axes(system, table.axes, f"{place}.axes")
         asked = arguments(table, system, setting, place)
         self.plan: BasinPlan = basin_plan(
-            system, axes, asked["at"], setting.method(one.method, f"{place}.map.method"), asked["periods"], asked["every"]
+            system,
+            axes,
+            asked["at"],
+            setting.method(one.method, f"{place}.map.method"),
+            asked["periods"],
+            asked["every"],
         )
 
     @property
@@ -64,7 +82,10 @@ class BasinMap(Question):
     def identity(self) -> dict[str, str]:
         """What must be the same to go on with a store."""
         plan = self.plan
-        axes = {name: f"{float(values[0])!r} to {float(values[-1])!r} in {len(values)}" for name, values in plan.axes.items()}
+        axes = {
+            name: f"{float(values[0])!r} to {float(values[-1])!r} in {len(values)}"
+            for name, values in plan.axes.items()
+        }
         asked = {"axes": axes, "at": dict(plan.fixed), "periods": plan.periods, "every": plan.every}
         return identity(plan.system, plan.method, asked)
 
@@ -105,14 +126,20 @@ class Agreement(Question):
     place, shared = "basins", True
 
     def __init__(self, one: BasinMap, other: str, other_stem: str) -> None:
-        self.title, self.group, self.names = f"{one.title} beside {other}", one.group, (other, one.title)
+        self.title, self.group, self.names = (
+            f"{one.title} beside {other}",
+            one.group,
+            (other, one.title),
+        )
         self.stem, self.needs = f"{one.stem}{AGREEMENT}", (other_stem, one.stem)
 
     def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
         """Compare the maps, cell by cell."""
         from saltus.analysis.basins.compare import compare
 
-        return compare(*(found[stem] for stem in self.needs)).assign_attrs(name_a=self.names[0], name_b=self.names[1])
+        return compare(*(found[stem] for stem in self.needs)).assign_attrs(
+            name_a=self.names[0], name_b=self.names[1]
+        )
 
     def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
         """A row for each pair of attractors."""

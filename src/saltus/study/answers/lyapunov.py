@@ -22,7 +22,10 @@ class Exponents(OneVerb):
     def check_first(self, table: Any) -> None:
         """A system without forcing has blocks of a time."""
         if table.every is None and self.system.forced_at is None:
-            raise StudyError(f'[{self.place}] {self.system.name} has no forcing period. Write every = "1 s", about a turn of the motion.')
+            raise StudyError(
+                f"[{self.place}] {self.system.name} has no forcing period. Write "
+                f'every = "1 s", about a turn of the motion.'
+            )
 
     def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
         """A row for each motion."""

@@ -19,13 +19,24 @@ _SUMS = {"sum": "exponent_sum", "mean divergence": "mean_divergence"}
 
 
 def exponent_table(title: str, ds: xr.Dataset) -> TextTable:
-    """A row for each trajectory: kind of motion, exponents, interval of the largest, their sum, mean divergence."""
+    """A row for each trajectory: kind of motion, exponents, interval of the largest, their sum,
+    mean divergence.
+    """
     unit = ds["lyapunov_exponent"].attrs.get("units", "")
     count, shown = ds.sizes["trajectory"], min(ds.sizes["exponent"], COLUMNS)
     periods = ds["response_period"].values.tolist() if "response_period" in ds else [0] * count
-    kinds = [kind_text(str(kind), int(n)) for kind, n in zip(ds["kind"].values, periods, strict=True)]
-    columns = [words("", range(count), "trajectory"), *varied(ds, ds["trajectory"].values), words("motion", kinds)]
-    columns += [number(f"exponent {k + 1}", ds["lyapunov_exponent"].values[:, k], ".6g", unit) for k in range(shown)]
+    kinds = [
+        kind_text(str(kind), int(n)) for kind, n in zip(ds["kind"].values, periods, strict=True)
+    ]
+    columns = [
+        words("", range(count), "trajectory"),
+        *varied(ds, ds["trajectory"].values),
+        words("motion", kinds),
+    ]
+    columns += [
+        number(f"exponent {k + 1}", ds["lyapunov_exponent"].values[:, k], ".6g", unit)
+        for k in range(shown)
+    ]
     low, high = (ds[name].values[:, 0] for name in ("lyapunov_low", "lyapunov_high"))
     columns.append(interval("95 % interval of the largest", low, high, "{:.6g}".format, unit))
     if ds.sizes["exponent"] > 1 and "mean_divergence" in ds:
@@ -36,9 +47,19 @@ def exponent_table(title: str, ds: xr.Dataset) -> TextTable:
 
 
 def _notes(ds: xr.Dataset, shown: int) -> tuple[str, ...]:
-    notes = [f"{ds.sizes['trajectory'] - shown} more motions are in the file."] if ds.sizes["trajectory"] > shown else []
+    notes = (
+        [f"{ds.sizes['trajectory'] - shown} more motions are in the file."]
+        if ds.sizes["trajectory"] > shown
+        else []
+    )
     if "near_graze" in ds and np.any(ds["near_graze"].values == 1):
-        notes.append("Near a graze finite deviations don't grow as infinitesimal ones do: the exponents say little there.")
+        notes.append(
+            "Near a graze finite deviations don't grow as infinitesimal ones do: the "
+            "exponents say little there."
+        )
     if "mean_divergence" in ds and ds.sizes["exponent"] > 1:
-        notes.append("The sum of the exponents and the mean divergence, found without the tangent, must agree.")
+        notes.append(
+            "The sum of the exponents and the mean divergence, found without the tangent, "
+            "must agree."
+        )
     return tuple(notes)

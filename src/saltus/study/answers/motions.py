@@ -28,7 +28,8 @@ _PARTS = ("energy", "supplied", "dissipated")
 class OfMotions(OneVerb):
     """A question on motions from given starts, of some length after a transient."""
 
-    #: The function of :mod:`saltus.plot` that draws the answer; whether it draws some trajectories of a batch.
+    #: The function of :mod:`saltus.plot` that draws the answer; whether it draws some trajectories
+    #: of a batch.
     picture: ClassVar[str]
     several: ClassVar[bool] = False
 
@@ -36,14 +37,27 @@ class OfMotions(OneVerb):
         """Lengths are periods if there is forcing, else times."""
         forced = self.system.forced_at is not None
         if forced != (table.periods is not None):
-            right = "periods = 200 in place of t_end" if forced else 't_end = "20 s" in place of periods'
-            raise StudyError(f"[{self.place}] {self.system.name} is {'forced' if forced else 'not forced'}. Write {right}.")
+            right = (
+                "periods = 200 in place of t_end"
+                if forced
+                else ('t_end = "20 s" in place of periods')
+            )
+            raise StudyError(
+                f"[{self.place}] {self.system.name} is "
+                f"{'forced' if forced else 'not forced'}. Write {right}."
+            )
 
     def check(self, table: Any, setting: Setting) -> None:
         """Start, length and values; then what the question asks besides."""
         from saltus.analysis.motion.window import stretch
 
-        stretch(self.system, **{name: self.arguments[name] for name in ("start", "values", "periods", "t_end", "t_start", "transient")})
+        stretch(
+            self.system,
+            **{
+                name: self.arguments[name]
+                for name in ("start", "values", "periods", "t_end", "t_start", "transient")
+            },
+        )
         self.check_more(table, setting)
 
     def check_more(self, table: Any, setting: Setting) -> None:
@@ -58,13 +72,20 @@ class OfMotions(OneVerb):
         from saltus import plot
         from saltus.plot.selection import MOST
 
-        some = {"trajectory": ds["trajectory"].values[:MOST].tolist()} if self.several and "trajectory" in ds.dims else {}
+        some = (
+            {"trajectory": ds["trajectory"].values[:MOST].tolist()}
+            if self.several and "trajectory" in ds.dims
+            else {}
+        )
         return {"": first_figure(getattr(plot, self.picture)(ds, **some))}
 
     def needs_contacts(self) -> None:
         """Refuse a method that steps over contacts."""
         if not self.method.records_contacts:
-            raise StudyError(f'[{self.place}] needs a method that locates contacts: name = "Taylor", or ODE45 with events = "locate".')
+            raise StudyError(
+                f"[{self.place}] needs a method that locates contacts: name = "
+                f'"Taylor", or ODE45 with events = "locate".'
+            )
 
 
 class Section(OfMotions):
@@ -78,14 +99,24 @@ class Section(OfMotions):
 
         self.needs_contacts()
         surface: Any = table.surface
-        known = [*(guard.name for guard in self.system.guards), *(f"{name} turns" for name in self.system.states)]
-        if isinstance(surface, dict) and isinstance(text := surface.get(FORMULA), str) and FORMULA not in self.system.states:
+        known = [
+            *(guard.name for guard in self.system.guards),
+            *(f"{name} turns" for name in self.system.states),
+        ]
+        if (
+            isinstance(surface, dict)
+            and isinstance(text := surface.get(FORMULA), str)
+            and FORMULA not in self.system.states
+        ):
             surface = setting.formula(text, f"{self.place}.surface")
         elif isinstance(surface, dict):
             (surface,) = quantities.states(self.system, surface, f"{self.place}.surface").items()
         elif surface not in known:
             level = f'surface = {{ {self.system.states[0]} = "0.3 mm" }}'
-            raise StudyError(f"[{self.place}] surface = {shown(surface)!r} is unknown. {nearest(surface, known)} Or give a level: {level}.")
+            raise StudyError(
+                f"[{self.place}] surface = {shown(surface)!r} is unknown. "
+                f"{nearest(surface, known)} Or give a level: {level}."
+            )
         crossed(self.system, surface, self.arguments["values"] or {})
         self.arguments["surface"] = surface
 
@@ -100,11 +131,20 @@ class Lines(OfMotions):
         self.arguments["states"] = table.states
         for name in table.states or []:
             if name not in self.system.states:
-                raise StudyError(f"[{self.place}] states: {name!r} is unknown to {self.system.name}. {nearest(name, self.system.states)}")
+                raise StudyError(
+                    f"[{self.place}] states: {name!r} is unknown to "
+                    f"{self.system.name}. {nearest(name, self.system.states)}"
+                )
         if table.last is not None and table.periods is None:
-            raise StudyError(f"[{self.place}] last counts forcing periods, and {self.system.name} isn't forced. Leave it out.")
+            raise StudyError(
+                f"[{self.place}] last counts forcing periods, and {self.system.name} "
+                f"isn't forced. Leave it out."
+            )
         if table.last is not None and table.last > (table.periods or 0):
-            raise StudyError(f"[{self.place}] last = {table.last} are more forcing periods than are looked at, periods = {table.periods}.")
+            raise StudyError(
+                f"[{self.place}] last = {table.last} are more forcing periods than "
+                f"are looked at, periods = {table.periods}."
+            )
 
     def call(self, how: dict[str, Any]) -> xr.Dataset:
         """Simulate, leave the transient out, take the spectrum."""
@@ -116,7 +156,9 @@ class Lines(OfMotions):
         else:
             run = simulate(self.system, t_end=asked["t_end"], **motion, **how)
             run = run.sel(time=slice(asked["t_start"] + asked["transient"], None))
-        ds: xr.Dataset = verb(self.function)(run, asked["states"], window=asked["window"], last=asked["last"])
+        ds: xr.Dataset = verb(self.function)(
+            run, asked["states"], window=asked["window"], last=asked["last"]
+        )
         return ds
 
 
@@ -130,12 +172,19 @@ class Statistics(OfMotions):
         self.needs_contacts()
         names = [guard.name for guard in self.system.guards]
         if not names:
-            raise StudyError(f"[{self.place}] {self.system.name} has no guard, so there is no contact to count.")
+            raise StudyError(
+                f"[{self.place}] {self.system.name} has no guard, so there is no contact to count."
+            )
         for key in ("contact_side", "force"):
             for name in getattr(table, key):
                 if name not in names:
-                    raise StudyError(f"[{self.place}.{key}] {name!r} is no guard of {self.system.name}. {nearest(name, names)}")
-        force = {name: setting.formula(text, f"{self.place}.force") for name, text in table.force.items()}
+                    raise StudyError(
+                        f"[{self.place}.{key}] {name!r} is no guard of "
+                        f"{self.system.name}. {nearest(name, names)}"
+                    )
+        force = {
+            name: setting.formula(text, f"{self.place}.force") for name, text in table.force.items()
+        }
         for name, function in force.items():
             quantity(self.system, function, f"the force at {name!r}")
         self.arguments["force"] = force or None
@@ -151,17 +200,25 @@ class Balance(OfMotions):
         from saltus import models
 
         if table.intervals is not None and self.system.forced_at is not None:
-            raise StudyError(f"[{self.place}] {self.system.name} is forced: its balance is drawn each forcing period. Leave intervals out.")
+            raise StudyError(
+                f"[{self.place}] {self.system.name} is forced: its balance is drawn "
+                f"each forcing period. Leave intervals out."
+            )
         written = {name: text for name in _PARTS if (text := getattr(table, name)) is not None}
         model = setting.study.system.model
         self.of_model: dict[str, Any] = {}
         if not written and model is not None:
             self.of_model = models.energy(model)
-            self.arguments = {name: value for name, value in self.arguments.items() if name not in _PARTS}
+            self.arguments = {
+                name: value for name, value in self.arguments.items() if name not in _PARTS
+            }
             return
         if lacking := [name for name in _PARTS if name not in written]:
             bring = "" if model is None else ", or leave all three out: the model brings them along"
-            raise StudyError(f'[{self.place}] lacks {lacking[0]}. Write {lacking[0]} = "..." as a formula, 0 if there is none{bring}.')
+            raise StudyError(
+                f'[{self.place}] lacks {lacking[0]}. Write {lacking[0]} = "..." as a '
+                f"formula, 0 if there is none{bring}."
+            )
         for name, text in written.items():
             self.arguments[name] = setting.formula(text, self.place)
             quantity(self.system, self.arguments[name], f"{name} =")

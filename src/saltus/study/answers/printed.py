@@ -1,4 +1,6 @@
-"""CSV files in the folder of a study: printed numbers and exact ones. Messages never repeat their contents."""
+"""CSV files in the folder of a study: printed numbers and exact ones. Messages never repeat their
+contents.
+"""
 
 from __future__ import annotations
 
@@ -38,14 +40,19 @@ class Row:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise StudyError(f"[compare] {self.place}: what stands in the column {column!r} is no finite number.")
+            raise StudyError(
+                f"[compare] {self.place}: what stands in the column {column!r} is no finite number."
+            )
         return value
 
     def whole(self, column: str) -> int:
         """A whole number from 1 on. Raises StudyError if the cell holds something else."""
         value = self.number(column)
         if value != int(value) or not 1 <= value <= fence.MOST_COUNT:
-            raise StudyError(f"[compare] {self.place}: what stands in the column {column!r} is no whole number from 1 to 2^31.")
+            raise StudyError(
+                f"[compare] {self.place}: what stands in the column {column!r} is no "
+                f"whole number from 1 to 2^31."
+            )
         return int(value)
 
 
@@ -68,15 +75,22 @@ def rows(data: bytes, path: Path, columns: tuple[str, ...]) -> list[Row]:
     """
     try:
         lines = list(_lines(fence.text(data)))
-        header, *table = [(number, cells) for number, line in lines for cells in csv.reader([line])] or [(0, [])]
+        header, *table = [
+            (number, cells) for number, line in lines for cells in csv.reader([line])
+        ] or [(0, [])]
     except fence.RefusedError as refused:
         raise StudyError(f"[compare] {path} {refused}") from None
     except csv.Error as error:
         raise StudyError(f"[compare] {path} can't be read: {error}.") from None
     lacking = [column for column in columns if column not in header[1]]
     if lacking:
-        raise StudyError(f"[compare] {path} lacks the column {lacking[0]!r}. It needs {', '.join(columns)}.")
-    return [Row(f"{path}, line {number}", dict(zip(header[1], cells, strict=False))) for number, cells in table]
+        raise StudyError(
+            f"[compare] {path} lacks the column {lacking[0]!r}. It needs {', '.join(columns)}."
+        )
+    return [
+        Row(f"{path}, line {number}", dict(zip(header[1], cells, strict=False)))
+        for number, cells in table
+    ]
 
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:

@@ -1,4 +1,6 @@
-"""What every question of a study can do: compute its Dataset, say it in rows, draw it. Nothing here writes a file."""
+"""What every question of a study can do: compute its Dataset, say it in rows, draw it. Nothing here
+writes a file.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ Show = Callable[[float], None]
 
 
 class Question(ABC):
-    """A question of a study whose answer is one Dataset: everything that could be checked before computing was.
+    """A question of a study whose answer is one Dataset: everything that could be checked before
+    computing was.
 
     Attributes
     ----------
@@ -63,7 +66,9 @@ class Question(ABC):
         return (self.stem,)
 
     def identity(self) -> dict[str, str] | None:
-        """What must be the same for a file to hold the answer; None if it follows at once from other answers."""
+        """What must be the same for a file to hold the answer; None if it follows at once from
+        other answers.
+        """
         return None
 
     @abstractmethod
@@ -80,7 +85,8 @@ class Question(ABC):
 
 
 class OneVerb(Question):
-    """A question that one function of the analyses answers, whose table was made from its parameters.
+    """A question that one function of the analyses answers, whose table was made from its
+    parameters.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""[frequency_response] and [bifurcation_diagram]: all steady responses over a frequency, over any parameter, or over two."""
+"""[frequency_response] and [bifurcation_diagram]: all steady responses over a frequency, over any
+parameter, or over two.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,12 @@ class Responses(OneVerb):
         """Check the arguments of the analysis before anything is computed."""
         from saltus.analysis.responses.grid import grid_of
 
-        start, box, seed, follow = (self.arguments[name] for name in ("start", "box", "seed", "follow"))
-        grid_of(self.system, self.varied(), start, box, None, seed, follow, self.arguments.get("every"))
+        start, box, seed, follow = (
+            self.arguments[name] for name in ("start", "box", "seed", "follow")
+        )
+        grid_of(
+            self.system, self.varied(), start, box, None, seed, follow, self.arguments.get("every")
+        )
 
     def varied(self) -> dict[str, Any]:
         """The values of each parameter as the analyses take them: a range, or an array."""
@@ -55,8 +61,13 @@ class Responses(OneVerb):
         from saltus.plot.choice import default_kind
 
         kind = default_kind(ds)
-        axes = getattr(plot, kind)(ds, **(self.drawn_with() if kind == "frequency_response" else {}))
-        axes.set_title(self.title if kind != "type_map" else f"{self.title}: {axes.get_title('left')}", loc="left")
+        axes = getattr(plot, kind)(
+            ds, **(self.drawn_with() if kind == "frequency_response" else {})
+        )
+        axes.set_title(
+            self.title if kind != "type_map" else f"{self.title}: {axes.get_title('left')}",
+            loc="left",
+        )
         return {"": first_figure(axes)}
 
 
@@ -75,13 +86,16 @@ class Response(Responses):
         """It needs a forcing frequency."""
         if self.system.forced_at is None:
             raise StudyError(
-                f"[{self.place}] {self.system.name} has no forcing frequency. Ask for a [{Diagram.place}] over another parameter."
+                f"[{self.place}] {self.system.name} has no forcing frequency. Ask for a "
+                f"[{Diagram.place}] over another parameter."
             )
 
     def check(self, table: Any, setting: Setting) -> None:
         """Read the measured points now: errors come before anything is computed."""
         super().check(table, setting)
-        self.measured = None if table.measured is None else setting.inputs.read(table.measured, self.place)
+        self.measured = (
+            None if table.measured is None else setting.inputs.read(table.measured, self.place)
+        )
         self.inputs = [] if self.measured is None else [self.measured]
         self.drawn_with()
 
@@ -99,7 +113,13 @@ class Response(Responses):
             return {}
         units, axis, first = self.system.units, str(self.system.forced_at), self.system.states[0]
         try:
-            points = measured_points(self.measured.data, self.measured.path, axis, units.get(axis, "1"), units.get(first, "1"))
+            points = measured_points(
+                self.measured.data,
+                self.measured.path,
+                axis,
+                units.get(axis, "1"),
+                units.get(first, "1"),
+            )
         except SaltusError as error:
             raise fault(self.place, error) from None
         return {"measured": points}

@@ -1,4 +1,6 @@
-"""What steady responses have to say, as tables: a row for each branch and each event; over two parameters for each kind of motion."""
+"""What steady responses have to say, as tables: a row for each branch and each event; over two
+parameters for each kind of motion.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.results.dataset.kinds import sentences
-from saltus.results.dataset.schema import event_name, kind_text, parameters_of, response_name, states_of
+from saltus.results.dataset.schema import (
+    event_name,
+    kind_text,
+    parameters_of,
+    response_name,
+    states_of,
+)
 from saltus.study.table import ROWS, Column, TextTable, interval, number, quantity, table, words
 from saltus.units import from_si
 
@@ -19,15 +27,19 @@ if TYPE_CHECKING:
 
 
 def tables(title: str, ds: xr.Dataset) -> list[TextTable]:
-    """The tables of responses: branches, and events if there are any; over two parameters kinds of motion."""
+    """The tables of responses: branches, and events if there are any; over two parameters kinds of
+    motion.
+    """
     if len(parameters_of(ds)) == 2:
         return [_kinds(title, ds)]
     return [_branches(title, ds), *([_events(title, ds)] if ds.sizes.get("event") else [])]
 
 
-# -- one parameter -------------------------------------------------------------------------------------------------------------
+# -- one parameter ---------------------------------------------------------------------------------
 def _branches(title: str, ds: xr.Dataset) -> TextTable:
-    """A row for each branch in the order in which they begin; on the screen the longest ones if there are many."""
+    """A row for each branch in the order in which they begin; on the screen the longest ones if
+    there are many.
+    """
     (axis,) = parameters_of(ds)
     branch = ds["response_branch"].values
     numbers, sizes = np.unique(branch, return_counts=True)
@@ -35,7 +47,10 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
     each = [ds.isel(response=np.flatnonzero(branch == number)) for number in numbers]
     tops = [int(np.nan_to_num(one["response_rms"].values, nan=-math.inf).argmax()) for one in each]
     first, along = states_of(ds)[0], axis.replace("_", " ")
-    values, (unit, size, gap) = response_name(axis), (ds[name].attrs.get("units", "") for name in (axis, "response_rms", "response_margin"))
+    values, (unit, size, gap) = (
+        response_name(axis),
+        (ds[name].attrs.get("units", "") for name in (axis, "response_rms", "response_margin")),
+    )
 
     def ends(name: str, pick: Callable[[np.ndarray], Any]) -> list[float]:
         return [float(pick(one[name].values)) for one in each]
@@ -49,7 +64,12 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
         words("values", sizes),
         quantity(f"{along} from", ends(values, np.min), unit, 5),
         quantity("to", ends(values, np.max), unit, 5, name=f"{along} to"),
-        interval("contacts in T", ends("response_contacts", _least), ends("response_contacts", _most), "{:.3g}".format),
+        interval(
+            "contacts in T",
+            ends("response_contacts", _least),
+            ends("response_contacts", _most),
+            "{:.3g}".format,
+        ),
         quantity(f"largest rms of {first}", at_top("response_rms"), size),
         quantity("at", at_top(values), unit, 5, name=f"{along} at the largest rms"),
         quantity(f"peak |{first}|", ends("response_peak", _most), size),
@@ -61,7 +81,11 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
 
 def _least(values: np.ndarray) -> float:
     """The least of the numbers that are there; NaN of none."""
-    return float(values[~np.isnan(values)].min(initial=math.inf)) if not np.isnan(values).all() else math.nan
+    return (
+        float(values[~np.isnan(values)].min(initial=math.inf))
+        if not np.isnan(values).all()
+        else math.nan
+    )
 
 
 def _most(values: np.ndarray) -> float:
@@ -70,13 +94,18 @@ def _most(values: np.ndarray) -> float:
 
 def _types(ds: xr.Dataset) -> str:
     """``T``, or ``T, 2T`` where a branch changes its kind."""
-    pairs = zip(ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True)
+    pairs = zip(
+        ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True
+    )
     return ", ".join(dict.fromkeys(kind_text(kind, n) for kind, n in pairs))
 
 
 def _notes(ds: xr.Dataset, more: int) -> tuple[str, ...]:
     of = ds["response_of"].values
-    notes = [f"{ds.sizes['response']} different responses from {of.size} starts at {math.prod(of.shape[:-1])} values."]
+    notes = [
+        f"{ds.sizes['response']} different responses from {of.size} starts at "
+        f"{math.prod(of.shape[:-1])} values."
+    ]
     if more:
         notes.append(f"{more} shorter branches are in the file.")
     return (*notes, *sentences(of))
@@ -87,28 +116,51 @@ def _events(title: str, ds: xr.Dataset) -> TextTable:
     (axis,) = parameters_of(ds)
     unit = ds[axis].attrs.get("units", "")
     columns = (axis.replace("_", " "), "branch", "what happens")
-    found = list(zip(ds[event_name(axis)].values, ds["event_branch"].values, ds["event_kind"].values.tolist(), strict=True))
+    found = list(
+        zip(
+            ds[event_name(axis)].values,
+            ds["event_branch"].values,
+            ds["event_kind"].values.tolist(),
+            strict=True,
+        )
+    )
     found.sort(key=lambda one: (one[0], one[1]))
-    rows = tuple((from_si(float(value), unit, 5), str(branch), kind.replace("_", " ")) for value, branch, kind in found[:ROWS])
+    rows = tuple(
+        (from_si(float(value), unit, 5), str(branch), kind.replace("_", " "))
+        for value, branch, kind in found[:ROWS]
+    )
     notes = ("Each lies between two neighbouring values.",)
-    return TextTable(f"{title}: on the way", columns, rows, notes + ((f"{len(found) - ROWS} more are in the file.",) * (len(found) > ROWS)))
+    return TextTable(
+        f"{title}: on the way",
+        columns,
+        rows,
+        notes + ((f"{len(found) - ROWS} more are in the file.",) * (len(found) > ROWS)),
+    )
 
 
-# -- two parameters ------------------------------------------------------------------------------------------------------------
+# -- two parameters --------------------------------------------------------------------------------
 def _kinds(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each kind of motion: on how much of the map it is, and where."""
     of = ds["response_of"].values
-    pairs = zip(ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True)
+    pairs = zip(
+        ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True
+    )
     names = np.array([kind_text(kind, n) for kind, n in pairs], dtype=np.str_)
     cells = np.append(names, "")[np.where(of < 0, len(names), of)]
     kinds = sorted(set(names.tolist()), key=lambda kind: (len(kind), kind))
     columns = [
         words("type", kinds),
-        Column("share", lambda i: f"{100 * shares[i]:.2f} %", {"share": (shares := [float((cells == kind).mean()) for kind in kinds])}),
+        Column(
+            "share",
+            lambda i: f"{100 * shares[i]:.2f} %",
+            {"share": (shares := [float((cells == kind).mean()) for kind in kinds])},
+        ),
     ]
     for dim, axis in enumerate(parameters_of(ds)):
         values, unit = ds[axis].values, ds[axis].attrs.get("units", "")
         where = [values[np.nonzero((cells == kind).any(axis=-1))[dim]] for kind in kinds]
         low, high = ([of(found) for found in where] for of in (_least, _most))
-        columns.append(interval(axis.replace("_", " "), low, high, partial(from_si, unit=unit, digits=4), unit))
+        columns.append(
+            interval(axis.replace("_", " "), low, high, partial(from_si, unit=unit, digits=4), unit)
+        )
     return table(title, columns, _notes(ds, 0))

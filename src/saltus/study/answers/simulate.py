@@ -1,4 +1,6 @@
-"""[simulate]: move one start, or a batch of them, and keep the motion with its contacts; [compare]: with printed and exact times."""
+"""[simulate]: move one start, or a batch of them, and keep the motion with its contacts; [compare]:
+with printed and exact times.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ if TYPE_CHECKING:
 
 
 def questions(table: Any, setting: Setting) -> list[Question]:
-    """How given starts move, by the study's method, and by the second one that [compare] names before it.
+    """How given starts move, by the study's method, and by the second one that [compare] names
+    before it.
 
     Raises
     ------
@@ -46,7 +49,10 @@ class Motion(OneVerb):
     def check_first(self, table: Any) -> None:
         """Periods are those of a forcing."""
         if table.periods is not None and self.system.forced_at is None:
-            raise StudyError(f'[simulate] periods: {self.system.name} has no forcing period. Write t_end = "2 s" in place of it.')
+            raise StudyError(
+                f"[simulate] periods: {self.system.name} has no forcing period. Write "
+                f't_end = "2 s" in place of it.'
+            )
 
     def check(self, table: Any, setting: Setting) -> None:
         """Read the files of [compare] now: errors come before anything is computed."""
@@ -56,8 +62,14 @@ class Motion(OneVerb):
         if quantities.is_batch(table.start or {}, table.values):
             raise StudyError("[compare] is for one start: let [simulate] start hold single values.")
         if table.keep is not None:
-            raise StudyError("[compare] counts contacts from the start of the run: leave keep out of [simulate].")
-        files = [setting.inputs.read(name, "compare") for name in (self.compare.printed, self.compare.exact) if name is not None]
+            raise StudyError(
+                "[compare] counts contacts from the start of the run: leave keep out of [simulate]."
+            )
+        files = [
+            setting.inputs.read(name, "compare")
+            for name in (self.compare.printed, self.compare.exact)
+            if name is not None
+        ]
         self.printed = printed_rows(files[0].data, files[0].path)
         self.exact = exact_times(files[1].data, files[1].path) if len(files) > 1 else {}
         self.inputs = files
@@ -69,13 +81,19 @@ class Motion(OneVerb):
         return [contact_table(self.title, ds, self.printed, self.exact, found.get(REFERENCE))]
 
     def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
-        """Phase portrait, or time history of a system of one state; of a large batch the first trajectories."""
+        """Phase portrait, or time history of a system of one state; of a large batch the first
+        trajectories.
+        """
         from saltus import plot
         from saltus.plot.selection import MOST
         from saltus.results.dataset.schema import states_of
 
         draw = plot.phase if len(states_of(ds)) > 1 else plot.history
-        some = {"trajectory": ds["trajectory"].values[:MOST].tolist()} if "trajectory" in ds.dims else {}
+        some = (
+            {"trajectory": ds["trajectory"].values[:MOST].tolist()}
+            if "trajectory" in ds.dims
+            else {}
+        )
         return {"": first_figure(draw(ds, **some))}
 
 

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 
 def run_table(title: str, run: xr.Dataset) -> TextTable:
-    """A row for each trajectory: status, contacts, grazes, steps, state at the end and, for a forced system, its response.
+    """A row for each trajectory: status, contacts, grazes, steps, state at the end and, for a
+    forced system, its response.
 
     Parameters
     ----------
@@ -28,21 +29,37 @@ def run_table(title: str, run: xr.Dataset) -> TextTable:
     """
     batch = run if "trajectory" in run.dims else run.expand_dims("trajectory")
     counts = [
-        name for name in ("events", "grazes", "grazes_unresolved", "steps") if name == "events" or name == "steps" or batch[name].any()
+        name
+        for name in ("events", "grazes", "grazes_unresolved", "steps")
+        if name == "events" or name == "steps" or batch[name].any()
     ]
     responses, total = response_texts(run), batch.sizes["trajectory"]
-    columns = [words("", range(total), "trajectory"), *(varied(run, run["trajectory"].values) if "trajectory" in run.dims else [])]
+    columns = [
+        words("", range(total), "trajectory"),
+        *(varied(run, run["trajectory"].values) if "trajectory" in run.dims else []),
+    ]
     columns.append(words("status", batch["status"].values.astype(str)))
-    columns += [words({"events": "contacts"}.get(name, name.replace("_", " ")), batch[name].values) for name in counts]
     columns += [
-        quantity(f"{name} at the end", batch[end_name(name)].values, batch[name].attrs.get("units", ""), 5) for name in states_of(run)
+        words({"events": "contacts"}.get(name, name.replace("_", " ")), batch[name].values)
+        for name in counts
+    ]
+    columns += [
+        quantity(
+            f"{name} at the end",
+            batch[end_name(name)].values,
+            batch[name].attrs.get("units", ""),
+            5,
+        )
+        for name in states_of(run)
     ]
     columns += [words("response", responses)] * bool(responses)
     return table(title, columns, _notes(batch, min(total, ROWS)))
 
 
 def response_texts(run: xr.Dataset) -> list[str]:
-    """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty for an unforced system or too few samples."""
+    """``T``, ``3T`` or ``not periodic within 48T`` for each trajectory; empty for an unforced
+    system or too few samples.
+    """
     try:
         found = settled(run)
     except ParameterError:
@@ -58,5 +75,9 @@ def _notes(batch: xr.Dataset, shown: int) -> tuple[str, ...]:
         notes.append(f"{total - shown} more trajectories are in the file.")
     status, counts = np.unique(batch["status"].values.astype(str), return_counts=True)
     sentences = dict(STATUS.values())
-    notes += [f"{count} of {total} {word}: {sentences.get(word, '')}." for word, count in zip(status, counts, strict=True) if word != "ok"]
+    notes += [
+        f"{count} of {total} {word}: {sentences.get(word, '')}."
+        for word, count in zip(status, counts, strict=True)
+        if word != "ok"
+    ]
     return tuple(notes)

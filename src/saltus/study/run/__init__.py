@@ -1,1 +1,3 @@
-"""Running studies: answers in a folder, maps in crash-safe stores, threads, processes and clusters."""
+"""Running studies: answers in a folder, maps in crash-safe stores, threads, processes
+and clusters.
+"""

@@ -1,6 +1,7 @@
 """Chunks on a dask cluster, which a scheduler's address stands for. Needs the extra ``cluster``.
 
-A dask scheduler runs any code: whoever can reach it can run anything as the user who started it. See docs/studies.md.
+A dask scheduler runs any code: whoever can reach it can run anything as the user who started it.
+See docs/studies.md.
 """
 
 from __future__ import annotations
@@ -20,11 +21,15 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.pipeline import BasinPlan
     from saltus.analysis.orbits.found import Found
 
-#: Chunks handed out at a time, for each worker: enough to keep it busy, few enough that a large map doesn't fill the scheduler.
+#: Chunks handed out at a time, for each worker: enough to keep it busy, few enough that a large map
+#: doesn't fill the scheduler.
 CHUNKS_PER_WORKER = 4
 #: Times that a chunk is given to another worker when its own dies.
 MAX_RETRIES = 5
-_SILENT = "the scheduler {} doesn't answer ({}). Start one with `dask scheduler`, or leave --scheduler out."
+_SILENT = (
+    "the scheduler {} doesn't answer ({}). Start one with `dask scheduler`, or leave "
+    "--scheduler out."
+)
 
 
 @contextmanager
@@ -44,8 +49,11 @@ def cluster_runner(scheduler: str) -> Iterator[Callable[..., None]]:
     try:
         from distributed import Client
     except ImportError:
-        raise StudyError('a cluster needs dask. Install "saltus[cluster]", or leave --scheduler out.') from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # late heartbeats and lost workers are handled here, or raise errors
+        raise StudyError(
+            'a cluster needs dask. Install "saltus[cluster]", or leave --scheduler out.'
+        ) from None
+    # late heartbeats and lost workers are handled here, or raise errors
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = Client(scheduler, timeout=10)
     except (OSError, ValueError) as error:
@@ -65,27 +73,47 @@ def check_scheduler(address: str) -> None:
         raise StudyError(_SILENT.format(address, error.strerror or error)) from error
 
 
-def _run(client: Any, plan: BasinPlan, found: Found, missing: list[int], keep: Callable, show: Callable[[float], None]) -> None:
-    """Hand out chunks, keep what comes back, hand out more; a chunk whose worker dies goes to another one."""
+def _run(
+    client: Any,
+    plan: BasinPlan,
+    found: Found,
+    missing: list[int],
+    keep: Callable,
+    show: Callable[[float], None],
+) -> None:
+    """Hand out chunks, keep what comes back, hand out more; a chunk whose worker dies goes to
+    another one.
+    """
     from distributed import as_completed
 
     try:
         client.wait_for_workers(1, timeout=30)
     except TimeoutError as error:
-        raise StudyError("the scheduler has no workers. Start some with `dask worker ADDRESS`, or leave --scheduler out.") from error
+        raise StudyError(
+            "the scheduler has no workers. Start some with `dask worker ADDRESS`, or "
+            "leave --scheduler out."
+        ) from error
     shared = client.scatter((plan, found), broadcast=True)
     waiting, tries = iter(missing), dict.fromkeys(missing, 0)
-    width = max(CHUNKS_PER_WORKER * max(len(client.scheduler_info()["workers"]), 1), CHUNKS_PER_WORKER)
-    indices = {_submit(client, shared, index): index for _, index in zip(range(width), waiting, strict=False)}
+    width = max(
+        CHUNKS_PER_WORKER * max(len(client.scheduler_info()["workers"]), 1), CHUNKS_PER_WORKER
+    )
+    indices = {
+        _submit(client, shared, index): index
+        for _, index in zip(range(width), waiting, strict=False)
+    }
     running, done = as_completed(list(indices)), 0
     for future in running:
         index = indices.pop(future)
         try:
             part = future.result()
-        except (Exception, asyncio.CancelledError) as error:  # every worker with the plan has died: send it to their successors
+        # every worker with the plan has died: send it to their successors
+        except (Exception, asyncio.CancelledError) as error:
             tries[index] += 1
             if tries[index] > MAX_RETRIES:
-                raise StudyError(f"chunk {index} failed on {MAX_RETRIES} workers, the last time with {error!r}.") from error
+                raise StudyError(
+                    f"chunk {index} failed on {MAX_RETRIES} workers, the last time with {error!r}."
+                ) from error
             client.wait_for_workers(1, timeout=60)
             shared = client.scatter((plan, found), broadcast=True)
             again = _submit(client, shared, index)

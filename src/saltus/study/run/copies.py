@@ -1,4 +1,6 @@
-"""The copy of a study in its output folder, with the files that it names, under a seal: what `resume` reads."""
+"""The copy of a study in its output folder, with the files that it names, under a seal: what
+`resume` reads.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +15,26 @@ from saltus.results.files.atomic import ResultFileError, replacing
 from saltus.results.store.durable import seal, sha256, unseal
 from saltus.study.setting.inputs import Input, Inputs, KeptInputs
 
-#: Names of the copy of the study, of the seal with its hashes, and of the folder of copies of its files.
+#: Names of the copy of the study, of the seal with its hashes, and of the folder of copies of its
+#: files.
 COPY, SEAL, INPUTS = "study.toml", "study.seal", "inputs"
-_CHANGED = "changed since it was written. Run the study that it was made from again, with --out {}: finished results are reused."
+_CHANGED = (
+    "changed since it was written. Run the study that it was made from again, with --out "
+    "{}: finished results are reused."
+)
 
 
 def keep_copy(folder: Path, text: str, files: Iterable[Input]) -> None:
-    """Copy a study and the files that it names into its output folder, byte for byte; the seal holds their hashes."""
+    """Copy a study and the files that it names into its output folder, byte for byte; the seal
+    holds their hashes.
+    """
     names = _names(files := list(files))
     if files:
         if not (folder / INPUTS).resolve().is_relative_to(folder.resolve()):
-            raise ResultFileError(f"{folder / INPUTS} is a link that leaves {folder}: nothing is written through it. Remove it.")
+            raise ResultFileError(
+                f"{folder / INPUTS} is a link that leaves {folder}: nothing is "
+                f"written through it. Remove it."
+            )
         (folder / INPUTS).mkdir(exist_ok=True)
     for file in files:
         _write(folder / INPUTS / names[file.name], file.data)
@@ -34,7 +45,9 @@ def keep_copy(folder: Path, text: str, files: Iterable[Input]) -> None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Write a file unless it is there already: a study that is run again leaves its copy untouched."""
+    """Write a file unless it is there already: a study that is run again leaves its
+    copy untouched.
+    """
     if path.is_symlink() or not path.is_file() or path.read_bytes() != data:
         with replacing(path) as (part,):
             part.write_bytes(data)
@@ -44,7 +57,10 @@ def _names(files: Iterable[Input]) -> dict[str, str]:
     """A file name for the copy of each file, no two the same on any system."""
     names: dict[str, str] = {}
     for file in files:
-        plain = PurePosixPath(re.sub(r"[^\w.-]+", "-", re.split(r"[/\\]", file.name)[-1])[-80:].lstrip(".-") or "input")
+        plain = PurePosixPath(
+            re.sub(r"[^\w.-]+", "-", re.split(r"[/\\]", file.name)[-1])[-80:].lstrip(".-")
+            or "input"
+        )
         name, number = plain.name, 1
         while name.lower() in {taken.lower() for taken in names.values()}:
             number += 1
@@ -56,12 +72,16 @@ def _names(files: Iterable[Input]) -> dict[str, str]:
 def copy_of(folder: Path) -> Path:
     """The study in an output folder. Raises StudyError if there is none."""
     if not (folder / COPY).is_file():
-        raise StudyError(f"{folder} holds no {COPY}: it isn't the output folder of a study. Run the study again with --out {folder}.")
+        raise StudyError(
+            f"{folder} holds no {COPY}: it isn't the output folder of a study. Run "
+            f"the study again with --out {folder}."
+        )
     return folder / COPY
 
 
 def inputs_of(folder: Path, text: str) -> Inputs:
-    """The copies of the files that the study in an output folder names, ``text`` being the study as it stands there.
+    """The copies of the files that the study in an output folder names, ``text`` being the study as
+    it stands there.
 
     Raises
     ------
@@ -78,7 +98,10 @@ def inputs_of(folder: Path, text: str) -> Inputs:
         raise StudyError(f"{folder / SEAL} {_CHANGED.format(folder)}")
     if sealed["study"] != sha256(text.encode()):
         raise StudyError(f"{folder / COPY} {_CHANGED.format(folder)}")
-    return KeptInputs(folder / INPUTS, {name: (one["copy"], one["sha256"]) for name, one in sealed["inputs"].items()})
+    return KeptInputs(
+        folder / INPUTS,
+        {name: (one["copy"], one["sha256"]) for name, one in sealed["inputs"].items()},
+    )
 
 
 def _is_seal(sealed: dict[str, Any]) -> bool:
@@ -87,9 +110,18 @@ def _is_seal(sealed: dict[str, Any]) -> bool:
     return (
         isinstance(sealed.get("study"), str)
         and isinstance(inputs, dict)
-        and all(isinstance(one, dict) and isinstance(one.get("sha256"), str) and _is_name(one.get("copy")) for one in inputs.values())
+        and all(
+            isinstance(one, dict)
+            and isinstance(one.get("sha256"), str)
+            and _is_name(one.get("copy"))
+            for one in inputs.values()
+        )
     )
 
 
 def _is_name(copy: object) -> bool:
-    return isinstance(copy, str) and bool(re.fullmatch(r"[\w.-]{1,200}", copy)) and copy.strip(".") != ""
+    return (
+        isinstance(copy, str)
+        and bool(re.fullmatch(r"[\w.-]{1,200}", copy))
+        and copy.strip(".") != ""
+    )

@@ -1,4 +1,6 @@
-"""The basin maps of a study: planned into chunks, computed by threads, processes or a cluster, in crash-safe stores."""
+"""The basin maps of a study: planned into chunks, computed by threads, processes or a cluster, in
+crash-safe stores.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,13 @@ from typing import TYPE_CHECKING
 from saltus.analysis.basins.basins import label_all
 from saltus.analysis.basins.labels import Settling, settle
 from saltus.analysis.basins.pipeline import CHUNK, BasinPlan, memory
-from saltus.analysis.basins.serial import cell_types, found_data, found_from, settling_arrays, settling_from
+from saltus.analysis.basins.serial import (
+    cell_types,
+    found_data,
+    found_from,
+    settling_arrays,
+    settling_from,
+)
 from saltus.flow.threads import usable_processors
 from saltus.results.store.store import Store
 from saltus.study.answers.basins import BasinMap
@@ -33,18 +41,29 @@ STORES = "stores"
 
 
 def open_store(job: BasinMap, folder: Path) -> Store:
-    """The store of a map in a study's output folder, made if it isn't there yet. Raises StoreError if it belongs to something else."""
+    """The store of a map in a study's output folder, made if it isn't there yet. Raises StoreError
+    if it belongs to something else.
+    """
     (folder / STORES).mkdir(parents=True, exist_ok=True)
     return Store.create_or_resume(
-        folder / STORES / job.stem, job.identity(), shape=job.plan.shape, chunk=CHUNK, arrays=cell_types(job.plan.system.states),
+        folder / STORES / job.stem, job.identity(), shape=job.plan.shape, chunk=CHUNK,
+        arrays=cell_types(job.plan.system.states),
         note={"name": job.title},
     )  # fmt: skip
 
 
-def compute(job: BasinMap, store: Store, resources_: Resources, report: Callable[[Report], None], say: Callable[[str], None]) -> bool:
-    """Compute the missing chunks of a map (of a shard of it); returns whether the whole map is done.
+def compute(
+    job: BasinMap,
+    store: Store,
+    resources_: Resources,
+    report: Callable[[Report], None],
+    say: Callable[[str], None],
+) -> bool:
+    """Compute the missing chunks of a map (of a shard of it); returns whether the whole map is
+    done.
 
-    Every chunk is committed when it is ready: stopped at any moment, by anything, the work goes on from there.
+    Every chunk is committed when it is ready: stopped at any moment, by anything, the work goes on
+    from there.
     """
     shard = resources_.shard
     with store.lock(shard):
@@ -63,11 +82,28 @@ def compute(job: BasinMap, store: Store, resources_: Resources, report: Callable
                 count[0] += 1
 
             def show(_share: float) -> None:
-                report(Report(job.title, int(store.done().sum()), job.plan.chunks, time.perf_counter() - begin, count[0]))
+                report(
+                    Report(
+                        job.title,
+                        int(store.done().sum()),
+                        job.plan.chunks,
+                        time.perf_counter() - begin,
+                        count[0],
+                    )
+                )
 
             with _runner(resources_) as run:
                 run(job.plan, found, missing, keep, show)
-        report(Report(job.title, int(store.done().sum()), job.plan.chunks, time.perf_counter() - begin, count[0], last=True))
+        report(
+            Report(
+                job.title,
+                int(store.done().sum()),
+                job.plan.chunks,
+                time.perf_counter() - begin,
+                count[0],
+                last=True,
+            )
+        )
     return not store.missing()
 
 
@@ -87,7 +123,9 @@ def _runner(resources_: Resources) -> AbstractContextManager[Callable[..., None]
     if resources_.workers is not None or resources_.scheduler == "local":
         return nullcontext(partial(run_on_processes, resources_.workers))
 
-    def run(plan: BasinPlan, found: Found, missing: list[int], keep: Callable, show: Callable) -> None:
+    def run(
+        plan: BasinPlan, found: Found, missing: list[int], keep: Callable, show: Callable
+    ) -> None:
         label_all(plan, found, missing, keep, resources_.threads, show)
 
     return nullcontext(run)
@@ -100,13 +138,23 @@ def finish(job: BasinMap, store: Store, threads: int | None = None) -> xr.Datase
 
 
 def estimate(plan: BasinPlan, found: Found, resources_: Resources) -> str:
-    """A sentence on the time, memory and disk that a map will take, from a few hundred of its cells."""
+    """A sentence on the time, memory and disk that a map will take, from a few hundred of its
+    cells.
+    """
     cells = plan.sample(TIMED_CELLS)
     map_ = plan.map(1)
     map_.launch(plan.starts(cells[:1]), 1).advance(1)  # compiles, if it must
     begin = time.perf_counter()
     settle(map_, plan.starts(cells), found, plan.periods)
-    seconds = (time.perf_counter() - begin) / len(cells) * plan.cells / (resources_.workers or resources_.threads or usable_processors())
+    seconds = (
+        (time.perf_counter() - begin)
+        / len(cells)
+        * plan.cells
+        / (resources_.workers or resources_.threads or usable_processors())
+    )
     size = len(plan.system.states)
     needed, disk = memory(plan.cells, size), plan.cells * (9.0 + 8.0 * size)
-    return f"{plan.cells} cells: about {seconds:.0f} s here, {needed / 1e9:.1f} GB of memory, {disk / 1e6:.0f} MB on the disk"
+    return (
+        f"{plan.cells} cells: about {seconds:.0f} s here, {needed / 1e9:.1f} GB of memory, "
+        f"{disk / 1e6:.0f} MB on the disk"
+    )

@@ -1,4 +1,6 @@
-"""Chunks by processes of this machine, each at the end of a pipe of its own: nothing listens, so nobody else can hand them work."""
+"""Chunks by processes of this machine, each at the end of a pipe of its own: nothing listens, so
+nobody else can hand them work.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.pipeline import BasinPlan
     from saltus.analysis.orbits.found import Found
 
-#: Chunks that a process has at a time: one that it computes, one that it begins while the first is committed.
+#: Chunks that a process has at a time: one that it computes, one that it begins while the first is
+#: committed.
 CHUNKS_PER_PROCESS = 2
 #: Times that a chunk is given to another process when its own dies.
 MAX_RETRIES = 5
@@ -34,9 +37,11 @@ def run_on_processes(
     keep: Callable[[int, Settling], None],
     show: Callable[[float], None],
 ) -> None:
-    """Compute chunks; ``keep(index, settling)`` is called from this process as each is ready, in any order.
+    """Compute chunks; ``keep(index, settling)`` is called from this process as each is ready, in
+    any order.
 
-    The chunks of a process that dies go to its successor. On Ctrl-C, and on any error, all processes are ended.
+    The chunks of a process that dies go to its successor. On Ctrl-C, and on any error, all
+    processes are ended.
 
     Parameters
     ----------
@@ -54,7 +59,8 @@ def run_on_processes(
     StudyError
         If a chunk can't be computed, or its processes die again and again.
     """
-    plan.map(1).launch(plan.starts(plan.cells_of(missing[0])[:1]), 1)  # compiles once, before every process does
+    # compiles once, before every process does
+    plan.map(1).launch(plan.starts(plan.cells_of(missing[0])[:1]), 1)
     waiting, tries, done = deque(missing), dict.fromkeys(missing, 0), 0
     team = [_Worker(plan, found) for _ in range(min(workers or usable_processors(), len(missing)))]
     try:
@@ -100,7 +106,9 @@ class _Worker:
         return True
 
     def answer(self) -> tuple[int, Settling] | None:
-        """A chunk that it has computed; None if it is dead. Raises StudyError with what went wrong there."""
+        """A chunk that it has computed; None if it is dead. Raises StudyError with what went wrong
+        there.
+        """
         try:
             part, problem = self.pipe.recv()
         except (EOFError, OSError):
@@ -130,22 +138,27 @@ def _successor(dead: _Worker, waiting: deque[int], tries: dict[int, int]) -> _Wo
     for index in reversed(dead.held or list(waiting)[:1]):
         tries[index] += 1
         if tries[index] > MAX_RETRIES:
-            raise StudyError(f"chunk {index} failed in {MAX_RETRIES} processes; the last ended with code {code}. Is there enough memory?")
+            raise StudyError(
+                f"chunk {index} failed in {MAX_RETRIES} processes; the last ended "
+                f"with code {code}. Is there enough memory?"
+            )
     waiting.extendleft(reversed(dead.held))
     return dead.again()
 
 
 @contextmanager
 def _without_ctrl_c() -> Iterator[None]:
-    """Processes that are started within never see Ctrl-C: it is for this one, which ends them. Here it waits until they are started.
+    """Processes that are started within never see Ctrl-C: it is for this one, which ends them. Here
+    it waits until they are started.
 
-    They inherit the mask. It holds for one thread: another may take the signal, and Python would raise it
-    here, amid the start of a process.
+    They inherit the mask. It holds for one thread: another may take the signal, and Python would
+    raise it here, amid the start of a process.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # else it starts with the first process, and lets the signal through again
+    # else it starts with the first process, and lets the signal through again
+    resource_tracker.ensure_running()
     with ctrl_c_waits():
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:

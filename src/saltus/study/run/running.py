@@ -24,8 +24,8 @@ class Resources:
     scheduler : str or None
         Basins: address of a dask scheduler, or ``"local"`` for processes of this machine.
     shard : (k, n) or None
-        Basins: only the chunks i with i % n == k, one of n jobs that share the store and nothing else. All other questions are left to
-        shard 0.
+        Basins: only the chunks i with i % n == k, one of n jobs that share the store and nothing
+        else. All other questions are left to shard 0.
     """
 
     threads: int | None = None
@@ -44,7 +44,8 @@ def shard_of(text: str) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Report:
-    """How far a question is; of a map read off its store, so that the work of other machines counts too.
+    """How far a question is; of a map read off its store, so that the work of other machines counts
+    too.
 
     ``what`` is counted: chunks, or per cent.
     """
@@ -65,7 +66,9 @@ class Report:
 
 @dataclass
 class Outcome:
-    """What a study gave: tables to print, files written, questions that other shards have still to answer."""
+    """What a study gave: tables to print, files written, questions that other shards have still to
+    answer.
+    """
 
     tables: list[TextTable] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)

@@ -31,7 +31,10 @@ def status_tables(folder: Path) -> list[TextTable]:
     maps = [status_table(found)] if (found := stores(folder)) else []
     others = None if (folder / "store.json").exists() else question_table(folder)
     if not maps and others is None:
-        raise StudyError(f"{folder} holds no store and no study. Give the output folder of a study, such as saltus-runs/fig6b.")
+        raise StudyError(
+            f"{folder} holds no store and no study. Give the output folder of a "
+            f"study, such as saltus-runs/fig6b."
+        )
     return maps + ([others] if others is not None else [])
 
 
@@ -49,7 +52,11 @@ def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
 
     found: list[StoreStatus | DamagedStore] = []
     alone = (folder / "store.json").exists()
-    for path in [folder] if alone else sorted(one for one in (folder / STORES).glob("[!.]*") if one.is_dir()):
+    for path in (
+        [folder]
+        if alone
+        else sorted(one for one in (folder / STORES).glob("[!.]*") if one.is_dir())
+    ):
         try:
             found.append(Store.open(path).status())
         except StoreError as error:
@@ -60,15 +67,22 @@ def stores(folder: Path) -> list[StoreStatus | DamagedStore]:
 def status_table(found: list[StoreStatus | DamagedStore]) -> TextTable:
     """A row for each store; errors of those that can't be opened follow below."""
     columns = ("map", "chunks", "done", "damaged", "MB", "last written", "at work")
-    return TextTable("Maps", columns, tuple(map(_row, found)), tuple(one.why for one in found if isinstance(one, DamagedStore)))
+    return TextTable(
+        "Maps",
+        columns,
+        tuple(map(_row, found)),
+        tuple(one.why for one in found if isinstance(one, DamagedStore)),
+    )
 
 
 def _row(one: StoreStatus | DamagedStore) -> tuple[str, ...]:
     if isinstance(one, DamagedStore):
         return one.name, "damaged", "-", "-", "-", "-", "-"
     return (
-        str(one.note.get("name", one.path.name)), f"{one.done} of {one.total}", f"{100 * one.done / max(one.total, 1):.0f} %",
-        str(one.damaged), f"{one.bytes / 1e6:.1f}", one.last_written.strftime(_TIME) if one.last_written else "never",
+        str(one.note.get("name", one.path.name)), f"{one.done} of {one.total}",
+        f"{100 * one.done / max(one.total, 1):.0f} %",
+        str(one.damaged), f"{one.bytes / 1e6:.1f}",
+        one.last_written.strftime(_TIME) if one.last_written else "never",
         ", ".join(one.writers) or "-",
     )  # fmt: skip
 
@@ -81,10 +95,21 @@ def question_table(folder: Path) -> TextTable | None:
     try:
         study, text = read(copy_of(folder))
         inputs_of(folder, text)
-        rows = [(title, f"{stem}.nc", *_state(folder / f"{stem}.nc")) for title, stem in study.answers()]
+        rows = [
+            (title, f"{stem}.nc", *_state(folder / f"{stem}.nc")) for title, stem in study.answers()
+        ]
     except StudyError as error:
-        rows, notes = [("the study", COPY, "changed or damaged", _written(folder / COPY))], [str(error)]
-    return TextTable("Questions", ("question", "file", "state", "last written"), tuple(rows), tuple(notes)) if rows else None
+        rows, notes = (
+            [("the study", COPY, "changed or damaged", _written(folder / COPY))],
+            [str(error)],
+        )
+    return (
+        TextTable(
+            "Questions", ("question", "file", "state", "last written"), tuple(rows), tuple(notes)
+        )
+        if rows
+        else None
+    )
 
 
 def _state(file: Path) -> tuple[str, str]:
@@ -92,7 +117,9 @@ def _state(file: Path) -> tuple[str, str]:
     from saltus.results import load
 
     if not file.exists():
-        return ("stopped on the way" if file.with_stem(f"{file.stem}{PARTIAL}").exists() else "not yet"), "never"
+        return (
+            "stopped on the way" if file.with_stem(f"{file.stem}{PARTIAL}").exists() else "not yet"
+        ), "never"
     try:
         load(file)
     except SaltusError:

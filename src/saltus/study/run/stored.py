@@ -1,4 +1,6 @@
-"""Results of one file: stored once computed, and reused while their identity is that of the question."""
+"""Results of one file: stored once computed, and reused while their identity is that of the
+question.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,11 @@ PARTIAL = "-partial"
 
 
 def load_or_compute(
-    stem: str, title: str, identity: Mapping[str, str], compute: Callable[[Callable[[float], None]], xr.Dataset], at: Running
+    stem: str,
+    title: str,
+    identity: Mapping[str, str],
+    compute: Callable[[Callable[[float], None]], xr.Dataset],
+    at: Running,
 ) -> xr.Dataset:
     """The result in ``STEM.nc`` if it has this question's identity, else computed and stored there.
 
@@ -52,7 +58,9 @@ def load_or_compute(
     return _computed(file, title, identity, compute, at)
 
 
-def _stored(file: Path, title: str, identity: Mapping[str, str], say: Callable[[str], None]) -> xr.Dataset | None:
+def _stored(
+    file: Path, title: str, identity: Mapping[str, str], say: Callable[[str], None]
+) -> xr.Dataset | None:
     """The result in a file, if it is there, sound, and of this identity."""
     if not file.exists():
         return None
@@ -64,13 +72,20 @@ def _stored(file: Path, title: str, identity: Mapping[str, str], say: Callable[[
         return None
     changed = [name for name in {**before, **identity} if before.get(name) != identity.get(name)]
     if changed:
-        say(f"{title}: computed again, as the {', '.join(changed)} changed since {file.name} was written.")
+        say(
+            f"{title}: computed again, as the {', '.join(changed)} changed since {file.name} was "
+            f"written."
+        )
         return None
     return ds
 
 
 def _computed(
-    file: Path, title: str, identity: Mapping[str, str], compute: Callable[[Callable[[float], None]], xr.Dataset], at: Running
+    file: Path,
+    title: str,
+    identity: Mapping[str, str],
+    compute: Callable[[Callable[[float], None]], xr.Dataset],
+    at: Running,
 ) -> xr.Dataset:
 
     begin = time.perf_counter()

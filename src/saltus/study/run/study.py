@@ -46,7 +46,8 @@ def run_study(
     study : Study
         What to compute.
     text : str
-        The file as it stands; a copy goes to the folder. :func:`saltus.study.tables.read.read` returns both.
+        The file as it stands; a copy goes to the folder. :func:`saltus.study.tables.read.read`
+        returns both.
     folder : Path
         Output: for each question a ``.nc``, a ``.csv`` and pictures; the stores of basins.
     own : System, optional
@@ -76,7 +77,11 @@ def run_study(
         from saltus.study.run.cluster import check_scheduler
 
         check_scheduler(str(resources.scheduler))
-    stores = {question.stem: open_store(question, folder) for question in asked if isinstance(question, BasinMap)}
+    stores = {
+        question.stem: open_store(question, folder)
+        for question in asked
+        if isinstance(question, BasinMap)
+    }
     keep_copy(folder, text, inputs.taken)
     at, outcome = Running(folder, text, resources, report, say, pictures), Outcome()
     found: dict[str, xr.Dataset] = {}
@@ -93,7 +98,9 @@ def run_study(
     return outcome
 
 
-def _answer(question: Question, found: Mapping[str, xr.Dataset], at: Running, stores: Mapping[str, Store]) -> xr.Dataset | None:
+def _answer(
+    question: Question, found: Mapping[str, xr.Dataset], at: Running, stores: Mapping[str, Store]
+) -> xr.Dataset | None:
     """The answer, loaded or computed; None if other shards have still to work on it."""
     if (identity := question.identity()) is None:
         ds = question.compute(found, at.resources.threads, lambda _: None)
@@ -101,11 +108,17 @@ def _answer(question: Question, found: Mapping[str, xr.Dataset], at: Running, st
         return ds
     if not isinstance(question, BasinMap):
         return load_or_compute(
-            question.stem, question.title, identity, lambda show: question.compute(found, at.resources.threads, show), at
+            question.stem,
+            question.title,
+            identity,
+            lambda show: question.compute(found, at.resources.threads, show),
+            at,
         )
     store = stores[question.stem]
     if not compute(question, store, at.resources, at.report, at.say):
         return None
-    ds = finish(question, store, at.resources.threads).assign_attrs(study=at.text, title=question.title)
+    ds = finish(question, store, at.resources.threads).assign_attrs(
+        study=at.text, title=question.title
+    )
     save(ds, at.folder / f"{question.stem}.nc")
     return ds

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from saltus.study.answers.question import Question
 
 
-def write(question: Question, ds: xr.Dataset, found: Mapping[str, xr.Dataset], at: Running) -> Outcome:
+def write(
+    question: Question, ds: xr.Dataset, found: Mapping[str, xr.Dataset], at: Running
+) -> Outcome:
     """Write what an answer says; its Dataset is written already."""
     tables, files = question.rows(ds, found), [at.folder / f"{question.stem}.nc"]
     notes = [file.note for file in question.inputs]
@@ -30,7 +32,10 @@ def write(question: Question, ds: xr.Dataset, found: Mapping[str, xr.Dataset], a
         from saltus import plot
 
         with plot.style():
-            files += [save_picture(figure, at.folder / f"{question.stem}{end}.png") for end, figure in question.pictures(ds).items()]
+            files += [
+                save_picture(figure, at.folder / f"{question.stem}{end}.png")
+                for end, figure in question.pictures(ds).items()
+            ]
     return Outcome(tables, files)
 
 

@@ -1,4 +1,6 @@
-"""The arguments of an analysis, from the table of a study that asks for it: quantities in SI, formulas traced."""
+"""The arguments of an analysis, from the table of a study that asks for it: quantities in SI,
+formulas traced.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,16 @@ if TYPE_CHECKING:
 
 
 def system_of_question(table: Generated, setting: Setting, place: str) -> System:
-    """The study's system with the values of one question that hold for all its trajectories. Raises StudyError."""
+    """The study's system with the values of one question that hold for all its trajectories. Raises
+    StudyError.
+    """
     values = getattr(table, "values", {})
     start = getattr(table, "start", None)
     quantities.is_batch(start if isinstance(start, dict) else {}, values, place=place)
-    return setting.system({name: value for name, value in values.items() if not isinstance(value, list)}, f"{place}.values")
+    return setting.system(
+        {name: value for name, value in values.items() if not isinstance(value, list)},
+        f"{place}.values",
+    )
 
 
 def arguments(table: Generated, system: System, setting: Setting, place: str) -> dict[str, Any]:
@@ -47,11 +54,17 @@ def arguments(table: Generated, system: System, setting: Setting, place: str) ->
         value = getattr(table, name)
         if kind is not OWN_METHOD:
             written = kind.convert and name in table.model_fields_set and value is not None
-            found[name] = _READINGS[kind.convert](value, _At(system, setting, place, name)) if written else None if value == {} else value
+            found[name] = (
+                _READINGS[kind.convert](value, _At(system, setting, place, name))
+                if written
+                else None
+                if value == {}
+                else value
+            )
     return found
 
 
-# -- readings, by what the kind of a key names ---------------------------------------------------------------------------------
+# -- readings, by what the kind of a key names -----------------------------------------------------
 @dataclass(frozen=True)
 class _At:
     """Where a key stands."""
@@ -71,11 +84,21 @@ def _transient(value: Any, at: _At) -> float:
 
 def _values(value: Any, at: _At) -> dict[str, list[float]] | None:
     """Those that differ from trajectory to trajectory."""
-    return quantities.varied(at.system, {name: one for name, one in value.items() if isinstance(one, list)}, f"{at.place}.{at.key}") or None
+    return (
+        quantities.varied(
+            at.system,
+            {name: one for name, one in value.items() if isinstance(one, list)},
+            f"{at.place}.{at.key}",
+        )
+        or None
+    )
 
 
 def _vary(value: Any, at: _At) -> dict[str, Any]:
-    return {name: quantities.grid(at.system, name, one, f"{at.place}.{at.key}") for name, one in value.items()}
+    return {
+        name: quantities.grid(at.system, name, one, f"{at.place}.{at.key}")
+        for name, one in value.items()
+    }
 
 
 _READINGS: dict[str, Callable[[Any, _At], Any]] = {
@@ -84,7 +107,9 @@ _READINGS: dict[str, Callable[[Any, _At], Any]] = {
     "time": lambda value, at: quantities.number(value, "s", at.place, at.key),
     "transient": _transient,
     "values": _values,
-    "frequency": lambda value, at: quantities.grid(at.system, str(at.system.forced_at), value, f"{at.place}.{at.key}"),
+    "frequency": lambda value, at: quantities.grid(
+        at.system, str(at.system.forced_at), value, f"{at.place}.{at.key}"
+    ),
     "vary": _vary,
     "outputs": lambda value, at: at.setting.outputs(at.system, value, at.place),
     "at": lambda value, at: quantities.states(at.system, value, f"{at.place}.{at.key}"),

@@ -12,12 +12,14 @@ from saltus.system.tables import Table, curve
 
 
 def curve_of(file: Input, how: Curve, name: str) -> Table:
-    """The curve through the points of a file: its first two columns, in SI by the units of their headings.
+    """The curve through the points of a file: its first two columns, in SI by the units of their
+    headings.
 
     Raises
     ------
     StudyError
-        If the file holds something else, or the points can't be those of a curve. What it holds isn't repeated.
+        If the file holds something else, or the points can't be those of a curve. What it holds
+        isn't repeated.
     """
     place = f"[system.tables.{name}]"
     try:

@@ -42,7 +42,8 @@ class Input:
 
 
 class Inputs:
-    """Where the files that a study names are found: in its own folder, and in those that the user allows.
+    """Where the files that a study names are found: in its own folder, and in those that the user
+    allows.
 
     Parameters
     ----------
@@ -69,25 +70,41 @@ class Inputs:
         Raises
         ------
         StudyError
-            If it lies elsewhere, isn't there, or is no regular file of at most 10 MB. Messages don't repeat its contents.
+            If it lies elsewhere, isn't there, or is no regular file of at most 10 MB. Messages
+            don't repeat its contents.
         """
         if name not in self._taken:
             path = self._find(name, place)
             try:
-                self._taken[name] = self._checked(Input(name, path, fence.content(path, fence.TABLE_BYTES)))
+                self._taken[name] = self._checked(
+                    Input(name, path, fence.content(path, fence.TABLE_BYTES))
+                )
             except fence.RefusedError as refused:
                 raise StudyError(f"[{place}] {path} {refused} {self._advice}") from None
         return self._taken[name]
 
     def _find(self, name: str, place: str) -> Path:
-        """Path of the file. It is checked as text first: a query for a network path already connects to it."""
+        """Path of the file. It is checked as text first: a query for a network path already
+        connects to it.
+        """
         if "\0" in name:
-            raise StudyError(f"[{place}] a file name holds a NUL character. Write the name of a file.")
-        inside = [path for folder in self._folders if (path := Path(os.path.normpath(folder / name))).is_relative_to(folder)]
-        real = [path for path in inside if any(path.resolve().is_relative_to(folder) for folder in self._folders)]
+            raise StudyError(
+                f"[{place}] a file name holds a NUL character. Write the name of a file."
+            )
+        inside = [
+            path
+            for folder in self._folders
+            if (path := Path(os.path.normpath(folder / name))).is_relative_to(folder)
+        ]
+        real = [
+            path
+            for path in inside
+            if any(path.resolve().is_relative_to(folder) for folder in self._folders)
+        ]
         if not real:
             raise StudyError(
-                f"[{place}] {fence.shown(name)!r} lies outside the study's folder {self._folders[0]}, and a study reads nothing there. "
+                f"[{place}] {fence.shown(name)!r} lies outside the study's folder "
+                f"{self._folders[0]}, and a study reads nothing there. "
                 "Put the file there; or, if you trust the study, allow the folder: --inputs FOLDER."
             )
         return next((path for path in real if path.exists()), real[0])
@@ -115,7 +132,9 @@ class KeptInputs(Inputs):
 
     def _find(self, name: str, place: str) -> Path:
         if name not in self._copies:
-            raise StudyError(f"[{place}] {self._folders[0]} has no copy of {fence.shown(name)!r}. {self._advice}")
+            raise StudyError(
+                f"[{place}] {self._folders[0]} has no copy of {fence.shown(name)!r}. {self._advice}"
+            )
         return self._folders[0] / self._copies[name][0]
 
     def _checked(self, found: Input) -> Input:

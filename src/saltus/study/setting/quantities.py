@@ -33,24 +33,39 @@ def number(value: Quantity, unit: str, place: str, key: str) -> float:
         If its unit is the wrong one.
     """
     if not isinstance(value, str) and unit not in ("", "1"):
-        raise StudyError(f'[{place}] {key} = {value:g} has no unit. Write it with one, for example {key} = "{value:g} {unit}".')
+        raise StudyError(
+            f"[{place}] {key} = {value:g} has no unit. Write it with one, for example "
+            f'{key} = "{value:g} {unit}".'
+        )
     try:
         return to_si(value, unit, key)
     except (ParameterError, UnitError) as error:
         raise type(error)(f"[{place}] {error}") from None
 
 
-def parameters(system: System, values: Mapping[str, Quantity], place: str = "system") -> dict[str, float]:
-    """Parameter values in SI. Raises StudyError for a name that the system doesn't have, or for a missing unit."""
-    return {name: number(value, _unit(system, name, system.values, place), place, name) for name, value in values.items()}
+def parameters(
+    system: System, values: Mapping[str, Quantity], place: str = "system"
+) -> dict[str, float]:
+    """Parameter values in SI. Raises StudyError for a name that the system doesn't have, or for a
+    missing unit.
+    """
+    return {
+        name: number(value, _unit(system, name, system.values, place), place, name)
+        for name, value in values.items()
+    }
 
 
 def states(system: System, table: Mapping[str, Quantity], place: str) -> dict[str, float]:
     """Values of some states in SI. Raises StudyError for an unknown state or a missing unit."""
-    return {name: number(value, _unit(system, name, system.states, place), place, name) for name, value in table.items()}
+    return {
+        name: number(value, _unit(system, name, system.states, place), place, name)
+        for name, value in table.items()
+    }
 
 
-def start(system: System, table: Mapping[str, Start], place: str = "simulate") -> dict[str, float | list[float]]:
+def start(
+    system: System, table: Mapping[str, Start], place: str = "simulate"
+) -> dict[str, float | list[float]]:
     """``start`` in SI: a number a state, or a list for a batch.
 
     Raises
@@ -60,32 +75,56 @@ def start(system: System, table: Mapping[str, Start], place: str = "simulate") -
     """
     missing = [state for state in system.states if state not in table]
     if missing:
-        raise StudyError(f"[{place}] start lacks {', '.join(missing)}. {system.name} has the states {', '.join(system.states)}.")
+        raise StudyError(
+            f"[{place}] start lacks {', '.join(missing)}. {system.name} has the "
+            f"states {', '.join(system.states)}."
+        )
     is_batch(table, place=place)
-    return {state: _numbers(system, state, value, system.states, f"{place}.start") for state, value in table.items()}
+    return {
+        state: _numbers(system, state, value, system.states, f"{place}.start")
+        for state, value in table.items()
+    }
 
 
-def starts(system: System, given: Starts | None, place: str) -> dict[str, float | list[float]] | str | None:
-    """``start`` of an analysis that follows many: states in SI, or text such as ``"sweep_up"``, which the analysis reads."""
+def starts(
+    system: System, given: Starts | None, place: str
+) -> dict[str, float | list[float]] | str | None:
+    """``start`` of an analysis that follows many: states in SI, or text such as ``"sweep_up"``,
+    which the analysis reads.
+    """
     return given if given is None or isinstance(given, str) else start(system, given, place)
 
 
-def box(system: System, given: Mapping[str, list[Quantity]] | None, place: str) -> dict[str, list[float]] | None:
+def box(
+    system: System, given: Mapping[str, list[Quantity]] | None, place: str
+) -> dict[str, list[float]] | None:
     """Ranges of states in SI."""
     if given is None:
         return None
     place = f"{place}.box"
-    return {name: [number(end, _unit(system, name, system.states, place), place, name) for end in ends] for name, ends in given.items()}
+    return {
+        name: [number(end, _unit(system, name, system.states, place), place, name) for end in ends]
+        for name, ends in given.items()
+    }
 
 
 def grid(system: System, name: str, given: Range, place: str) -> tuple[Any, ...] | list[float]:
-    """Values of a parameter in SI: (first, last, count, scale), or a list of the values themselves."""
+    """Values of a parameter in SI: (first, last, count, scale), or a list of the
+    values themselves.
+    """
     return _values(given, _unit(system, name, system.values, place), name, place)
 
 
-def axes(system: System, table: Mapping[str, Range], place: str) -> dict[str, tuple[Any, ...] | list[float]]:
-    """Starts along some states in SI: (first, last, count, scale), or a list of the starts themselves."""
-    return {name: _values(given, _unit(system, name, system.states, place), name, place) for name, given in table.items()}
+def axes(
+    system: System, table: Mapping[str, Range], place: str
+) -> dict[str, tuple[Any, ...] | list[float]]:
+    """Starts along some states in SI: (first, last, count, scale), or a list of the starts
+    themselves.
+    """
+    return {
+        name: _values(given, _unit(system, name, system.states, place), name, place)
+        for name, given in table.items()
+    }
 
 
 def _values(given: Range, unit: str, name: str, place: str) -> tuple[Any, ...] | list[float]:
@@ -93,29 +132,56 @@ def _values(given: Range, unit: str, name: str, place: str) -> tuple[Any, ...] |
         return [number(value, unit, place, name) for value in given.values]
     assert given.first is not None
     assert given.last is not None
-    return number(given.first, unit, place, f"{name}.first"), number(given.last, unit, place, f"{name}.last"), given.count, given.scale
+    return (
+        number(given.first, unit, place, f"{name}.first"),
+        number(given.last, unit, place, f"{name}.last"),
+        given.count,
+        given.scale,
+    )
 
 
-def varied(system: System, table: Mapping[str, list[Quantity]], place: str = "simulate.values") -> dict[str, list[float]]:
+def varied(
+    system: System, table: Mapping[str, list[Quantity]], place: str = "simulate.values"
+) -> dict[str, list[float]]:
     """Values that differ from trajectory to trajectory in SI: a list a parameter."""
-    return {name: [number(value, _unit(system, name, system.values, place), place, name) for value in row] for name, row in table.items()}
+    return {
+        name: [
+            number(value, _unit(system, name, system.values, place), place, name) for value in row
+        ]
+        for name, row in table.items()
+    }
 
 
 def is_batch(*tables: Mapping[str, Start], place: str = "simulate") -> bool:
-    """Whether there are lists among values. Raises StudyError if two of them differ in length, or one is empty."""
-    lengths = {name: len(value) for part in tables for name, value in part.items() if isinstance(value, list)}
+    """Whether there are lists among values. Raises StudyError if two of them differ in length, or
+    one is empty.
+    """
+    lengths = {
+        name: len(value)
+        for part in tables
+        for name, value in part.items()
+        if isinstance(value, list)
+    }
     if len(set(lengths.values())) > 1 or 0 in lengths.values():
         sizes = ", ".join(f"{name} has {length}" for name, length in lengths.items())
         raise StudyError(f"[{place}] lists must have the same length, at least 1: {sizes}.")
     return bool(lengths)
 
 
-def _numbers(system: System, state: str, value: Start, known: tuple[str, ...], place: str) -> float | list[float]:
+def _numbers(
+    system: System, state: str, value: Start, known: tuple[str, ...], place: str
+) -> float | list[float]:
     unit = _unit(system, state, known, place)
-    return [number(one, unit, place, state) for one in value] if isinstance(value, list) else number(value, unit, place, state)
+    return (
+        [number(one, unit, place, state) for one in value]
+        if isinstance(value, list)
+        else number(value, unit, place, state)
+    )
 
 
-def _unit(system: System, name: str, known: Mapping[str, float] | tuple[str, ...], place: str) -> str:
+def _unit(
+    system: System, name: str, known: Mapping[str, float] | tuple[str, ...], place: str
+) -> str:
     if name not in known:
         raise StudyError(f"[{place}] {name!r} is unknown to {system.name}. {nearest(name, known)}")
     return system.units.get(name, "")

@@ -53,12 +53,18 @@ class Setting:
         except SaltusError as error:
             raise fault(place, error) from None
 
-    def outputs(self, system: System, given: Mapping[str, Output], place: str) -> dict[str, Any] | None:
-        """Outputs as the analyses take them, checked now: errors come before anything is computed."""
+    def outputs(
+        self, system: System, given: Mapping[str, Output], place: str
+    ) -> dict[str, Any] | None:
+        """Outputs as the analyses take them, checked now: errors come before anything
+        is computed.
+        """
         from saltus.analysis.outputs import outputs_of
 
         place = f"{place}.outputs"
-        outputs = {name: (self.formula(one.formula, place), one.unit) for name, one in given.items()}
+        outputs = {
+            name: (self.formula(one.formula, place), one.unit) for name, one in given.items()
+        }
         try:
             outputs_of(system, outputs)
         except SaltusError as error:
@@ -84,14 +90,22 @@ def setting_of(study: Study, own: System | None, inputs: Inputs) -> Setting:
 
 def formulas_of(table: SystemTable, inputs: Inputs) -> Formulas:
     """The terms and tables of [system]. Raises StudyError if one can't be read."""
-    tables = {name: curve_of(inputs.read(one.file, f"system.tables.{name}"), one, name) for name, one in table.tables.items()}
+    tables = {
+        name: curve_of(inputs.read(one.file, f"system.tables.{name}"), one, name)
+        for name, one in table.tables.items()
+    }
     try:
         return Formulas(table.terms, tables)
     except SaltusError as error:
         raise fault("system", error) from None
 
 
-def system_of(table: SystemTable, own: System | None = None, formulas: Formulas | None = None, header: Header | None = None) -> System:
+def system_of(
+    table: SystemTable,
+    own: System | None = None,
+    formulas: Formulas | None = None,
+    header: Header | None = None,
+) -> System:
     """The system that [system] names or writes out, with its values.
 
     Raises
@@ -106,16 +120,24 @@ def system_of(table: SystemTable, own: System | None = None, formulas: Formulas 
     kinds = {"a model": table.model or table.case, "rates": table.rates, "--system": own}
     if len(given := [kind for kind, one in kinds.items() if one]) > 1:
         raise StudyError(f"[system] {' and '.join(given)}: these are several systems. Keep one.")
-    own_keys = [key for key in ("units", "guards", "forced_at", "check_units") if key in table.model_fields_set]
+    own_keys = [
+        key
+        for key in ("units", "guards", "forced_at", "check_units")
+        if key in table.model_fields_set
+    ]
     if not table.rates and own_keys:
-        raise StudyError(f"[system] {', '.join(own_keys)}: this is for equations of your own. Give rates, or leave it out.")
+        raise StudyError(
+            f"[system] {', '.join(own_keys)}: this is for equations of your own. Give "
+            f"rates, or leave it out."
+        )
     if own is not None:
         base = own
     elif table.rates:
         base = _written(table, formulas or Formulas(), header)
     elif table.model is None:
         raise StudyError(
-            '[system] names no model. Write model = "delangre" (`saltus models` lists them), give rates, or --system my_rig.py:rig.'
+            '[system] names no model. Write model = "delangre" (`saltus models` lists them), give '
+            "rates, or --system my_rig.py:rig."
         )
     else:
         try:
@@ -129,7 +151,9 @@ def system_of(table: SystemTable, own: System | None = None, formulas: Formulas 
 
 
 def _with_values(system: System, values: Mapping[str, Quantity], place: str) -> System:
-    """The system with values as a table gives them. Raises StudyError or UnitError if one is refused."""
+    """The system with values as a table gives them. Raises StudyError or UnitError if one is
+    refused.
+    """
     given = quantities.parameters(system, values, place)
     try:
         return system.with_values(**given)
@@ -143,14 +167,19 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
 
     try:
         rates = {name: formulas.formula(text) for name, text in table.rates.items()}
-        used = {name for rate in rates.values() for name in rate.names} | ({table.forced_at} if table.forced_at else set())
+        used = {name for rate in rates.values() for name in rate.names} | (
+            {table.forced_at} if table.forced_at else set()
+        )
         if unused := [name for name in table.values if name not in used]:
-            raise StudyError(f"[system] {unused[0]!r} stands in no rate. {nearest(unused[0], sorted(used))}")
+            raise StudyError(
+                f"[system] {unused[0]!r} stands in no rate. {nearest(unused[0], sorted(used))}"
+            )
         equations = Equations(rates, table.values, header.description if header else "")
         title, source = (header.name, header.source) if header else ("system", "")
         guards = {name: formulas.formula(text) for name, text in table.guards.items()}
         return system(
-            states=list(rates), units=table.units, forced_at=table.forced_at, guards=guards, check_units=table.check_units, name=title,
+            states=list(rates), units=table.units, forced_at=table.forced_at, guards=guards,
+            check_units=table.check_units, name=title,
             source=source,
         )(equations)  # fmt: skip
     except StudyError:
@@ -160,7 +189,9 @@ def _written(table: SystemTable, formulas: Formulas, header: Header | None) -> S
 
 
 def method_of(table: SpecTable, place: str = "method") -> Any:
-    """The method that a table describes. Raises StudyError if it doesn't take one of the options."""
+    """The method that a table describes. Raises StudyError if it doesn't take one of
+    the options.
+    """
     options = table.model_dump(exclude_unset=True)
     try:
         return getattr(flow, options.pop("name"))(**options)

@@ -1,4 +1,6 @@
-"""How the parameters of the analyses are written in a study file, by their names: those that Python writes in another way."""
+"""How the parameters of the analyses are written in a study file, by their names: those that Python
+writes in another way.
+"""
 
 from __future__ import annotations
 
@@ -38,15 +40,21 @@ Surface = Annotated[
 ]
 _POWER = "Power that {} [W], a formula; of a published model it is known."
 _STARTS = (
-    'Every state at the start, the same at every value, lists making a batch; or "sweep_up", "sweep_down", "random 20" with box. '
+    'Every state at the start, the same at every value, lists making a batch; or "sweep_up", '
+    '"sweep_down", "random 20" with box. '
     "At rest by default."
 )
-_FORMULAS_OF_GUARDS = "For guards by name: the force of that contact, right in contact only. Its integral is the impulse."
+_FORMULAS_OF_GUARDS = (
+    "For guards by name: the force of that contact, right in contact only. Its "
+    "integral is the impulse."
+)
 KINDS = {
     "start": Kind(dict[str, Start], ({"x": ["0.2 mm", "0.4 mm"], "v": "0 m/s"},),
-                  "Every state at the start; lists make a batch. At rest by default.", None, convert="start"),
+                  "Every state at the start; lists make a batch. At rest by "
+                  "default.", None, convert="start"),
     "values": Kind(dict[str, Start], ({"frequency": ["14 Hz", "15 Hz"]},),
-                   "Values that differ from [system], for this question only; lists hold one for each trajectory.", {}, convert="values"),
+                   "Values that differ from [system], for this question only; lists hold one for "
+                   "each trajectory.", {}, convert="values"),
     "method": OWN_METHOD,
     "flow": OWN_METHOD,
     "periods": whole(60, most=MOST_PERIODS),
@@ -60,18 +68,27 @@ KINDS = {
     "t_start": _time("0 s"),
     "every": _time("1 s"),
     "transient": Kind(Quantity, (500, "5 s"), convert="transient"),
-    "box": Kind(dict[str, Interval], ({"x": ["-5 mm", "5 mm"], "v": ["-1 m/s", "1 m/s"]},), convert="box"),
-    "outputs": Kind(Outputs, ({"spring force": "k*x", "power": {"formula": "c*v**2", "unit": "W"}},),
-                    "What to read off each response besides its states, by name: formulas.", {}, convert="outputs"),
-    "frequency": Kind(Range, ({"first": "2 Hz", "last": "30 Hz", "count": 281},), "Forcing frequencies.", convert="frequency"),
-    "vary": Kind(dict[str, Range], ({"contact_stiffness": {"first": "1e3 N/m", "last": "1e9 N/m", "count": 200, "scale": "log"}},),
+    "box": Kind(dict[str, Interval], ({"x": ["-5 mm", "5 mm"], "v": ["-1 m/s", "1 m/s"]},),
+        convert="box"),
+    "outputs": Kind(Outputs,
+        ({"spring force": "k*x", "power": {"formula": "c*v**2", "unit": "W"}},),
+                    "What to read off each response besides its states, by name: "
+                    "formulas.", {}, convert="outputs"),
+    "frequency": Kind(Range, ({"first": "2 Hz", "last": "30 Hz", "count": 281},),
+        "Forcing frequencies.", convert="frequency"),
+    "vary": Kind(dict[str, Range],
+        ({"contact_stiffness": {"first": "1e3 N/m", "last": "1e9 N/m", "count": 200,
+            "scale": "log"}},),
                  "One parameter, or two for a map of the kinds of motion.", convert="vary"),
     "at": Kind(dict[str, Quantity], ({"y": "0 mm"},), default={}, convert="at"),
     "surface": Kind(Surface, ({"x": "0.3 mm"}, "x turns", {"formula": "x - 0.1*v"}),
-                    'A level of a state; its turning points, "x turns"; a guard of the system by name; or where a formula is zero.'),
+                    'A level of a state; its turning points, "x turns"; a guard of the system by '
+                    'name; or where a formula is zero.'),
     "contact_side": Kind(dict[str, Literal[-1, 1]], ({"upper_gap": 1},), default={}),
-    "force": Kind(dict[str, Formula], ({"upper_gap": "contact_stiffness*(x - upper_gap)"},), _FORMULAS_OF_GUARDS, {}),
-    "energy": Kind(Formula, ("(mass*v**2 + stiffness*x**2)/2",), "Stored energy [J], a formula; of a published model it is known.", None),
+    "force": Kind(dict[str, Formula], ({"upper_gap": "contact_stiffness*(x - "
+                                                     "upper_gap)"},), _FORMULAS_OF_GUARDS, {}),
+    "energy": Kind(Formula, ("(mass*v**2 + stiffness*x**2)/2",), "Stored energy [J], a formula; of "
+        "a published model it is known.", None),
     "supplied": Kind(Formula, ("force*cos(2*pi*frequency*t)*v",), _POWER.format("flows in"), None),
     "dissipated": Kind(Formula, ("damping*v**2",), _POWER.format("is lost"), None),
 }  # fmt: skip

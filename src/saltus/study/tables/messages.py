@@ -18,12 +18,15 @@ from saltus.study.tables.spec import QUESTIONS, Study
 from saltus.study.tables.wording import toml
 
 TABLES: dict[str, type[Table]] = QUESTIONS | {
-    "study": Header, "system": SystemTable, "compare": Compare, "map": Map, "axes": Axis, "frequency": Range, "vary": Range,
+    "study": Header, "system": SystemTable, "compare": Compare, "map": Map, "axes": Axis,
+    "frequency": Range, "vary": Range,
     "outputs": Output, "tables": Curve,
 }  # fmt: skip
 #: Parts of a place that name the branch of a union, not a key.
 _BRANCHES = re.compile(r"float|str|(list|dict)\[.*\]|function-.*")
-_BARE_QUANTITY = re.compile(r"\s*([\w.-]+)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[A-Za-zµ][^#\"']*?)\s*(?:#.*)?")
+_BARE_QUANTITY = re.compile(
+    r"\s*([\w.-]+)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[A-Za-zµ][^#\"']*?)\s*(?:#.*)?"
+)
 _EXPECTED = {
     "int_type": "a whole number",
     "float_type": "a number",
@@ -43,13 +46,18 @@ def _given(value: Any) -> str:
 
 
 def syntax_fault(error: TOMLDecodeError, text: str) -> str:
-    """A sentence on text that isn't TOML: the line, and what to write if the fault is a common one."""
+    """A sentence on text that isn't TOML: the line, and what to write if the fault is
+    a common one.
+    """
     place = re.search(r"line (\d+)", str(error))
     number = int(place[1]) if place else text.rstrip().count("\n") + 1
     lines = text.split("\n")
     line = shown(lines[min(number, len(lines)) - 1].strip())
     if re.match(r"Cannot (overwrite|declare|mutate)|Duplicate", str(error)):
-        return f"line {number}: {line!r} gives again what stands in the file already. Keep one of the two."
+        return (
+            f"line {number}: {line!r} gives again what stands in the file already. Keep one of "
+            f"the two."
+        )
     quantity = _BARE_QUANTITY.fullmatch(line)
     if quantity:
         return f'line {number}: {line!r} needs quotes. Write {quantity[1]} = "{quantity[2]}".'
@@ -57,16 +65,24 @@ def syntax_fault(error: TOMLDecodeError, text: str) -> str:
 
 
 def content_faults(error: ValidationError, data: Any = None) -> list[str]:
-    """A sentence for each fault of a study that is TOML, but not a study; ``data`` is what the TOML holds."""
+    """A sentence for each fault of a study that is TOML, but not a study; ``data`` is what the TOML
+    holds.
+    """
     faults: dict[tuple, list[dict]] = {}
     for detail in error.errors():
-        place = tuple(part for part in detail["loc"] if not (isinstance(part, str) and _BRANCHES.fullmatch(part)))
+        place = tuple(
+            part
+            for part in detail["loc"]
+            if not (isinstance(part, str) and _BRANCHES.fullmatch(part))
+        )
         faults.setdefault(place, []).append(dict(detail))
     return [_fault(place, details, data) for place, details in faults.items()]
 
 
 def _path(place: tuple, data: Any) -> list[str]:
-    """The place as words: tables of an array are counted from 1, ``lyapunov 2``; one that stands alone isn't."""
+    """The place as words: tables of an array are counted from 1, ``lyapunov 2``; one that stands
+    alone isn't.
+    """
     path: list[str] = []
     for part in place:
         if isinstance(part, int):
@@ -85,22 +101,41 @@ def _fault(place: tuple, details: list[dict], data: Any) -> str:
     *tables, key = path or [""]
     where = f"[{'.'.join(tables)}] " if tables else ""
     if kind == "extra_forbidden":
-        return f"{where or 'the file '}has no {'key' if tables else 'table'} {key!r}. {nearest(key, _known(place[:-1]))}"
+        return (
+            f"{where or 'the file '}has no {'key' if tables else 'table'} {key!r}. "
+            f"{nearest(key, _known(place[:-1]))}"
+        )
     if kind == "missing":
-        return f"{where}needs {key!r}." + _example(place) if tables else f"a table [{key}] is missing."
+        return (
+            f"{where}needs {key!r}." + _example(place)
+            if tables
+            else (f"a table [{key}] is missing.")
+        )
     if kind == "union_tag_invalid":
         given = str(first["ctx"]["tag"])
         alike = [name for name in METHODS if name.lower() == given.lower()]
-        return f"[{'.'.join(path)}] name = {_given(given)} is no method. {nearest(alike[0] if alike else given, METHODS)}"
+        return (
+            f"[{'.'.join(path)}] name = {_given(given)} is no method. "
+            f"{nearest(alike[0] if alike else given, METHODS)}"
+        )
     if kind == "union_tag_not_found":
         return f'[{".".join(path)}] needs \'name\'. Write name = "Taylor" or name = "ODE45".'
     if kind == "value_error":
-        return f"[{'.'.join(path)}] {first['ctx']['error']}." if path else f"{first['ctx']['error']}."
+        return (
+            f"[{'.'.join(path)}] {first['ctx']['error']}." if path else f"{first['ctx']['error']}."
+        )
     if len(details) > 1:
         finite = any(detail["type"] == "finite_number" for detail in details)
-        expected = "a finite number" if finite else 'a plain number, or text with a unit, such as "0.4 mm"'
+        expected = (
+            "a finite number"
+            if finite
+            else ('a plain number, or text with a unit, such as "0.4 mm"')
+        )
     elif kind in ("too_short", "too_long"):
-        return f"{where}{key} = {_given(first['input'])} must have {first['msg'].split('have ')[1].split(' after')[0]}." + _example(place)
+        return (
+            f"{where}{key} = {_given(first['input'])} must have "
+            f"{first['msg'].split('have ')[1].split(' after')[0]}."
+        ) + _example(place)
     elif kind == "list_type" and len(place) == 1:
         expected = "a table"
     else:
@@ -112,7 +147,11 @@ def _table(place: tuple) -> type[Table] | None:
     """The class of the table at a place in a study."""
     table: type[Table] | None = Study
     for part in place:
-        nested = part in ("method", "flow", "reference") or isinstance(part, int) or table in (Axis, Range, Output, Curve)
+        nested = (
+            part in ("method", "flow", "reference")
+            or isinstance(part, int)
+            or table in (Axis, Range, Output, Curve)
+        )
         table = METHODS.get(part) or TABLES.get(part) or (table if nested else None)
     return table
 
@@ -125,4 +164,8 @@ def _known(place: tuple) -> Iterator[str]:
 def _example(place: tuple) -> str:
     table = _table(place[:-1])
     field = table.model_fields.get(str(place[-1])) if table else None
-    return f" For example: {place[-1]} = {toml(field.examples[0])}" if field is not None and field.examples else ""
+    return (
+        f" For example: {place[-1]} = {toml(field.examples[0])}"
+        if field is not None and field.examples
+        else ""
+    )

@@ -20,4 +20,6 @@ if TYPE_CHECKING:
 else:
     Method = Annotated[Taylor | ODE45, Field(discriminator="name")]
 #: A method of one question.
-OWN_METHOD = Kind(Method, ({"name": "Taylor"},), "How to integrate; the study's [method] by default.")
+OWN_METHOD = Kind(
+    Method, ({"name": "Taylor"},), "How to integrate; the study's [method] by default."
+)

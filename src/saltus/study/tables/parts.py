@@ -1,6 +1,8 @@
-"""What the tables of a study file are made of: the strict base, quantities as written, systems, methods, ranges.
+"""What the tables of a study file are made of: the strict base, quantities as written, systems,
+methods, ranges.
 
-Quantities stay as written here ("4 N"); :mod:`saltus.study.setting.quantities` turns them into SI once the system is known.
+Quantities stay as written here ("4 N"); :mod:`saltus.study.setting.quantities` turns them into SI
+once the system is known.
 """
 
 from __future__ import annotations
@@ -9,7 +11,16 @@ import re
 from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
 
 from saltus.fence import MOST_COUNT, has_control
 
@@ -35,7 +46,9 @@ def _title(name: str) -> str:
 
 def _file_name(name: str) -> str:
     if len(slug(name)) > LONGEST:
-        raise ValueError(f"gives a file name of {len(slug(name))} characters; at most {LONGEST} are allowed")
+        raise ValueError(
+            f"gives a file name of {len(slug(name))} characters; at most {LONGEST} are allowed"
+        )
     return name
 
 
@@ -56,43 +69,64 @@ class Header(Table):
     """[study]: title and description, for readers."""
 
     name: FileTitle = Field(description="A title.", examples=["Rig b4 at 15 Hz"])
-    description: str = Field("", description="What the study shows.", examples=["Four starts, four responses"])
-    source: str = Field("", description="Where the setting comes from.", examples=["Saunders et al. (2021), Table 2"])
+    description: str = Field(
+        "", description="What the study shows.", examples=["Four starts, four responses"]
+    )
+    source: str = Field(
+        "",
+        description="Where the setting comes from.",
+        examples=["Saunders et al. (2021), Table 2"],
+    )
 
 
 class Curve(Table):
-    """[system.tables.<name>]: measured points from a file, which formulas call by their name: ``stop(x)``, ``drive(t)``."""
+    """[system.tables.<name>]: measured points from a file, which formulas call by their name:
+    ``stop(x)``, ``drive(t)``.
+    """
 
     file: str = Field(
-        description="CSV in the study's folder: two columns, units in the headings. Where the curve is known, ascending; its values there.",
+        description="CSV in the study's folder: two columns, units in the headings. Where the "
+        "curve is known, ascending; its values there.",
         examples=["stop.csv"],
     )
     kind: Literal["linear", "pchip", "spline"] = Field(
-        "linear", description="Straight between the points, cubics without overshoot, or a cubic spline.", examples=["pchip"]
+        "linear",
+        description="Straight between the points, cubics without overshoot, or a cubic spline.",
+        examples=["pchip"],
     )
     outside: Literal["hold", "extend", "periodic"] = Field(
         "hold",
-        description="Before and after the points: the values at the ends, the polynomials there, or the curve again.",
+        description="Before and after the points: the values at the ends, the polynomials there, "
+        "or the curve again.",
         examples=["extend"],
     )
 
 
 class SystemTable(Table):
-    """[system]: a model that comes with saltus, or equations of your own, and values of the parameters."""
+    """[system]: a model that comes with saltus, or equations of your own, and values of the
+    parameters.
+    """
 
     model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, Quantity] = Field(init=False)
 
-    model: str | None = Field(None, description="A published system; `saltus models` lists them.", examples=["delangre"])
-    case: str | None = Field(None, description="A named set of values of the model.", examples=["b"])
+    model: str | None = Field(
+        None, description="A published system; `saltus models` lists them.", examples=["delangre"]
+    )
+    case: str | None = Field(
+        None, description="A named set of values of the model.", examples=["b"]
+    )
 
     rates: dict[str, Formula] = Field(
         default_factory=dict,
-        description="A system of your own: its states, and the formula of the time derivative of each. Every other key is a parameter.",
+        description="A system of your own: its states, and the formula of the time derivative of "
+        "each. Every other key is a parameter.",
         examples=[{"x": "v", "v": "(force*cos(2*pi*frequency*t) - k*x)/mass"}],
     )
     units: dict[str, str] = Field(
-        default_factory=dict, description="Units of states and parameters of a system of your own.", examples=[{"x": "m", "v": "m/s"}]
+        default_factory=dict,
+        description="Units of states and parameters of a system of your own.",
+        examples=[{"x": "m", "v": "m/s"}],
     )
     guards: dict[str, Formula] = Field(
         default_factory=dict,
@@ -100,18 +134,26 @@ class SystemTable(Table):
         examples=[{"teeth": "x2 - x1 > gap"}],
     )
     forced_at: str | None = Field(
-        None, description="The parameter of a system of your own that is the forcing frequency.", examples=["frequency"]
+        None,
+        description="The parameter of a system of your own that is the forcing frequency.",
+        examples=["frequency"],
     )
     check_units: bool = Field(
-        True, description="Whether units of what a formula of the rates adds or compares must be the same.", examples=[False]
+        True,
+        description="Whether units of what a formula of the rates adds or compares must be "
+        "the same.",
+        examples=[False],
     )
     terms: dict[str, Formula] = Field(
         default_factory=dict,
-        description="Formulas by name, for all other formulas of the study. One may use those before it.",
+        description="Formulas by name, for all other formulas of the study. One may use those "
+        "before it.",
         examples=[{"contact": "k*(x - gap) if x > gap else 0"}],
     )
     tables: dict[str, Curve] = Field(
-        default_factory=dict, description="Curves by name, for formulas to call.", examples=[{"stop": {"file": "stop.csv"}}]
+        default_factory=dict,
+        description="Curves by name, for formulas to call.",
+        examples=[{"stop": {"file": "stop.csv"}}],
     )
 
     @property
@@ -120,15 +162,26 @@ class SystemTable(Table):
         return dict(self.__pydantic_extra__ or {})
 
 
-# -- questions -----------------------------------------------------------------------------------------------------------------
+# -- questions -------------------------------------------------------------------------------------
 class Range(Table):
     """Values of a parameter: from one to another, ends included, or given one by one."""
 
     first: Quantity | None = Field(None, description="The first value.", examples=["2 Hz"])
     last: Quantity | None = Field(None, description="The last value.", examples=["30 Hz"])
-    count: int | None = Field(None, ge=1, le=MOST_COUNT, description="How many values.", examples=[281])
-    scale: Literal["linear", "log"] = Field("linear", description="Evenly spaced in the values, or in their logarithms.", examples=["log"])
-    values: list[Quantity] | None = Field(None, min_length=1, description="The values themselves, ascending.", examples=[["5 Hz", "17 Hz"]])
+    count: int | None = Field(
+        None, ge=1, le=MOST_COUNT, description="How many values.", examples=[281]
+    )
+    scale: Literal["linear", "log"] = Field(
+        "linear",
+        description="Evenly spaced in the values, or in their logarithms.",
+        examples=["log"],
+    )
+    values: list[Quantity] | None = Field(
+        None,
+        min_length=1,
+        description="The values themselves, ascending.",
+        examples=[["5 Hz", "17 Hz"]],
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -141,7 +194,8 @@ class Range(Table):
         ends = (self.first, self.last, self.count)
         if self.values is None and None in ends:
             raise ValueError(
-                'needs first, last and count, such as { first = "2 Hz", last = "30 Hz", count = 281 }, '
+                'needs first, last and count, such as { first = "2 Hz", last = "30 Hz", count = '
+                "281 }, "
                 'or an array of values, such as ["5 Hz", "17 Hz"]'
             )
         if self.values is not None and (ends != (None, None, None) or self.scale != "linear"):
@@ -155,7 +209,11 @@ class Named(Table):
     #: Name of one without a name.
     called: ClassVar[str]
 
-    name: FileTitle | None = Field(None, description="What it is called in tables, pictures and files.", examples=["stiff stop"])
+    name: FileTitle | None = Field(
+        None,
+        description="What it is called in tables, pictures and files.",
+        examples=["stiff stop"],
+    )
 
     @property
     def title(self) -> str:
@@ -179,7 +237,9 @@ class Output(Table):
     """An output: a formula, and the unit that it is in."""
 
     formula: Formula = Field(description="What is read off the motion.", examples=["k*(x - gap)"])
-    unit: str = Field("", description="Its unit; by default what the formula comes to.", examples=["N"])
+    unit: str = Field(
+        "", description="Its unit; by default what the formula comes to.", examples=["N"]
+    )
 
 
 def _alone(given: Any) -> Any:
@@ -199,8 +259,11 @@ def _as_list(given: Any) -> Any:
 
 
 def one_or_many(table: type[T]) -> Any:
-    """The type of a question that may be asked once, as a table, or several times, as an array of tables: always a tuple."""
-    return Annotated[list[table], BeforeValidator(_as_list, json_schema_input_type=table | list[table])]  # type: ignore[valid-type]
+    """The type of a question that may be asked once, as a table, or several times, as an array of
+    tables: always a tuple.
+    """
+    rows = BeforeValidator(_as_list, json_schema_input_type=table | list[table])  # type: ignore[valid-type]
+    return Annotated[list[table], rows]  # type: ignore[valid-type]
 
 
 def distinct_names(tables: Sequence[Any], key: str) -> None:

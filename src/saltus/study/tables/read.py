@@ -33,7 +33,8 @@ def read(path: Path | str) -> tuple[Study, str]:
     Raises
     ------
     StudyError
-        If the file can't be read, isn't TOML, or holds a key or a value that a study may not hold. Every fault is named.
+        If the file can't be read, isn't TOML, or holds a key or a value that a study may not hold.
+        Every fault is named.
     """
     path = Path(path)
     try:
@@ -46,7 +47,9 @@ def read(path: Path | str) -> tuple[Study, str]:
 
 
 def parse(text: str, name: str = "study") -> Study:
-    """A study from its text; ``name`` stands in the messages. Raises StudyError as :func:`read` does."""
+    """A study from its text; ``name`` stands in the messages. Raises StudyError as :func:`read`
+    does.
+    """
     text = text.removeprefix("\ufeff")  # the mark of Windows editors
     try:
         data = fence.toml(text)
@@ -64,21 +67,37 @@ def study_of(data: Mapping[str, Any], name: str = "study") -> Study:
         return Study.model_validate(data)
     except ValidationError as error:
         faults = content_faults(error, data)
-        faults = [*faults[:_FAULTS], *([f"and {len(faults) - _FAULTS} more."] if len(faults) > _FAULTS else [])]
-        raise StudyError(f"{name}: " + (faults[0] if len(faults) == 1 else "".join(f"\n  - {fault}" for fault in faults))) from None
+        faults = [
+            *faults[:_FAULTS],
+            *([f"and {len(faults) - _FAULTS} more."] if len(faults) > _FAULTS else []),
+        ]
+        raise StudyError(
+            f"{name}: "
+            + (faults[0] if len(faults) == 1 else "".join(f"\n  - {fault}" for fault in faults))
+        ) from None
 
 
 #: Most errors in one message.
 _FAULTS = 12
-#: Longest texts by key [characters]: titles and paths may be longer than quantities and words, descriptions longer still.
-_LONGEST = {"name": 200, "printed": 400, "exact": 400, "measured": 400, "description": 20_000, "source": 20_000}
+#: Longest texts by key [characters]: titles and paths may be longer than quantities and words,
+#: descriptions longer still.
+_LONGEST = {
+    "name": 200,
+    "printed": 400,
+    "exact": 400,
+    "measured": 400,
+    "description": 20_000,
+    "source": 20_000,
+}
 _WORD = 100
 #: Tables whose texts are formulas.
 _FORMULAS = ("rates", "terms", "guards", "outputs", "energy", "force", "surface")
 
 
 def _short(data: Any, key: str = "", most: int = _WORD) -> None:
-    """Refuse a text that is longer than any that could stand there; ``most`` holds where the key says nothing of its own."""
+    """Refuse a text that is longer than any that could stand there; ``most`` holds where the key
+    says nothing of its own.
+    """
     if isinstance(data, dict):
         for name, value in data.items():
             _short(value, name, LONGEST if name in _FORMULAS else most)
@@ -86,4 +105,6 @@ def _short(data: Any, key: str = "", most: int = _WORD) -> None:
         for value in data:
             _short(value, key, most)
     elif isinstance(data, str) and len(data) > (longest := _LONGEST.get(key, most)):
-        raise fence.RefusedError(f"has a text of {len(data)} characters in {key!r}, where at most {longest} fit.")
+        raise fence.RefusedError(
+            f"has a text of {len(data)} characters in {key!r}, where at most {longest} fit."
+        )

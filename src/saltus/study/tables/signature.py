@@ -1,4 +1,6 @@
-"""Tables made from the functions that answer them: what a key is called, holds by default and means stands once, with the function."""
+"""Tables made from the functions that answer them: what a key is called, holds by default and means
+stands once, with the function.
+"""
 
 from __future__ import annotations
 
@@ -36,13 +38,15 @@ class Kind:
     examples : tuple
         The first one stands in messages.
     description : str
-        For what a file writes in another way than Python; by default the first sentence of the function's docstring.
+        For what a file writes in another way than Python; by default the first sentence of the
+        function's docstring.
     default : object
         In place of the function's.
     limits : mapping
         ``ge=`` and others.
     convert : str
-        Which reading of :mod:`saltus.study.setting.arguments` makes the function's argument of it; by default it is the argument.
+        Which reading of :mod:`saltus.study.setting.arguments` makes the function's argument of it;
+        by default it is the argument.
     """
 
     holds: Any = None
@@ -87,7 +91,8 @@ def table(
     place : str
         Its name in the file.
     verbs : sequence of str
-        Functions of the analyses whose parameters are keys, the first one giving the table its summary.
+        Functions of the analyses whose parameters are keys, the first one giving the table its
+        summary.
     kinds : mapping of str to Kind
         How parameters are written that aren't plain numbers, words and choices.
     base, without, called
@@ -99,14 +104,24 @@ def table(
     for function in map(verb, verbs):
         for parameter in inspect.signature(function).parameters.values():
             name = parameter.name
-            if name not in (*_OF_THE_STUDY, *without, *found, *own) and parameter.kind != parameter.VAR_KEYWORD:
+            if (
+                name not in (*_OF_THE_STUDY, *without, *found, *own)
+                and parameter.kind != parameter.VAR_KEYWORD
+            ):
                 found[name] = _key(function, parameter, kinds.get(name, Kind()))
     summary = (inspect.getdoc(verb(verbs[0])) or "").split("\n\n")[0]
-    several = f" Several: [[{place}]], each with a name." if issubclass(base if isinstance(base, type) else base[-1], Named) else ""
+    several = (
+        f" Several: [[{place}]], each with a name."
+        if issubclass(base if isinstance(base, type) else base[-1], Named)
+        else ""
+    )
     fields: dict[str, Any] = {name: key for name, (key, _) in found.items()} | own
     title, text = place.title().replace("_", ""), f"[{place}]: {_plain(summary)}{several}"
     made = create_model(title, __base__=base, __module__=__name__, __doc__=text, **fields)
-    for name, value in {"kinds": {name: kind for name, (_, kind) in found.items()}, "called": called}.items():
+    for name, value in {
+        "kinds": {name: kind for name, (_, kind) in found.items()},
+        "called": called,
+    }.items():
         setattr(made, name, value)
     return made
 
@@ -114,7 +129,10 @@ def table(
 def options(method: type, examples: Mapping[str, Any]) -> Any:
     """The table of the options of a method."""
     parameters = inspect.signature(method).parameters.values()
-    keys: dict[str, Any] = {one.name: _key(method, one, Kind(examples=(examples.get(one.name, one.default),)))[0] for one in parameters}
+    keys: dict[str, Any] = {
+        one.name: _key(method, one, Kind(examples=(examples.get(one.name, one.default),)))[0]
+        for one in parameters
+    }
     summary = _plain((inspect.getdoc(method) or "").split("\n\n")[0])
     name: Any = method.__name__
     text = f"[method] name = {toml(name)}: {summary}"
@@ -122,12 +140,18 @@ def options(method: type, examples: Mapping[str, Any]) -> Any:
     return create_model(name, __base__=Table, __module__=__name__, __doc__=text, **fields)
 
 
-# -- one key -------------------------------------------------------------------------------------------------------------------
-def _key(function: Callable[..., Any], parameter: inspect.Parameter, kind: Kind) -> tuple[Any, Kind]:
+# -- one key ---------------------------------------------------------------------------------------
+def _key(
+    function: Callable[..., Any], parameter: inspect.Parameter, kind: Kind
+) -> tuple[Any, Kind]:
     """Type and Field of a key, and how it is written."""
     written, description = documented(function)[parameter.name]
     kind = Kind() if written.startswith("{") else kind  # its choices say all
-    holds, examples, limits = kind.holds or _holds(parameter, written), kind.examples, dict(kind.limits)
+    holds, examples, limits = (
+        kind.holds or _holds(parameter, written),
+        kind.examples,
+        dict(kind.limits),
+    )
     if holds in (int, float) and not limits:
         limits = {"ge": 1, "le": MOST_COUNT} if holds is int else {"gt": 0}
     choices = getattr(holds, "__args__", ())
@@ -135,7 +159,11 @@ def _key(function: Callable[..., Any], parameter: inspect.Parameter, kind: Kind)
     default = kind.default if kind.default is not parameter.empty else parameter.default
     optional = holds if default is not None else holds | None
     text = kind.description or _plain(description)
-    given = {"default_factory": dict} if default == {} else {"default": ... if default is parameter.empty else default}
+    given = (
+        {"default_factory": dict}
+        if default == {}
+        else {"default": ... if default is parameter.empty else default}
+    )
     made = Field(**given, description=text, examples=list(examples), **limits)
     return (optional, made), kind
 
@@ -158,14 +186,22 @@ def _choice(text: str) -> Any:
 
 @cache
 def documented(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
-    """Type and meaning of each parameter, as the docstring has them; of one that is "as for" another function those of that one."""
-    part = (inspect.getdoc(function) or "").partition("Parameters\n----------\n")[2].split("\n\n")[0]
+    """Type and meaning of each parameter, as the docstring has them; of one that is "as for"
+    another function those of that one.
+    """
+    part = (
+        (inspect.getdoc(function) or "").partition("Parameters\n----------\n")[2].split("\n\n")[0]
+    )
     found: dict[str, tuple[str, str]] = {}
     for heading, body in _ENTRY.findall(part + "\n"):
         names, _, written = heading.partition(" : ")
         other = _AS_FOR.match(body.strip())
         for name in names.replace("*", "").split(", "):
-            there = documented(verb(other[1])).get(name) if other and other[1] != getattr(function, "__name__", "") else None
+            there = (
+                documented(verb(other[1])).get(name)
+                if other and other[1] != getattr(function, "__name__", "")
+                else None
+            )
             found[name] = there or (written, " ".join(body.split()))
     return found
 
@@ -173,4 +209,8 @@ def documented(function: Callable[..., Any]) -> dict[str, tuple[str, str]]:
 def _plain(text: str) -> str:
     """The first sentence, as it is said of a study file."""
     sentence = _SENTENCE.match(text)
-    return in_toml(_ROLE.sub(lambda role: role[1] or role[2], (sentence[1] if sentence else text).replace("\n", " ")))
+    return in_toml(
+        _ROLE.sub(
+            lambda role: role[1] or role[2], (sentence[1] if sentence else text).replace("\n", " ")
+        )
+    )

@@ -25,8 +25,10 @@ from saltus.study.tables.questions import (
 
 #: Tables that ask something, in the order in which they are answered: the quick ones first.
 QUESTIONS: dict[str, type[Table]] = {
-    "simulate": Simulate, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts, "energy": Energy, "lyapunov": Lyapunov,
-    "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram, "basins": Basins,
+    "simulate": Simulate, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts,
+    "energy": Energy, "lyapunov": Lyapunov,
+    "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram,
+    "basins": Basins,
 }  # fmt: skip
 #: Those that may be asked several times, as arrays of tables.
 SEVERAL = tuple(name for name, table in QUESTIONS.items() if issubclass(table, Named))
@@ -55,7 +57,9 @@ class Study(Table):
             *most, last = (f"[{name}]" for name in QUESTIONS)
             raise ValueError(f"a study asks something: it has a table {', '.join(most)} or {last}")
         if self.compare is not None and self.simulate is None:
-            raise ValueError("[compare] goes with [simulate]; maps are compared with compare = in [[basins.map]]")
+            raise ValueError(
+                "[compare] goes with [simulate]; maps are compared with compare = in [[basins.map]]"
+            )
         for name in SEVERAL:
             distinct_names(getattr(self, name), name)
         return self

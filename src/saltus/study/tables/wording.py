@@ -1,4 +1,6 @@
-"""What the analyses say of Python arguments, said of a study file: ``t_end="2 s"`` is ``t_end = "2 s"`` there, a tuple is an array."""
+"""What the analyses say of Python arguments, said of a study file: ``t_end="2 s"`` is ``t_end = "2
+s"`` there, a tuple is an array.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +26,13 @@ _CLOSING = {"(": ")", "[": "]", "{": "}"}
 #: Arguments that formulas give by name too, as Python does: ``piecewise(..., otherwise=0)``.
 _OF_FORMULAS = {*signature(freeplay).parameters, *signature(piecewise).parameters}
 _QUESTIONS = (
-    "simulate", "poincare", "spectrum", "lyapunov", "frequency_response", "bifurcation_diagram", "basins", "compare",
+    "simulate", "poincare", "spectrum", "lyapunov", "frequency_response", "bifurcation_diagram",
+    "basins", "compare",
 )  # fmt: skip
-_TABLES = {name: f"[{name}]" for name in _QUESTIONS} | {"impact_statistics": "[impacts]", "energy_balance": "[energy]"}
+_TABLES = {name: f"[{name}]" for name in _QUESTIONS} | {
+    "impact_statistics": "[impacts]",
+    "energy_balance": "[energy]",
+}
 
 
 def fault(place: str, error: Exception) -> StudyError:
@@ -36,11 +42,18 @@ def fault(place: str, error: Exception) -> StudyError:
 
 
 def toml(value: Any) -> str:
-    """A value as TOML would write it on one line; a tuple (first, last, count) of Python is a range, any other an array."""
+    """A value as TOML would write it on one line; a tuple (first, last, count) of Python is a
+    range, any other an array.
+    """
     match value:
         case dict():
             return (
-                "{ " + ", ".join(f"{key if _BARE_KEY.fullmatch(key) else toml(key)} = {toml(item)}" for key, item in value.items()) + " }"
+                "{ "
+                + ", ".join(
+                    f"{key if _BARE_KEY.fullmatch(key) else toml(key)} = {toml(item)}"
+                    for key, item in value.items()
+                )
+                + " }"
             )
         case tuple((_, _, int(_)) | (_, _, int(_), str(_))):
             return toml(dict(zip(("first", "last", "count", "scale"), value, strict=False)))
@@ -53,7 +66,9 @@ def toml(value: Any) -> str:
 
 
 def in_toml(message: str) -> str:
-    """A message on arguments of a Python function as one on keys of a study; quotations don't change."""
+    """A message on arguments of a Python function as one on keys of a study; quotations don't
+    change.
+    """
     parts, at = [], 0
     while (found := _PYTHON.search(message, at)) is not None:
         parts.append(message[at : found.start()])
@@ -84,7 +99,9 @@ def _said(found: re.Match[str], message: str) -> tuple[str, int]:
 
 
 def _literal(text: str, start: int) -> tuple[Any, int] | None:
-    """The value that Python's text holds from a place on, and where it ends; None if there is none."""
+    """The value that Python's text holds from a place on, and where it ends; None if
+    there is none.
+    """
     if number := _NUMBER.match(text, start):
         end = number.end()
     elif text[start : start + 1] in ("'", '"'):

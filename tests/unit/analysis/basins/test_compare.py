@@ -19,25 +19,41 @@ CHAOS = ("chaotic", [], 4e-3)
 LABELS = np.array([[0, 0, 1], [0, 1, 1], [2, 2, 1], [2, -1, 2]])
 
 
-def basins(motions=(ONE, TWO, CHAOS), labels=LABELS, axes=None, units=None, states=("x", "v"), parameters='{"gap": 1e-3}', **attrs):
+def basins(
+    motions=(ONE, TWO, CHAOS),
+    labels=LABELS,
+    axes=None,
+    units=None,
+    states=("x", "v"),
+    parameters='{"gap": 1e-3}',
+    **attrs,
+):
     m = len(motions)
     table = AttractorTable(
-        kind=[kind for kind, _, _ in motions], period=[len(points) for _, points, _ in motions], contacts=np.full(m, 2.0),
-        itinerary=["0 1"] * m, peak=[peak for *_, peak in motions], rms=[peak / 2 for *_, peak in motions], margin=np.ones(m),
+        kind=[kind for kind, _, _ in motions], period=[len(points) for _, points, _ in motions],
+        contacts=np.full(m, 2.0),
+        itinerary=["0 1"] * m, peak=[peak for *_, peak in motions],
+        rms=[peak / 2 for *_, peak in motions], margin=np.ones(m),
         multipliers=np.zeros((m, 2)), exponent=np.zeros(m), exponent_error=np.zeros(m),
-        points=[np.array(points, dtype=float).reshape(-1, len(states)) for _, points, _ in motions], fractions=fractions(labels, m),
+        points=[np.array(points, dtype=float).reshape(-1, len(states)) for _, points, _ in motions],
+        fractions=fractions(labels, m),
     )  # fmt: skip
     return made_results.basins(
-        states=states, units=units or {"x": "m", "v": "m/s"}, axes=axes or {"x": X, "v": V}, basin=labels,
-        periods_to_settle=np.ones_like(labels), status=np.full(labels.shape, 2), status_meanings={2: "ok"},
+        states=states, units=units or {"x": "m", "v": "m/s"}, axes=axes or {"x": X, "v": V},
+        basin=labels,
+        periods_to_settle=np.ones_like(labels), status=np.full(labels.shape, 2),
+        status_meanings={2: "ok"},
         grazes_unresolved=np.zeros_like(labels), attractors=table, gap_unit="m",
-        attrs={"system": "rig", "method": "taylor", "method_options": "{}", "parameters": parameters, "units": '{"gap": "m"}', **attrs},
+        attrs={"system": "rig", "method": "taylor", "method_options": "{}",
+            "parameters": parameters, "units": '{"gap": "m"}', **attrs},
     )  # fmt: skip
 
 
 def renumbered(order, labels=LABELS):
     """The labels when attractor i is called order.index(i)."""
-    return np.array([order.index(label) if label >= 0 else label for label in labels.ravel()]).reshape(labels.shape)
+    return np.array(
+        [order.index(label) if label >= 0 else label for label in labels.ravel()]
+    ).reshape(labels.shape)
 
 
 def moved(motion, by):
@@ -49,7 +65,7 @@ def table(ds):
     return list(zip(ds["match_a"].values.tolist(), ds["match_b"].values.tolist(), strict=True))
 
 
-# -- matching ------------------------------------------------------------------------------------------------------------------
+# -- matching --------------------------------------------------------------------------------------
 def test_a_map_agrees_with_itself():
     ds = compare(basins(), basins())
     assert table(ds) == [(0, 0), (1, 1), (2, 2)]
@@ -97,7 +113,8 @@ def test_a_response_shifted_in_phase_is_the_same_while_its_peak_is():
     far = (kind, [[x + 0.15 * 0.01, v] for x, v in points], peak)
     assert table(compare(basins(), basins((shifted, TWO, CHAOS)))) == [(0, 0), (1, 1), (2, 2)]
     assert table(compare(basins(), basins((far, TWO, CHAOS))))[0] == (0, -1)
-    assert table(compare(basins(), basins((moved(ONE, 0.05), TWO, CHAOS))))[0] == (0, -1)  # its peak is another
+    # its peak is another
+    assert table(compare(basins(), basins((moved(ONE, 0.05), TWO, CHAOS))))[0] == (0, -1)
 
 
 def test_a_tolerance_of_zero_takes_equal_orbits():
@@ -109,7 +126,13 @@ def test_period_and_type_come_before_distance():
     torus = ("quasi_periodic", *CHAOS[1:])
     ds = compare(basins(), basins((doubled, TWO, torus)))
     assert table(ds) == [(0, -1), (1, 1), (2, -1), (-1, 0), (-1, 2)]
-    assert ds["match_type"].values.tolist() == ["periodic", "periodic", "chaotic", "periodic", "quasi_periodic"]
+    assert ds["match_type"].values.tolist() == [
+        "periodic",
+        "periodic",
+        "chaotic",
+        "periodic",
+        "quasi_periodic",
+    ]
     assert ds["match_period"].values.tolist() == [1, 2, 0, 2, 0]
 
 
@@ -121,7 +144,9 @@ def test_a_noisy_orbit_is_the_one_about_which_it_scatters():
 
 
 def test_the_nearest_go_together_whatever_cells_they_share():
-    """Two orbits of period 1 within the tolerance of both; the labels of b are exchanged, and that must show."""
+    """Two orbits of period 1 within the tolerance of both; the labels of b are exchanged, and that
+    must show.
+    """
     other = moved(ONE, 0.004)
     a = basins((ONE, other), np.where(LABELS > 1, 1, LABELS))
     b = basins((ONE, other), 1 - np.where(LABELS > 1, 1, np.abs(LABELS)))
@@ -156,7 +181,7 @@ def test_orbits_without_points_match_nothing():
     assert table(compare(basins(), basins((lost, TWO, CHAOS))))[0] == (0, -1)
 
 
-# -- cells ---------------------------------------------------------------------------------------------------------------------
+# -- cells -----------------------------------------------------------------------------------------
 def test_cells_that_differ_are_counted():
     labels = LABELS.copy()
     labels[0, 0], labels[1, 0], labels[3, 1] = 1, -2, 0
@@ -164,7 +189,9 @@ def test_cells_that_differ_are_counted():
     assert ds["agreement"].values.tolist() == [[0, 1, 1], [-1, 1, 1], [1, 1, 1], [1, -1, 1]]
     assert ds["match_agreeing_cells"].values.tolist() == [1, 4, 4]
     assert ds.attrs["agreement"] == 9 / 10
-    assert (ds.attrs["agreement_low"], ds.attrs["agreement_high"]) == tuple(map(float, wilson(9, 10)))
+    assert (ds.attrs["agreement_low"], ds.attrs["agreement_high"]) == tuple(
+        map(float, wilson(9, 10))
+    )
     assert ds["match_fraction_a"].values.tolist() == [3 / 12, 4 / 12, 4 / 12]
     assert ds["match_fraction_b"].values.tolist() == [2 / 12, 5 / 12, 4 / 12]
     assert ds["basin_b"].values[1, 0] == -2
@@ -192,13 +219,18 @@ def test_maps_without_any_attractor():
     assert table(compare(empty, basins())) == [(-1, 0), (-1, 1), (-1, 2)]
 
 
-# -- the result ----------------------------------------------------------------------------------------------------------------
+# -- the result ------------------------------------------------------------------------------------
 def test_the_result_says_where_both_come_from():
-    b = basins(parameters='{"gap": 2e-3, "force": 4}', method="ode45").assign_attrs(units='{"gap": "mm"}')
+    b = basins(parameters='{"gap": 2e-3, "force": 4}', method="ode45").assign_attrs(
+        units='{"gap": "mm"}'
+    )
     ds = compare(basins(parameters='{"gap": 1e-3, "force": 4}'), b)
     assert ds.attrs["saltus_result"] == "agreement"
     assert (ds.attrs["method_a"], ds.attrs["method_b"]) == ("taylor", "ode45")
-    assert (ds.attrs["result_hash_a"], ds.attrs["result_hash_b"]) == (basins().attrs["result_hash"], b.attrs["result_hash"])
+    assert (ds.attrs["result_hash_a"], ds.attrs["result_hash_b"]) == (
+        basins().attrs["result_hash"],
+        b.attrs["result_hash"],
+    )
     assert ds.attrs["parameters_b"] == '{"gap": 2e-3, "force": 4}'
     assert ds.attrs["parameters"] == '{"force": 4}'
     assert "units" not in ds.attrs
@@ -211,10 +243,12 @@ def test_the_result_survives_a_file(tmp_path):
     xr.testing.assert_identical(load(save(ds, tmp_path / "agreement.nc")), ds)
 
 
-# -- states beyond the axes ----------------------------------------------------------------------------------------------------
+# -- states beyond the axes ------------------------------------------------------------------------
 def test_a_state_that_is_no_axis_is_measured_by_its_points():
     def three(z):
-        return basins([("periodic", [[1e-3, 0.5, z]], 2e-3)], np.zeros((4, 3), int), states=("x", "v", "z"))
+        return basins(
+            [("periodic", [[1e-3, 0.5, z]], 2e-3)], np.zeros((4, 3), int), states=("x", "v", "z")
+        )
 
     ds = compare(three(100.0), three(99.5))
     assert ds["match_orbit_distance"].values.tolist() == pytest.approx([0.005])
@@ -222,22 +256,32 @@ def test_a_state_that_is_no_axis_is_measured_by_its_points():
     assert table(compare(three(0.0), three(0.0))) == [(0, 0)]
 
 
-# -- grids that differ ---------------------------------------------------------------------------------------------------------
+# -- grids that differ -----------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"axes": {"x": X[:3], "v": V}, "labels": LABELS[:3]}, "x has 4 and 3 cells"),
-        ({"axes": {"x": X, "v": V + 0.1}}, r"v runs from -1 to 1 and from -0\.90.* m/s, up to 0\.1 apart"),
+        (
+            {"axes": {"x": X, "v": V + 0.1}},
+            r"v runs from -1 to 1 and from -0\.90.* m/s, up to 0\.1 "
+            r"apart",
+        ),
         ({"axes": {"v": X, "x": V}}, "axes are x, v and v, x"),
         ({"units": {"x": "mm", "v": "m/s"}}, "x is in m and in mm"),
         (
-            {"states": ("x", "v", "z"), "motions": [("periodic", [[1e-3, 0.5, 0.0]], 1.0)], "labels": 0 * LABELS},
+            {
+                "states": ("x", "v", "z"),
+                "motions": [("periodic", [[1e-3, 0.5, 0.0]], 1.0)],
+                "labels": 0 * LABELS,
+            },
             "states are x, v and x, v, z",
         ),
     ],
 )
 def test_grids_that_differ_are_named(changes, message):
-    with pytest.raises(ParameterError, match=f"aren't on one grid: .*{message}.*same states, ranges"):
+    with pytest.raises(
+        ParameterError, match=f"aren't on one grid: .*{message}.*same states, ranges"
+    ):
         compare(basins(), basins(**changes))
 
 

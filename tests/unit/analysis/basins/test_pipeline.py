@@ -28,17 +28,21 @@ def three(t, a, b, c, *, f=1.0):
 
 
 def plan(axes=None, at=None, periods=10, every=None, system=RIG):
-    return basin_plan(system, {"x": X, "v": V} if axes is None else axes, at, sl.Taylor(), periods, every)
+    return basin_plan(
+        system, {"x": X, "v": V} if axes is None else axes, at, sl.Taylor(), periods, every
+    )
 
 
-# -- starts --------------------------------------------------------------------------------------------------------------------
+# -- starts ----------------------------------------------------------------------------------------
 def test_cells_run_along_the_second_axis_and_states_keep_their_order():
     rows = plan().starts(np.arange(15))
     x, v = np.linspace(-5e-3, 5e-3, 5), np.linspace(-1, 1, 3)
     np.testing.assert_array_equal(rows, np.stack([np.repeat(x, 3), np.tile(v, 5)], axis=1))
     turned = plan({"v": V, "x": X})
     assert turned.shape == (3, 5)
-    np.testing.assert_array_equal(turned.starts(np.arange(15)), np.stack([np.tile(x, 3), np.repeat(v, 5)], axis=1))
+    np.testing.assert_array_equal(
+        turned.starts(np.arange(15)), np.stack([np.tile(x, 3), np.repeat(v, 5)], axis=1)
+    )
 
 
 def test_other_states_start_where_at_says():
@@ -64,8 +68,19 @@ def test_chunks_cover_every_cell_once(monkeypatch, size):
 def test_axes_may_be_arrays_and_must_ascend():
     given = np.array([-1e-3, 0.0, 5e-3])
     np.testing.assert_array_equal(plan({"x": given, "v": V}).axes["x"], given)
-    for wrong in (given[::-1], given[:1], np.array([0, np.nan]), np.array([0, np.inf]), np.zeros((2, 2)), np.array([0.0, 0.0])):
-        with pytest.raises(ParameterError, match=r"starts along x must ascend|Give finite starts|must be a range"):
+    for wrong in (
+        given[::-1],
+        given[:1],
+        np.array([0, np.nan]),
+        np.array([0, np.inf]),
+        np.zeros((2, 2)),
+        np.array([0.0, 0.0]),
+    ):
+        with pytest.raises(
+            ParameterError,
+            match=r"starts along x must ascend|Give finite "
+            r"starts|must be a range",
+        ):
             plan({"x": wrong, "v": V})
 
 
@@ -81,7 +96,9 @@ def test_whole_periods_may_be_written_as_a_float():
 
 def test_a_list_that_looks_like_a_range_is_refused():
     with pytest.raises(
-        ParameterError, match=r"x = \['-1 mm', '1 mm', 5\] is a list.*5 has no unit. A range is a tuple: x=\('-1 mm', '1 mm', 5\)"
+        ParameterError,
+        match=r"x = \['-1 mm', '1 mm', 5\] is a list.*5 has no unit. A range is a "
+        r"tuple: x=\('-1 mm', '1 mm', 5\)",
     ):
         plan({"x": ["-1 mm", "1 mm", 5], "v": V})
 
@@ -92,7 +109,7 @@ def test_a_list_holds_the_starts_and_a_tuple_is_a_range():
     assert rows.axes["v"].tolist() == [0.0, 1.0]
 
 
-# -- what is refused, in words --------------------------------------------------------------------------------------------------
+# -- what is refused, in words ---------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("axes", "message"),
     [
@@ -104,7 +121,10 @@ def test_a_list_holds_the_starts_and_a_tuple_is_a_range():
         ({"x": (1, 0, 4), "v": V}, "starts along x must ascend"),
         ({"x": (math.nan, 1, 4), "v": V}, "x = nan is not a finite number"),
         ({"x": (-math.inf, 1, 4), "v": V}, "x = -inf is not a finite number"),
-        ({"x": (0, 1, 1), "v": V}, "number of starts along x must be a whole number of at least 2, not 1"),
+        (
+            {"x": (0, 1, 1), "v": V},
+            "number of starts along x must be a whole number of at least 2, not 1",
+        ),
         ({"x": (0, 1, 2.5), "v": V}, r"at least 2, not 2\.5"),
         ({"x": (0, 1), "v": V}, "A tuple is a range; a list holds the starts themselves"),
         ({"x": (0, 1, True), "v": V}, "at least 2, not True"),
@@ -182,7 +202,11 @@ def test_seeds_that_are_refused(seed):
 
 @pytest.mark.parametrize("call", ["basins", "attractors", "basin_fractions"])
 def test_every_is_needed_without_forcing_and_refused_with_it(call):
-    rest = {"basins": dict(x=X, v=V), "attractors": dict(start=[0.1, 0.0]), "basin_fractions": dict(samples=4, x=SPAN_X)}[call]
+    rest = {
+        "basins": dict(x=X, v=V),
+        "attractors": dict(start=[0.1, 0.0]),
+        "basin_fractions": dict(samples=4, x=SPAN_X),
+    }[call]
     with pytest.raises(ParameterError, match="no forcing period: give every="):
         getattr(sl, call)(unforced, **rest)
     with pytest.raises(ParameterError, match="is forced: leave every= out"):
@@ -199,7 +223,11 @@ def test_every_must_be_a_positive_time(every):
 
 @pytest.mark.parametrize("call", ["basins", "attractors", "basin_fractions"])
 def test_a_system_must_be_one(call):
-    rest = {"basins": dict(x=X, v=V), "attractors": dict(start=[0.1, 0.0]), "basin_fractions": dict(samples=4, x=SPAN_X)}[call]
+    rest = {
+        "basins": dict(x=X, v=V),
+        "attractors": dict(start=[0.1, 0.0]),
+        "basin_fractions": dict(samples=4, x=SPAN_X),
+    }[call]
     with pytest.raises(ParameterError, match="must be a System, not str"):
         getattr(sl, call)("rig", **rest)
     with pytest.raises(ParameterError, match=r"Call it: sl\.models\.delangre\(\)\.$"):
@@ -212,7 +240,11 @@ def test_a_system_must_be_one(call):
 
 @pytest.mark.parametrize("call", ["basins", "attractors", "basin_fractions"])
 def test_a_method_must_be_one(call):
-    rest = {"basins": dict(x=X, v=V), "attractors": dict(start=[0.1, 0.0]), "basin_fractions": dict(samples=4, x=SPAN_X)}[call]
+    rest = {
+        "basins": dict(x=X, v=V),
+        "attractors": dict(start=[0.1, 0.0]),
+        "basin_fractions": dict(samples=4, x=SPAN_X),
+    }[call]
     with pytest.raises(ParameterError, match="method must be such as"):
         getattr(sl, call)(RIG, method="Taylor", **rest)
 

@@ -11,7 +11,13 @@ import pytest
 
 from function_maps import FunctionMap
 from saltus.analysis.basins.labels import Settling, settle
-from saltus.analysis.basins.serial import cell_types, found_data, found_from, settling_arrays, settling_from
+from saltus.analysis.basins.serial import (
+    cell_types,
+    found_data,
+    found_from,
+    settling_arrays,
+    settling_from,
+)
 from saltus.analysis.orbits.aperiodic import SampledAttractor
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.find_attractors import find_attractors
@@ -24,11 +30,21 @@ SCALE = np.array([3.0, 1.0])
 
 
 def henon(a, b):
-    """Chaotic at a = 1.4, b = 0.3; a 4-cycle at a = 1, b = 0.3. What escapes stays far away, but finite."""
+    """Chaotic at a = 1.4, b = 0.3; a 4-cycle at a = 1, b = 0.3. What escapes stays far away, but
+    finite.
+    """
     return FunctionMap(
-        lambda s: np.clip(np.stack([1 - a * s[:, 0] ** 2 + s[:, 1], b * s[:, 0]], axis=1), -1e3, 1e3),
+        lambda s: np.clip(
+            np.stack([1 - a * s[:, 0] ** 2 + s[:, 1], b * s[:, 0]], axis=1), -1e3, 1e3
+        ),
         "x y",
-        lambda s: np.stack([np.stack([-2 * a * s[:, 0], np.ones(len(s))], 1), np.stack([np.full(len(s), b), np.zeros(len(s))], 1)], 1),
+        lambda s: np.stack(
+            [
+                np.stack([-2 * a * s[:, 0], np.ones(len(s))], 1),
+                np.stack([np.full(len(s), b), np.zeros(len(s))], 1),
+            ],
+            1,
+        ),
     )
 
 
@@ -41,7 +57,9 @@ def case(request):
     """A map, and the attractors that were found on it."""
     map_ = henon(1.4 if request.param == "chaotic" else 1.0, 0.3)
     found = find_attractors(map_, starts(), SCALE, 256)[0]
-    assert [len(found.sampled), len(found.orbits)] == ([1, 0] if request.param == "chaotic" else [0, 1])
+    assert [len(found.sampled), len(found.orbits)] == (
+        [1, 0] if request.param == "chaotic" else [0, 1]
+    )
     return map_, found
 
 
@@ -57,10 +75,23 @@ def numbers(found):
         array = np.asarray(array)
         return array.dtype.str, array.shape, array.tobytes()
 
-    orbits = [(told(o.points), told(o.multipliers.astype(complex)), struct.pack("d", o.mismatch)) for o in (*found.orbits, *found.unstable)]
-    sampled = [(w.kind, struct.pack("dd", w.exponent, w.exponent_error), told(w.points), told(w.scale)) for w in found.sampled]
+    orbits = [
+        (told(o.points), told(o.multipliers.astype(complex)), struct.pack("d", o.mismatch))
+        for o in (*found.orbits, *found.unstable)
+    ]
+    sampled = [
+        (w.kind, struct.pack("dd", w.exponent, w.exponent_error), told(w.points), told(w.scale))
+        for w in found.sampled
+    ]
     near = found.near
-    return len(found.orbits), orbits, sampled, told(near.centres), told(near.weights), told(near.owners)
+    return (
+        len(found.orbits),
+        orbits,
+        sampled,
+        told(near.centres),
+        told(near.weights),
+        told(near.owners),
+    )
 
 
 def test_found_comes_back_to_the_last_bit(case):
@@ -90,8 +121,12 @@ def test_twice_is_as_once(case):
 
 
 def test_numbers_that_text_may_lose():
-    """Denormals, signed zero, infinity, not-a-number, 17 digits, complex multipliers, an orbit that doesn't attract."""
-    odd = np.array([[5e-324, -0.0], [0.1 + 0.2, 1.7976931348623157e308], [np.inf, -np.inf], [np.nan, 1 / 3]])
+    """Denormals, signed zero, infinity, not-a-number, 17 digits, complex multipliers, an orbit that
+    doesn't attract.
+    """
+    odd = np.array(
+        [[5e-324, -0.0], [0.1 + 0.2, 1.7976931348623157e308], [np.inf, -np.inf], [np.nan, 1 / 3]]
+    )
     matrices = np.arange(16.0).reshape(4, 2, 2) / 7
     orbit = Orbit(odd, np.array([0.3 + 0.4j, complex(-0.0, -0.4)]), np.float64(1e-17))
     found = Found(
@@ -131,7 +166,9 @@ def test_a_worker_gets_the_same_attractors(case):
         lambda data: data["near"].update(owners=data["near"]["owners"][:1]),
         lambda data: data["near"].update(owners=[2**40] * len(data["near"]["owners"])),
         lambda data: data["near"].update(owners=[-1] * len(data["near"]["owners"])),
-        lambda data: data["near"].update(centres=[[float("nan")] * 2] * len(data["near"]["centres"])),
+        lambda data: data["near"].update(
+            centres=[[float("nan")] * 2] * len(data["near"]["centres"])
+        ),
         lambda data: data["near"].update(centres=[[]]),
         lambda data: data.update(orbits=[]),
         lambda data: data["orbits"][0].update(points=[]),
@@ -142,7 +179,9 @@ def test_a_worker_gets_the_same_attractors(case):
     ],
 )
 def test_data_that_do_not_hold_together_are_refused(forge):
-    """Machine code reads them by their lengths: somebody else's, with a right checksum, must not reach it."""
+    """Machine code reads them by their lengths: somebody else's, with a right checksum, must not
+    reach it.
+    """
     data = json.loads(json.dumps(found_data(_periodic())))
     found_from(data, 2)
     forge(data)
@@ -152,22 +191,28 @@ def test_data_that_do_not_hold_together_are_refused(forge):
 
 def _periodic():
     orbit = Orbit(np.zeros((2, 2)), np.zeros(2, complex), 0.0)
-    return Found(Neighbourhoods(np.zeros((2, 2)), np.stack([np.eye(2)] * 2), np.zeros(2, np.int64)), [orbit])
+    return Found(
+        Neighbourhoods(np.zeros((2, 2)), np.stack([np.eye(2)] * 2), np.zeros(2, np.int64)), [orbit]
+    )
 
 
-# -- cells -----------------------------------------------------------------------------------------------------------------------
+# -- cells -----------------------------------------------------------------------------------------
 def some_cells():
     return Settling(
-        np.array([0, 3, -1, -2, -3, -5]), np.array([1, 2000, -1, -1, -1, -1]), np.array([2, 3, 8, 12, 6, 2]),
+        np.array([0, 3, -1, -2, -3, -5]), np.array([1, 2000, -1, -1, -1, -1]),
+        np.array([2, 3, 8, 12, 6, 2]),
         np.array([0, 32767, 0, 1, 0, 0]),
-        np.array([[0.0, -0.0], [1 / 3, 5e-324], [np.inf, np.nan], [1.0, 2.0], [3.0, 4.0], [-1e300, 1.0]]),
+        np.array([[0.0, -0.0], [1 / 3, 5e-324], [np.inf, np.nan], [1.0, 2.0], [3.0, 4.0],
+            [-1e300, 1.0]]),
     )  # fmt: skip
 
 
 def test_cells_come_back_to_the_last_bit():
     cells, states = some_cells(), ("x", "v")
     arrays = settling_arrays(cells, states)
-    assert {name: array.dtype for name, array in arrays.items()} == {name: np.dtype(kind) for name, kind in cell_types(states).items()}
+    assert {name: array.dtype for name, array in arrays.items()} == {
+        name: np.dtype(kind) for name, kind in cell_types(states).items()
+    }
     again = settling_from(arrays, states)
     for name in ("label", "periods", "status", "unresolved", "end"):
         assert getattr(again, name).tobytes() == getattr(cells, name).tobytes(), name

@@ -1,4 +1,6 @@
-"""Impact statistics: which side is contact, how contacts are paired and blocks are cut, what a standard error is worth."""
+"""Impact statistics: which side is contact, how contacts are paired and blocks are cut, what a
+standard error is worth.
+"""
 
 import numpy as np
 import pytest
@@ -20,8 +22,14 @@ from saltus.errors import ParameterError
     ],
 )
 def test_contact_is_where_rest_is_not(system, sides):
-    found = dict(zip((guard.name for guard in system.guards), contact_sides(system, {}).tolist(), strict=True))
-    assert all(side == (-1 if " = -" in name or "lower" in name else 1) for name, side in found.items())
+    found = dict(
+        zip(
+            (guard.name for guard in system.guards), contact_sides(system, {}).tolist(), strict=True
+        )
+    )
+    assert all(
+        side == (-1 if " = -" in name or "lower" in name else 1) for name, side in found.items()
+    )
     assert sorted(found.values()) == sorted(sides)
     assert contact_sides(system, {0: 1})[0] == 1
 
@@ -39,18 +47,23 @@ def test_time_in_contact_is_cut_at_the_borders_of_blocks():
     assert spells.tolist() == [[0.0, 1.0], [2.0, 2.5], [4.5, 5.0]]
     none = np.zeros(0)
     found = Touchdowns(none, none, none, none, none, none, None, {(0, 0): spells})
-    assert found.covered(0, 0, np.array([0.0, 0.5, 2.25, 4.75, 5.0])) == pytest.approx([0.5, 0.75, 0.5, 0.25])
+    assert found.covered(0, 0, np.array([0.0, 0.5, 2.25, 4.75, 5.0])) == pytest.approx(
+        [0.5, 0.75, 0.5, 0.25]
+    )
 
 
 def test_the_standard_error_of_values_that_depend_on_each_other():
-    """An autoregressive row, coefficient 0.8: the error of its mean is sqrt((1 + 0.8) / (1 - 0.8)) = 3 times that of independent values."""
+    """An autoregressive row, coefficient 0.8: the error of its mean is sqrt((1 + 0.8) / (1 - 0.8))
+    = 3 times that of independent values.
+    """
     random = np.random.default_rng(8)
     noise = random.normal(size=(400, 4000))
     row = np.zeros_like(noise)
     for k in range(1, noise.shape[1]):
         row[:, k] = 0.8 * row[:, k - 1] + noise[:, k]
     claimed = np.sqrt(np.mean([_error_of_row(one) ** 2 for one in row]))
-    assert claimed == pytest.approx(row.mean(axis=1).std(ddof=1), rel=0.12)  # 400 rows know it to 3.5 %, 20 blocks of 200 to some more
+    # 400 rows know it to 3.5 %, 20 blocks of 200 to some more
+    assert claimed == pytest.approx(row.mean(axis=1).std(ddof=1), rel=0.12)
     assert claimed > 2.5 * row.std() / np.sqrt(row.shape[1])
 
 

@@ -17,7 +17,12 @@ def stroboscope(*strobes: np.ndarray, status: str = "ok"):
     """A stroboscope of one state with these rows."""
     rows = np.stack(strobes)
     return made_results.stroboscope(
-        states=("x",), units={"x": "m"}, period=np.arange(rows.shape[1]), values={"x": rows}, status=[status] * len(rows), guards=NONE
+        states=("x",),
+        units={"x": "m"},
+        period=np.arange(rows.shape[1]),
+        values={"x": rows},
+        status=[status] * len(rows),
+        guards=NONE,
     )
 
 
@@ -40,7 +45,9 @@ def test_longer_than_half_of_what_was_kept():
 
 
 def test_a_doubled_orbit_is_not_its_half():
-    """Every second repeat of 12T off by 1e-4 of the range: 24T, as the rig does at 15 Hz from x = 0.4 mm."""
+    """Every second repeat of 12T off by 1e-4 of the range: 24T, as the rig does at 15 Hz from x =
+    0.4 mm.
+    """
     doubled = cycle(12)
     doubled[np.arange(97) % 24 == 5] += 1e-4 * np.abs(doubled).max()
     assert settled(stroboscope(doubled))["response_period"].item() == 24
@@ -53,7 +60,9 @@ def test_a_transient_is_not_settled():
 
 
 def test_a_turning_transient_is_not_taken_for_a_multiple():
-    """A residue of 5T whose multiplier turns by a third each 5 periods repeats better after 15: that isn't a 15T response."""
+    """A residue of 5T whose multiplier turns by a third each 5 periods repeats better after 15:
+    that isn't a 15T response.
+    """
     k = np.arange(97)
     turning = cycle(5) * (1 + 1e-6 * 0.999**k * np.cos(2 * np.pi * k / 15))
     assert settled(stroboscope(turning))["response_period"].item() == 0

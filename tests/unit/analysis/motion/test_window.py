@@ -12,7 +12,14 @@ from saltus.flow import engine
 
 simulate_module = importlib.import_module("saltus.analysis.motion.simulate")
 
-STOP = {"spring": 1.0, "damping": 0.02, "force": 0.8, "boundary": 0.3, "stiffness": 40.0, "frequency": 0.2}
+STOP = {
+    "spring": 1.0,
+    "damping": 0.02,
+    "force": 0.8,
+    "boundary": 0.3,
+    "stiffness": 40.0,
+    "frequency": 0.2,
+}
 ENERGY = {"energy": lambda x: x**2, "supplied": lambda v: v, "dissipated": lambda v: v**2}
 
 
@@ -37,7 +44,9 @@ def test_an_interrupted_stretch_holds_what_was_computed(ask, arguments, variable
     assert {"interrupted", "not_computed"} & set(partial.status.values.tolist())
 
 
-@pytest.mark.parametrize(("ask", "arguments"), [(sl.simulate, {"samples": 1}), (sl.stroboscope, {})])
+@pytest.mark.parametrize(
+    ("ask", "arguments"), [(sl.simulate, {"samples": 1}), (sl.stroboscope, {})]
+)
 def test_samples_that_no_trajectory_has_reached_are_cut_off(ask, arguments, monkeypatch):
     monkeypatch.setattr(engine, "SLICE", 200)
     whole = ask(lab, (0.0, 0.5), periods=2000, values=STOP, progress=False, threads=1, **arguments)
@@ -81,15 +90,28 @@ def test_a_stop_puts_together_what_it_has_when_it_is_asked_for():
 
 def test_the_outcome_of_a_run_inside_is_no_answer():
     with pytest.raises(sl.Interrupted) as caught:
-        sl.attractors(lab.with_values(**STOP), {"x": np.linspace(0, 0.2, 3000), "v": 0.5}, progress=interrupt, threads=1)
+        sl.attractors(
+            lab.with_values(**STOP),
+            {"x": np.linspace(0, 0.2, 3000), "v": 0.5},
+            progress=interrupt,
+            threads=1,
+        )
     assert caught.value.partial is None
 
 
 def test_a_trajectory_that_fails_says_so():
     with pytest.warns(sl.errors.SaltusWarning, match="1 of 2 trajectories: nonfinite"):
-        both = sl.impact_statistics(lab, {"x": [0.0, 1.0], "v": 0.0}, periods=3, values=STOP | {"cubic": [0.0, -1e3]})
+        both = sl.impact_statistics(
+            lab, {"x": [0.0, 1.0], "v": 0.0}, periods=3, values=STOP | {"cubic": [0.0, -1e3]}
+        )
     assert both.status.values.tolist() == ["ok", "nonfinite"]
     with pytest.warns(sl.errors.SaltusWarning, match="nonfinite"):
-        balance = sl.energy_balance(lab, {"x": [0.0, 1.0], "v": 0.0}, periods=3, values=STOP | {"cubic": [0.0, -1e3]}, **ENERGY)
+        balance = sl.energy_balance(
+            lab,
+            {"x": [0.0, 1.0], "v": 0.0},
+            periods=3,
+            values=STOP | {"cubic": [0.0, -1e3]},
+            **ENERGY,
+        )
     assert np.isnan(balance.imbalance.values[1])
     assert np.isfinite(balance.imbalance.values[0])

@@ -1,4 +1,6 @@
-"""Neighbourhoods that capture: what they hold really goes where they say, on maps whose basins are known."""
+"""Neighbourhoods that capture: what they hold really goes where they say, on maps whose basins are
+known.
+"""
 
 import warnings
 
@@ -15,7 +17,11 @@ from saltus.analysis.orbits.found import Found
 def linear(matrix) -> FunctionMap:
     """x -> A x."""
     matrix = np.array(matrix, float)
-    return FunctionMap(lambda z: z @ matrix.T, " ".join("xyzw"[: len(matrix)]), lambda z: np.broadcast_to(matrix, (len(z), *matrix.shape)))
+    return FunctionMap(
+        lambda z: z @ matrix.T,
+        " ".join("xyzw"[: len(matrix)]),
+        lambda z: np.broadcast_to(matrix, (len(z), *matrix.shape)),
+    )
 
 
 def cubic(a: float) -> FunctionMap:
@@ -24,7 +30,9 @@ def cubic(a: float) -> FunctionMap:
 
 
 def newton() -> FunctionMap:
-    """Newton's method for z^3 = 1 in the plane: three superstable points whose basins are fractal."""
+    """Newton's method for z^3 = 1 in the plane: three superstable points whose basins
+    are fractal.
+    """
 
     def image(z):
         w = z[:, 0] + 1j * z[:, 1]
@@ -33,7 +41,9 @@ def newton() -> FunctionMap:
 
     def derivative(z):
         d = 2 * ((z[:, 0] + 1j * z[:, 1]) ** 3 - 1) / (3 * (z[:, 0] + 1j * z[:, 1]) ** 3)
-        return np.stack([np.stack([d.real, -d.imag], axis=1), np.stack([d.imag, d.real], axis=1)], axis=1)
+        return np.stack(
+            [np.stack([d.real, -d.imag], axis=1), np.stack([d.imag, d.real], axis=1)], axis=1
+        )
 
     return FunctionMap(image, "x y", derivative)
 
@@ -47,19 +57,28 @@ def inside(near: Neighbourhoods, i: int, count: int, seed: int = 3) -> np.ndarra
     return near.centres[i] + ball @ np.linalg.inv(near.weights[i]).T
 
 
-# -- the kernel ----------------------------------------------------------------------------------------------------------------
+# -- the kernel ------------------------------------------------------------------------------------
 @pytest.mark.parametrize("size", [1, 2, 3])
 def test_kernel_against_a_plain_search(size):
-    """Disjoint ellipsoids, 400 trajectories of 5 points: the first point inside any, and its owner; NaN lies in none."""
+    """Disjoint ellipsoids, 400 trajectories of 5 points: the first point inside any, and its owner;
+    NaN lies in none.
+    """
     rng = np.random.default_rng(size)
     centres = rng.uniform(-1, 1, (12, size))
     apart = np.abs(centres[:, None] - centres[None]).max(axis=2) + 9 * np.eye(12)
-    weights = np.stack([np.diag(rng.uniform(2, 9, size)) / apart.min() + 0.1 * rng.standard_normal((size, size)) for _ in centres])
+    weights = np.stack(
+        [
+            np.diag(rng.uniform(2, 9, size)) / apart.min() + 0.1 * rng.standard_normal((size, size))
+            for _ in centres
+        ]
+    )
     near = Neighbourhoods.none(size).joined(Neighbourhoods(centres, weights, np.arange(12)))
     points = rng.uniform(-1.2, 1.2, (400, 5, size))
     points[::2, 3] = centres[rng.integers(0, 12, 200)] + 1e-4
     points[7, 2:] = np.nan
-    distance = np.linalg.norm(np.einsum("mij,knmj->knmi", near.weights, points[:, :, None] - near.centres), axis=3)
+    distance = np.linalg.norm(
+        np.einsum("mij,knmj->knmi", near.weights, points[:, :, None] - near.centres), axis=3
+    )
     hit = (distance <= 1).any(axis=2)
     first = hit.argmax(axis=1)
     owner = near.owners[(distance[np.arange(400), first] <= 1).argmax(axis=1)]
@@ -70,10 +89,14 @@ def test_kernel_against_a_plain_search(size):
 
 
 def test_the_edge_of_an_ellipsoid_is_where_its_weights_say():
-    """A long ellipsoid across the first coordinate: points just inside and just outside its tips."""
+    """A long ellipsoid across the first coordinate: points just inside and just
+    outside its tips.
+    """
     angle = 0.3
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    near = Neighbourhoods(np.array([[1.0, 2.0]]), (np.diag([1 / 5, 1 / 0.01]) @ turn.T)[None], np.array([4]))
+    near = Neighbourhoods(
+        np.array([[1.0, 2.0]]), (np.diag([1 / 5, 1 / 0.01]) @ turn.T)[None], np.array([4])
+    )
     tip = np.array([1.0, 2.0]) + 5 * turn[:, 0] * np.array([1 - 1e-9, 1 + 1e-9])[:, None]
     label, _ = near.capture(tip[:, None, :])
     assert label.tolist() == [4, -1]
@@ -84,7 +107,7 @@ def test_nothing_captures_nothing():
     assert label.tolist() == [-1, -1, -1]
 
 
-# -- what is verified ----------------------------------------------------------------------------------------------------------
+# -- what is verified ------------------------------------------------------------------------------
 def test_a_linear_contraction_is_verified_at_the_largest_radius():
     map_ = linear([[0.5, 0.4], [-0.4, 0.5]])
     orbit = orbit_near(map_, np.array([0.1, 0.1]), 1, np.ones(2))
@@ -94,10 +117,14 @@ def test_a_linear_contraction_is_verified_at_the_largest_radius():
 
 @pytest.mark.parametrize("multiplier", [0.95, 0.99, 0.999, -0.9995])
 def test_a_slow_attractor_has_a_neighbourhood_too(multiplier):
-    """A linear map contracts everywhere, however slowly: its neighbourhood is limited by what is tried, not by the rate."""
+    """A linear map contracts everywhere, however slowly: its neighbourhood is limited by what is
+    tried, not by the rate.
+    """
     map_ = linear([[multiplier, 0.0], [0.0, 0.5]])
     orbit = orbit_near(map_, np.array([0.1, 0.1]), 1, np.ones(2))
-    assert neighbourhoods(map_, orbit, 0, np.ones(2)).capture(np.array([[[1e-3, 1e-3]]]))[0].tolist() == [0]
+    assert neighbourhoods(map_, orbit, 0, np.ones(2)).capture(np.array([[[1e-3, 1e-3]]]))[
+        0
+    ].tolist() == [0]
 
 
 def test_a_strongly_sheared_contraction_is_verified():
@@ -138,8 +165,15 @@ class TouchingInAWedge(FunctionMap):
     def sequences(self, start, count):
         """See Map."""
         end, _ = super().sequences(start, count)
-        turned = start @ np.array([[np.cos(self.direction), -np.sin(self.direction)], [np.sin(self.direction), np.cos(self.direction)]])
-        touches = (np.abs(np.arctan2(turned[:, 1], turned[:, 0])) < 0.1) & (np.linalg.norm(start, axis=1) > 0.01)
+        turned = start @ np.array(
+            [
+                [np.cos(self.direction), -np.sin(self.direction)],
+                [np.sin(self.direction), np.cos(self.direction)],
+            ]
+        )
+        touches = (np.abs(np.arctan2(turned[:, 1], turned[:, 0])) < 0.1) & (
+            np.linalg.norm(start, axis=1) > 0.01
+        )
         return end, [np.full(int(touch), 3) for touch in touches]
 
 
@@ -167,7 +201,9 @@ def test_newton_s_map_every_point_of_a_neighbourhood_ends_on_its_root():
 
 @pytest.mark.parametrize("a", [1.5, 2.1, 2.25, 2.29])
 def test_twins_of_the_cubic_map_are_told_apart_point_by_point(a):
-    """Periods 1, 2, 4, 8; the basins are laced into each other. Labels equal those of uncaptured runs, twins mirror each other."""
+    """Periods 1, 2, 4, 8; the basins are laced into each other. Labels equal those of uncaptured
+    runs, twins mirror each other.
+    """
     map_, scale = cubic(a), np.array([3.0])
     starts = np.linspace(-1.49, 1.49, 2001)[:, None]
     starts = starts[np.abs(starts[:, 0]) > 1e-3]
@@ -175,22 +211,30 @@ def test_twins_of_the_cubic_map_are_told_apart_point_by_point(a):
     assert len(found) == 2
     assert found.orbits[0].period == found.orbits[1].period == {1.5: 1, 2.1: 2, 2.25: 4, 2.29: 8}[a]
     end = map_.launch(starts, 4000).advance(4000)[:, -1]
-    distance = np.stack([np.abs(orbit.points[:, 0] - end).min(axis=1) for orbit in found.orbits], axis=1)
+    distance = np.stack(
+        [np.abs(orbit.points[:, 0] - end).min(axis=1) for orbit in found.orbits], axis=1
+    )
     assert distance.min(axis=1).max() < 1e-9
     np.testing.assert_array_equal(label, distance.argmin(axis=1))
     np.testing.assert_array_equal(label, 1 - label[::-1])
 
 
 def test_neighbourhoods_of_different_attractors_do_not_overlap():
-    found, _, _ = find_attractors(cubic(2.29), np.random.default_rng(1).uniform(-1.5, 1.5, (200, 1)), np.array([3.0]), 2000)
+    found, _, _ = find_attractors(
+        cubic(2.29), np.random.default_rng(1).uniform(-1.5, 1.5, (200, 1)), np.array([3.0]), 2000
+    )
     for i, owner in enumerate(found.near.owners):
-        label, _ = Neighbourhoods(found.near.centres, found.near.weights, found.near.owners).capture(inside(found.near, i, 500)[:, None, :])
+        label, _ = Neighbourhoods(
+            found.near.centres, found.near.weights, found.near.owners
+        ).capture(inside(found.near, i, 500)[:, None, :])
         assert (label == owner).all()
 
 
-# -- its parts -----------------------------------------------------------------------------------------------------------------
+# -- its parts -------------------------------------------------------------------------------------
 def test_neighbourhoods_join_in_ascending_order_and_are_renumbered():
-    one = Neighbourhoods(np.array([[3.0, 0.0], [5.0, 0.0]]), np.stack([np.eye(2)] * 2), np.array([0, 0]))
+    one = Neighbourhoods(
+        np.array([[3.0, 0.0], [5.0, 0.0]]), np.stack([np.eye(2)] * 2), np.array([0, 0])
+    )
     both = one.joined(Neighbourhoods(np.array([[4.0, 1.0]]), 2 * np.eye(2)[None], np.array([1])))
     assert both.centres[:, 0].tolist() == [3.0, 4.0, 5.0]
     assert both.owners.tolist() == [0, 1, 0]
@@ -200,7 +244,9 @@ def test_neighbourhoods_join_in_ascending_order_and_are_renumbered():
 
 def test_alike_allows_a_contact_at_the_very_start_or_end_and_nothing_else():
     own = np.array([5, 3, 5, 7])
-    assert _alike([own, own[1:], own[:-1], np.array([7, 5, 3, 5, 7]), np.array([5, 3, 5, 7, 5])], own)
+    assert _alike(
+        [own, own[1:], own[:-1], np.array([7, 5, 3, 5, 7]), np.array([5, 3, 5, 7, 5])], own
+    )
     assert not _alike([own, np.array([5, 5, 3, 7])], own)
     assert not _alike([np.array([5, 3, 5, 7, 3])], own)
     assert not _alike([np.array([5, 3, 5])[:2]], own)

@@ -1,4 +1,6 @@
-"""Orbits that errors of a map blur: scatter with a known size, what counts as one attractor, and what errors leave without a type."""
+"""Orbits that errors of a map blur: scatter with a known size, what counts as one attractor, and
+what errors leave without a type.
+"""
 
 import json
 import math
@@ -20,7 +22,9 @@ SCALE = np.array([3.0, 1.0])
 
 
 def bounded(z):
-    """Numbers within [-1, 1] that the place decides as a generator would: no two places of a motion have related ones. Variance 1/2."""
+    """Numbers within [-1, 1] that the place decides as a generator would: no two places of a motion
+    have related ones. Variance 1/2.
+    """
     return np.sin(1e9 * z + 1.0)
 
 
@@ -39,10 +43,18 @@ def henon(error, noise=1e-5) -> FunctionMap:
 
     def derivative(z):
         one = np.ones(len(z))
-        return np.stack([np.stack([-2 * z[:, 0], one], axis=1), np.stack([0.3 * one, 0 * one], axis=1)], axis=1)
+        return np.stack(
+            [np.stack([-2 * z[:, 0], one], axis=1), np.stack([0.3 * one, 0 * one], axis=1)], axis=1
+        )
 
     exact = FunctionMap(image, "x y", derivative)
-    return FunctionMap(lambda z: image(z) + error * bounded(z + z[:, ::-1]) * SCALE, "x y", derivative, noise, exact)
+    return FunctionMap(
+        lambda z: image(z) + error * bounded(z + z[:, ::-1]) * SCALE,
+        "x y",
+        derivative,
+        noise,
+        exact,
+    )
 
 
 def starts(count=12, size=1):
@@ -66,7 +78,7 @@ def searched():
     return map_, found, label
 
 
-# -- scatter -------------------------------------------------------------------------------------------------------------------
+# -- scatter ---------------------------------------------------------------------------------------
 @pytest.mark.parametrize("slope", [0.0, 0.8, -0.9])
 def test_the_scatter_of_a_linear_map_is_that_of_its_errors_added_up(slope):
     """x' = a x + e u with independent u of variance 1/2: the variance of x is e^2/2 / (1 - a^2)."""
@@ -98,7 +110,8 @@ def test_starts_are_labelled_by_it(cycle, searched):
     map_, found, _ = searched
     result = settle(map_, starts(200, 2), found, 512)
     assert set(result.label) == {0}
-    exact = settle(map_.exact_map, starts(200, 2), found, 512)  # the check by an exact method knows it too
+    # the check by an exact method knows it too
+    exact = settle(map_.exact_map, starts(200, 2), found, 512)
     assert set(exact.label) == {0}
     assert np.abs(exact.end[:, None] - cycle.points).max(axis=2).min(axis=1).max() < 1e-4
 
@@ -114,8 +127,13 @@ def test_what_scouts_miss_is_found_by_the_post_pass():
 
 
 def test_the_starts_do_not_decide_the_scatter(searched):
-    """But for the last bits of the orbit, which errors of this kind amplify: 4 runs of 4096 points tell the scatter to some per cent."""
-    few, many = find_attractors(henon(1e-3), starts(2, 2), SCALE, 256)[0].sampled[0], searched[1].sampled[0]
+    """But for the last bits of the orbit, which errors of this kind amplify: 4 runs of 4096 points
+    tell the scatter to some per cent.
+    """
+    few, many = (
+        find_attractors(henon(1e-3), starts(2, 2), SCALE, 256)[0].sampled[0],
+        searched[1].sampled[0],
+    )
     np.testing.assert_allclose(few.scatter, many.scatter, rtol=0.05)
 
 
@@ -129,7 +147,7 @@ def test_an_exact_map_is_never_noisy():
     assert set(label) == {-1}
 
 
-# -- phases --------------------------------------------------------------------------------------------------------------------
+# -- phases ----------------------------------------------------------------------------------------
 def noisy_cycle(orbit) -> Noisy:
     one = blurred(henon(1e-3), orbit, SCALE)
     assert one is not None
@@ -140,8 +158,14 @@ def test_only_the_right_order_of_the_points_is_on_it(cycle):
     one = noisy_cycle(cycle)
     iterates = np.tile(cycle.points, (16, 1))
     slip = np.concatenate([iterates[:30], iterates[31:]])
-    backwards, jitter = iterates[::-1], np.random.default_rng(1).uniform(-1, 1, iterates.shape) * one.size * one.stray
-    shares = [one.share(each[None])[0] for each in (iterates, np.roll(iterates, 1, axis=0), iterates + jitter, slip, backwards)]
+    backwards, jitter = (
+        iterates[::-1],
+        np.random.default_rng(1).uniform(-1, 1, iterates.shape) * one.size * one.stray,
+    )
+    shares = [
+        one.share(each[None])[0]
+        for each in (iterates, np.roll(iterates, 1, axis=0), iterates + jitter, slip, backwards)
+    ]
     assert shares[:3] == [1.0, 1.0, 1.0]
     assert 0.4 < shares[3] < 0.6
     assert shares[4] < 0.6
@@ -154,17 +178,24 @@ def test_distances_are_those_at_the_best_of_all_shifts(cycle):
     runs = np.random.default_rng(3).normal(size=(5, 11, 2))
     slow = []
     for iterates in runs:
-        shifts = [[(iterates[j] - cycle.points[(j + shift) % 4]) / SCALE for j in range(11)] for shift in range(4)]
+        shifts = [
+            [(iterates[j] - cycle.points[(j + shift) % 4]) / SCALE for j in range(11)]
+            for shift in range(4)
+        ]
         slow.append(min(shifts, key=lambda rows: np.sum(np.square(rows))))
     np.testing.assert_allclose(apart(runs, cycle.points, SCALE), slow, rtol=1e-12)
 
 
-# -- one attractor, or none ----------------------------------------------------------------------------------------------------
+# -- one attractor, or none ------------------------------------------------------------------------
 def test_loops_that_errors_make_are_scatter_about_the_exact_orbit():
-    """x' = -x/2 - e sign(x) goes between 2e and -2e for ever: an orbit of period 2, closed to rounding, where the exact one has 1."""
+    """x' = -x/2 - e sign(x) goes between 2e and -2e for ever: an orbit of period 2, closed to
+    rounding, where the exact one has 1.
+    """
     error, derivative = 1e-3, lambda z: np.full((len(z), 1, 1), -0.5)
     exact = FunctionMap(lambda z: -0.5 * z, "x", derivative)
-    map_ = FunctionMap(lambda z: -0.5 * z - error * np.where(z < 0, -1.0, 1.0), "x", derivative, 1e-5, exact)
+    map_ = FunctionMap(
+        lambda z: -0.5 * z - error * np.where(z < 0, -1.0, 1.0), "x", derivative, 1e-5, exact
+    )
     assert orbit_near(map_, np.array([2.1 * error]), 2, WIDE).period == 2
     found, label, _ = find_attractors(map_, starts(), WIDE, 256)
     assert [(one.kind, one.orbit.period) for one in found.sampled] == [("noisy_periodic", 1)]
@@ -175,7 +206,13 @@ def test_loops_that_errors_make_are_scatter_about_the_exact_orbit():
 
 def test_an_orbit_that_errors_only_shift_stays_periodic():
     derivative = lambda z: np.full((len(z), 1, 1), 0.5)  # noqa: E731
-    map_ = FunctionMap(lambda z: 0.5 * z + 1e-3, "x", derivative, 1e-5, FunctionMap(lambda z: 0.5 * z, "x", derivative))
+    map_ = FunctionMap(
+        lambda z: 0.5 * z + 1e-3,
+        "x",
+        derivative,
+        1e-5,
+        FunctionMap(lambda z: 0.5 * z, "x", derivative),
+    )
     found, label, _ = find_attractors(map_, starts(), WIDE, 256)
     assert [orbit.period for orbit in found.orbits] == [1]
     assert not found.sampled
@@ -185,7 +222,9 @@ def test_an_orbit_that_errors_only_shift_stays_periodic():
 
 def test_orbits_beside_a_noisy_one_become_it(cycle):
     """Labels that were given before follow."""
-    elsewhere = FunctionMap(lambda z: 0.5 * z + 5.0, "x y", lambda z: np.tile(0.5 * np.eye(2), (len(z), 1, 1)))
+    elsewhere = FunctionMap(
+        lambda z: 0.5 * z + 5.0, "x y", lambda z: np.tile(0.5 * np.eye(2), (len(z), 1, 1))
+    )
     found = Found(Neighbourhoods.none(2))
     far = orbit_near(elsewhere, np.full(2, 9.9), 1, SCALE)
     found.add(henon(0.0).exact_map, cycle, SCALE)
@@ -209,7 +248,9 @@ def test_cells_that_have_a_label_keep_their_attractor_when_it_turns_out_to_be_no
 
 
 def test_errors_that_carry_the_motion_too_far_leave_it_without_a_type():
-    """0.02/(1 - 0.9) is a fifth of the range: no scatter about a point. What it would be, and how far it strays, is told."""
+    """0.02/(1 - 0.9) is a fifth of the range: no scatter about a point. What it would be, and how
+    far it strays, is told.
+    """
     found, label, _ = find_attractors(linear(0.9, 0.02), starts(), WIDE, 256)
     assert len(found) == 0
     assert set(label) == {-1}

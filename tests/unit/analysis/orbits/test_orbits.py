@@ -19,7 +19,10 @@ def henon(a: float, b: float = 0.3) -> FunctionMap:
 
     def derivative(z):
         one = np.ones(len(z))
-        return np.stack([np.stack([-2 * a * z[:, 0], one], axis=1), np.stack([b * one, 0 * one], axis=1)], axis=1)
+        return np.stack(
+            [np.stack([-2 * a * z[:, 0], one], axis=1), np.stack([b * one, 0 * one], axis=1)],
+            axis=1,
+        )
 
     return FunctionMap(image, "x y", derivative)
 
@@ -32,7 +35,11 @@ def logistic(r: float) -> FunctionMap:
 def affine(matrix, shift=(0.0, 0.0)) -> FunctionMap:
     """x -> A x + s."""
     matrix = np.array(matrix)
-    return FunctionMap(lambda z: z @ matrix.T + shift, "x y", lambda z: np.broadcast_to(matrix, (len(z), *matrix.shape)))
+    return FunctionMap(
+        lambda z: z @ matrix.T + shift,
+        "x y",
+        lambda z: np.broadcast_to(matrix, (len(z), *matrix.shape)),
+    )
 
 
 def test_fixed_point_and_multipliers_of_a_linear_contraction():
@@ -41,7 +48,8 @@ def test_fixed_point_and_multipliers_of_a_linear_contraction():
     orbit = orbit_near(affine(matrix, shift), np.array([0.8, 0.3]), 1, 10 * UNIT)
     assert orbit.period == 1
     assert np.abs(orbit.points[0] - np.linalg.solve(np.eye(2) - matrix, shift)).max() < 1e-14
-    assert orbit.multipliers == pytest.approx([0.4 + 0.1j, 0.4 - 0.1j], abs=1e-15)  # of a pair the upper one first
+    # of a pair the upper one first
+    assert orbit.multipliers == pytest.approx([0.4 + 0.1j, 0.4 - 0.1j], abs=1e-15)
     assert attracts(orbit)
     assert orbit.mismatch < 1e-15
 
@@ -58,14 +66,19 @@ def test_a_saddle_is_not_stable():
 
 
 def test_henon_two_cycle_in_closed_form():
-    """x of the 2-cycle solves a^2 x^2 - a (1-b) x + (1-b)^2 - a = 0; the product of its multipliers is b^2."""
+    """x of the 2-cycle solves a^2 x^2 - a (1-b) x + (1-b)^2 - a = 0; the product of its multipliers
+    is b^2.
+    """
     a, b = 0.9, 0.3
     x = np.sort(np.roots([a * a, -a * (1 - b), (1 - b) ** 2 - a]).real)
     orbit = orbit_near(henon(a, b), np.array([x[1] + 0.01, b * x[0] - 0.01]), 2, UNIT)
     assert orbit.period == 2
-    assert np.abs(orbit.points - np.stack([x, b * x[::-1]], axis=1)).max() < 1e-14  # the smallest x first, then as visited
+    # the smallest x first, then as visited
+    assert np.abs(orbit.points - np.stack([x, b * x[::-1]], axis=1)).max() < 1e-14
     trace = 4 * a * a * x[0] * x[1] + 2 * b
-    assert sorted(orbit.multipliers.real) == pytest.approx(sorted(np.roots([1, -trace, b * b]).real), abs=1e-14)
+    assert sorted(orbit.multipliers.real) == pytest.approx(
+        sorted(np.roots([1, -trace, b * b]).real), abs=1e-14
+    )
     assert attracts(orbit)
 
 
@@ -93,7 +106,8 @@ def test_superstable_point():
 
 
 def test_no_orbit_is_none():
-    assert orbit_near(affine(np.eye(2), (1.0, 0.0)), np.zeros(2), 1, UNIT) is None  # a translation: 1 - M is singular
+    # a translation: 1 - M is singular
+    assert orbit_near(affine(np.eye(2), (1.0, 0.0)), np.zeros(2), 1, UNIT) is None
     assert orbit_near(affine(np.diag([0.5, np.nan])), np.zeros(2), 1, UNIT) is None
     far = affine(0.5 * np.eye(2), (100.0, 0.0))
     assert orbit_near(far, np.zeros(2), 1, UNIT) is None  # its fixed point lies 200 ranges away
@@ -101,7 +115,9 @@ def test_no_orbit_is_none():
 
 def test_same_orbits_whatever_their_first_point_and_twins_that_are_not():
     points = np.array([[-1.0, 0.2], [0.5, 0.1], [1.0, 0.0]])
-    a, shifted, twin = (Orbit(p, np.zeros(2) + 0j, 0.0) for p in (points, np.roll(points, 1, axis=0), -points))
+    a, shifted, twin = (
+        Orbit(p, np.zeros(2) + 0j, 0.0) for p in (points, np.roll(points, 1, axis=0), -points)
+    )
     assert same(a, shifted, UNIT, 1e-9)
     assert not same(a, twin, UNIT, 1e-9)  # of equal amplitude
     assert not same(a, Orbit(points[:1], np.zeros(2) + 0j, 0.0), UNIT, 1e-9)
@@ -110,7 +126,13 @@ def test_same_orbits_whatever_their_first_point_and_twins_that_are_not():
 def test_an_orbit_of_an_inexact_map_does_not_depend_on_the_others_of_its_batch():
     """Errors that the place decides: means over other iterates would be others."""
     exact = FunctionMap(lambda z: 0.5 * z, "x", lambda z: np.full((len(z), 1, 1), 0.5))
-    map_ = FunctionMap(lambda z: 0.5 * z + 1e-6 * np.sin(1e9 * z), "x", lambda z: np.full((len(z), 1, 1), 0.5), 1e-5, exact)
+    map_ = FunctionMap(
+        lambda z: 0.5 * z + 1e-6 * np.sin(1e9 * z),
+        "x",
+        lambda z: np.full((len(z), 1, 1), 0.5),
+        1e-5,
+        exact,
+    )
     start, scale = np.full((2, 1), 0.1), np.ones((2, 1))
     both = find_orbits(map_, start, np.array([1, 48]), scale, np.full(2, map_.noise))
     alone = find_orbits(map_, start[:1], np.array([1]), scale[:1], np.full(1, map_.noise))

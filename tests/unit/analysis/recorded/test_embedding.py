@@ -24,7 +24,9 @@ def test_embedding():
 
 
 def test_mutual_information_of_known_series():
-    """A pair of normal variables of correlation r shares -ln(1 - r^2) / 2; cells lose a little of it, and find a little where none is."""
+    """A pair of normal variables of correlation r shares -ln(1 - r^2) / 2; cells lose a little of
+    it, and find a little where none is.
+    """
     smooth = np.empty_like(NOISE)
     smooth[0] = NOISE[0]
     for i in range(1, len(NOISE)):
@@ -55,7 +57,9 @@ def test_noise_has_no_dimension():
 
 
 def test_neighbours_that_part_at_a_known_rate():
-    """x -> 2 x mod 1, unfolded on a circle: every distance doubles, but for the curvature of the circle."""
+    """x -> 2 x mod 1, unfolded on a circle: every distance doubles, but for the curvature of the
+    circle.
+    """
     x, angles = 0.1234567, []
     rng = np.random.default_rng(3)
     for _ in range(4000):
@@ -65,7 +69,8 @@ def test_neighbours_that_part_at_a_known_rate():
     evolutions = follow(points, Search(1, 1e-6, 0.01, 5))
     assert np.abs(evolutions.growth - math.log(2)).max() < 1e-3
     assert len(evolutions.growth) == 3999
-    assert 0.01 < evolutions.distance.max() <= 0.05  # five times as far where nobody near is in the right direction
+    # five times as far where nobody near is in the right direction
+    assert 0.01 < evolutions.distance.max() <= 0.05
     assert evolutions.distance.min() >= 1e-6
 
 
@@ -74,7 +79,8 @@ def test_excluded_neighbours_and_those_too_close_are_not_taken():
     assert not len(follow(line, Search(1, 0.5, 3.0, 20)).growth)
     assert len(follow(line, Search(1, 0.5, 30.0, 20)).growth)
     twice = np.tile(np.arange(50.0), 4)[:, None]
-    assert follow(twice, Search(1, 0.5, 1.0, 5)).distance.min() == 1.0  # copies of a point lie at distance 0
+    # copies of a point lie at distance 0
+    assert follow(twice, Search(1, 0.5, 1.0, 5)).distance.min() == 1.0
     assert crowd_distance(NOISE[:2000, None], 1e-9, 5) < 0.1
     assert crowd_distance(line[:10], 1e-9, 5) == math.inf
 

@@ -1,4 +1,6 @@
-"""Grids of parameters and the responses over them: what users may write, threads, shares, Ctrl-C."""
+"""Grids of parameters and the responses over them: what users may write, threads,
+shares, Ctrl-C.
+"""
 
 import numpy as np
 import pytest
@@ -11,15 +13,25 @@ from saltus.errors import ParameterError, UnitError
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 
 
-# -- what users write ----------------------------------------------------------------------------------------------------------
+# -- what users write ------------------------------------------------------------------------------
 def test_an_axis_is_linear_or_logarithmic_or_an_array():
     np.testing.assert_allclose(axis(RIG, "frequency", ("10 Hz", "0.02 kHz", 3)), [10, 15, 20])
-    np.testing.assert_allclose(axis(RIG, "contact_stiffness", ("1 kN/m", 1e5, 3, "log")), [1e3, 1e4, 1e5])
+    np.testing.assert_allclose(
+        axis(RIG, "contact_stiffness", ("1 kN/m", 1e5, 3, "log")), [1e3, 1e4, 1e5]
+    )
     np.testing.assert_allclose(axis(RIG, "frequency", np.array([3.0, 4.0])), [3, 4])
 
 
 @pytest.mark.parametrize(
-    "given", [[2, 3, 4], [2.0, 3, "4 Hz"], ["2 Hz", "3 Hz", "0.004 kHz"], (2, 4, 3), ("2 Hz", 4.0, 3.0), np.array([2, 3, 4])]
+    "given",
+    [
+        [2, 3, 4],
+        [2.0, 3, "4 Hz"],
+        ["2 Hz", "3 Hz", "0.004 kHz"],
+        (2, 4, 3),
+        ("2 Hz", 4.0, 3.0),
+        np.array([2, 3, 4]),
+    ],
 )
 def test_a_list_holds_the_values_and_a_tuple_is_a_range(given):
     np.testing.assert_allclose(axis(RIG, "frequency", given), [2, 3, 4])
@@ -88,7 +100,11 @@ def test_an_unforced_system_is_told_what_to_give():
     def free(t, x, v, *, stiffness=1.0):
         return v, -stiffness * x
 
-    with pytest.raises(ParameterError, match=r"Take sl\.bifurcation_diagram over another parameter, with every="):
+    with pytest.raises(
+        ParameterError,
+        match=r"Take sl\.bifurcation_diagram over another "
+        r"parameter, with every=",
+    ):
         sl.frequency_response(free, (1.0, 2.0, 3))
     with pytest.raises(ParameterError, match="give every="):
         sl.bifurcation_diagram(free, {"stiffness": (1.0, 2.0, 3)})
@@ -100,20 +116,35 @@ def test_an_unforced_system_is_told_what_to_give():
 
 def test_a_huge_grid_is_refused_before_it_fills_memory():
     with pytest.raises(ParameterError, match="coarser grid"):
-        grid_of(RIG, {"frequency": ("1 Hz", "2 Hz", 100_000)}, {"x": np.zeros(100), "v": 0.0}, None, None, 1, False)
+        grid_of(
+            RIG,
+            {"frequency": ("1 Hz", "2 Hz", 100_000)},
+            {"x": np.zeros(100), "v": 0.0},
+            None,
+            None,
+            1,
+            False,
+        )
 
 
 def test_contacts_of_a_method_without_them_are_refused():
     with pytest.raises(ParameterError, match="locates no contacts"):
-        sl.bifurcation_diagram(RIG, {"force": ("1 N", "2 N", 2)}, sample="contacts", method=sl.ODE45(events="ignore"))
+        sl.bifurcation_diagram(
+            RIG, {"force": ("1 N", "2 N", 2)}, sample="contacts", method=sl.ODE45(events="ignore")
+        )
     with pytest.raises(ParameterError, match="Did you mean 'stroboscope'"):
         sl.bifurcation_diagram(RIG, {"force": ("1 N", "2 N", 2)}, sample="stroboscop")
 
 
-# -- what comes out --------------------------------------------------------------------------------------------------------------
+# -- what comes out --------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def few():
-    return sl.frequency_response(RIG, ("14.5 Hz", "16 Hz", 4), start="random 40", box={"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")})
+    return sl.frequency_response(
+        RIG,
+        ("14.5 Hz", "16 Hz", 4),
+        start="random 40",
+        box={"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")},
+    )
 
 
 def test_threads_change_nothing_and_the_order_of_starts_only_the_last_digits(few):
@@ -122,7 +153,8 @@ def test_threads_change_nothing_and_the_order_of_starts_only_the_last_digits(few
     assert one.attrs["result_hash"] == few.attrs["result_hash"]
     starts = {"x": few.start_x.values[::-1], "v": few.start_v.values[::-1]}
     alone = sl.frequency_response(RIG, np.array([15.0]), start=starts)
-    np.testing.assert_allclose(alone.rms.values[0, ::-1], few.rms.values[1], rtol=1e-12)  # Newton's method from another start
+    # Newton's method from another start
+    np.testing.assert_allclose(alone.rms.values[0, ::-1], few.rms.values[1], rtol=1e-12)
     np.testing.assert_array_equal(alone.period.values[0, ::-1], few.period.values[1])
 
 
@@ -131,14 +163,24 @@ def test_shares_of_random_starts_add_up_and_lie_in_their_intervals(few):
         here = few.response_frequency.values == value
         settled = (few.response_of.sel(frequency=value) >= 0).mean().item()
         assert few.response_share.values[here].sum() == pytest.approx(settled)
-    assert ((few.response_share_low <= few.response_share) & (few.response_share <= few.response_share_high)).all()
+    assert (
+        (few.response_share_low <= few.response_share)
+        & (few.response_share <= few.response_share_high)
+    ).all()
 
 
 def test_every_cell_is_that_of_its_response(few):
     of = few.response_of.values
-    for name, column in (("rms", "response_rms"), ("peak", "response_peak"), ("period", "response_period")):
+    for name, column in (
+        ("rms", "response_rms"),
+        ("peak", "response_peak"),
+        ("period", "response_period"),
+    ):
         np.testing.assert_array_equal(few[name].values[of >= 0], few[column].values[of[of >= 0]])
-    assert (few.response_frequency.values[of[of >= 0]] == np.broadcast_to(few.frequency.values[:, None], of.shape)[of >= 0]).all()
+    assert (
+        few.response_frequency.values[of[of >= 0]]
+        == np.broadcast_to(few.frequency.values[:, None], of.shape)[of >= 0]
+    ).all()
 
 
 def test_results_survive_a_file(few, tmp_path):
@@ -164,7 +206,9 @@ def test_ctrl_c_keeps_what_is_known():
             raise KeyboardInterrupt
 
     with pytest.raises(sl.Interrupted) as stop:
-        sl.frequency_response(RIG, ("14 Hz", "16 Hz", 9), follow=True, start=(0.0, 0.0), progress=press)
+        sl.frequency_response(
+            RIG, ("14 Hz", "16 Hz", 9), follow=True, start=(0.0, 0.0), progress=press
+        )
     part = stop.value.partial
     assert part.response_of.values[0, 0] == 0
     assert (part.type.values[1:] == "not_computed").all()
@@ -178,7 +222,13 @@ def test_a_chaotic_response_is_typed_and_shown():
     assert np.isfinite(ds.sample_x.values).sum() > 100
 
 
-@pytest.mark.parametrize("axes", [{"frequency": ("14 Hz", "16 Hz", 2)}, {"frequency": ("14 Hz", "16 Hz", 2), "force": ("1 N", "2 N", 2)}])
+@pytest.mark.parametrize(
+    "axes",
+    [
+        {"frequency": ("14 Hz", "16 Hz", 2)},
+        {"frequency": ("14 Hz", "16 Hz", 2), "force": ("1 N", "2 N", 2)},
+    ],
+)
 def test_where_nothing_is_found_the_result_says_so(axes, tmp_path):
     """Starts beyond the range of numbers: all escape."""
     ds = sl.bifurcation_diagram(RIG, axes, {"x": 1e200, "v": 0.0}, progress=False)

@@ -12,11 +12,15 @@ from saltus.results.dataset import schema
 def made(**changes):
     arguments = {
         "columns": {
-            "kind": ["periodic", "chaotic"], "response_period": [3, 0], "lyapunov_exponent": [[-0.5, -1.0], [0.5, -2.0]],
-            "lyapunov_high": [[-0.5, -1.0], [0.6, -1.9]], "near_graze": [1, 0], "smallest_gap_margin": [1e-4, np.inf],
-            "running_exponent": np.zeros((2, 2, 5)), "running_time": np.ones((2, 5)), "status": ["ok", "ok"],
+            "kind": ["periodic", "chaotic"], "response_period": [3, 0],
+            "lyapunov_exponent": [[-0.5, -1.0], [0.5, -2.0]],
+            "lyapunov_high": [[-0.5, -1.0], [0.6, -1.9]], "near_graze": [1, 0],
+            "smallest_gap_margin": [1e-4, np.inf],
+            "running_exponent": np.zeros((2, 2, 5)), "running_time": np.ones((2, 5)),
+            "status": ["ok", "ok"],
         },
-        "rate": "bit/s", "states": ("x", "v"), "gap_unit": "m", "units": {"frequency": "Hz"}, "varied": {"frequency": np.array([5.0, 7.0])},
+        "rate": "bit/s", "states": ("x", "v"), "gap_unit": "m", "units": {"frequency": "Hz"},
+        "varied": {"frequency": np.array([5.0, 7.0])},
         "attrs": {"algorithm": "by hand", "parameters": "{}", "settings": [1, 2]},
     }  # fmt: skip
     return made_results.exponents(**{**arguments, **changes})
@@ -57,6 +61,8 @@ def test_a_parameter_can_not_take_a_name_of_the_result():
 def test_check_knows_the_kind():
     schema.check(made(), caller="plot.exponents", kinds=[schema.EXPONENTS])
     with pytest.raises(ParameterError, match="misses running_exponent"):
-        schema.check(made().drop_vars("running_exponent"), caller="plot.exponents", kinds=[schema.EXPONENTS])
+        schema.check(
+            made().drop_vars("running_exponent"), caller="plot.exponents", kinds=[schema.EXPONENTS]
+        )
     with pytest.raises(ParameterError, match=r"this Dataset is from sl\.lyapunov"):
         sl.settled(made())

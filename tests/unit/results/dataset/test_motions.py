@@ -1,4 +1,6 @@
-"""Sections, spectra, impacts and energies as Datasets: names, dims, units; through a file and back; in words."""
+"""Sections, spectra, impacts and energies as Datasets: names, dims, units; through a file and back;
+in words.
+"""
 
 import numpy as np
 import pytest
@@ -10,8 +12,10 @@ from saltus.errors import ParameterError
 from saltus.results.dataset import schema
 
 EVERY = {
-    "section": section(), "section of two": section(2), "impacts": impacts(), "impacts of two": impacts(2), "energy": energy(),
-    "energy of two": energy(2), "energy in time": energy(along="time"), "spectrum": spectrum(), "spectra": spectrum(2),
+    "section": section(), "section of two": section(2), "impacts": impacts(),
+    "impacts of two": impacts(2), "energy": energy(),
+    "energy of two": energy(2), "energy in time": energy(along="time"), "spectrum": spectrum(),
+    "spectra": spectrum(2),
     "spectra of their own": spectrum(2, own=True),
 }  # fmt: skip
 
@@ -33,7 +37,10 @@ def test_everything_has_a_name_and_a_unit(ds):
     ("ds", "words"),
     [
         (section(), "x = 0.3 mm, both ways"),
-        (impacts(), "lower_gap: 0.5 a second, at 0.5 m/s on average, in contact 50.00% of the time"),
+        (
+            impacts(),
+            "lower_gap: 0.5 a second, at 0.5 m/s on average, in contact 50.00% of the time",
+        ),
         (energy(), "0.003 J supplied and 0.002 J dissipated"),
         (spectrum(2), "9 lines up to 8 Hz, window none"),
     ],
@@ -49,5 +56,12 @@ def test_units_follow_the_system():
 
 
 def test_a_state_with_the_name_of_a_column_is_refused():
-    with pytest.raises(ParameterError, match="the state 'crossings' has the name of something else"):
-        made_results.motion(schema.SECTION, **common(1, ("crossings",)), each=each(1), table={"crossings": np.zeros(2)})
+    with pytest.raises(
+        ParameterError, match="the state 'crossings' has the name of something else"
+    ):
+        made_results.motion(
+            schema.SECTION,
+            **common(1, ("crossings",)),
+            each=each(1),
+            table={"crossings": np.zeros(2)},
+        )

@@ -1,4 +1,6 @@
-"""Functions that read results: over one that was changed they say so, and a mistake of saltus stays one."""
+"""Functions that read results: over one that was changed they say so, and a mistake of saltus stays
+one.
+"""
 
 import matplotlib as mpl
 import pytest
@@ -23,7 +25,10 @@ mpl.use("Agg")
         (describe, lambda: sine_run().assign_attrs(varied_parameters="5")),
         (describe, lambda: sine_run().assign_attrs(parameters="[" * 100_000)),
         (describe, lambda: impacts().rename_dims(contact="event")),
-        (draw_impacts, lambda: impacts().drop_vars("speed_low").assign(speed_low=(("q", "r"), [[1.0, 2.0]]))),
+        (
+            draw_impacts,
+            lambda: impacts().drop_vars("speed_low").assign(speed_low=(("q", "r"), [[1.0, 2.0]])),
+        ),
         (draw_section, lambda: section().assign(crossing_direction=("q", [1, 2]))),
         (history, lambda: sine_run().assign(x=("contact", sine_run()["contact_time"].values))),
     ],

@@ -1,4 +1,6 @@
-"""Steady responses over parameters: what the schema promises, and files that bring all of it back."""
+"""Steady responses over parameters: what the schema promises, and files that bring
+all of it back.
+"""
 
 import csv
 import dataclasses
@@ -16,20 +18,31 @@ from saltus.results.dataset.kinds import Kind
 from .responses_data import NO_RESPONSE, RESPONSE_OF, TABLE, responses, two_parameters
 
 SAMPLED = Responses(
-    TABLE, np.array([[0], [0], [1], [2], [2]]), np.array([0, 1, 0, 0, 2]), [np.full((n, 2), 1e-3 * n) for n in (2, 6, 2, 4, 9)]
+    TABLE,
+    np.array([[0], [0], [1], [2], [2]]),
+    np.array([0, 1, 0, 0, 2]),
+    [np.full((n, 2), 1e-3 * n) for n in (2, 6, 2, 4, 9)],
 )
 CASES = {
     "frequency response": responses,
     "no guards": lambda: responses(guards=None),
-    "a gap that varies": lambda: responses(guards=Guards(("stop",), ("x",), np.array([[1e-3, 2e-3, 3e-3]]))),
+    "a gap that varies": lambda: responses(
+        guards=Guards(("stop",), ("x",), np.array([[1e-3, 2e-3, 3e-3]]))
+    ),
     "two parameters": two_parameters,
     "samples": lambda: responses(responses=SAMPLED, sample="turning_points"),
     "no events": lambda: responses(events=None),
     "no response": lambda: responses(
-        responses=Responses(NO_RESPONSE, np.zeros((0, 1)), np.zeros(0)), response_of=np.full((3, 2), -3), events=None
+        responses=Responses(NO_RESPONSE, np.zeros((0, 1)), np.zeros(0)),
+        response_of=np.full((3, 2), -3),
+        events=None,
     ),
     "sweep": lambda: responses(starts=Starts(directions=["up", "down"])),
-    "no shares": lambda: responses(responses=Responses(dataclasses.replace(TABLE, fractions=None), SAMPLED.place, SAMPLED.branch)),
+    "no shares": lambda: responses(
+        responses=Responses(
+            dataclasses.replace(TABLE, fractions=None), SAMPLED.place, SAMPLED.branch
+        )
+    ),
 }
 
 
@@ -42,7 +55,9 @@ def test_a_file_brings_back_every_bit(make, netcdf3, tmp_path, monkeypatch):
     back = load(save(ds, tmp_path / "responses.nc"))
     xr.testing.assert_identical(back, ds)
     assert content_hash(back) == ds.attrs["result_hash"]
-    assert {name: back[name].dtype.kind for name in back.variables} == {name: ds[name].dtype.kind for name in ds.variables}
+    assert {name: back[name].dtype.kind for name in back.variables} == {
+        name: ds[name].dtype.kind for name in ds.variables
+    }
 
 
 @pytest.mark.parametrize("make", CASES.values(), ids=CASES)
@@ -58,9 +73,17 @@ def test_the_grid_is_looked_up_in_the_responses():
     ds = responses()
     assert ds["response_of"].dims == ("frequency", "start")
     assert ds["response_of"].values.tolist() == RESPONSE_OF.tolist()
-    assert ds["rms"].values.tolist() == [[5e-4, 1e-3], [1.5e-3, pytest.approx(np.nan, nan_ok=True)], [2e-3, 2.5e-3]]
+    assert ds["rms"].values.tolist() == [
+        [5e-4, 1e-3],
+        [1.5e-3, pytest.approx(np.nan, nan_ok=True)],
+        [2e-3, 2.5e-3],
+    ]
     assert ds["period"].values.tolist() == [[1, 3], [1, 0], [1, 0]]
-    assert ds["type"].values.tolist() == [["periodic", "periodic"], ["periodic", "escaped"], ["periodic", "chaotic"]]
+    assert ds["type"].values.tolist() == [
+        ["periodic", "periodic"],
+        ["periodic", "escaped"],
+        ["periodic", "chaotic"],
+    ]
     assert ds["contacts_per_period"].values[0].tolist() == [2.0, 3.0]
     assert ds["response_frequency"].values.tolist() == [4.0, 4.0, 5.0, 6.0, 6.0]
     assert ds["response_frequency"].attrs["units"] == "Hz"
@@ -125,7 +148,9 @@ def test_describe_counts():
 
 def test_describe_a_map_without_branches():
     text = describe(two_parameters())
-    assert "3 x 2 values, frequency from 4 to 6 Hz, gap from 0.001 to 0.002 m, 1 start at each" in text
+    assert (
+        "3 x 2 values, frequency from 4 to 6 Hz, gap from 0.001 to 0.002 m, 1 start at each"
+    ) in text
     assert "5 responses: 3 T, 1 3T, 1 chaotic" in text
 
 
@@ -137,6 +162,11 @@ def test_csv_has_a_row_for_each_response(tmp_path):
     assert float(rows[1][header.index("rms [m]")]) == TABLE.rms[1]
     with (tmp_path / "a_events.csv").open(encoding="utf-8") as file:
         header, row = csv.reader(line for line in file if not line.startswith("#"))
-    assert dict(zip(header, row, strict=True)) == {"event": "0", "kind": "graze", "branch": "0", "frequency [Hz]": "5.5"}
+    assert dict(zip(header, row, strict=True)) == {
+        "event": "0",
+        "kind": "graze",
+        "branch": "0",
+        "frequency [Hz]": "5.5",
+    }
     save(responses(events=None), tmp_path / "b.csv")
     assert not (tmp_path / "b_events.csv").exists()

@@ -14,9 +14,22 @@ from saltus.results import Result, load, save
 
 @pytest.mark.parametrize("call", ["to_dataframe", "to_dataarray", "to_dask_dataframe"])
 def test_the_product_of_samples_contacts_and_guards_is_refused(batch, call):
-    rows = batch.sizes["trajectory"] * batch.sizes["time"] * batch.sizes["contact"] * batch.sizes["guard"]
-    says = rf"{call} of this result would multiply its tables \(trajectory x time and contact .*\) to {rows} rows\. Take one: "
-    with pytest.raises(ParameterError, match=says + rf"sl\.samples\(run\), sl\.contacts\(run\) or run\[\['x', 'v'\]\]\.{call}\(\)"):
+    rows = (
+        batch.sizes["trajectory"]
+        * batch.sizes["time"]
+        * batch.sizes["contact"]
+        * batch.sizes["guard"]
+    )
+    says = (
+        rf"{call} of this result would multiply its tables \(trajectory x time and contact "
+        rf".*\) "
+        rf"to {rows} rows\. Take one: "
+    )
+    with pytest.raises(
+        ParameterError,
+        match=says + rf"sl\.samples\(run\), sl\.contacts\(run\) or "
+        rf"run\[\['x', 'v'\]\]\.{call}\(\)",
+    ):
         getattr(batch, call)()
 
 
@@ -28,7 +41,9 @@ def test_tables_of_a_run_without_contacts_are_not_lost_in_an_empty_frame(batch):
 
 def test_variables_of_one_table_become_a_frame_as_of_any_dataset(batch):
     frame = batch[["x", "v"]].to_dataframe()
-    pd.testing.assert_frame_equal(frame, xr.Dataset(dict(batch[["x", "v"]].variables)).to_dataframe(), check_like=True)
+    pd.testing.assert_frame_equal(
+        frame, xr.Dataset(dict(batch[["x", "v"]].variables)).to_dataframe(), check_like=True
+    )
     assert len(frame) == batch.sizes["trajectory"] * batch.sizes["time"]
     assert len(batch[["status", "events"]].to_dataframe()) == 3
     assert len(batch[["contact_time", "contact_guard"]].to_dataframe()) == batch.sizes["contact"]
@@ -38,9 +53,12 @@ def test_variables_of_one_table_become_a_frame_as_of_any_dataset(batch):
 
 def test_it_stays_what_it_is(batch, tmp_path):
     kept = [
-        batch.isel(trajectory=0), batch.sel(time=slice(0, 1)), batch[["x"]], batch.assign_attrs(a=1), batch.drop_vars("mode"), batch.copy(),
-        copy.deepcopy(batch), pickle.loads(pickle.dumps(batch)), batch.assign(twice=2 * batch["x"]), xr.concat([batch, batch], "run"),
-        load(save(batch, tmp_path / "run.nc")), batch.rename(x="y"), batch.transpose(), batch.load(),
+        batch.isel(trajectory=0), batch.sel(time=slice(0, 1)), batch[["x"]],
+        batch.assign_attrs(a=1), batch.drop_vars("mode"), batch.copy(),
+        copy.deepcopy(batch), pickle.loads(pickle.dumps(batch)), batch.assign(twice=2 * batch["x"]),
+        xr.concat([batch, batch], "run"),
+        load(save(batch, tmp_path / "run.nc")), batch.rename(x="y"), batch.transpose(),
+        batch.load(),
     ]  # fmt: skip
     assert {type(one) for one in kept} == {Result}
     assert kept[7].identical(batch)

@@ -10,7 +10,9 @@ from saltus.results.dataset import schema
 from unit.results.conftest import GAP, sine_points, sine_run
 
 
-@pytest.mark.parametrize("make", [sine_run, lambda: sine_run((2e-3, 0.5e-3), batch=True), sine_points])
+@pytest.mark.parametrize(
+    "make", [sine_run, lambda: sine_run((2e-3, 0.5e-3), batch=True), sine_points]
+)
 def test_every_variable_says_what_it_is(make):
     for name, variable in make().variables.items():
         assert isinstance(variable.attrs["units"], str), name
@@ -44,8 +46,20 @@ def test_contacts_are_those_of_the_closed_form(run):
 
 def test_units_follow_the_states_and_guards(run):
     units = {name: run[name].attrs["units"] for name in run.variables}
-    assert [units[name] for name in ("time", "x", "v", "contact_x", "end_v", "contact_velocity", "guard_boundary", "period", "mode")] == [
-        "s", "m", "m/s", "m", "m/s", "m/s", "m", "1", "1"]  # fmt: skip
+    assert [
+        units[name]
+        for name in (
+            "time",
+            "x",
+            "v",
+            "contact_x",
+            "end_v",
+            "contact_velocity",
+            "guard_boundary",
+            "period",
+            "mode",
+        )
+    ] == ["s", "m", "m/s", "m", "m/s", "m/s", "m", "1", "1"]
     assert schema.rate_unit("m/s") == "m/s^2"
     assert schema.rate_unit("") == ""
 
@@ -80,7 +94,11 @@ def test_a_state_called_velocity_keeps_both_variables():
     assert schema.contact_name("x") == "contact_x"
     assert schema.contact_name("velocity") == "contact_state_velocity"
     x = np.zeros((1, 49))
-    run = sine_run(states=("x", "velocity"), values={"x": x, "velocity": x + 1}, end={"x": [0.0], "velocity": [1.0]})
+    run = sine_run(
+        states=("x", "velocity"),
+        values={"x": x, "velocity": x + 1},
+        end={"x": [0.0], "velocity": [1.0]},
+    )
     assert np.abs(run["contact_velocity"].values).max() > 0
     assert "contact_state_velocity" in run
 

@@ -1,4 +1,6 @@
-"""Files: netCDF of both kinds, CSV, MATLAB. Numbers come back bit for bit, the same result gives the same bytes."""
+"""Files: netCDF of both kinds, CSV, MATLAB. Numbers come back bit for bit, the same result gives
+the same bytes.
+"""
 
 import csv
 
@@ -49,7 +51,9 @@ def test_save_and_load_return_the_same(case, engine, tmp_path):
     for name, variable in run.variables.items():
         assert back[name].dtype.kind == variable.dtype.kind, name
         assert variable.dtype.kind == "U" or back[name].dtype == variable.dtype, name
-    assert {key: type(value) for key, value in back.attrs.items()} == {key: type(value) for key, value in run.attrs.items()}
+    assert {key: type(value) for key, value in back.attrs.items()} == {
+        key: type(value) for key, value in run.attrs.items()
+    }
     assert content_hash(back) == run.attrs["result_hash"]
 
 
@@ -88,7 +92,7 @@ def test_only_results_are_written(write, tmp_path):
         write(xr.Dataset({"x": 1.0}), tmp_path / "run.nc")
 
 
-# -- CSV ----------------------------------------------------------------------------------------------------------------------------------
+# -- CSV -------------------------------------------------------------------------------------------
 def read(path):
     return pd.read_csv(path, comment="#")
 
@@ -103,8 +107,19 @@ def test_csv_has_units_and_all_digits(run, tmp_path):
 def test_csv_of_contacts(run, tmp_path):
     to_csv(run, tmp_path / "run.csv")
     table = read(tmp_path / "run_contacts.csv")
-    assert table.columns.tolist() == ["time [s]", "time_error [s]", "guard", "direction", "velocity [m/s]", "kind", "mode_before",
-                                      "mode_after", "steps", "x [m]", "v [m/s]"]  # fmt: skip
+    assert table.columns.tolist() == [
+        "time [s]",
+        "time_error [s]",
+        "guard",
+        "direction",
+        "velocity [m/s]",
+        "kind",
+        "mode_before",
+        "mode_after",
+        "steps",
+        "x [m]",
+        "v [m/s]",
+    ]
     assert table["time [s]"].values.tobytes() == run["contact_time"].values.tobytes()
     assert table["kind"].unique().tolist() == ["crossing"]
     assert len(list(tmp_path.iterdir())) == 2
@@ -118,7 +133,10 @@ def test_csv_of_a_batch_is_long(batch, tmp_path):
     each = read(tmp_path / "run_trajectories.csv")
     assert each["status"].tolist() == ["ok"] * 3
     assert each["events"].tolist() == [6, 0, 6]
-    assert read(tmp_path / "run_contacts.csv")["trajectory"].tolist() == batch["contact_trajectory"].values.tolist()
+    assert (
+        read(tmp_path / "run_contacts.csv")["trajectory"].tolist()
+        == batch["contact_trajectory"].values.tolist()
+    )
 
 
 def test_csv_of_trajectories_with_periods_of_their_own(tmp_path):
@@ -134,8 +152,13 @@ def test_csv_says_where_it_comes_from(tmp_path):
     lines = (tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
     notes = [line for line in lines if line.startswith("#")]
     assert len(lines) == len(notes) + 1 + 49
-    for part in ("# system: sine", '# source: "two\\nlines"', f"# result_hash: {run.attrs['result_hash']}", "# status: ok",
-                 "# guard gap: x = 0.001 m"):  # fmt: skip
+    for part in (
+        "# system: sine",
+        '# source: "two\\nlines"',
+        f"# result_hash: {run.attrs['result_hash']}",
+        "# status: ok",
+        "# guard gap: x = 0.001 m",
+    ):
         assert part in notes
 
 
@@ -143,18 +166,25 @@ def test_csv_of_stroboscope(tmp_path):
     table = read(to_csv(sine_points(), tmp_path / "points.csv"))
     assert table.columns.tolist() == ["trajectory", "period", "x [m]", "v [m/s]"]
     assert table["period"].tolist() == [10**6, 10**6 + 1, 10**6 + 2, 10**6 + 3] * 2
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["points.csv", "points_trajectories.csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "points.csv",
+        "points_trajectories.csv",
+    ]
 
 
 def test_csv_quotes_what_holds_a_comma(tmp_path):
     run = sine_run(guards=("max(x, 0)",))
     to_csv(run, tmp_path / "run.csv")
-    rows = [row for row in csv.reader((tmp_path / "run_contacts.csv").open()) if not row[0].startswith("#")]
+    rows = [
+        row
+        for row in csv.reader((tmp_path / "run_contacts.csv").open())
+        if not row[0].startswith("#")
+    ]
     assert {len(row) for row in rows} == {11}
     assert rows[1][2] == "max(x, 0)"
 
 
-# -- MATLAB -------------------------------------------------------------------------------------------------------------------------------
+# -- MATLAB ----------------------------------------------------------------------------------------
 def test_mat_reads_back(run, tmp_path):
     back = loadmat(to_mat(run, tmp_path / "run.mat"), simplify_cells=True)
     assert back["x"].tobytes() == run["x"].values.tobytes()
@@ -180,11 +210,28 @@ def test_mat_has_columns_and_cells(batch, tmp_path):
 def test_mat_names_are_ones_that_matlab_takes(tmp_path):
     states = ("end", "_y", "größe", "a" * 40, "a" * 41)
     x = np.zeros((1, 49))
-    run = sine_run(guards=(), states=states, values=dict.fromkeys(states, x), end=dict.fromkeys(states, (0.0,)), units={},
-                   contacts=_no_contacts(5))  # fmt: skip
+    run = sine_run(
+        guards=(),
+        states=states,
+        values=dict.fromkeys(states, x),
+        end=dict.fromkeys(states, (0.0,)),
+        units={},
+        contacts=_no_contacts(5),
+    )
     back = loadmat(to_mat(run, tmp_path / "run.mat"), simplify_cells=True)
-    names = [name for name in (*back, *back["contact"], *back["provenance"], *back["units"]) if not name.startswith("__")]
-    assert all(name.isascii() and name.isidentifier() and name[0].isalpha() and len(name) <= 31 and name != "end" for name in names)
+    names = [
+        name
+        for name in (*back, *back["contact"], *back["provenance"], *back["units"])
+        if not name.startswith("__")
+    ]
+    assert all(
+        name.isascii()
+        and name.isidentifier()
+        and name[0].isalpha()
+        and len(name) <= 31
+        and name != "end"
+        for name in names
+    )
     assert back["names"]["v_end"] == "end"
     assert back["names"]["gr__e"] == "größe"
     assert {back["names"]["a" * 31], back["names"]["a" * 29 + "_2"]} == {"a" * 40, "a" * 41}
@@ -203,7 +250,13 @@ def test_every_result_becomes_a_mat_file(case, tmp_path):
 
 
 def test_the_accessor_does_the_same(run, tmp_path):
-    assert run.saltus.to_csv(tmp_path / "a.csv").read_bytes() == to_csv(run, tmp_path / "b.csv").read_bytes()
-    assert run.saltus.to_mat(tmp_path / "a.mat").read_bytes() == to_mat(run, tmp_path / "b.mat").read_bytes()
+    assert (
+        run.saltus.to_csv(tmp_path / "a.csv").read_bytes()
+        == to_csv(run, tmp_path / "b.csv").read_bytes()
+    )
+    assert (
+        run.saltus.to_mat(tmp_path / "a.mat").read_bytes()
+        == to_mat(run, tmp_path / "b.mat").read_bytes()
+    )
     assert run.saltus.save(tmp_path / "a.nc").exists()
     assert "sine" in run.saltus.describe()

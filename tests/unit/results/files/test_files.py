@@ -18,12 +18,16 @@ from unit.results.conftest import sine_run
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of file sizes are POSIX")
 def test_a_write_that_the_system_refuses_leaves_nothing(tmp_path):
-    """The kernel refuses to let any file grow beyond 20 kB, which is what a full disk looks like from inside."""
+    """The kernel refuses to let any file grow beyond 20 kB, which is what a full disk looks like
+    from inside.
+    """
     names = ["run.nc", "run3.nc", "run.csv", "run.mat"]
     old = [tmp_path / f"old_{name}" for name in names]
     for path in old:
         path.write_bytes(b"what stood here before")
-    paths = [path for name, before in zip(names, old, strict=True) for path in (tmp_path / name, before)]
+    paths = [
+        path for name, before in zip(names, old, strict=True) for path in (tmp_path / name, before)
+    ]
     script = f"""
         import resource, sys
         sys.path[:0] = {[str(Path(__file__).parents[2]), *sys.path]!r}
@@ -39,7 +43,13 @@ def test_a_write_that_the_system_refuses_leaves_nothing(tmp_path):
             except Exception as error:
                 print(type(error).__name__, error)
     """
-    done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
     lines = done.stdout.splitlines()
     assert len(lines) == 8, done
     for line, path in zip(lines, paths, strict=True):
@@ -90,16 +100,26 @@ def test_a_link_out_of_the_folder_is_not_written_through(tmp_path):
         save(sine_run(), tmp_path / "out" / "run.nc")
     assert (tmp_path / "precious").read_text() == "mine"
     (tmp_path / "linked").symlink_to(tmp_path / "out")
-    assert save(sine_run(), tmp_path / "linked" / "other.nc").exists(), "a folder may be a link: it was named by whoever asked"
+    assert save(sine_run(), tmp_path / "linked" / "other.nc").exists(), (
+        "a folder may be a link: it was named by whoever asked"
+    )
 
 
 def test_old_drafts_are_removed_and_nothing_else(tmp_path):
-    names = [".run.nc.0123abcd.part", ".0123abcd.part", ".run.nc.part", "run.nc.0123abcd.part", ".run.nc.0123abcd.part.nc"]
+    names = [
+        ".run.nc.0123abcd.part",
+        ".0123abcd.part",
+        ".run.nc.part",
+        "run.nc.0123abcd.part",
+        ".run.nc.0123abcd.part.nc",
+    ]
     for name in [*names, ".young.nc.0123abcd.part"]:
         (tmp_path / name).touch()
         os.utime(tmp_path / name, (0, 0) if "young" not in name else None)
     usable_folder(tmp_path)
-    assert sorted(one.name for one in tmp_path.iterdir()) == sorted([*names[2:], ".young.nc.0123abcd.part"])
+    assert sorted(one.name for one in tmp_path.iterdir()) == sorted(
+        [*names[2:], ".young.nc.0123abcd.part"]
+    )
 
 
 def test_nothing_is_visible_before_the_end(tmp_path):
@@ -111,7 +131,7 @@ def test_nothing_is_visible_before_the_end(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
 
 
-# -- load ---------------------------------------------------------------------------------------------------------------------------------
+# -- load ------------------------------------------------------------------------------------------
 @pytest.fixture(params=["h5netcdf", "scipy"])
 def saved(request, tmp_path, monkeypatch):
     if request.param == "scipy":
@@ -128,7 +148,9 @@ def test_a_file_that_was_cut_is_refused(saved, keep):
 
 
 def test_no_flipped_byte_goes_unnoticed(saved):
-    """Whichever byte is changed, load refuses the file or returns exactly what was saved (the byte was padding)."""
+    """Whichever byte is changed, load refuses the file or returns exactly what was saved (the byte
+    was padding).
+    """
     data, run = saved.read_bytes(), load(saved)
     refused = 0
     for place in range(50, len(data), len(data) // 150):
@@ -152,7 +174,11 @@ def test_a_changed_file_says_so(saved):
 
 @pytest.mark.parametrize(
     ("name", "content", "message"),
-    [("run.nc", b"hello", "not a netCDF file"), ("run.csv", b"a,b", r"only \.nc files"), ("gone.nc", None, "there is no file")],
+    [
+        ("run.nc", b"hello", "not a netCDF file"),
+        ("run.csv", b"a,b", r"only \.nc files"),
+        ("gone.nc", None, "there is no file"),
+    ],
 )
 def test_other_files_are_told_apart(name, content, message, tmp_path):
     if content:

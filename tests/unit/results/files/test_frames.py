@@ -20,10 +20,12 @@ def test_contacts_are_a_row_each(run):
     np.testing.assert_array_equal(frame["x"], GAP)
     np.testing.assert_array_equal(frame["v"], frame["velocity"])
     assert list(frame.columns) == [
-        "time", "time_error", "guard", "direction", "velocity", "kind", "mode_before", "mode_after", "steps", "x", "v",
+        "time", "time_error", "guard", "direction", "velocity", "kind", "mode_before", "mode_after",
+        "steps", "x", "v",
     ]  # fmt: skip
     assert frame.attrs["units"] == {
-        "time": "s", "time_error": "s", "guard": "", "direction": "1", "velocity": "m/s", "kind": "", "mode_before": "1", "mode_after": "1",
+        "time": "s", "time_error": "s", "guard": "", "direction": "1", "velocity": "m/s",
+        "kind": "", "mode_before": "1", "mode_after": "1",
         "steps": "1", "x": "m", "v": "m/s",
     }  # fmt: skip
 
@@ -31,7 +33,8 @@ def test_contacts_are_a_row_each(run):
 def test_contacts_of_a_batch_know_their_trajectory(batch):
     frame = contacts(batch)
     assert frame.columns[0] == "trajectory"
-    assert frame.groupby("trajectory").size().to_dict() == {0: 6, 2: 6}  # the second never reaches the gap
+    # the second never reaches the gap
+    assert frame.groupby("trajectory").size().to_dict() == {0: 6, 2: 6}
     assert contacts(batch.isel(trajectory=2))["trajectory"].tolist() == [2] * 6
     assert contacts(batch.isel(trajectory=1)).empty
     assert contacts(batch.sel(trajectory=[1, 2]))["trajectory"].tolist() == [2] * 6
@@ -62,7 +65,9 @@ def test_no_contacts_are_an_empty_table():
 
 @pytest.mark.parametrize("function", [contacts, samples])
 def test_what_is_no_run_is_refused(function, run):
-    with pytest.raises(ParameterError, match=f"sl.{function.__name__} takes the Dataset that sl.simulate"):
+    with pytest.raises(
+        ParameterError, match=f"sl.{function.__name__} takes the Dataset that sl.simulate"
+    ):
         function(run["x"])
     with pytest.raises(ParameterError, match=r"this Dataset is from sl\.stroboscope"):
         contacts(sine_points())

@@ -1,4 +1,6 @@
-"""A store keeps a map chunk by chunk: what is put in comes out, what isn't there is said, nothing of another kind gets in."""
+"""A store keeps a map chunk by chunk: what is put in comes out, what isn't there is said, nothing
+of another kind gets in.
+"""
 
 import hashlib
 import json
@@ -37,7 +39,7 @@ def fill(store, indices=None):
     return store
 
 
-# -- chunks ----------------------------------------------------------------------------------------------------------------------
+# -- chunks ----------------------------------------------------------------------------------------
 def test_what_is_committed_is_read(store):
     fill(store, [5, 0])
     assert store.done().tolist() == [True, False, False, False, False, True]
@@ -86,10 +88,19 @@ def test_order_and_repetition_leave_no_trace(tmp_path):
     for name, order in ("one", [0, 1, 2, 3, 4, 5]), ("other", [3, 5, 5, 0, 4, 1, 3, 2, 0]):
         (tmp_path / name).mkdir()
         path = fill(
-            Store.create(tmp_path / name / "map", dict(reversed(IDENTITY.items())) if name == "other" else IDENTITY, **MAKE), order
+            Store.create(
+                tmp_path / name / "map",
+                dict(reversed(IDENTITY.items())) if name == "other" else IDENTITY,
+                **MAKE,
+            ),
+            order,
         ).path
         both.append(
-            {str(file.relative_to(path)): file.read_bytes() for file in path.rglob("*") if file.is_file() and "locks" not in file.parts}
+            {
+                str(file.relative_to(path)): file.read_bytes()
+                for file in path.rglob("*")
+                if file.is_file() and "locks" not in file.parts
+            }
         )
     assert both[0] == both[1]
 
@@ -125,7 +136,7 @@ def test_a_chunk_larger_than_the_grid_is_the_grid(tmp_path):
     Store.create_or_resume(tmp_path / "map", {}, shape=(2, 2), chunk=100, arrays={"x": "f8"})
 
 
-# -- the file of a chunk -----------------------------------------------------------------------------------------------------------
+# -- the file of a chunk ---------------------------------------------------------------------------
 def test_a_chunk_is_numbers_their_place_and_a_checksum(store):
     """As the documentation of the store says: other programs may read it."""
     fill(store)
@@ -143,11 +154,13 @@ def test_every_bit_of_a_chunk_counts(store):
         flipped = bytearray(data)
         flipped[bit // 8] ^= 1 << bit % 8
         assert store.chunks.decode(1, bytes(flipped), store._made_under) is None
-    assert all(store.chunks.decode(1, data[:end], store._made_under) is None for end in range(len(data)))
+    assert all(
+        store.chunks.decode(1, data[:end], store._made_under) is None for end in range(len(data))
+    )
     assert store.chunks.decode(1, data + b"0", store._made_under) is None
 
 
-# -- making and opening ----------------------------------------------------------------------------------------------------------
+# -- making and opening ----------------------------------------------------------------------------
 def test_resuming_goes_on(store):
     fill(store, [1])
     again = Store.create_or_resume(store.path, IDENTITY, **MAKE)
@@ -159,13 +172,17 @@ def test_resuming_goes_on(store):
     (IDENTITY | {"system": "duffing"}, {}, "system was 'rig', is 'duffing'"),
     (IDENTITY | {"method": "Taylor"}, {}, "method was not set, is 'Taylor'"),
     ({"system": "rig"}, {}, "study was 'a{40}…', is not set"),
-    (IDENTITY | {"study": "a" * 60 + "X" + "c" * 60}, {}, "study was '…a{12}bc{27}…', is '…a{12}Xc{27}…'"),
+    (IDENTITY | {"study": "a" * 60 + "X" + "c" * 60}, {}, "study was '…a{12}bc{27}…', is "
+                                                          "'…a{12}Xc{27}…'"),
     (IDENTITY, {"shape": (7, 3)}, "shape was '3 x 7', is '7 x 3'"),
     (IDENTITY, {"chunk": 5}, "chunk was '4', is '5'"),
-    (IDENTITY, {"arrays": {"basin": "i2", "peak": "f4"}}, "arrays was '.*peak float64', is '.*peak float32'"),
+    (IDENTITY, {"arrays": {"basin": "i2", "peak": "f4"}}, "arrays was '.*peak float64', is '.*peak "
+                                                          "float32'"),
 ])  # fmt: skip
 def test_another_identity_is_refused(identity, make, message, store):
-    with pytest.raises(StoreError, match=f"made from something else: {message}.*Choose another path"):
+    with pytest.raises(
+        StoreError, match=f"made from something else: {message}.*Choose another path"
+    ):
         Store.create_or_resume(store.path, identity, **MAKE | make)
 
 
@@ -197,7 +214,15 @@ def test_paths_that_are_not_there(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "change", [{"shape": ()}, {"shape": (3, 0)}, {"chunk": 0}, {"arrays": {}}, {"arrays": {"a/b": "f8"}}, {"arrays": {"x": "U3"}}]
+    "change",
+    [
+        {"shape": ()},
+        {"shape": (3, 0)},
+        {"chunk": 0},
+        {"arrays": {}},
+        {"arrays": {"a/b": "f8"}},
+        {"arrays": {"x": "U3"}},
+    ],
 )
 def test_what_cannot_be_stored_is_refused_first(change, tmp_path):
     with pytest.raises(ParameterError):
@@ -214,12 +239,18 @@ def test_another_layout_is_refused(store, layout, age):
     head = json.loads((store.path / "store.json").read_bytes())
     del head["checksum"]
     (store.path / "store.json").write_bytes(seal(head | {"format": layout}))
-    for again in (lambda: Store.open(store.path), lambda: Store.create_or_resume(store.path, IDENTITY, **MAKE)):
+    for again in (
+        lambda: Store.open(store.path),
+        lambda: Store.create_or_resume(store.path, IDENTITY, **MAKE),
+    ):
         with pytest.raises(StoreError, match=f"made by {age} saltus"):
             again()
 
 
-@pytest.mark.parametrize("damage", [lambda data: data[:40], lambda data: data.replace(b"rig", b"gir"), lambda _: b"", None])
+@pytest.mark.parametrize(
+    "damage",
+    [lambda data: data[:40], lambda data: data.replace(b"rig", b"gir"), lambda _: b"", None],
+)
 def test_a_damaged_head_is_written_again(store, damage):
     """It follows from the study; what is computed stays, whatever happens to it."""
     fill(store, [0, 3])
@@ -247,7 +278,9 @@ def test_the_head_of_another_store_is_put_right(store, tmp_path):
     fill(store)
     other = Store.create(tmp_path / "other", IDENTITY | {"system": "another"}, **MAKE)
     (store.path / "store.json").write_bytes((other.path / "store.json").read_bytes())
-    assert len(Store.open(store.path).damaged()) == 6, "none of the chunks is taken for another store's"
+    assert len(Store.open(store.path).damaged()) == 6, (
+        "none of the chunks is taken for another store's"
+    )
     again = Store.create_or_resume(store.path, IDENTITY, **MAKE)
     assert again.identity == IDENTITY
     assert again.damaged() == []
@@ -277,9 +310,13 @@ def test_old_drafts_go_young_ones_stay(tmp_path):
     assert sorted(one.name for one in tmp_path.iterdir()) == [".map.young.part", "map"]
 
 
-# -- locks -----------------------------------------------------------------------------------------------------------------------
+# -- locks -----------------------------------------------------------------------------------------
 def test_writing_needs_the_lock(store):
-    for write in (lambda: store.commit(0, values(store, 0)), store.verify, lambda: store.put("x", 1)):
+    for write in (
+        lambda: store.commit(0, values(store, 0)),
+        store.verify,
+        lambda: store.put("x", 1),
+    ):
         with pytest.raises(StoreError, match="isn't locked by this process"):
             write()
     fill(store, [0])
@@ -290,7 +327,11 @@ def test_writing_needs_the_lock(store):
 def test_a_shard_writes_its_own_chunks_only(store):
     with store.lock((1, 2)):
         store.commit(3, values(store, 3))
-        with pytest.raises(StoreError, match=r"chunk 2 .* belongs to shard 0 of 2, and the lock is for shard 1"):
+        with pytest.raises(
+            StoreError,
+            match=r"chunk 2 .* belongs to shard 0 of 2, and the lock is "
+            r"for shard 1",
+        ):
             store.commit(2, values(store, 2))
     with pytest.raises(ParameterError, match="numbered from 0"), store.lock((2, 2)):
         pass
@@ -300,9 +341,15 @@ def test_a_lock_is_for_one_part_of_a_process(store):
     other = Store.open(store.path)
     with store.lock((0, 2)):
         with other.lock((1, 2)):
-            assert [text.split(", ")[1] for text in store.status().writers] == ["shard 0 of 2", "shard 1 of 2"]
+            assert [text.split(", ")[1] for text in store.status().writers] == [
+                "shard 0 of 2",
+                "shard 1 of 2",
+            ]
         for shard in None, (0, 2):
-            with pytest.raises(StoreError, match=f"process {os.getpid()} on .*, shard 0 of 2. Wait"), other.lock(shard):
+            with (
+                pytest.raises(StoreError, match=f"process {os.getpid()} on .*, shard 0 of 2. Wait"),
+                other.lock(shard),
+            ):
                 pass
     with other.lock():
         pass
@@ -311,7 +358,8 @@ def test_a_lock_is_for_one_part_of_a_process(store):
 
 def test_the_name_of_a_killed_holder_goes(store):
     (store.path / "locks" / "0-of-1").write_text(
-        '{"host": "a host with a long name", "process": 1, "since": "2026-01-01 12:00:00+00:00"}' * 2
+        '{"host": "a host with a long name", "process": 1, "since": "2026-01-01 '
+        '12:00:00+00:00"}' * 2
     )
     assert store.status().writers == ()
     with store.lock():
@@ -323,7 +371,9 @@ def test_a_refused_writer_does_not_get_in_the_way(store):
     with store.lock((0, 2)):
         with pytest.raises(StoreError), other.lock():
             pass
-        assert not (store.path / "locks" / "0-of-1").exists(), "it looked before it took its own lock"
+        assert not (store.path / "locks" / "0-of-1").exists(), (
+            "it looked before it took its own lock"
+        )
 
 
 def test_two_that_take_a_lock_at_once_are_not_both_let_in(store, monkeypatch):
@@ -337,7 +387,10 @@ def test_two_that_take_a_lock_at_once_are_not_both_let_in(store, monkeypatch):
                 late.enter_context(lock.exclusive(folder / "0-of-2"))
 
         monkeypatch.setattr(lock, "_refuse_if_held", look_and_lose)
-        with pytest.raises(StoreError, match="written by another process, shard 0 of 2"), store.lock():
+        with (
+            pytest.raises(StoreError, match="written by another process, shard 0 of 2"),
+            store.lock(),
+        ):
             pass
 
 
@@ -360,12 +413,17 @@ def test_drafts_of_killed_writers_go(store):
         assert not list(parts.iterdir())
 
 
-# -- artifacts -------------------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("value", [b"", bytes(range(256)), None, {"b": [1, 2.5e-310, -0.0, "µ"], "a": {}}, [math.inf, True]])
+# -- artifacts -------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    "value",
+    [b"", bytes(range(256)), None, {"b": [1, 2.5e-310, -0.0, "µ"], "a": {}}, [math.inf, True]],
+)
 def test_an_artifact_comes_back(value, store):
     assert not store.has("attractors")
     with store.lock():
-        assert repr(store.put("attractors", value)) == repr(value) or value == store.get("attractors")
+        assert repr(store.put("attractors", value)) == repr(value) or value == store.get(
+            "attractors"
+        )
     again = Store.open(store.path)
     assert again.has("attractors")
     assert again.get("attractors") == value
@@ -422,15 +480,24 @@ def test_a_seal_sees_every_bit():
     assert unseal(sealed)["a"] == [1.5, None]
     for place in range(len(sealed)):
         for bit in range(8):
-            assert unseal(sealed[:place] + bytes([sealed[place] ^ 1 << bit]) + sealed[place + 1 :]) is None
+            assert (
+                unseal(sealed[:place] + bytes([sealed[place] ^ 1 << bit]) + sealed[place + 1 :])
+                is None
+            )
     for text in (b"", b"[]", b"null", b"{}", b"\xff", sealed[:-2], sealed + b"\n", b"[" * 100_000):
         assert unseal(text) is None
 
 
-# -- status ----------------------------------------------------------------------------------------------------------------------
+# -- status ----------------------------------------------------------------------------------------
 def test_status_tells_how_far_it_is(store):
     before = store.status()
-    assert (before.done, before.total, before.damaged, before.last_written, before.writers) == (0, 6, 0, None, ())
+    assert (before.done, before.total, before.damaged, before.last_written, before.writers) == (
+        0,
+        6,
+        0,
+        None,
+        (),
+    )
     fill(store, [0, 1, 4])
     (store.path / "chunks/1.chunk").write_bytes(b"short")
     file = store.path / "chunks/4.chunk"
@@ -463,10 +530,11 @@ def test_a_store_that_was_deleted_says_so(store):
         store.done()
 
 
-# -- what somebody else wrote, with right checksums --------------------------------------------------------------------------------
+# -- what somebody else wrote, with right checksums ------------------------------------------------
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("format", "3"), ("identity", []), ("note", None), ("shape", [None, 7]), ("shape", []), ("shape", [10**9, 10**9]), ("chunk", 0),
+    [("format", "3"), ("identity", []), ("note", None), ("shape", [None, 7]), ("shape", []),
+        ("shape", [10**9, 10**9]), ("chunk", 0),
      ("chunk", None), ("arrays", {"basin": [-1]}), ("arrays", {"basin": "object"})],
 )  # fmt: skip
 def test_a_head_that_says_what_none_does_counts_as_damaged(store, name, value):
@@ -476,4 +544,6 @@ def test_a_head_that_says_what_none_does_counts_as_damaged(store, name, value):
     with pytest.raises(StoreError, match=r"store\.json is damaged"):
         Store.open(store.path)
     fill(store, [0])
-    assert Store.create_or_resume(store.path, IDENTITY, **MAKE).done()[0], "it is written again, and the chunks stay"
+    assert Store.create_or_resume(store.path, IDENTITY, **MAKE).done()[0], (
+        "it is written again, and the chunks stay"
+    )
