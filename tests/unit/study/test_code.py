@@ -21,9 +21,8 @@ class Thing:
 
     def grow(self, by=1, *, most=LIMIT):
         """Grow it."""
-        text = f"{self.size + by:.3f}{by:>{most}}"
-        return text, [one for one in range(by) if one < most], -1e-300, None
-'''
+        return f"{self.size + by:.3f}{by:>{most}}", [one for one in range(by) if one < most], -1e-300, None
+'''  # noqa: E501
 
 
 @pytest.mark.parametrize(
