@@ -1,5 +1,6 @@
-"""Stopping on Ctrl-C or on request: the exception that carries what was finished, and how work on
-threads learns of it.
+"""Stopping on Ctrl-C, or by `Stop` from another thread. `Interrupted` carries what was finished.
+
+Work on threads learns of it in flow/threads.py, between pieces of work.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
 """Template, 5 of 6 of the Taylor flow: contacts of one lane - settling what the quadratic bound
-could not, landing, recording.
+could not, landing, recording. The first crossing of a step is found before, by `locate` in
+taylor_crossings.
 """
 
 import math

@@ -1,5 +1,6 @@
-"""The tolerances of the engine of orbits, each with its reason. Distances are in units of the range
-of each state.
+"""The tolerances of the search for attractors and of the engine of orbits, each with its reason.
+
+Distances are in units of the range of each state.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Files that are there in full or not at all."""
+"""Files of results that are there in full or not at all; store/durable.py has those of a store."""
 
 from __future__ import annotations
 

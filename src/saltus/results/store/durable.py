@@ -1,5 +1,5 @@
 """Files that reach the disk complete or not at all, and JSON that knows when it was damaged. The
-ground under a store.
+ground under a store; files of single results are files/atomic.py's.
 """
 
 from __future__ import annotations
