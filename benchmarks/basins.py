@@ -13,10 +13,10 @@ A rival can't be held to labels that rounding decides: this system stays on a ch
 hundreds of periods from many a start. So saltus and heyoka are also compared with themselves at
 another tolerance (the floor), and with each other where neither changes its mind.
 
-    python benchmarks/basins.py                 200 x 200 cells python benchmarks/basins.py --cells
-    60      smaller (or larger) python benchmarks/basins.py --alone         saltus only python
-    benchmarks/basins.py --write FOLDER  keep the tables for the documentation (python -m benchmarks
-    does that)
+    python benchmarks/basins.py                 200 x 200 cells
+    python benchmarks/basins.py --cells 60      smaller (or larger)
+    python benchmarks/basins.py --alone         saltus only
+    python benchmarks/basins.py --write FOLDER  keep the tables for the documentation
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ for all equations, lies on disk; that cost stands in a table of its own. Nothing
 does. heyoka's tangents have no jumps at contacts, saltus's have. CPU time counts all threads and
 processes; medians.
 
-    python benchmarks/compile.py                 both tables python benchmarks/compile.py --repeats
-    9     more processes python benchmarks/compile.py --write FOLDER  keep the tables for the
-    documentation (python -m benchmarks does that)
+    python benchmarks/compile.py                 both tables
+    python benchmarks/compile.py --repeats 9     more processes
+    python benchmarks/compile.py --write FOLDER  keep the tables for the documentation
 """
 
 from __future__ import annotations

@@ -6,9 +6,9 @@ every contact located. CPU time of one pinned core, medians over the repeats, th
 alternating. The difference is that of the states after two periods, relative to the largest: both
 programs follow the same motion.
 
-    python benchmarks/contacts.py                 the table python benchmarks/contacts.py --repeats
-    15    more repeats python benchmarks/contacts.py --write FOLDER  keep the table for the
-    documentation (python -m benchmarks does that)
+    python benchmarks/contacts.py                 the table
+    python benchmarks/contacts.py --repeats 15    more repeats
+    python benchmarks/contacts.py --write FOLDER  keep the tables for the documentation
 """
 
 from __future__ import annotations

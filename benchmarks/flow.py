@@ -6,10 +6,10 @@ CPU time of one pinned core, the smallest of three repeats, over 100 periods fro
 (SciPy: a few starts, its cost per trajectory is the same). Errors are of |x| after 5 periods from
 the 64 grid starts of tests/reference/rig_b4_15hz_5periods.csv, known to 30 digits.
 
-    python benchmarks/flow.py                 the table of the README python benchmarks/flow.py
-    --orders        cost and error by order and tolerance of the series python benchmarks/flow.py
-    --memory        memory of a stroboscope run from 1e6 starts python benchmarks/flow.py --write
-    FOLDER  keep the table for the documentation (python -m benchmarks does that)
+    python benchmarks/flow.py                 the table of the README
+    python benchmarks/flow.py --orders        cost and error by order and tolerance of the series
+    python benchmarks/flow.py --memory        memory of a stroboscope run from 1e6 starts
+    python benchmarks/flow.py --write FOLDER  keep the tables for the documentation
 """
 
 from __future__ import annotations

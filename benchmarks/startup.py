@@ -8,9 +8,9 @@ fonts, as the first command on a machine. The libraries alone stand first: what 
 saltus. The second table is one call among many in a process: a click. CPU time counts all threads,
 and is disturbed less than wall time by others on the machine. Medians.
 
-    python benchmarks/startup.py                 both tables python benchmarks/startup.py --repeats
-    20    more processes python benchmarks/startup.py --write FOLDER  keep the tables for the
-    documentation (python -m benchmarks does that)
+    python benchmarks/startup.py                 both tables
+    python benchmarks/startup.py --repeats 20    more processes
+    python benchmarks/startup.py --write FOLDER  keep the tables for the documentation
 """
 
 from __future__ import annotations

@@ -4,8 +4,9 @@ term.
 Between two contacts the displacement is, with u measured from the boundary in contact and from the
 origin in free flight,
 
-    u(s) = offset + a cos(w s) + b sin(w s) + exp(-sigma s) (c cos(wd s) + d sin(wd s)),    s = time
-    since the last contact.
+    u(s) = offset + a cos(w s) + b sin(w s) + exp(-sigma s) (c cos(wd s) + d sin(wd s)),
+
+s being the time since the last contact.
 
 **Why no contact is missed.** Differentiating an exponential term multiplies its complex amplitude
 by ``-sigma + i wd``, whose modulus is the mode's natural frequency ``wm``. Hence for every later

@@ -4,8 +4,8 @@ runs, and made again once it has work.
 Two tiers give the same bits, for they are the same operations in the same order:
 
 generic   the templates' machine code serves all equations and is on disk; only the equation is
-compiled, in a fraction of a second full      sizes, tables and the equation are known to the
-compiler: one piece of code
+          compiled, in a fraction of a second
+full      sizes, tables and the equation are known to the compiler: one piece of code
 
 A flow begins generic. After `STEADY_AFTER` seconds of work another process compiles the full tier,
 stores it on disk, and the flow changes to it between two calls. The next process begins with it.

@@ -41,19 +41,23 @@ def aeroelastic(
     [rad/s]. It isn't forced: in a range of airspeeds it oscillates by itself. Masses, springs,
     dampers and loads are per unit span.
 
-    ==================  =========  =================
-    ================================================= parameter           symbol     default
-    meaning ==================  =========  =================
-    ================================================= airspeed            U          12 m/s mass
-    m          12.4 kg/m inertia             I_alpha    0.065 kg*m         about the elastic axis
+    ==================  =========  =================  ==============================================
+    parameter           symbol     default            meaning
+    ==================  =========  =================  ==============================================
+    airspeed            U          12 m/s
+    mass                m          12.4 kg/m
+    inertia             I_alpha    0.065 kg*m         about the elastic axis
     imbalance           x_alpha    0.25               centre of mass behind the elastic axis, in b
-    half_chord          b          0.135 m elastic_axis        a          -0.6
-    position behind mid-chord, in b plunge_stiffness    k_h        2840 N/m^2 pitch_stiffness
-    k_alpha    40 N/rad           beyond the freeplay pitch_gap           delta      0.01 rad
-    half of the freeplay plunge_damping      c_h        27.4 N*s/m^2 pitch_damping       c_alpha
-    0.036 N*s/rad air_density         rho        1.225 kg/m^3 lift_slope          c_l        6.28
-    /rad ==================  =========  =================
-    =================================================
+    half_chord          b          0.135 m
+    elastic_axis        a          -0.6               position behind mid-chord, in b
+    plunge_stiffness    k_h        2840 N/m^2
+    pitch_stiffness     k_alpha    40 N/rad           beyond the freeplay
+    pitch_gap           delta      0.01 rad           half of the freeplay
+    plunge_damping      c_h        27.4 N*s/m^2
+    pitch_damping       c_alpha    0.036 N*s/rad
+    air_density         rho        1.225 kg/m^3
+    lift_slope          c_l        6.28 /rad
+    ==================  =========  =================  ==============================================
 
     Notes
     -----

@@ -35,18 +35,18 @@ def gear_pair(
     States are the dynamic transmission error ``x`` [m] and its rate ``v`` [m/s]; it is forced at
     ``mesh_frequency``.
 
-    ===================  =======  ===========
-    =================================================================== parameter            symbol
-    default      meaning ===================  =======  ===========
-    =================================================================== mesh_mass            m
-    0.25 kg      1/(r_p^2/I_p + r_g^2/I_g): both gears reduced to the line of action damping_ratio
-    zeta     0.05         of the mesh mesh_stiffness       k        400 MN/m     mean
-    stiffness_variation  kappa    0.2          first harmonic, relative to the mean gap
-    b        20 µm        half of the backlash mean_force           F_m      800 N
-    transmitted torque over base radius alternating_force    F_a      400 N        from transmission
-    error and torque fluctuation mesh_frequency       f        6 kHz        teeth a second
-    ===================  =======  ===========
-    ===================================================================
+    ===================  =======  ===========  =====================================================
+    parameter            symbol   default      meaning
+    ===================  =======  ===========  =====================================================
+    mesh_mass            m        0.25 kg      1/(r_p^2/I_p + r_g^2/I_g), on the line of action
+    damping_ratio        zeta     0.05         of the mesh
+    mesh_stiffness       k        400 MN/m     mean
+    stiffness_variation  kappa    0.2          first harmonic, relative to the mean
+    gap                  b        20 µm        half of the backlash
+    mean_force           F_m      800 N        transmitted torque over base radius
+    alternating_force    F_a      400 N        from transmission error and torque fluctuation
+    mesh_frequency       f        6 kHz        teeth a second
+    ===================  =======  ===========  =====================================================
 
     Notes
     -----
