@@ -440,66 +440,18 @@ def advance(i, budget, batch, work):
 
 @entry
 def propagate(
-    period,
-    origin,
-    param,
-    stride,
-    state,
-    count,
-    phase,
-    mode,
-    fresh,
-    carry,
-    status,
-    end_count,
-    end_phase,
-    counters,
-    minima,
-    sample_count,
-    sample_fraction,
-    cursor,
-    samples,
-    sample_mode,
-    rec_first,
-    rec_i,
-    rec_f,
-    rec_used,
-    options,
-    data,
-    budget,
-    work,
-):
+    period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
+    end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
+    rec_first, rec_i, rec_f, rec_used, options, data, budget, work,
+):  # fmt: skip
     """Move every trajectory whose status is RUNNING to its end, `budget` tries of a step at most.
     See kernels/batch.py for the arrays.
     """
     batch = Batch(
-        period,
-        origin,
-        param,
-        stride,
-        state,
-        count,
-        phase,
-        mode,
-        fresh,
-        carry,
-        status,
-        end_count,
-        end_phase,
-        counters,
-        minima,
-        sample_count,
-        sample_fraction,
-        cursor,
-        samples,
-        sample_mode,
-        rec_first,
-        rec_i,
-        rec_f,
-        rec_used,
-        options,
-        data,
-    )
+        period, origin, param, stride, state, count, phase, mode, fresh, carry, status, end_count,
+        end_phase, counters, minima, sample_count, sample_fraction, cursor, samples, sample_mode,
+        rec_first, rec_i, rec_f, rec_used, options, data,
+    )  # fmt: skip
     for i in range(status.shape[0]):
         if status[i] == RUNNING:
             budget = advance(i, budget, batch, work)
