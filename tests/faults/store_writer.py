@@ -21,6 +21,7 @@ MAKE = {
 }
 SMALL = MAKE | {"shape": (4, 5), "arrays": {"basin": "i2", "peak": "f8"}}
 FINE = MAKE | {"chunk": 2}
+FINEST = MAKE | {"chunk": 1}
 
 
 def values(store, index):
@@ -34,14 +35,14 @@ def values(store, index):
     return {name: part for name, part in every.items() if name in store.chunks.arrays}
 
 
-def compute(path, shard=None, order=1, pause=0.0, make=MAKE):
-    """Resume the store and finish it, or a shard of it."""
+def compute(path, shard=None, order=1, pause=0.0, make=MAKE, most=None):
+    """Resume the store and finish it, or a shard of it; or wait for an end after `most` chunks."""
     store = Store.create_or_resume(path, IDENTITY, **make)
     with store.lock(shard):
         store.verify()
         store.put("attractors", [[1.0, float("nan")], [2.0, -0.0]])
-        for index in store.missing(shard)[::order]:
-            time.sleep(pause)
+        for count, index in enumerate(store.missing(shard)[::order]):
+            time.sleep(60.0 if count == most else pause)
             store.commit(index, values(store, index))
     return store
 

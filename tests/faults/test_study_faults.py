@@ -47,7 +47,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and for
 STUDY = small_study(24)
 CHUNKS = 24
 #: The command with small chunks (in a process of --workers too, which imports this file first), and
-#: a moment between two commits, so that there is one to be killed in. Pictures are empty frames
+#: a moment between two commits, so that there is one to be killed in; after the MOST-th chunk it
+#: waits for that. Pictures are empty frames
 #: unless they are asked for: drawing takes longer than all else together. With `serve` it runs the
 #: study once, by which everything is loaded and compiled, and forks a child for each line: a child
 #: has nothing to load.
@@ -66,10 +67,13 @@ if __name__ == "__main__":  # a process of --workers computes chunks only
     saltus.study.run.maps.CHUNK = 24
     saltus.study.run.maps.LARGE = 100  # nobody asks how long it will take
     commit = Store.commit
+    committed = []
 
     def slow_commit(self, index, values):
-        time.sleep(float(os.environ.get("PAUSE", "0")))
+        waits = len(committed) == int(os.environ.get("MOST", "-1"))
+        time.sleep(60 if waits else float(os.environ.get("PAUSE", "0")))
         commit(self, index, values)
+        committed.append(index)
 
     Store.commit = slow_commit
 
@@ -142,11 +146,11 @@ class Server:
         )  # fmt: skip
         assert self.process.stdout.readline() == "ready\n"
 
-    def start(self, *arguments, pause=0.0, pictures=False):
+    def start(self, *arguments, pause=0.0, pictures=False, most=-1):
         """Number of the process that runs the command."""
         log, environment = (
             self.place / f"log{len(self.logs)}.txt",
-            {"PAUSE": str(pause)} | ({"PICTURES": "1"} if pictures else {}),
+            {"PAUSE": str(pause), "MOST": str(most)} | ({"PICTURES": "1"} if pictures else {}),
         )
         child = self._answer([list(map(str, arguments)), environment, str(log)])
         self.logs[child] = log
@@ -217,16 +221,19 @@ def wait_for(condition, seconds=300):
 # -- killed ----------------------------------------------------------------------------------------
 def test_killed_at_20_random_moments(server, undisturbed, tmp_path):
     """While attractors are looked for, between chunks, while table and pictures are made; then it
-    goes on as if nothing had been.
+    goes on as if nothing had been. No run gets on by more than three chunks, however fast it is;
+    one that finds no more of them to make may end before it is killed.
     """
-    moments, folder, progress, killed = random.Random(4), tmp_path / "out", [0], 0
+    moments, folder, progress = random.Random(4), tmp_path / "out", [0]
     for _ in range(20):
-        child = server.start(*arguments(server, folder), pause=0.004, pictures=True)
-        goal = min(progress[-1] + moments.randrange(4), CHUNKS)
+        chunks = moments.randrange(3)
+        child = server.start(*arguments(server, folder), pictures=True, most=chunks + 1)
+        goal = min(progress[-1] + chunks, CHUNKS)
         wait_for(lambda goal=goal, child=child: committed(folder) >= goal or ended(child))
         time.sleep(moments.uniform(0.0, 0.05 if goal < CHUNKS else 0.5))
         os.kill(child, signal.SIGKILL)
-        killed += server.end(child)[0] == -signal.SIGKILL
+        code, text = server.end(child)
+        assert code == -signal.SIGKILL or (code == 0 and progress[-1] >= CHUNKS - 3), text
         progress.append(committed(folder))
         if (folder / "stores" / "basins").exists():
             assert Store.open(folder / "stores" / "basins").damaged() == [], (
@@ -235,7 +242,6 @@ def test_killed_at_20_random_moments(server, undisturbed, tmp_path):
         if (folder / "basins.nc").exists():
             load(folder / "basins.nc")
     assert progress == sorted(progress), "what is done stays done"
-    assert killed > 15
     assert len(set(progress)) > 5, "it got on between the kills"
     assert progress[-1] > CHUNKS // 2
     for draft in (folder / "stores").glob(".basins.*.part"):
