@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.compare import compare
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
+    from saltus.analysis.methods.regularisation_widths import regularisation_widths
     from saltus.analysis.motion.energy import energy_balance
     from saltus.analysis.motion.impacts import impact_statistics
     from saltus.analysis.motion.poincare import poincare
@@ -84,6 +85,7 @@ _HOMES = {
     "impact_statistics": "saltus.analysis.motion.impacts",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
     "poincare": "saltus.analysis.motion.poincare",
+    "regularisation_widths": "saltus.analysis.methods.regularisation_widths",
     "settled": "saltus.analysis.motion.settled",
     "simulate": "saltus.analysis.motion.simulate",
     "spectrum": "saltus.analysis.motion.spectrum",
@@ -147,6 +149,7 @@ __all__ = [
     "piecewise",
     "plot",
     "poincare",
+    "regularisation_widths",
     "regularise",
     "samples",
     "save",

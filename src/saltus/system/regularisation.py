@@ -16,7 +16,7 @@ from typing import Any
 from saltus.errors import ParameterError, TraceError, among, nearest, shown
 from saltus.system import checks
 from saltus.system.blend import STEPS, Step, blended
-from saltus.system.dimensions import units_of
+from saltus.system.dimensions import gap_units
 from saltus.system.names import why_no_name
 from saltus.system.singular import set_aside
 from saltus.system.system import System
@@ -154,9 +154,9 @@ def _parameters(
     system: System, widths: Mapping[int, Any]
 ) -> tuple[dict[int, str], dict[str, float], dict[str, str]]:
     """Name of the width of each guard; values and units of these parameters."""
-    gap_units = _gap_units(system)
+    in_units = gap_units(system)
     one = len(set(map(id, widths.values()))) == 1 and len(widths) == len(system.guards)
-    known = sorted({gap_units[number] for number in widths} - {""})
+    known = sorted({in_units[number] for number in widths} - {""})
     if one and len(known) > 1:
         guards = [guard.name for guard in system.guards]
         raise ParameterError(
@@ -171,7 +171,7 @@ def _parameters(
             names[number] = next(iter(values))
             continue
         name = _free_name(system, values, None if one else system.guards[number].name)
-        unit = (known or [""])[0] if one else gap_units[number]
+        unit = (known or [""])[0] if one else in_units[number]
         if not unit and isinstance(value, str):
             unit = coherent_unit(value, name)
         names[number], units[name] = name, unit
@@ -179,17 +179,6 @@ def _parameters(
         if values[name] <= 0:
             raise ParameterError(f"{name} = {values[name]:g} must be positive.")
     return names, values, units
-
-
-def _gap_units(system: System) -> list[str]:
-    """Unit of each gap, ``""`` where it isn't known."""
-    found = units_of(
-        system.states, system.units, system.field, [guard.gap for guard in system.guards]
-    )
-    return [
-        system.units[guard.state] if guard.state else unit
-        for guard, unit in zip(system.guards, found, strict=True)
-    ]
 
 
 def _free_name(system: System, others: Mapping[str, float], guard: str | None) -> str:
