@@ -42,6 +42,7 @@ class Guard:
     gap: Expr
     state: str | None = None
     boundary: Expr | None = None
+    law: object = None
 
 
 def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
