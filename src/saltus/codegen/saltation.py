@@ -1,9 +1,9 @@
 """What happens to states and tangent at a contact, generated: jumps by a law of contact, and the
 saltation matrix.
 
-Where the mode changes, S = I + (f_after - f_before) n' / (n' f_before + g_t): the identity where the
-force is continuous. Where the state jumps to J(t, y), S = J_y + (f_after - J_y f_before - J_t) n' /
-(n' f_before + g_t). Where a contact begins to be held, what leads away from it is projected out.
+Where the mode changes, S = I + (f_after - f_before) n' / (n' f_before + g_t): the identity where
+the force is continuous. Where the state jumps to J(t, y), S = J_y + (f_after - J_y f_before - J_t)
+n' / (n' f_before + g_t). Where a contact begins to be held, what leads away is projected out.
 Aizerman & Gantmakher, J. Mech. Appl. Math. 11 (1958); Leine & Nijmeijer (2004), section 7.4.
 """
 
@@ -71,12 +71,14 @@ def jump_function(system: System, clocks: Clocks) -> str:
 
 
 def reset_function(system: System, clocks: Clocks) -> str:
-    """``reset(t, y, p, h, mode, g, out)``: put the state after the jump of guard g's law into y, and
-    S times the tangent; out[0] is the law's restitution, out[1] the closing velocity before.
+    """``reset(t, y, p, h, mode, g, out)``: put the state after the jump of guard g's law into y,
+    and S times the tangent; out[0] is the law's restitution, out[1] the closing velocity before.
     """
     head = "@kernel\ndef reset(t, y, p, h, mode, g, out):\n"
     base = system.tangent_of or system
-    laws = [(g, guard, guard.law) for g, guard in enumerate(base.guards) if guard.law and guard.law.reset]
+    laws = [
+        (g, one.gap, one.law) for g, one in enumerate(base.guards) if one.law and one.law.settled
+    ]
     if not laws:
         return head + "    pass\n"
     size, leaf = len(base.states), parameter_leaf(base, "y", clocks.value)
@@ -95,10 +97,10 @@ def reset_function(system: System, clocks: Clocks) -> str:
     if system.tangent_of:
         lines += [f"drift_{i} = 0.0" for i in range(size)]
         lines += [f"n_{i} = 0.0" for i in range(size + 1)]
-    for g, guard, law in laws:
+    for g, gap, law in laws:
         code = ScalarCode(leaf, side=_bit_in_mode, prefix=f"law{g}_", switch=clocks.side)
         wanted = {f"new_{i}": entry for i, entry in enumerate(law.reset)}
-        if law.restitution is not None:
+        if law.restitution is not None and law.constraint is not None:
             wanted |= {"restitution": law.restitution, "closing_before": law.constraint}
         else:
             wanted |= {"closing_before": ex.constant(1.0)}
@@ -106,7 +108,7 @@ def reset_function(system: System, clocks: Clocks) -> str:
             wanted |= {f"s_{i}_{k}": differentiate(law.reset[i], states[k]) for i, k in carried}
             wanted |= {f"drift_{i}": differentiate(law.reset[i], ex.TIME) for i in range(size)}
             wanted |= {
-                f"n_{i}": differentiate(guard.gap, one) for i, one in enumerate((*states, ex.TIME))
+                f"n_{i}": differentiate(gap, one) for i, one in enumerate((*states, ex.TIME))
             }
         values = code.values(wanted.values())
         code.lines += [f"{name} = {value}" for name, value in zip(wanted, values, strict=True)]
@@ -123,7 +125,7 @@ def reset_function(system: System, clocks: Clocks) -> str:
 def _reset_of_tangent(
     system: System, base: System, clocks: Clocks, carried: list[tuple[int, int]]
 ) -> tuple[str, list[str]]:
-    """Function that multiplies a column of the tangent by S of a jump, and the lines that call it."""
+    """A function that multiplies a column of the tangent by S of a jump, and lines that call it."""
     size = len(base.states)
     names = {name: f"new_{i}" for i, name in enumerate(base.states)}
     known = parameter_leaf(base, "y", clocks.value)
@@ -139,7 +141,9 @@ def _reset_of_tangent(
     changed = sorted({i for i, _ in carried})
     for i in range(size):
         carried_rate = " + ".join(f"s_{i}_{k} * rate_before_{k}" for j, k in carried if j == i)
-        lines.append(f"leap_{i} = rate_after_{i} - ({carried_rate or f'rate_before_{i}'}) - drift_{i}")
+        lines.append(
+            f"leap_{i} = rate_after_{i} - ({carried_rate or f'rate_before_{i}'}) - drift_{i}"
+        )
     lines.append(
         "closing = " + " + ".join([*(f"n_{i} * rate_before_{i}" for i in range(size)), f"n_{size}"])
     )
@@ -152,7 +156,9 @@ def _reset_of_tangent(
     )
     lines += [f"reset_of_column(y[{j}:], {given})" for j in range(size)]
     column = [f"y[{i}]" for i in first_column(system)]
-    body = [f"along = ({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"]
+    body = [
+        f"along = ({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"
+    ]
     body += [
         f"carried_{i} = " + " + ".join(f"s_{i}_{k} * {column[k]}" for j, k in carried if j == i)
         for i in changed
@@ -163,13 +169,13 @@ def _reset_of_tangent(
 
 
 def settle_function(system: System, clocks: Clocks) -> str:
-    """``settle(t, y, p, h, mode, g)``: bring state and tangent onto the constraint of guard g, where
-    it begins to be held.
+    """``settle(t, y, p, h, mode, g)``: bring state and tangent onto the constraint of guard g,
+    where its contact begins to be held.
     """
     head = "@kernel\ndef settle(t, y, p, h, mode, g):\n"
     base = system.tangent_of or system
     laws = [
-        (g, guard, guard.law) for g, guard in enumerate(base.guards) if guard.law and guard.law.settled
+        (g, one.gap, one.law) for g, one in enumerate(base.guards) if one.law and one.law.settled
     ]
     if not laws:
         return head + "    pass\n"
@@ -178,7 +184,7 @@ def settle_function(system: System, clocks: Clocks) -> str:
     if system.tangent_of:
         lines += [f"w_{i} = 0.0" for i in range(size)] + [f"d_{i} = 0.0" for i in range(size)]
         lines += [f"n_{i} = 0.0" for i in range(size)] + ["across = 1.0", "square = 1.0"]
-    for g, guard, law in laws:
+    for g, gap, law in laws:
         code = ScalarCode(leaf, side=_bit_in_mode, prefix=f"law{g}_", switch=clocks.side)
         wanted = {f"new_{i}": entry for i, entry in enumerate(law.settled)}
         if system.tangent_of:
@@ -186,7 +192,7 @@ def settle_function(system: System, clocks: Clocks) -> str:
             wanted |= {f"d_{i}": entry for i, entry in enumerate(law.direction)}
             wanted |= {"across": _dot(law.normal, law.direction)}
             if law.kind == "impact":
-                normal = [differentiate(guard.gap, ex.state(name)) for name in base.states]
+                normal = [differentiate(gap, ex.state(name)) for name in base.states]
                 wanted |= {f"n_{i}": entry for i, entry in enumerate(normal)}
                 wanted |= {"square": _dot(normal, normal)}
         values = code.values(wanted.values())

@@ -25,9 +25,9 @@ def gaps_function(system: System, clocks: Clocks) -> str:
     """``gaps(t, y, p, h, out)``: value of every guard, sides taken from the state; h is what the
     clocks hold.
 
-    Whether a contact is held, and the side of a gap that is zero, are taken from out. Behind the gaps come, for a guard whose contact can
-    be held, the rate at which its constraint is left without its own force, and what that force
-    changes of it.
+    Whether a contact is held, and the side of a gap that is zero, are taken from out. Behind the
+    gaps come, for a guard whose contact can be held, the rate at which its constraint is left
+    without its own force, and what that force changes of it.
     """
     laws = any(guard.law for guard in system.guards)
     code = ScalarCode(

@@ -96,9 +96,7 @@ def strike(lanes, lane, batch, g, rate, slow):
         slow.state[i] = lanes.y[i, lane]
     show_clocks(lanes, lane, slow)
     now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
-    reset(
-        now, slow.state, batch.param[who * batch.stride], slow.held, mode, g, slow.out
-    )
+    reset(now, slow.state, batch.param[who * batch.stride], slow.held, mode, g, slow.out)
     restitution, closing = slow.out[0], slow.out[1]
     if closing > 0.0:
         velocity = rate * lanes.side[g, lane]
