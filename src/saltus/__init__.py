@@ -59,6 +59,7 @@ if TYPE_CHECKING:
         mod,
         pi,
         piecewise,
+        regularise,
         sign,
         sin,
         sinh,
@@ -101,7 +102,7 @@ _HOMES = {
     ),
     **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
         "sinh"), "saltus.system"),
-    **dict.fromkeys(("table", "where"), "saltus.system"),
+    **dict.fromkeys(("regularise", "table", "where"), "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 
@@ -146,6 +147,7 @@ __all__ = [
     "piecewise",
     "plot",
     "poincare",
+    "regularise",
     "samples",
     "save",
     "settled",

@@ -41,6 +41,7 @@ from saltus.system.functions import (
 )
 from saltus.system.guards import Guard
 from saltus.system.laws import freeplay
+from saltus.system.regularisation import regularise
 from saltus.system.system import System
 from saltus.system.tables import table
 from saltus.system.trace import system
@@ -48,8 +49,8 @@ from saltus.system.trace import system
 __all__ = [
     "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp",
     "freeplay", "heaviside", "hypot", "log", "max",
-    "min", "mod", "pi", "piecewise", "sign", "sin", "sinh", "sqrt", "system", "table", "tan",
-    "tanh", "where",
+    "min", "mod", "pi", "piecewise", "regularise", "sign", "sin", "sinh", "sqrt", "system", "table",
+    "tan", "tanh", "where",
 ]  # fmt: skip
 
 
