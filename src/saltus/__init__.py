@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.compare import compare
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
+    from saltus.analysis.methods.regularisation_widths import regularisation_widths
     from saltus.analysis.motion.energy import energy_balance
     from saltus.analysis.motion.impacts import impact_statistics
     from saltus.analysis.motion.poincare import poincare
@@ -59,10 +60,15 @@ if TYPE_CHECKING:
         mod,
         pi,
         piecewise,
+        pulse,
+        recorded,
+        regularise,
+        sawtooth,
         sign,
         sin,
         sinh,
         sqrt,
+        square,
         system,
         table,
         tan,
@@ -83,6 +89,7 @@ _HOMES = {
     "impact_statistics": "saltus.analysis.motion.impacts",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
     "poincare": "saltus.analysis.motion.poincare",
+    "regularisation_widths": "saltus.analysis.methods.regularisation_widths",
     "settled": "saltus.analysis.motion.settled",
     "simulate": "saltus.analysis.motion.simulate",
     "spectrum": "saltus.analysis.motion.spectrum",
@@ -101,7 +108,8 @@ _HOMES = {
     ),
     **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
         "sinh"), "saltus.system"),
-    **dict.fromkeys(("table", "where"), "saltus.system"),
+    **dict.fromkeys(("pulse", "recorded", "regularise", "sawtooth", "square", "table", "where"),
+        "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 
@@ -148,8 +156,13 @@ __all__ = [
     "piecewise",
     "plot",
     "poincare",
+    "pulse",
+    "recorded",
+    "regularisation_widths",
+    "regularise",
     "samples",
     "save",
+    "sawtooth",
     "settled",
     "sign",
     "simulate",
@@ -157,6 +170,7 @@ __all__ = [
     "sinh",
     "spectrum",
     "sqrt",
+    "square",
     "stroboscope",
     "system",
     "table",

@@ -61,6 +61,10 @@ BATCH = (
 
 _CLOCKS = {"numbers_of_clocks": (ARRAY, ARRAY)}
 _JUMP = {"jump": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE)}
+_LAWS = {
+    "reset": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, ARRAY),
+    "settle": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE),
+}
 
 #: What the layouts' ``workspace()`` return.
 _TAYLOR_WORK = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2, _F1, _F1)
@@ -70,23 +74,23 @@ TAYLOR = Interface(
     arguments=BATCH + _TAYLOR_WORK,
     layout="taylor_layout",
     templates=("clocks", "taylor_singular", "taylor_crossings", "taylor_step", "taylor_contacts",
-        "taylor_lanes"),
+        "taylor_laws", "taylor_lanes"),
     sizes=(
         "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW",
         "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
         "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "NSTEPPED", "NSERIES", "NCLOCKS",
     ),
-    flags=("PROBED", "TANGENT"),
+    flags=("PROBED", "TANGENT", "LAWS"),
     tables=MappingProxyType(
         dict.fromkeys(
             (
                 "STEP_ROW", "SERIES_ROW", "GUARD_ROW", "GUARD_SERIES", "SNAP_STATE", "SNAP_CONST",
                 "SINGULAR_GUARD", "CLOCK_KIND",
-                "CLOCK_TABLE",
+                "CLOCK_TABLE", "LAW", "PARTNER",
             ),
             WHOLE,
         )
-        | {"GUARD_SIGN": REAL}
+        | {"GUARD_SIGN": REAL, "LAW_SIDE": REAL, "KNOWN_ZEROS": REAL}
     ),
     functions=MappingProxyType(
         {
@@ -97,6 +101,7 @@ TAYLOR = Interface(
             "rates": (ARRAY,) * 5,
             **_CLOCKS,
             **_JUMP,
+            **_LAWS,
         }
     ),
     truths=("turns",),

@@ -9,15 +9,19 @@ two stages at one time is computed once.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from saltus.codegen.clocks import Clocks
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.saltation import jump_function
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.taylor_head import bits_of, evaluation_order
+from saltus.errors import ParameterError
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
 from saltus.system.expression import Expr
+from saltus.system.guards import Guard
+from saltus.system.singular import assuming
 from saltus.system.system import System
 
 
@@ -119,10 +123,33 @@ def _gap_rates(system: System, stages: _Stages) -> str:
     return indented(code.lines)
 
 
+def never_held(system: System) -> System:
+    """The system without reduced equations: no contact is held, no hold guard is crossed.
+
+    Raises
+    ------
+    ParameterError
+        If its state jumps at contacts: the right-hand side alone doesn't say so.
+    """
+    for guard in system.guards:
+        if guard.law and guard.law.reset:
+            raise ParameterError(
+                f"{system.name} has an impact or a jump at {guard.name!r}, which only sl.Taylor() "
+                f"follows. Leave method= out."
+            )
+    guards, field = list(system.guards), system.field
+    for number, guard in enumerate(system.guards):
+        if guard.law and guard.law.kind == "hold":
+            guards[number] = Guard(guard.name, ex.constant(-1.0))
+            field = tuple(assuming(entry, number, False) for entry in field)
+    return system if field is system.field else replace(system, field=field, guards=tuple(guards))
+
+
 def rates_head(system: System, numbers: Mapping[str, Constant]) -> Head:
     """Everything that kernels/trajectory.py and the templates of a method expect to stand above
     them; ``numbers`` are those of the method (codegen/tableaux.py).
     """
+    system = never_held(system)
     stages = _Stages(system)
     gaps = [guard.gap for guard in system.guards]
     field = _outputs(_with_sides(system, stages, system.field, of_mode=True), system.field)

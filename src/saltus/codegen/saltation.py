@@ -1,18 +1,21 @@
-"""The jump of the tangent at a contact, generated: the saltation matrix S = I + (f_after -
-f_before) n' / (n' f_before + g_t).
+"""What happens to states and tangent at a contact, generated: jumps by a law of contact, and the
+saltation matrix.
 
-It is the identity where the force is continuous. Aizerman & Gantmakher, J. Mech. Appl. Math. 11
-(1958); Leine & Nijmeijer (2004), section 7.4.
+Where the mode changes, S = I + (f_after - f_before) n' / (n' f_before + g_t): the identity where
+the force is continuous. Where the state jumps to J(t, y), S = J_y + (f_after - J_y f_before - J_t)
+n' / (n' f_before + g_t). Where a contact begins to be held, what leads away is projected out.
+Aizerman & Gantmakher, J. Mech. Appl. Math. 11 (1958); Leine & Nijmeijer (2004), section 7.4.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from saltus.codegen.clocks import Clocks
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
+from saltus.system.expression import Expr
 from saltus.system.singular import SetAside, set_aside
 from saltus.system.system import System
 from saltus.system.tangent import first_column
@@ -65,6 +68,163 @@ def jump_function(system: System, clocks: Clocks) -> str:
         f"@kernel\ndef jump_of_column(y, {given}):\n{indented(leap)}\n\n"
         f"@kernel\ndef jump(t, y, p, h, before, after, g):\n{indented(lines)}\n"
     )
+
+
+def reset_function(system: System, clocks: Clocks) -> str:
+    """``reset(t, y, p, h, mode, g, out)``: put the state after the jump of guard g's law into y,
+    and S times the tangent; out[0] is the law's restitution, out[1] the closing velocity before.
+    """
+    head = "@kernel\ndef reset(t, y, p, h, mode, g, out):\n"
+    base = system.tangent_of or system
+    laws = [
+        (g, one.gap, one.law) for g, one in enumerate(base.guards) if one.law and one.law.settled
+    ]
+    if not laws:
+        return head + "    pass\n"
+    size, leaf = len(base.states), parameter_leaf(base, "y", clocks.value)
+    states = [ex.state(name) for name in base.states]
+    lines = ["restitution = 0.0", "closing_before = 0.0"]
+    lines += [f"new_{i} = y[{i}]" for i in range(size)]
+    slopes = {
+        (i, k): differentiate(entry, state)
+        for _, _, law in laws
+        for i, entry in enumerate(law.reset)
+        if entry is not states[i]
+        for k, state in enumerate(states)
+    }
+    carried = sorted(slopes) if system.tangent_of else []
+    lines += [f"s_{i}_{k} = {1.0 if i == k else 0.0}" for i, k in carried]
+    if system.tangent_of:
+        lines += [f"drift_{i} = 0.0" for i in range(size)]
+        lines += [f"n_{i} = 0.0" for i in range(size + 1)]
+    for g, gap, law in laws:
+        code = ScalarCode(leaf, side=_bit_in_mode, prefix=f"law{g}_", switch=clocks.side)
+        wanted = {f"new_{i}": entry for i, entry in enumerate(law.reset)}
+        if law.restitution is not None and law.constraint is not None:
+            wanted |= {"restitution": law.restitution, "closing_before": law.constraint}
+        else:
+            wanted |= {"closing_before": ex.constant(1.0)}
+        if system.tangent_of:
+            wanted |= {f"s_{i}_{k}": differentiate(law.reset[i], states[k]) for i, k in carried}
+            wanted |= {f"drift_{i}": differentiate(law.reset[i], ex.TIME) for i in range(size)}
+            wanted |= {
+                f"n_{i}": differentiate(gap, one) for i, one in enumerate((*states, ex.TIME))
+            }
+        values = code.values(wanted.values())
+        code.lines += [f"{name} = {value}" for name, value in zip(wanted, values, strict=True)]
+        lines += [f"if g == {g}:", *("    " + line for line in code.lines)]
+    helper = ""
+    if system.tangent_of:
+        helper, more = _reset_of_tangent(system, base, clocks, carried)
+        lines += more
+    lines += ["out[0] = restitution", "out[1] = closing_before"]
+    lines += [f"y[{i}] = new_{i}" for i in range(size)]
+    return f"{helper}{head}{indented(lines)}\n"
+
+
+def _reset_of_tangent(
+    system: System, base: System, clocks: Clocks, carried: list[tuple[int, int]]
+) -> tuple[str, list[str]]:
+    """A function that multiplies a column of the tangent by S of a jump, and lines that call it."""
+    size = len(base.states)
+    names = {name: f"new_{i}" for i, name in enumerate(base.states)}
+    known = parameter_leaf(base, "y", clocks.value)
+    lines = []
+    for word, leaf in (
+        ("before", known),
+        ("after", lambda node: names[node.payload] if node.op == "state" else known(node)),
+    ):
+        code = ScalarCode(leaf, side=_bit_in_mode, prefix=f"{word}_", switch=clocks.side)
+        for i, value in enumerate(code.values(base.field)):
+            code.lines.append(f"rate_{word}_{i} = {value}")
+        lines += code.lines
+    changed = sorted({i for i, _ in carried})
+    for i in range(size):
+        carried_rate = " + ".join(f"s_{i}_{k} * rate_before_{k}" for j, k in carried if j == i)
+        lines.append(
+            f"leap_{i} = rate_after_{i} - ({carried_rate or f'rate_before_{i}'}) - drift_{i}"
+        )
+    lines.append(
+        "closing = " + " + ".join([*(f"n_{i} * rate_before_{i}" for i in range(size)), f"n_{size}"])
+    )
+    given = ", ".join(
+        [
+            *(f"s_{i}_{k}" for i, k in carried),
+            *(f"leap_{i}, n_{i}" for i in range(size)),
+            "closing",
+        ]
+    )
+    lines += [f"reset_of_column(y[{j}:], {given})" for j in range(size)]
+    column = [f"y[{i}]" for i in first_column(system)]
+    body = [
+        f"along = ({' + '.join(f'n_{i} * {entry}' for i, entry in enumerate(column))}) / closing"
+    ]
+    body += [
+        f"carried_{i} = " + " + ".join(f"s_{i}_{k} * {column[k]}" for j, k in carried if j == i)
+        for i in changed
+    ]
+    body += [f"{column[i]} = carried_{i}" for i in changed]
+    body += [f"{entry} += leap_{i} * along" for i, entry in enumerate(column)]
+    return f"@kernel\ndef reset_of_column(y, {given}):\n{indented(body)}\n\n", lines
+
+
+def settle_function(system: System, clocks: Clocks) -> str:
+    """``settle(t, y, p, h, mode, g)``: bring state and tangent onto the constraint of guard g,
+    where its contact begins to be held.
+    """
+    head = "@kernel\ndef settle(t, y, p, h, mode, g):\n"
+    base = system.tangent_of or system
+    laws = [
+        (g, one.gap, one.law) for g, one in enumerate(base.guards) if one.law and one.law.settled
+    ]
+    if not laws:
+        return head + "    pass\n"
+    size, leaf = len(base.states), parameter_leaf(base, "y", clocks.value)
+    lines = [f"new_{i} = y[{i}]" for i in range(size)]
+    if system.tangent_of:
+        lines += [f"w_{i} = 0.0" for i in range(size)] + [f"d_{i} = 0.0" for i in range(size)]
+        lines += [f"n_{i} = 0.0" for i in range(size)] + ["across = 1.0", "square = 1.0"]
+    for g, gap, law in laws:
+        code = ScalarCode(leaf, side=_bit_in_mode, prefix=f"law{g}_", switch=clocks.side)
+        wanted = {f"new_{i}": entry for i, entry in enumerate(law.settled)}
+        if system.tangent_of:
+            wanted |= {f"w_{i}": entry for i, entry in enumerate(law.normal)}
+            wanted |= {f"d_{i}": entry for i, entry in enumerate(law.direction)}
+            wanted |= {"across": _dot(law.normal, law.direction)}
+            if law.kind == "impact":
+                normal = [differentiate(gap, ex.state(name)) for name in base.states]
+                wanted |= {f"n_{i}": entry for i, entry in enumerate(normal)}
+                wanted |= {"square": _dot(normal, normal)}
+        values = code.values(wanted.values())
+        code.lines += [f"{name} = {value}" for name, value in zip(wanted, values, strict=True)]
+        lines += [f"if g == {g}:", *("    " + line for line in code.lines)]
+    helper = ""
+    if system.tangent_of:
+        given = ", ".join([*(f"w_{i}, d_{i}, n_{i}" for i in range(size)), "across", "square"])
+        column = [f"y[{i}]" for i in first_column(system)]
+        body = []
+        for over, along, by in (("w", "d", "across"), ("n", "n", "square")):
+            total = " + ".join(f"{over}_{i} * {entry}" for i, entry in enumerate(column))
+            body.append(f"share_{over} = ({total}) / {by}")
+            body += [f"{entry} += -{along}_{i} * share_{over}" for i, entry in enumerate(column)]
+        helper = f"@kernel\ndef settle_column(y, {given}):\n{indented(body)}\n\n"
+        lines += [f"settle_column(y[{j}:], {given})" for j in range(size)]
+    lines += [f"y[{i}] = new_{i}" for i in range(size)]
+    return f"{helper}{head}{indented(lines)}\n"
+
+
+def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
+    """Sum of products, without those that are zero."""
+    total = ex.constant(0.0)
+    for one, other in zip(a, b, strict=True):
+        if not any(x.op == "const" and x.payload == 0 for x in (one, other)):
+            total = ex.add(total, ex.mul(one, other))
+    return total
+
+
+def _bit_in_mode(guard: int) -> str:
+    """Code for the side of a guard in the mode that a function is given."""
+    return f"((mode >> {guard}) & 1) == 1"
 
 
 def _bit_of(word: str, aside: SetAside) -> Callable[[int], str]:

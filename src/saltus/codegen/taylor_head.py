@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from saltus.codegen.clocks import Clocks
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.jets import MOVING, Constants, JetCode
-from saltus.codegen.saltation import jump_function
+from saltus.codegen.saltation import jump_function, reset_function, settle_function
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.series import Linear, SeriesBuilder, is_constant
+from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
 from saltus.system.singular import set_aside
@@ -23,24 +24,44 @@ FIRST_TURN = 2
 def gaps_function(system: System, clocks: Clocks) -> str:
     """``gaps(t, y, p, h, out)``: value of every guard, sides taken from the state; h is what the
     clocks hold.
+
+    Whether a contact is held, and the side of a gap that is zero, are taken from out. Behind the
+    gaps come, for a guard whose contact can be held, the rate at which its constraint is left
+    without its own force, and what that force changes of it.
     """
+    laws = any(guard.law for guard in system.guards)
     code = ScalarCode(
         parameter_leaf(system, "y", clocks.value),
-        side=lambda i: f"(out[{i}] > 0.0)",
+        side=lambda i: f"up_{i}" if laws else f"(out[{i}] > 0.0)",
         switch=clocks.side,
     )
+    if laws:
+        code.lines += [f"up_{i} = out[{i}] > 0.0" for i in range(len(system.guards))]
     for i in evaluation_order(system):
         value = code.value(system.guards[i].gap)
         code.lines.append(f"out[{i}] = {value}")
+        if laws:
+            code.lines.append(f"up_{i} = {value} > 0.0 or ({value} == 0.0 and up_{i})")
+    count, held = len(system.guards), []
+    for i, guard in enumerate(system.guards):
+        if guard.law and guard.law.kind == "hold":
+            held.append(f"out[{i}] = {code.value(guard.gap)}")
+        elif guard.law and guard.law.drive is not None and guard.law.pivot is not None:
+            held.append(f"out[{count + i}] = {code.value(guard.law.drive)}")
+            held.append(f"out[{2 * count + i}] = {code.value(guard.law.pivot)}")
+    code.lines += held  # behind all that reads whether contacts are held
     return f"@kernel\ndef gaps(t, y, p, h, out):\n{indented(code.lines)}\n"
 
 
 def evaluation_order(system: System) -> list[int]:
-    """Guards ordered so that a gap comes after the guards on whose sides it depends."""
+    """Guards ordered so that a gap comes after the guards on whose sides it depends; without those
+    that say whether a contact is held, which depend on one another in circles.
+    """
     order: list[int] = []
 
     def visit(i: int) -> None:
-        if i in order:
+        law = system.guards[i].law
+        if i in order or (law and law.kind == "hold"):
             return
         for node in ex.walk(system.guards[i].gap):
             if node.op == "select":
@@ -129,11 +150,13 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         NEWTON_DEGREE_1=min(5, order), NEWTON_DEGREE_2=min(11, order), NSTEPPED=len(stepped),
         NSERIES=len(series),
         PROBED=probed, TANGENT=system.tangent_of is not None,
+        LAWS=any(guard.law for guard in system.guards),
         **_tables(
             STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row,
             GUARD_SERIES=[series.index(row) for row in guards.row],
             GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const,
             SINGULAR_GUARD=list(aside.guards),
+            **_laws(system),
         ),
         **clocks.constants(),
     )  # fmt: skip
@@ -142,11 +165,26 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         clocks.function(),
         gaps_function(system, clocks),
         jump_function(system, clocks),
+        reset_function(system, clocks),
+        settle_function(system, clocks),
         _turns_function(system, code),
         _jets_functions(code, len(column), handed_row, order + 1),
         f"@inner\ndef rates(y, side, c, clock, work):\n{indented(rates)}\n",
     ]
     return Head(constants_of_head, "\n".join(functions))
+
+
+def _laws(system: System) -> dict[str, list]:
+    """Tables of the laws of contact, for each guard: its kind, the guard that says whether it is
+    held (of that one: whose contact), its side, the zeros known where holding ends.
+    """
+    laws = [guard.law for guard in system.guards]
+    return dict(
+        LAW=[LAW_KINDS[law.kind] if law else NO_LAW for law in laws],
+        PARTNER=[law.partner if law else -1 for law in laws],
+        LAW_SIDE=[float(law.side) if law else 0.0 for law in laws],
+        KNOWN_ZEROS=[float(law.zeros) if law else 1.0 for law in laws],
+    )
 
 
 def _rates(
@@ -202,7 +240,10 @@ def _write_guards(
 ) -> tuple[_Guards, int]:
     """Write every gap to the work rows; guards of one state share that state's rows."""
     guards, rows = _Guards(), len(system.states) * (order + 1)
-    boundaries = [_state_boundary(form) for form in forms]
+    boundaries = [
+        None if guard.law and guard.law.kind == "hold" else _state_boundary(form)
+        for guard, form in zip(system.guards, forms, strict=True)
+    ]
     own_rows = rows
     for form, boundary in zip(forms, boundaries, strict=True):
         if boundary:

@@ -59,9 +59,21 @@ STATUS = {
 CROSSING = 0
 GRAZE = 1
 GRAZE_SHALLOW = 2
+IMPACT = 3
+HOLD = 4
+RELEASE = 5
 
 #: Name of every kind of contact record.
-CONTACT_KIND = {CROSSING: "crossing", GRAZE: "graze", GRAZE_SHALLOW: "graze_unresolved"}
+CONTACT_KIND = {
+    CROSSING: "crossing", GRAZE: "graze", GRAZE_SHALLOW: "graze_unresolved", IMPACT: "impact",
+    HOLD: "hold", RELEASE: "release",
+}  # fmt: skip
+
+# Laws of contact of a guard: none, a two-valued force that may hold the contact, an impact, a jump
+# of the state; or the guard says whether another one's contact is held.
+NO_LAW, SURFACE_LAW, IMPACT_LAW, JUMP_LAW, HOLD_LAW = range(5)
+#: Number of each kind of law.
+LAW_KINDS = {"surface": SURFACE_LAW, "impact": IMPACT_LAW, "jump": JUMP_LAW, "hold": HOLD_LAW}
 
 # Columns of the integer counters kept for each trajectory.
 STEPS, REJECTED, EVENTS, GRAZES, UNRESOLVED, VIOLATIONS = range(6)

@@ -1,4 +1,4 @@
-"""Template, 5 of 6 of the Taylor flow: contacts of one lane - settling what the quadratic bound
+"""Template, 5 of 7 of the Taylor flow: contacts of one lane - settling what the quadratic bound
 could not, landing, recording. The first crossing of a step is found before, by `locate` in
 taylor_crossings.
 """
@@ -45,7 +45,7 @@ from saltus.kernels.status import (
 # -- the slow path: one lane that the quadratic bound could not settle -----------------------------
 @kernel
 def scaled_gap(lanes, lane, g, h, slow):
-    """P on [0, 1] of one lane into slow.q, the known root divided out; returns the rounding error
+    """P on [0, 1] of one lane into slow.q, the known zeros divided out; returns the rounding error
     of the gap's terms at the start.
     """
     s = lanes.side[g, lane]
@@ -54,10 +54,12 @@ def scaled_gap(lanes, lane, g, h, slow):
     for k in range(1, ORDER + 1):
         scale *= h
         slow.q[k] = scale * lanes.work[GUARD_ROW[g] + k, lane]
-    if lanes.fresh[g, lane] > 0.5:
-        for k in range(ORDER):
-            slow.q[k] = slow.q[k + 1]
-        slow.q[ORDER] = 0.0
+    known = int(lanes.fresh[g, lane])
+    if known > 0:
+        for k in range(ORDER + 1 - known):
+            slow.q[k] = slow.q[k + known]
+        for k in range(ORDER + 1 - known, ORDER + 1):
+            slow.q[k] = 0.0
     return ROUNDING * (lanes.work[SCALE_ROW + g, lane] + lanes.prior[PRIOR_ROWS * g + OLD, lane])
 
 
@@ -75,6 +77,8 @@ def first_place(lanes, lane, g, h, slow, count):
     """Time into the step at which gap g crosses first, beyond h if it doesn't; and the touches now
     on the list.
     """
+    if LAWS and lanes.side[WATCHED + g, lane] < 0.5:
+        return 2.0 * h, count
     noise = scaled_gap(lanes, lane, g, h, slow)
     fresh = lanes.fresh[g, lane] > 0.5
     sign = leading_sign(slow.q, ORDER)
@@ -277,9 +281,13 @@ def show_clocks(lanes, lane, slow):
 
 @kernel
 def gaps_here(lanes, lane, batch, slow):
-    """All gaps at the node where a lane stands, to slow.gaps."""
+    """All gaps at the node where a lane stands, to slow.gaps; of contacts that can be held also
+    what `gaps` writes behind them.
+    """
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
+    for g in range(NGUARDS):
+        slow.gaps[g] = lanes.side[g, lane]
     show_clocks(lanes, lane, slow)
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
     gaps(
@@ -296,6 +304,8 @@ def is_past(lanes, lane, g, slow):
     """Whether a gap in slow.gaps is on the wrong side of its boundary, by more than the rounding of
     the terms of the step before.
     """
+    if LAWS and lanes.side[WATCHED + g, lane] < 0.5:
+        return False
     return slow.gaps[g] * lanes.side[g, lane] < -ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
 
 
@@ -533,6 +543,8 @@ def land_all(lanes, lane, batch, hits, slow):
             exactly = lanes.memo[lane, DECIDED] == 1 or batch.rec_i.shape[0] > 0
             rate = gap_rate(lanes, lane, g, d) if exactly else lanes.found[RATE, lane]
             past = -lanes.side[g, lane] * lanes.work[GAP_ROW + g, lane]
+            if LAWS and meet(lanes, lane, batch, g, rate, slow):
+                continue
             if (
                 d == 0.0
                 and lanes.fresh[g, lane] < 0.5

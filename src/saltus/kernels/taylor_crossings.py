@@ -1,4 +1,4 @@
-"""Template, 3 of 6 of the Taylor flow: where gaps close within a step, in all lanes at once.
+"""Template, 3 of 7 of the Taylor flow: where gaps close within a step, in all lanes at once.
 
 `locate` bounds the series, classifies each gap and chooses the first crossing. What is proven to
 cross is refined by Newton's method. What stays open is tried on a shorter step (`settle_sooner`),
@@ -151,11 +151,16 @@ def classify(lanes, g, h):
     least = select(turns, vertex, smaller(p0, p0 + p1 + p2)) + smaller(p3, 0.0) - (1.0 / 6.0) * rest
     falls, rises, concave, convex = one_way(p1, p2, p3, rest)
     dips = convex & turns & (6.0 * (vertex + larger(p3, 0.0) + noise) + rest < 0.0)
-    inside = p0 > 0.0
+    inside, asked = p0 > 0.0, load(lanes.run, ACTIVE, LANES) > 0.5
+    if LAWS:  # more known zeros than one are left to the slow path
+        asked = asked & (load(lanes.side, WATCHED + g, LANES) > 0.5)
+        inside = inside & (load(lanes.fresh, g, LANES) < 1.5)
     clear = inside & (((falls | rises | concave) & (end > noise)) | (least > noise))
     once = inside & (end < -noise) & (falls | concave | convex)
-    closes = (load(lanes.run, ACTIVE, LANES) > 0.5) & inside & (~clear)
+    closes = asked & inside & (~clear)
     undecided = ~inside
+    if LAWS:
+        undecided = undecided & asked
     if NSERIES > 1:
         store(lanes.found, RIVALS + g, splat(-1.0, LANES))
     if any_lane(closes):
@@ -190,6 +195,8 @@ def classify(lanes, g, h):
         & (turns | rises_again)
         & (least < load(lanes.run, LEAST, LANES))
     )
+    if LAWS:
+        near = near & asked
     if any_lane(near):
         note_turn(lanes, g, near, rises_again, h * larger(smaller(flat_at, 1.0), 0.0), h)
     return undecided
@@ -580,6 +587,9 @@ def share_to_first_crossing(lanes, h):
         a0, a1, a2, a3, end = terms_of_gap(lanes, g)
         p0, p1, p2, p3 = without_known_root(load(lanes.fresh, g, LANES) > 0.5, a0, a1, a2, a3)
         inside, discriminant = p0 > 0.0, p1 * p1 - 4.0 * p0 * p2
+        if LAWS:
+            inside = inside & (load(lanes.side, WATCHED + g, LANES) > 0.5)
+            inside = inside & (load(lanes.fresh, g, LANES) < 1.5)
         x = 2.0 * p0 / (root(larger(discriminant, 0.0)) - p1)
         x = select(inside & (discriminant >= 0.0) & (x > 0.0), x, math.inf)
         second, first = smaller(second, larger(first, x)), smaller(first, x)
@@ -588,6 +598,8 @@ def share_to_first_crossing(lanes, h):
         )
         # the vertex is -discriminant / (4 p2)
         touches = (p1 < 0.0) & (p2 > 0.0) & (6.0 * magnitude(discriminant) <= 4.0 * p2 * doubt)
+        if LAWS:
+            touches = touches & inside
         ends_on_boundary = magnitude(end) <= TOGETHER * TOGETHER * (
             magnitude(a0) + magnitude(a1) + magnitude(a2) + magnitude(a3)
         )

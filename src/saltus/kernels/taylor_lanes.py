@@ -1,4 +1,4 @@
-"""Template, 6 of 6 of the Taylor flow: the life of a lane - filled, attended to at contacts,
+"""Template, 7 of 7 of the Taylor flow: the life of a lane - filled, attended to at contacts,
 samples and ends of periods, emptied.
 """
 
@@ -13,6 +13,8 @@ from saltus.kernels.status import (
     FINISHED,
     GAP_MARGIN,
     GRAZE_UNRESOLVED,
+    HOLD_LAW,
+    IMPACT_LAW,
     NONFINITE,
     OK,
     PAUSED,
@@ -90,6 +92,8 @@ def final_contacts(lanes, lane, batch, slow):
     d, met, past = lanes.found[DELTA, lane], 0, 0
     for g in range(NGUARDS):
         inside = slow.gaps[g] * lanes.side[g, lane]
+        if LAWS and lanes.side[WATCHED + g, lane] < 0.5:
+            continue
         if lanes.fresh[g, lane] < 0.5 and inside <= 0.0:
             if inside == 0.0 and gap_rate(lanes, lane, g, d) >= 0.0:
                 note_touch(lanes, lane, batch, slow, g, d, lanes.run[START, lane])
@@ -102,7 +106,9 @@ def final_contacts(lanes, lane, batch, slow):
         if (past >> g) & 1:
             jump_over(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow)
         elif (met >> g) & 1:
-            land(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow)
+            rate = gap_rate(lanes, lane, g, d)
+            if not (LAWS and meet(lanes, lane, batch, g, rate, slow)):
+                land(lanes, lane, batch, g, rate, slow)
 
 
 @inner
@@ -204,12 +210,20 @@ def attend(lanes, lane, batch, slow):
 @kernel
 def start_sides(lanes, lane, batch, slow):
     """Sides of all guards from the state; on a boundary the guard is fresh and its side is settled
-    by the first step.
+    by the first step. No contact is held yet; a stop is on the side that it allows.
     """
+    for g in range(NGUARDS):
+        lanes.side[g, lane] = -1.0
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
         lanes.side[g, lane] = -1.0 if slow.gaps[g] < 0.0 else 1.0
         lanes.fresh[g, lane] = 1.0 if slow.gaps[g] == 0.0 else 0.0
+        if LAW[g] == HOLD_LAW:
+            lanes.side[g, lane], lanes.fresh[g, lane] = -1.0, 0.0
+        if LAW[g] == IMPACT_LAW and slow.gaps[g] == 0.0:
+            lanes.side[g, lane] = LAW_SIDE[g]
+    if LAWS:
+        watch(lanes, lane)
     lanes.run[STARTING, lane] = 1.0
     lanes.run[LANDED, lane] = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
 
@@ -260,6 +274,10 @@ def fill(lanes, lane, who, batch, slow):
     for g in range(NGUARDS):
         lanes.side[g, lane] = 1.0 if (batch.mode[who] >> g) & 1 else -1.0
         lanes.fresh[g, lane] = 1.0 if (batch.fresh[who] >> g) & 1 else 0.0
+        if LAWS:
+            lanes.fresh[g, lane] = batch.carry[who, CARRIED + NGUARDS + g]
+    if LAWS:
+        watch(lanes, lane)
     lanes.run[LANDED, lane] = batch.carry[who, 0]
     lanes.run[BOUNCES, lane], lanes.run[STARTING, lane] = batch.carry[who, 1], batch.carry[who, 2]
     lanes.run[FLIPPED, lane], lanes.run[LIMIT, lane], lanes.run[MARK, lane] = (
@@ -284,6 +302,8 @@ def empty(lanes, lane, batch, status):
     batch.mode[who], batch.fresh[who], batch.status[who] = mode_of(lanes, lane), fresh, status
     for g in range(NGUARDS):
         batch.carry[who, CARRIED + g] = lanes.prior[PRIOR_ROWS * g + NEW, lane]
+        if LAWS:
+            batch.carry[who, CARRIED + NGUARDS + g] = lanes.fresh[g, lane]
     batch.carry[who, 0] = lanes.run[LANDED, lane]
     batch.carry[who, 1], batch.carry[who, 2] = lanes.run[BOUNCES, lane], lanes.run[STARTING, lane]
     batch.carry[who, 3], batch.carry[who, 4], batch.carry[who, 5] = (

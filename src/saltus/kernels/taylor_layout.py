@@ -1,4 +1,4 @@
-"""Template, 1 of 6 of the Taylor flow: what its work arrays hold. codegen puts a generated head
+"""Template, 1 of 7 of the Taylor flow: what its work arrays hold. codegen puts a generated head
 before the six.
 
 One step of all lanes reads: jets -> step length (taylor_step.py) -> locate contacts
@@ -12,10 +12,12 @@ Symbols
 N = ORDER; y_k Taylor coefficient k of state y; g gap; s = +1/-1 the side of a guard that the mode
 says; P(d) = s*g along the step, d the time since its start; h step length; T forcing period; tau
 phase in [0, T); c parameter-only constants of each lane. A guard is *fresh* while its lane stands
-exactly on the boundary: P(0) = 0, and that known root is divided out.
+exactly on the boundary: P(0) = 0, and that known root is divided out; `fresh` counts the known
+zeros, of P and its derivatives.
 
 The head supplies the sizes LANES, NSTATES, NGUARDS, ORDER, NCONST, NTURNS, ROWS, NSERIES, the rows
 SERIES_ROW, GUARD_ROW, GUARD_SERIES, GUARD_SIGN, GAP_ROW, SCALE_ROW, SNAP_STATE, SNAP_CONST, the
+laws LAW, PARTNER, LAW_SIDE, KNOWN_ZEROS of the guards (LAWS: whether there is one), the
 degrees NEWTON_DEGREE_1 and _2, and the functions constants(p, c, lane), gaps(t, y, p, h, out),
 turns(p, origin, period, count, lane, clock) -> whether they change from period to period, jets(y,
 side, c, clock, work) and rates(y, side, c, clock, work), the right-hand side alone; PROBED says
@@ -87,12 +89,16 @@ LOG2_TOLERANCE, MOST_STEPS, MOST_CONTACTS, PACE = range(4)
 # this one, each step counting half of the one after it; their rounding is inherited.
 OLD, NEW, PRIOR_ROWS = range(3)
 # Columns of `carry`, what a paused lane needs besides its state: LANDED, BOUNCES, STARTING,
-# FLIPPED, LIMIT, MARK, then NEW for each guard.
+# FLIPPED, LIMIT, MARK, then NEW for each guard; where contacts have laws, `fresh` of each.
 CARRIED = 6
-CARRY = CARRIED + NGUARDS
+CARRY = CARRIED + (2 if LAWS else 1) * NGUARDS
 #: Records that one step may write at most: contacts and touches of all lanes, in the step and at
 #: the end of the run.
-STEP_RECORDS = 2 * LANES * (NGUARDS + MOST_TOUCHES)
+STEP_RECORDS = 2 * LANES * ((2 if LAWS else 1) * NGUARDS + MOST_TOUCHES)
+#: Row of `side` from which on the lanes stand in which a guard is watched (0/1).
+WATCHED = NGUARDS + NSINGULAR
+#: Part of the time scale of the acceleration that may be left of a chatter when it is completed.
+CHATTER = 1.0e-8
 #: Times within this many ulp are one event (EVENTS.md, rule 6).
 COINCIDENT = 10.0 * 2.220446049250313e-16
 #: Rounds of flips at one instant before the contact is given up as sliding (EVENTS.md, rule 6).
@@ -167,7 +173,7 @@ def workspace():
     """The memory that one call of `propagate` works in; one set for each thread."""
     guards = max(NGUARDS, 1)
     rows = dict(
-        y=NSTATES, side=guards + NSINGULAR, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS,
+        y=NSTATES, side=2 * guards + NSINGULAR, fresh=guards, clock=CLOCK_ROWS, c=NCONST, work=ROWS,
         bounds=BOUNDS * max(NSERIES, 1),
         prior=PRIOR_ROWS * guards, poly=ORDER + 1, run=RUN_ROWS, found=RIVALS + guards,
         probe_y=NSTATES,
@@ -180,7 +186,7 @@ def workspace():
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)),
         bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(2), gaps=np.zeros(guards), state=np.zeros(NSTATES),
+        out=np.zeros(2), gaps=np.zeros(3 * guards), state=np.zeros(NSTATES),
         touches=np.zeros((MOST_TOUCHES, 2)),
         held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
     )  # fmt: skip

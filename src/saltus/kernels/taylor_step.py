@@ -1,4 +1,4 @@
-"""Template, 4 of 6 of the Taylor flow: one step of all lanes, as arithmetic on lanes: how long it
+"""Template, 4 of 7 of the Taylor flow: one step of all lanes, as arithmetic on lanes: how long it
 is, how it is taken.
 """
 
@@ -211,7 +211,7 @@ def advance(lanes, room, records):
     if NCLOCKS > 0:
         due = due | (tau >= load(run, WATCH, LANES))
     crosses = load(lanes.found, WHICH, LANES) >= 0.0
-    if TANGENT or records:
+    if TANGENT or LAWS or records:
         due = due | crosses
     else:
         land_simply(lanes, crosses & (~due), tau)

@@ -20,6 +20,57 @@ from saltus.system.text import Writer
 
 
 @dataclass(frozen=True, eq=False)
+class Law:
+    """What a contact does beyond changing the equations: the state jumps, or the contact is held.
+
+    A contact that can be held - at rest, stuck, sliding along its boundary - has a *hold guard*
+    behind all others, whose bit says that it is. There the field is the reduced one.
+
+    Attributes
+    ----------
+    kind : str
+        ``impact``, ``jump``; ``surface``: both sides may push onto the boundary; ``hold``: the
+        guard is the hold guard of another.
+    side : int
+        Sign of the gap on the side that an impact allows, or from which a jump happens; else 0.
+    partner : int
+        Number of the hold guard; of the owner, if this is one; -1 of a jump.
+    reset : tuple of Expr
+        The state after an impact or a jump.
+    settled : tuple of Expr
+        The state on the constraint, where the contact begins to be held.
+    constraint : Expr or None
+        w, zero while the contact is held: the closing velocity of an impact, the function of a
+        surface.
+    normal, direction : tuple of Expr
+        Gradient of w with respect to the states; what a unit of the contact's own force adds to the
+        field, that of others that are held eliminated.
+    drive, pivot : Expr or None
+        Rate of w without the contact's own force, and what a unit of it adds to that rate.
+    limit : Expr or None
+        Of a surface: static over kinetic force.
+    restitution : Expr or None
+        Of an impact.
+    zeros : int
+        Derivatives of the gap that are zero where holding fades out, the gap among them.
+    """
+
+    kind: str
+    side: int = 0
+    partner: int = -1
+    reset: tuple[Expr, ...] = ()
+    settled: tuple[Expr, ...] = ()
+    constraint: Expr | None = None
+    normal: tuple[Expr, ...] = ()
+    direction: tuple[Expr, ...] = ()
+    drive: Expr | None = None
+    pivot: Expr | None = None
+    limit: Expr | None = None
+    restitution: Expr | None = None
+    zeros: int = 1
+
+
+@dataclass(frozen=True, eq=False)
 class Guard:
     """A boundary; side 1 is where ``gap > 0``.
 
@@ -36,12 +87,15 @@ class Guard:
         boundary.
     boundary : Expr or None
         That level, an expression of parameters.
+    law : Law or None
+        None for a contact that only changes the equations.
     """
 
     name: str
     gap: Expr
     state: str | None = None
     boundary: Expr | None = None
+    law: Law | None = None
 
 
 def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:

@@ -1,0 +1,210 @@
+"""Template, 6 of 7 of the Taylor flow: laws of contact of one lane - impacts, jumps, contacts that
+are held: at rest, stuck, sliding along a boundary.
+
+A contact that is held has a guard of its own, the hold guard: on its positive side the equations
+are the reduced ones, and its gap says how far the contact is from being released. So a guard is
+watched only where it can act: a hold guard while the contact is held, the contact's own guard while
+it isn't. docs/decisions/0040.
+"""
+
+import math
+
+from saltus.kernels.status import (
+    HOLD,
+    HOLD_LAW,
+    IMPACT,
+    IMPACT_LAW,
+    JUMP_LAW,
+    RELEASE,
+    SURFACE_LAW,
+)
+
+
+# -- which guards are watched ----------------------------------------------------------------------
+@inner
+def watch(lanes, lane):
+    """Watch the guards that can act in the mode of a lane."""
+    for g in range(NGUARDS):
+        held = PARTNER[g] >= 0 and lanes.side[g if LAW[g] == HOLD_LAW else PARTNER[g], lane] > 0.0
+        lanes.side[WATCHED + g, lane] = 1.0 if held == (LAW[g] == HOLD_LAW) else 0.0
+
+
+# -- contacts by their laws ------------------------------------------------------------------------
+@kernel
+def meet(lanes, lane, batch, g, rate, slow):
+    """One contact by the law of its guard; returns whether that law has dealt with it."""
+    if LAW[g] == HOLD_LAW:
+        release(lanes, lane, batch, g, slow)
+        return True
+    if LAW[g] == SURFACE_LAW:
+        return caught(lanes, lane, batch, g, slow)
+    if (LAW[g] == IMPACT_LAW or LAW[g] == JUMP_LAW) and lanes.side[g, lane] * LAW_SIDE[g] > 0.0:
+        strike(lanes, lane, batch, g, rate, slow)
+        return True
+    return False
+
+
+@inner
+def snap(lanes, lane, g):
+    """Put the state on the boundary of a guard."""
+    if SNAP_STATE[g] >= 0:
+        lanes.y[SNAP_STATE[g], lane] = lanes.c[SNAP_CONST[g], lane]
+    lanes.fresh[g, lane] = 1.0
+
+
+@kernel
+def note(lanes, lane, batch, g, kind, direction, velocity, before, later, slow):
+    """Count and record what a law did to the state in slow.state, `later` than now by some seconds;
+    at the start of a run it is an initial condition, and no event.
+    """
+    if lanes.run[STARTING, lane] > 0.5:
+        who = lanes.memo[lane, WHO]
+        for m in range(batch.cursor[who]):
+            batch.sample_mode[who, m] = mode_of(lanes, lane)
+        return
+    lanes.run[MET, lane] += 1.0
+    if not recorded(lanes, lane, batch):
+        return
+    tau = lanes.clock[TAU, lane]
+    error = CHATTER * later + 2.0e-16 * (tau + abs(lanes.clock[BASE, lane]))
+    if velocity != 0.0:
+        error = time_error(lanes, lane, g, velocity, tau)
+    record(
+        lanes,
+        lane,
+        batch,
+        tau + later,
+        g,
+        direction,
+        velocity,
+        kind,
+        before,
+        mode_of(lanes, lane),
+        error,
+        slow.state,
+    )
+
+
+@kernel
+def strike(lanes, lane, batch, g, rate, slow):
+    """The state jumps at a boundary that it may not pass. Rebounds too small to be followed end at
+    rest.
+    """
+    who, mode = lanes.memo[lane, WHO], mode_of(lanes, lane)
+    snap(lanes, lane, g)
+    for i in range(NSTATES):
+        slow.state[i] = lanes.y[i, lane]
+    show_clocks(lanes, lane, slow)
+    now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
+    reset(now, slow.state, batch.param[who * batch.stride], slow.held, mode, g, slow.out)
+    restitution, closing = slow.out[0], slow.out[1]
+    if closing > 0.0:
+        velocity = rate * lanes.side[g, lane]
+        lanes.run[SLOWEST, lane] = min(lanes.run[SLOWEST, lane], abs(rate))
+        for i in range(NSTATES):
+            lanes.y[i, lane] = slow.state[i]
+        note(lanes, lane, batch, g, IMPACT, int(-lanes.side[g, lane]), velocity, mode, 0.0, slow)
+    if LAW[g] == JUMP_LAW:
+        after_jump(lanes, lane, batch, g, slow)
+        return
+    gaps_here(lanes, lane, batch, slow)
+    pressing, rebound = slow.gaps[NGUARDS + g], restitution * max(closing, 0.0)
+    if pressing > 0.0:
+        later = 0.0
+        if rebound > 0.0:
+            later = 2.0 * rebound / (pressing * (1.0 - restitution))
+        if later <= too_short(lanes, lane, g, restitution):
+            hold(lanes, lane, batch, g, later, slow)
+
+
+@inner
+def too_short(lanes, lane, g, restitution):
+    """Duration of a chatter [s] below which it is completed: what is left of it changes the
+    acceleration by less than 1e-8, so the time at which it ends is right to rounding.
+
+    The acceleration's own time scale is read from the series of the flight that has just ended.
+    """
+    row = GUARD_ROW[g]
+    second = abs(lanes.work[row + 2, lane])
+    third, fourth = abs(lanes.work[row + 3, lane]), abs(lanes.work[row + 4, lane])
+    scale = lanes.run[END, lane]
+    if second < scale * third:
+        scale = second / third
+    if second < scale * scale * fourth:
+        scale = math.sqrt(second / fourth)
+    now = lanes.clock[TAU, lane] + abs(lanes.clock[BASE, lane])
+    return max(CHATTER * (1.0 - restitution) * scale, 4.0e-16 * now)
+
+
+@inner
+def after_jump(lanes, lane, batch, g, slow):
+    """The side of a guard behind whose boundary the state has jumped."""
+    gaps_here(lanes, lane, batch, slow)
+    lanes.fresh[g, lane] = 0.0
+    near = TOLD * ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
+    if abs(slow.gaps[g]) <= near:
+        lanes.side[g, lane] = -lanes.side[g, lane]
+        lanes.fresh[g, lane] = 1.0
+        lanes.run[BOUNCES, lane] = 1.0  # should it turn back at once, nothing has happened
+    elif slow.gaps[g] * lanes.side[g, lane] < 0.0:
+        lanes.side[g, lane] = -lanes.side[g, lane]
+
+
+# -- contacts that are held ------------------------------------------------------------------------
+@kernel
+def caught(lanes, lane, batch, g, slow):
+    """Whether both sides push onto the surface that a lane has reached, so that it is held there:
+    the force needed is within its limit.
+    """
+    gap = lanes.work[GAP_ROW + g, lane]
+    if lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] < 0.5 and gap != 0.0:
+        return False  # it jumped over the surface
+    snap(lanes, lane, g)
+    gaps_here(lanes, lane, batch, slow)
+    if slow.gaps[2 * NGUARDS + g] < 0.0 and slow.gaps[PARTNER[g]] > 0.0:
+        hold(lanes, lane, batch, g, 0.0, slow)
+        return True
+    return False
+
+
+@kernel
+def hold(lanes, lane, batch, g, later, slow):
+    """A contact begins to be held: state and tangent go onto its constraint, `later` [s] at most
+    than now.
+    """
+    who, before, h = lanes.memo[lane, WHO], mode_of(lanes, lane), PARTNER[g]
+    lanes.side[h, lane], lanes.fresh[h, lane] = 1.0, 0.0
+    watch(lanes, lane)
+    if TANGENT and LAW[g] == SURFACE_LAW and lanes.run[STARTING, lane] < 0.5:
+        saltate(lanes, lane, batch, g, before, slow)
+    for i in range(NSTATES):
+        slow.state[i] = lanes.y[i, lane]
+    show_clocks(lanes, lane, slow)
+    now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
+    settle(now, slow.state, batch.param[who * batch.stride], slow.held, before, g)
+    for i in range(NSTATES):
+        lanes.y[i, lane] = slow.state[i]
+    note(lanes, lane, batch, h, HOLD, 1, 0.0, before, later, slow)
+
+
+@kernel
+def release(lanes, lane, batch, h, slow):
+    """A contact is held no longer. Where its force fades out, more than the gap is known to be
+    zero; where it jumps, its rate at most.
+    """
+    before, g = mode_of(lanes, lane), PARTNER[h]
+    gaps_here(lanes, lane, batch, slow)
+    fades = lanes.found[DELTA, lane] > 0.0
+    lanes.side[h, lane] = -1.0
+    if LAW[g] == SURFACE_LAW:
+        lanes.side[g, lane] = 1.0 if slow.gaps[NGUARDS + g] > 0.0 else -1.0
+        lanes.fresh[g, lane] = KNOWN_ZEROS[g] if fades else 1.0
+    else:
+        lanes.side[g, lane] = LAW_SIDE[g]
+        lanes.fresh[g, lane] = KNOWN_ZEROS[g] if fades else 2.0
+    watch(lanes, lane)
+    if TANGENT and fades:
+        saltate(lanes, lane, batch, h, before, slow)
+    for i in range(NSTATES):
+        slow.state[i] = lanes.y[i, lane]
+    note(lanes, lane, batch, h, RELEASE, -1, 0.0, before, 0.0, slow)

@@ -1,0 +1,134 @@
+"""Blends in place of pieces: every side of a guard gets a weight, a smoothed step of its gap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from saltus.errors import TraceError
+from saltus.system import expression as ex
+from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
+from saltus.system.functions import atan, piecewise, sqrt, tanh
+from saltus.system.guards import Guard, find_guards, number_of
+from saltus.system.singular import check_finite, check_gaps, lifted
+from saltus.system.system import System
+
+#: A smoothed step of a gap and a width, from 0 far below the boundary to 1 far above.
+Step = Callable[[Any, Any], Any]
+
+
+def _tanh(gap: Any, width: Any) -> Any:
+    return 0.5 * (1.0 + tanh(gap / width))
+
+
+def _sigmoid(gap: Any, width: Any) -> Any:
+    return 0.5 * (1.0 + tanh(gap / (2.0 * width)))  # 1/(1 + exp(-u)), without its overflow
+
+
+def _polynomial(gap: Any, width: Any) -> Any:
+    u = gap / width
+    inside = 0.5 + 0.75 * u - 0.25 * u * u * u
+    return piecewise((0.0, gap + width < 0), (1.0, gap - width > 0), otherwise=inside)
+
+
+def _rational(gap: Any, width: Any) -> Any:
+    u = gap / width
+    return 0.5 * (1.0 + u / sqrt(1.0 + u * u))
+
+
+def _arctan(gap: Any, width: Any) -> Any:
+    return 0.5 + atan(gap / width) / math.pi
+
+
+#: The smoothed steps by their names.
+STEPS: dict[str, Step] = {
+    "tanh": _tanh,
+    "sigmoid": _sigmoid,
+    "polynomial": _polynomial,
+    "rational": _rational,
+    "arctan": _arctan,
+}
+
+
+def blended(
+    system: System, step: Step, parameters: Mapping[int, str]
+) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
+    """Field and guards of the stand-in."""
+    blend = _Blend(step, parameters)
+    for guard in system.guards:
+        blend.add(blend.rewrite(guard.gap))
+    try:
+        field, guards = find_guards([blend.rewrite(entry) for entry in system.field])
+        field = lifted(field, guards)
+        check_finite(field, guards, system.states)
+        check_gaps(guards)
+    except TraceError as error:
+        raise TraceError(f"{system.name}, regularised: {error}") from error
+    return field, _with_old_names(system.guards, blend.sides, guards)
+
+
+def _with_old_names(
+    old: Sequence[Guard], sides: Sequence[Any], guards: Sequence[Guard]
+) -> tuple[Guard, ...]:
+    """The guards, those that stay with the names that they had."""
+    kept = {
+        number_of(side, guards): guard.name
+        for guard, side in zip(old, sides, strict=True)
+        if isinstance(side, Relation)
+    }
+    return tuple(
+        replace(guard, name=kept.get(number, guard.name)) for number, guard in enumerate(guards)
+    )
+
+
+class _Blend:
+    """Weights in place of the bits of guards."""
+
+    def __init__(self, step: Step, parameters: Mapping[int, str]) -> None:
+        self._step, self._parameters = step, parameters
+        self.sides: list[Expr | Relation] = []
+        self._rewritten: dict[Expr, Expr] = {}
+
+    def add(self, gap: Expr) -> None:
+        """The next guard: its weight, or the comparison that it stays."""
+        name = self._parameters.get(len(self.sides))
+        self.sides.append(
+            Relation(gap) if name is None else ex.as_expr(self._step(gap, ex.parameter(name)))
+        )
+
+    def rewrite(self, root: Expr) -> Expr:
+        """The expression with blends in place of pieces."""
+        memo = self._rewritten
+        for node in ex.walk(root):
+            if node in memo:
+                continue
+            args = tuple(memo[child] for child in node.args)
+            if node.op != "select":
+                memo[node] = ex.rebuild(node, args, node.payload)
+                continue
+            side = self._side(node.payload)
+            if isinstance(side, Condition):
+                memo[node] = ex.select(side, *args)
+            else:
+                memo[node] = ex.add(args[1], ex.mul(side, ex.sub(args[0], args[1])))
+        return memo[root]
+
+    def _side(self, condition: Condition) -> Expr | Condition:
+        """The weight of a condition; a condition of boundaries that stay is still one."""
+        match condition:
+            case Bit(number):
+                return self.sides[number]
+            case Relation():
+                return condition
+            case Not(inner):
+                side = self._side(inner)
+                return Not(side) if isinstance(side, Condition) else 1.0 - side
+            case And(left, right) | Or(left, right):
+                a, b = self._side(left), self._side(right)
+                if isinstance(a, Condition) and isinstance(b, Condition):
+                    return type(condition)(a, b)
+                a, b = (ex.select(c, 1, 0) if isinstance(c, Condition) else c for c in (a, b))
+                return a * b if isinstance(condition, And) else 1.0 - (1.0 - a) * (1.0 - b)
+        raise TypeError(condition)
