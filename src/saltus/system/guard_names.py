@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from saltus.errors import TraceError, shown
+from saltus.system.contacts import hold_name
 from saltus.system.expression import Condition, Relation
-from saltus.system.guards import equation_of, number_of
+from saltus.system.guards import equation_of, is_hold, number_of
 from saltus.system.names import why_no_title
 from saltus.system.quantity import Quantity, called
 from saltus.system.system import System
@@ -51,6 +52,9 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
         replace(guard, name=new.get(number, guard.name))
         for number, guard in enumerate(system.guards)
     ]
+    for number, guard in enumerate(guards):
+        if guard.law is not None and is_hold(guard) and guard.law.partner in new:
+            guards[number] = replace(guard, name=hold_name(guards[guard.law.partner]))
     taken = {*system.states, *(f"{state} turns" for state in system.states)}
     for number, guard in enumerate(guards):
         if guard.name in taken:
@@ -78,7 +82,11 @@ def _meant(system: System, name: str, function: Quantity) -> int:
     number = number_of(condition, system.guards)
     if number is None:
         have = (
-            ", ".join(equation_of(each, system.guards) for each in range(len(system.guards)))
+            ", ".join(
+                equation_of(each, system.guards)
+                for each, guard in enumerate(system.guards)
+                if not is_hold(guard)
+            )
             or "none"
         )
         raise TraceError(
