@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.compare import compare
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
+    from saltus.analysis.methods.regularisation_widths import regularisation_widths
     from saltus.analysis.motion.energy import energy_balance
     from saltus.analysis.motion.impacts import impact_statistics
     from saltus.analysis.motion.poincare import poincare
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
-    from saltus.flow import ODE45, Interrupted, Taylor
+    from saltus.flow import ODE23, ODE45, RK4, Interrupted, Taylor
     from saltus.interrupt import Stop
     from saltus.results import contacts, load, samples, save, to_csv, to_mat
     from saltus.results.describe import describe
@@ -62,11 +63,15 @@ if TYPE_CHECKING:
         mod,
         pi,
         piecewise,
+        pulse,
+        recorded,
         regularise,
+        sawtooth,
         sign,
         sin,
         sinh,
         sqrt,
+        square,
         system,
         table,
         tan,
@@ -87,6 +92,7 @@ _HOMES = {
     "impact_statistics": "saltus.analysis.motion.impacts",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
     "poincare": "saltus.analysis.motion.poincare",
+    "regularisation_widths": "saltus.analysis.methods.regularisation_widths",
     "settled": "saltus.analysis.motion.settled",
     "simulate": "saltus.analysis.motion.simulate",
     "spectrum": "saltus.analysis.motion.spectrum",
@@ -95,7 +101,7 @@ _HOMES = {
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
     "Stop": "saltus.interrupt",
-    **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
+    **dict.fromkeys(("ODE23", "ODE45", "RK4", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"),
         "saltus.results"),
     **dict.fromkeys(
@@ -106,12 +112,15 @@ _HOMES = {
     **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
         "sinh"), "saltus.system"),
     **dict.fromkeys(("friction", "impact", "jump"), "saltus.system"),
-    **dict.fromkeys(("regularise", "table", "where"), "saltus.system"),
+    **dict.fromkeys(("pulse", "recorded", "regularise", "sawtooth", "square", "table", "where"),
+        "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 
 __all__ = [
+    "ODE23",
     "ODE45",
+    "RK4",
     "Interrupted",
     "SaltusError",
     "Stop",
@@ -154,9 +163,13 @@ __all__ = [
     "piecewise",
     "plot",
     "poincare",
+    "pulse",
+    "recorded",
+    "regularisation_widths",
     "regularise",
     "samples",
     "save",
+    "sawtooth",
     "settled",
     "sign",
     "simulate",
@@ -164,6 +177,7 @@ __all__ = [
     "sinh",
     "spectrum",
     "sqrt",
+    "square",
     "stroboscope",
     "system",
     "table",

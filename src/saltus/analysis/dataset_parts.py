@@ -5,7 +5,6 @@ provenance, contacts and their errors.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from saltus.flow.engine import Outcome
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.results import Guards, Subject, attributes
-from saltus.system.dimensions import units_of
+from saltus.system.dimensions import gap_units
 from saltus.system.evaluate import evaluate
 from saltus.system.system import System
 
@@ -36,10 +35,9 @@ def guards_over(system: System, values: Mapping[str, Any], shape: tuple[int, ...
     """The guards with their boundaries; of this shape where a parameter that is given as an array
     moves one of them.
     """
-    places = []
-    for guard in system.guards:
-        place = np.nan if guard.boundary is None else evaluate([guard.boundary], values=values)[0]
-        places.append(np.broadcast_to(place, shape if np.ndim(place) else ()))
+    boundaries = [guard.boundary for guard in system.guards]
+    found = iter(evaluate([one for one in boundaries if one is not None], values=values))
+    places = [np.nan if one is None else next(found) for one in boundaries]
     if any(np.ndim(place) for place in places):
         places = [np.broadcast_to(place, shape) for place in places]
     return Guards(
@@ -47,22 +45,6 @@ def guards_over(system: System, values: Mapping[str, Any], shape: tuple[int, ...
         [g.state for g in system.guards],
         np.array(places, float),
         gap_units(system),
-    )
-
-
-def gap_units(system: System) -> list[str]:
-    """Unit of the gap of each guard, ``""`` where it isn't known."""
-    return list(_gap_units(system.origin))
-
-
-@lru_cache(maxsize=64)  # the same for all values, and as long to find as a short run
-def _gap_units(system: System) -> tuple[str, ...]:
-    found = units_of(
-        system.states, system.units, system.field, [guard.gap for guard in system.guards]
-    )
-    return tuple(
-        unit if guard.state is None else system.units[guard.state]
-        for guard, unit in zip(system.guards, found, strict=True)
     )
 
 

@@ -14,7 +14,15 @@ from saltus.system.declared import Declared, Impact, Jump
 from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Bit, Expr, Friction, Not
-from saltus.system.guards import Guard, Law, bits_in, equation_of, find_guards, relations
+from saltus.system.guards import (
+    Guard,
+    Law,
+    bits_in,
+    equation_of,
+    find_guards,
+    is_hold,
+    relations,
+)
 from saltus.system.reduction import Elimination, Held, dot, held_contact, hold_gap, with_pivots
 from saltus.system.singular import check_finite, check_gaps, lifted
 from saltus.system.surfaces import (
@@ -156,6 +164,19 @@ def hold_name(owner: Guard) -> str:
     """Name of the hold guard of a guard."""
     assert owner.law is not None
     return f"{owner.name} {'at rest' if owner.law.kind == 'impact' else 'held'}"
+
+
+def renamed(guards: Sequence[Guard], names: Mapping[int, str]) -> tuple[Guard, ...]:
+    """Guards with other names for some; hold guards follow the names of their owners."""
+    new = [
+        replace(guard, name=names.get(number, guard.name)) for number, guard in enumerate(guards)
+    ]
+    return tuple(
+        replace(guard, name=hold_name(new[guard.law.partner]))
+        if guard.law is not None and is_hold(guard) and guard.law.partner in names
+        else guard
+        for guard in new
+    )
 
 
 def _held_contacts(

@@ -11,12 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from saltus.errors import UnitError
 from saltus.system.declared import Declared, Jump
 from saltus.system.expression import ELEMENTARY, Expr, walk
 from saltus.system.text import PI_MULTIPLES
 from saltus.units import dimension, unit_text
+
+if TYPE_CHECKING:
+    from saltus.system.system import System
 
 #: Exponents of m, kg, s, A and K.
 Dimension = dict[str, Fraction]
@@ -130,6 +135,8 @@ class DimensionCheck:
                 return self._units.get(node.payload)
             case "time":
                 return self._time
+            case "table":
+                return dimension(node.payload.unit) if node.payload.unit else None
             case "neg":
                 return args[0]
             case "add" | "sub" | "select" | "mod":
@@ -238,6 +245,21 @@ def units_of(
     except UnitError:
         return [""] * len(formulas)
     return [_unit(check, formula) for formula in formulas]
+
+
+def gap_units(system: System) -> list[str]:
+    """Unit of the gap of each guard of a system, ``""`` where it isn't known."""
+    return list(_gap_units(system.origin))
+
+
+@lru_cache(maxsize=64)  # the same for all values, and as long to find as a short run
+def _gap_units(system: System) -> tuple[str, ...]:
+    gaps = [guard.gap for guard in system.guards]
+    found = units_of(system.states, system.units, system.field, gaps)
+    return tuple(
+        unit if guard.state is None else system.units[guard.state]
+        for guard, unit in zip(system.guards, found, strict=True)
+    )
 
 
 def _unit(check: DimensionCheck, formula: Expr) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from saltus.errors import TraceError, shown
-from saltus.system.contacts import hold_name
+from saltus.system.contacts import renamed
 from saltus.system.expression import Condition, Relation
 from saltus.system.guards import equation_of, is_hold, number_of
 from saltus.system.names import why_no_title
@@ -48,13 +48,7 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
                 f"{shown(name)}. Keep one of the two."
             )
         new[number] = name
-    guards = [
-        replace(guard, name=new.get(number, guard.name))
-        for number, guard in enumerate(system.guards)
-    ]
-    for number, guard in enumerate(guards):
-        if guard.law is not None and is_hold(guard) and guard.law.partner in new:
-            guards[number] = replace(guard, name=hold_name(guards[guard.law.partner]))
+    guards = renamed(system.guards, new)
     taken = {*system.states, *(f"{state} turns" for state in system.states)}
     for number, guard in enumerate(guards):
         if guard.name in taken:
@@ -67,7 +61,7 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
                 f"{system.name}: {shown(guard.name)} is the name of {what}. Choose another one."
             )
         taken.add(guard.name)
-    return replace(system, guards=tuple(guards))
+    return replace(system, guards=guards)
 
 
 def _meant(system: System, name: str, function: Quantity) -> int:

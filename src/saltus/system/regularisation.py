@@ -16,8 +16,10 @@ from typing import Any
 from saltus.errors import ParameterError, TraceError, among, nearest, shown
 from saltus.system import checks
 from saltus.system.blend import STEPS, Step, blended
-from saltus.system.dimensions import units_of
+from saltus.system.dimensions import gap_units
+from saltus.system.guards import is_hold
 from saltus.system.names import why_no_name
+from saltus.system.reduction import free_field
 from saltus.system.singular import set_aside
 from saltus.system.system import System
 from saltus.units import coherent_unit
@@ -70,7 +72,8 @@ def regularise(
     Raises
     ------
     ParameterError, UnitError
-        If the system has no boundary, or a width, law or name can't be used.
+        If the system has no boundary or one at which the state jumps, or a width, law or name can't
+        be used.
     TraceError
         If a piece has no values on the other side of its boundary, as ``depth**1.5`` has none.
 
@@ -95,6 +98,7 @@ def regularise(
     if not system.guards:
         raise ParameterError(f"{system.name} has no boundary: there is nothing to regularise.")
     step = _step(law)
+    system = _without_laws(system)
     named = _names(system, width)
     parameters, values, units = _parameters(system, named)
     _check_both_sides(system, parameters)
@@ -112,6 +116,23 @@ def regularise(
         guards=guards,
         values={**system.values, **values},
         units={**system.units, **units},
+    )
+
+
+def _without_laws(system: System) -> System:
+    """The system of which friction only slips: nothing is held. Raises a ParameterError if the
+    state jumps at a contact.
+    """
+    for guard in system.guards:
+        if guard.law is not None and guard.law.reset:
+            raise ParameterError(
+                f"{system.name}: at {guard.name!r} the state jumps, and nothing smooth stands for "
+                f"that. Write the contact as a stiff spring and a damper."
+            )
+    return replace(
+        system,
+        field=free_field(system.field, system.guards),
+        guards=tuple(guard for guard in system.guards if not is_hold(guard)),
     )
 
 
@@ -154,9 +175,9 @@ def _parameters(
     system: System, widths: Mapping[int, Any]
 ) -> tuple[dict[int, str], dict[str, float], dict[str, str]]:
     """Name of the width of each guard; values and units of these parameters."""
-    gap_units = _gap_units(system)
+    in_units = gap_units(system)
     one = len(set(map(id, widths.values()))) == 1 and len(widths) == len(system.guards)
-    known = sorted({gap_units[number] for number in widths} - {""})
+    known = sorted({in_units[number] for number in widths} - {""})
     if one and len(known) > 1:
         guards = [guard.name for guard in system.guards]
         raise ParameterError(
@@ -171,7 +192,7 @@ def _parameters(
             names[number] = next(iter(values))
             continue
         name = _free_name(system, values, None if one else system.guards[number].name)
-        unit = (known or [""])[0] if one else gap_units[number]
+        unit = (known or [""])[0] if one else in_units[number]
         if not unit and isinstance(value, str):
             unit = coherent_unit(value, name)
         names[number], units[name] = name, unit
@@ -179,17 +200,6 @@ def _parameters(
         if values[name] <= 0:
             raise ParameterError(f"{name} = {values[name]:g} must be positive.")
     return names, values, units
-
-
-def _gap_units(system: System) -> list[str]:
-    """Unit of each gap, ``""`` where it isn't known."""
-    found = units_of(
-        system.states, system.units, system.field, [guard.gap for guard in system.guards]
-    )
-    return [
-        system.units[guard.state] if guard.state else unit
-        for guard, unit in zip(system.guards, found, strict=True)
-    ]
 
 
 def _free_name(system: System, others: Mapping[str, float], guard: str | None) -> str:

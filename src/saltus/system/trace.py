@@ -48,6 +48,8 @@ _LIBRARIES = tuple(
 _CALLS = {
     "freeplay": "sl.freeplay(x, stiffness=..., gap=...), or lower_gap= and upper_gap=, damping= "
     "with velocity=, preload=",
+    "friction": "sl.friction(v, slip=..., stick=...)",
+    "impact": "sl.impact(x < gap, v, restitution=0.8), after the rates",
     "piecewise": "sl.piecewise((value, condition), ..., otherwise=value)",
     "table": 'sl.table(t, points, values, kind="linear", outside="hold")',
 }

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import saltus as sl
-from saltus.analysis.dataset_parts import gap_units
 from saltus.analysis.motion import time_errors
 from saltus.codegen.module import lane_width
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
-from saltus.flow.methods import SMALL_BATCH
+from saltus.flow.taylor import SMALL_BATCH
 from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
+from saltus.system.dimensions import gap_units
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 
