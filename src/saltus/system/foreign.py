@@ -72,8 +72,12 @@ ADVICE: dict[str, str] = {
     **dict.fromkeys(("sim", "simulation", "integrate", "odeint", "run", "solve_ode"),
         "Write sl.simulate(system, "
         "start, t_end=...)."),
-    **dict.fromkeys(("ode45", "RK45", "ode23", "ode15s", "DOP853"), "Write sl.simulate(system, "
+    **dict.fromkeys(("ode45", "RK45", "DOP853"), "Write sl.simulate(system, "
         "start, t_end=..., method=sl.ODE45())."),
+    **dict.fromkeys(("ode23", "RK23"), "Write sl.simulate(system, start, t_end=..., "
+                                       "method=sl.ODE23())."),
+    **dict.fromkeys(("rk4", "rungekutta", "runge_kutta"), "Write sl.simulate(system, start, "
+                                                          "t_end=..., method=sl.RK4(step))."),
     **dict.fromkeys(("transmission", "transmissibilities"), "Write sl.transmissibility(response, "
         "output, input)."),
     **dict.fromkeys(("interp1d", "interp1", "lookup"), "Write sl.table(x, points, values)."),

@@ -174,7 +174,8 @@ class Record:
         """
         if isinstance(t, Expr):
             return look_up(t, self.table)
-        return self.table(t)
+        found = self.table(t)
+        return found if np.ndim(found) else float(found)
 
 
 def recorded(
