@@ -44,7 +44,9 @@ class Declared:
     __array_ufunc__ = None
 
     def __repr__(self) -> str:
-        return f"{self.name}({self.condition.gap!r} > 0)"
+        gap = self.condition.gap
+        left, right = gap.args if gap.op == "sub" else (gap, 0)
+        return f"{self.name}({left!r} > {right!r})"
 
 
 class Impact(Declared):
