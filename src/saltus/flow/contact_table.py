@@ -111,7 +111,9 @@ class ContactTable:
         same = (np.diff(rows) == 1) & (np.diff(self.trajectory[rows]) == 0)
         same &= np.diff(self.guard[rows]) == 0
         run = np.cumsum(np.append(True, ~same)) - 1
-        behind = np.minimum(rows[np.append(np.flatnonzero(~same), len(rows) - 1)] + 1, len(self) - 1)
+        behind = np.minimum(
+            rows[np.append(np.flatnonzero(~same), len(rows) - 1)] + 1, len(self) - 1
+        )
         rests = (self.kind[behind] == st.HOLD) & (
             self.trajectory[behind] == self.trajectory[behind - 1]
         )

@@ -40,7 +40,7 @@ from saltus.system.functions import (
     tanh,
 )
 from saltus.system.guards import Guard
-from saltus.system.laws import freeplay
+from saltus.system.laws import freeplay, friction, impact, jump
 from saltus.system.regularisation import regularise
 from saltus.system.system import System
 from saltus.system.tables import table
@@ -48,7 +48,7 @@ from saltus.system.trace import system
 
 __all__ = [
     "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp",
-    "freeplay", "heaviside", "hypot", "log", "max",
+    "freeplay", "friction", "heaviside", "hypot", "impact", "jump", "log", "max",
     "min", "mod", "pi", "piecewise", "regularise", "sign", "sin", "sinh", "sqrt", "system", "table",
     "tan", "tanh", "where",
 ]  # fmt: skip

@@ -28,8 +28,8 @@ def where(condition: Condition | bool, value: Operand, otherwise: Operand) -> An
 def sign(a: Operand) -> Any:
     """1 where ``a > 0``, -1 where ``a < 0``; a boundary at ``a = 0``. Of the number 0 it is 0.
 
-    As the direction of friction it makes the motion stick where both sides push onto ``a = 0``;
-    saltus stops there with status `sliding`. ``sl.tanh(a/width)`` is its smooth stand-in.
+    As the direction of friction it makes the motion stick where both sides push onto ``a = 0``.
+    ``sl.tanh(a/width)`` is its smooth stand-in.
     """
     if _traced(a):
         return piecewise((1.0, a > 0), otherwise=-1.0)

@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from saltus.system.expression import ELEMENTARY, Condition, Expr
+from saltus.system.guards import Law
+from saltus.system.singular import assuming
 from saltus.system.text import _ATOM, _PRODUCT, PI_MULTIPLES, Writer
 from saltus.units import from_si
 
@@ -59,16 +61,25 @@ def equation_lines(system: System) -> list[str]:
     writer = _writer(Writer, system)
     lines = [
         f"d{name}/dt = {writer.text(entry)}"
-        for name, entry in zip(system.states, system.field, strict=True)
+        for name, entry in zip(system.states, free_field(system), strict=True)
     ]
     return writer.lines + lines
+
+
+def free_field(system: System) -> tuple[Expr, ...]:
+    """The field as it was written: no contact is held."""
+    field = system.field
+    for number, guard in enumerate(system.guards):
+        if guard.law and guard.law.kind == "hold":
+            field = tuple(assuming(entry, number, False) for entry in field)
+    return field
 
 
 def system_text(system: System) -> str:
     """The block that ``repr`` shows: equations, guards, parameters."""
     head = (
         f"System {system.name}: {_counted(len(system.states), 'state')}, "
-        f"{_counted(len(system.guards), 'guard')}{_forcing(system)}"
+        f"{_counted(len(_guard_rows(system)), 'guard')}{_forcing(system)}"
     )
     states = [
         f"{name} [{system.units[name]}]" if system.units[name] else name for name in system.states
@@ -103,6 +114,8 @@ def _guard_rows(system: System) -> list[tuple[str, str]]:
     writer = _writer(Writer, system)
     rows = []
     for number, guard in enumerate(system.guards):
+        if guard.law and guard.law.kind == "hold":
+            continue
         place = writer.side(number).replace(" > ", " = ", 1)
         if guard.boundary is not None and guard.state is not None:
             (value,) = evaluate([guard.boundary], values=system.values)
@@ -111,8 +124,23 @@ def _guard_rows(system: System) -> list[tuple[str, str]]:
                 if guard.boundary.op != "const"
                 else ""
             )
-        rows.append((guard.name, place))
+        rows.append((guard.name, place + _law_text(writer, guard.law)))
     return rows
+
+
+def _law_text(writer: Writer, law: Law | None) -> str:
+    """What happens at a guard, in words; "" if only the equations change."""
+    match law:
+        case None:
+            return ""
+        case Law(kind="impact", restitution=Expr() as ratio):
+            return f": impact with restitution {writer.text(ratio)}, and rest"
+        case Law(kind="jump"):
+            return ": the state jumps"
+        case Law(kind="surface", limit=Expr() as limit):
+            more = "" if limit.op == "const" else f", held up to {writer.text(limit)} of its force"
+            return f": sticks where both sides push onto it{more}"
+    return ""
 
 
 def _parameter_rows(system: System) -> list[tuple[str, str]]:
@@ -130,7 +158,8 @@ def _parameter_rows(system: System) -> list[tuple[str, str]]:
 
 
 def _writer(kind: type, system: System) -> Writer:
-    roots = (*system.field, *(guard.gap for guard in system.guards))
+    plain = [guard.gap for guard in system.guards if not (guard.law and guard.law.kind == "hold")]
+    roots = (*free_field(system), *plain)
     return kind(system.guards, shared=roots, taken=(*system.states, *system.values, "t"))
 
 

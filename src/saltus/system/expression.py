@@ -283,6 +283,8 @@ class Relation(Condition):
     """
 
     gap: Expr
+    #: Static over kinetic force of friction whose direction the comparison decides.
+    limit: Expr | None = None
 
 
 @dataclass(frozen=True)

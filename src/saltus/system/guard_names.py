@@ -51,6 +51,11 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
         replace(guard, name=new.get(number, guard.name))
         for number, guard in enumerate(system.guards)
     ]
+    for number, guard in enumerate(guards):
+        if guard.law and guard.law.kind == "hold":
+            owner = system.guards[guard.law.partner].name
+            renamed = guards[guard.law.partner].name + guard.name.removeprefix(owner)
+            guards[number] = replace(guard, name=renamed)
     taken = {*system.states, *(f"{state} turns" for state in system.states)}
     for number, guard in enumerate(guards):
         if guard.name in taken:

@@ -69,6 +69,13 @@ class Law:
     restitution: Expr | None = None
     zeros: int = 1
 
+    @property
+    def expressions(self) -> tuple[Expr, ...]:
+        """All of its expressions."""
+        single = (self.constraint, self.drive, self.pivot, self.limit, self.restitution)
+        several = (*self.reset, *self.settled, *self.normal, *self.direction)
+        return (*several, *(one for one in single if one is not None))
+
 
 @dataclass(frozen=True, eq=False)
 class Guard:
@@ -96,6 +103,11 @@ class Guard:
     state: str | None = None
     boundary: Expr | None = None
     law: Law | None = None
+
+    @property
+    def expressions(self) -> tuple[Expr, ...]:
+        """The gap, and what its law evaluates when the boundary is met."""
+        return (self.gap, *(self.law.expressions if self.law else ()))
 
 
 def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:

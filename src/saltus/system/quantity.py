@@ -235,6 +235,7 @@ def acting_guards(system: System) -> tuple[int, ...]:
     added.
     """
     acting = bits_in(system.field)
+    acting |= {number for number, guard in enumerate(system.guards) if guard.law}
     for number in reversed(range(len(system.guards))):
         if number in acting:
             acting |= bits_in([system.guards[number].gap])

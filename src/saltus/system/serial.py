@@ -22,7 +22,7 @@ from saltus.system.expression import (
     varies,
     walk,
 )
-from saltus.system.guards import Guard, bits_in
+from saltus.system.guards import Guard, Law, bits_in
 from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
 from saltus.system.tables import Table
 from saltus.units import check_declared
@@ -46,6 +46,8 @@ _OPERANDS = {
     "pow": 2,
     "select": 2,
 }
+_LAW_FIELDS = tuple(Law.__dataclass_fields__)
+_LAW_KINDS = ("impact", "jump", "surface", "hold")
 _OPERANDS |= {"mod": 2, "table": 1}
 _OPERANDS |= dict.fromkeys(ELEMENTARY, 1)
 
@@ -68,6 +70,7 @@ def _equations(system: System) -> dict[str, Any]:
     roots = [*system.field]
     for guard in system.guards:
         roots += [guard.gap] if guard.boundary is None else [guard.gap, guard.boundary]
+        roots += guard.law.expressions if guard.law else ()
     index: dict[Expr, int] = {}
     nodes = []
     for node in walk(*roots):
@@ -76,7 +79,8 @@ def _equations(system: System) -> dict[str, Any]:
         if isinstance(payload, Table):
             payload = payload.to_data()
         nodes.append([node.op, [index[child] for child in node.args], payload])
-    return {
+    laws = [_law_data(guard.law, index) if guard.law else None for guard in system.guards]
+    return ({"laws": laws} if any(laws) else {}) | {
         "states": list(system.states),
         "parameters": list(system.values),
         "forced_at": system.forced_at,
@@ -92,6 +96,19 @@ def _equations(system: System) -> dict[str, Any]:
             for guard in system.guards
         ],
     }
+
+
+def _law_data(law: Law, index: Mapping[Expr, int]) -> dict[str, Any]:
+    """A law, its expressions by the numbers of their nodes."""
+    data: dict[str, Any] = {}
+    for name in _LAW_FIELDS:
+        value = getattr(law, name)
+        if isinstance(value, Expr):
+            value = {"node": index[value]}
+        elif isinstance(value, tuple):
+            value = [index[one] for one in value]
+        data[name] = value
+    return data
 
 
 def fingerprint(system: System) -> str:
@@ -192,9 +209,13 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         all(0 <= place < len(nodes) for place in places),
         "a derivative or a boundary stands in no node",
     )
+    laws = [
+        None if law is None else _law(law, nodes, len(states), len(data["guards"]))
+        for law in data.get("laws", [None] * len(data["guards"]))
+    ]
     guards = tuple(
-        Guard(name, nodes[gap], state, None if boundary is None else nodes[boundary])
-        for name, gap, state, boundary in data["guards"]
+        Guard(name, nodes[gap], state, None if boundary is None else nodes[boundary], law)
+        for (name, gap, state, boundary), law in zip(data["guards"], laws, strict=True)
     )
     field = tuple(nodes[i] for i in data["field"])
     _require(len(field) == len(states), "the number of derivatives and of states differ")
@@ -208,7 +229,12 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         "a guard names an unknown state",
     )
     for number, guard in enumerate(guards):
-        _require(bits_in([guard.gap]) <= set(range(number)), "a gap depends on a later guard")
+        held = bool(guard.law and guard.law.kind == "hold")
+        known = set(range(len(guards) if held else number))
+        _require(bits_in([guard.gap]) <= known, "a gap depends on a later guard")
+        if guard.law:
+            bits = bits_in(guard.law.expressions)
+            _require(bits <= set(range(len(guards))), "a law names an unknown guard")
     _require(bits_in(field) <= set(range(len(guards))), "a condition names an unknown guard")
     _require(
         data["forced_at"] is None or data["forced_at"] in parameters, "forced_at is no parameter"
@@ -226,6 +252,27 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         "field": field,
         "guards": guards,
     }
+
+
+def _law(data: Mapping[str, Any], nodes: Sequence[Expr], states: int, guards: int) -> Law:
+    values: dict[str, Any] = {}
+    for name in _LAW_FIELDS:
+        value = data[name]
+        if isinstance(value, Mapping):
+            value = nodes[_place(value["node"], nodes)]
+        elif isinstance(value, list):
+            _require(len(value) in (0, states), "a law has another number of states")
+            value = tuple(nodes[_place(one, nodes)] for one in value)
+        elif name in ("side", "partner", "zeros"):
+            _require(isinstance(value, int) and -1 <= value < max(guards, 4), f"wrong {name}")
+        values[name] = value
+    _require(values["kind"] in _LAW_KINDS, f"unknown law {shown(values['kind'])}")
+    return Law(**values)
+
+
+def _place(number: Any, nodes: Sequence[Expr]) -> int:
+    _require(isinstance(number, int) and 0 <= number < len(nodes), "a law stands in no node")
+    return int(number)
 
 
 def _node(

@@ -11,7 +11,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation, operands, walk
 
@@ -28,6 +28,14 @@ PI_MULTIPLES = {math.pi: "pi", 2 * math.pi: "2*pi", 4 * math.pi: "4*pi", math.pi
 
 class Boundary(Protocol):
     """What a writer asks of a guard."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def law(self) -> Any:
+        """What happens at it."""
 
     @property
     def gap(self) -> Expr:
@@ -232,6 +240,8 @@ class Writer:
         return self.name(name), _ATOM
 
     def _guard_sides(self, guard: Boundary) -> tuple[str, str]:
+        if guard.law is not None and guard.law.kind == "hold":
+            return guard.name, f"not {guard.name}"
         if guard.state is not None and guard.boundary is not None:
             state, boundary = self.name(guard.state), self.text(guard.boundary)
             return state + self.greater + boundary, state + self.less + boundary

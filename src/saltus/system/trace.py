@@ -26,13 +26,13 @@ from saltus.errors import (
     shown,
 )
 from saltus.system import checks
+from saltus.system.contact_laws import with_laws
 from saltus.system.dimensions import DimensionCheck
 from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.formula import Equations, Formula
-from saltus.system.guards import find_guards
+from saltus.system.laws import Impact, Jump
 from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
-from saltus.system.singular import check_finite, check_gaps, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
@@ -346,18 +346,14 @@ def _traced(
             returned = function(
                 TIME, *map(state, states), **{name: parameter(name) for name in parameters}
             )
-            derivatives = _as_derivatives(returned, states)
+            derivatives, laws = _as_derivatives(returned, states)
         if dimensions is not None:
             dimensions.check_rates(derivatives)
     except Exception as error:
         kind = UnitError if isinstance(error, UnitError) else TraceError
         raise kind(explained(error, function, title)) from error
     try:
-        field, guards = find_guards(derivatives)
-        field = lifted(field, guards)
-        check_finite(field, guards, states)
-        check_gaps(guards)
-        return field, guards
+        return with_laws(states, derivatives, laws)
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
 
@@ -368,7 +364,7 @@ def _warn_of_unused(
     """Warn of parameters on which nothing depends: a name forgotten in the equation."""
     used = {
         node.payload
-        for node in walk(*field, *(guard.gap for guard in guards))
+        for node in walk(*field, *(root for guard in guards for root in guard.expressions))
         if node.op == "param"
     } | {forced_at}
     if unused := [name for name in parameters if name not in used]:
@@ -383,8 +379,10 @@ def _warn_of_unused(
         )
 
 
-def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
-    """What the function returned, as one expression per state."""
+def _as_derivatives(
+    returned: Any, states: tuple[str, ...]
+) -> tuple[list[Expr], list[Impact | Jump]]:
+    """What the function returned: one expression per state, then its laws of contact."""
     if returned is None:
         raise TraceError(
             "it returns nothing. End it with: return " + ", ".join(f"d{name}/dt" for name in states)
@@ -392,7 +390,11 @@ def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
     if isinstance(returned, Expr | int | float):
         returned = (returned,)
     try:
-        derivatives = [as_expr(value) for value in returned]
+        values = list(returned)
+        laws = [value for value in values if isinstance(value, Impact | Jump)]
+        if any(one is not other for one, other in zip(values[len(states) :], laws, strict=False)):
+            raise TraceError("a law of contact stands between the rates. Return it behind them.")
+        derivatives = [as_expr(one) for one in values if not isinstance(one, Impact | Jump)]
     except TypeError:
         raise TraceError(
             f"it returns {shown(returned)} in place of the time derivatives of {', '.join(states)}."
@@ -403,7 +405,7 @@ def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
             f"{len(states)} states "
             f"({', '.join(states)}): one time derivative for each, in this order."
         )
-    return derivatives
+    return derivatives, laws
 
 
 def explained(error: Exception, function: Callable[..., Any], title: str) -> str:
