@@ -15,7 +15,7 @@ from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import basin_plan
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.lyapunov.lyapunov import lyapunov
-from saltus.analysis.methods.compare_methods import compare_methods, method_label, methods_dataset
+from saltus.analysis.methods.compare_methods import compare_methods, methods_dataset
 from saltus.analysis.methods.method_errors import one_period_errors
 from saltus.analysis.motion.simulate import simulate
 from saltus.analysis.motion.stroboscope import stroboscope
@@ -427,7 +427,7 @@ def compared(
     """Both of the paper's ways of integrating beside the exact one, from the three Datasets that
     exist already.
     """
-    known = dict(zip(map(method_label, (method, ON, OFF)), three, strict=True))
+    known = {one.label: ds for one, ds in zip((method, ON, OFF), three, strict=True)}
     return compare_methods(system, analysis, (ON, OFF), computed=known, **how)
 
 
@@ -438,7 +438,7 @@ def tighter(
     errors = [one_period_errors(system, method, way, exact, threads=threads) for way in TIGHTER]
     no_long_runs = np.full((len(TIGHTER), *exact["response_of"].shape), -1, np.int8)
     return methods_dataset(
-        base=exact, labels=[method_label(way) for way in TIGHTER], columns={},
+        base=exact, labels=[way.label for way in TIGHTER], columns={},
         fields={"agrees": no_long_runs,
             **{name: np.stack([error[name] for error in errors]) for name in errors[0]}},
         attrs=provenance(system, TIGHTER[0], system.values) | {"analysis": "bifurcation_diagram"},

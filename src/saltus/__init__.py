@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
-    from saltus.flow import ODE45, Interrupted, Taylor
+    from saltus.flow import ODE23, ODE45, RK4, Interrupted, Taylor
     from saltus.interrupt import Stop
     from saltus.results import contacts, load, samples, save, to_csv, to_mat
     from saltus.results.describe import describe
@@ -63,11 +63,15 @@ if TYPE_CHECKING:
         mod,
         pi,
         piecewise,
+        pulse,
+        recorded,
         regularise,
+        sawtooth,
         sign,
         sin,
         sinh,
         sqrt,
+        square,
         system,
         table,
         tan,
@@ -97,7 +101,7 @@ _HOMES = {
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
     "Stop": "saltus.interrupt",
-    **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
+    **dict.fromkeys(("ODE23", "ODE45", "RK4", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"),
         "saltus.results"),
     **dict.fromkeys(
@@ -107,13 +111,16 @@ _HOMES = {
     ),
     **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
         "sinh"), "saltus.system"),
-    **dict.fromkeys(("friction", "impact", "jump", "regularise", "table", "where"),
+    **dict.fromkeys(("friction", "impact", "jump", "pulse", "recorded", "regularise", "sawtooth",
+        "square", "table", "where"),
         "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 
 __all__ = [
+    "ODE23",
     "ODE45",
+    "RK4",
     "Interrupted",
     "SaltusError",
     "Stop",
@@ -156,10 +163,13 @@ __all__ = [
     "piecewise",
     "plot",
     "poincare",
+    "pulse",
+    "recorded",
     "regularisation_widths",
     "regularise",
     "samples",
     "save",
+    "sawtooth",
     "settled",
     "sign",
     "simulate",
@@ -167,6 +177,7 @@ __all__ = [
     "sinh",
     "spectrum",
     "sqrt",
+    "square",
     "stroboscope",
     "system",
     "table",

@@ -48,6 +48,11 @@ CASES = {
         1.0,
         sl.ODE45(1e-5, 1e-8),
     ),
+    "fixed steps": (
+        walls.with_values(moving_stiffness=30.0, stiffness=5.0, ceiling_stiffness=3.0),
+        1.0,
+        sl.RK4(0.01, "bisect"),
+    ),
 }
 
 

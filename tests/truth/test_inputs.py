@@ -26,7 +26,7 @@ def recorded(points, values):
     @sl.system(states="x v")
     def driven(
         t, x, v, *, stiffness=K, damping=C, half_sine=0.0, ramp=0.0, square=0.0, pulses=0.0,
-        saw=0.0, record=0.0, duration=0.7, rise=0.4,
+        saw=0.0, record=0.0, duty=0.0, tooth=0.0, train=0.0, shock=0.0, duration=0.7, rise=0.4,
         beat=2.5, cycle=0.9, width=0.35, late=0.1,
     ):  # fmt: skip
         """An oscillator with every kind of input; amplitudes choose."""
@@ -37,6 +37,9 @@ def recorded(points, values):
             sl.mod(t, cycle) < width, 1, 0
         )
         push += saw * sl.mod(t, cycle) + record * sl.table(t - late, points, values)
+        push += duty * sl.square(beat * t + 0.2, 0.3) + tooth * sl.sawtooth(beat * t, 0.4)
+        push += train * sl.pulse(t, width, start=2 * late, every=cycle, shape="half_sine")
+        push += shock * sl.pulse(t, duration, start=rise, shape="triangle")
         return v, push - stiffness * x - damping * v
 
     return driven
@@ -96,6 +99,30 @@ def turning(middle):
 
 
 RISE = math.asin(0.3) / 2.5
+TURN = 2 * mpmath.pi / mpmath.mpf(2.5)
+
+
+def duty(begin, middle):
+    return 0, (1 if (middle / TURN + mpmath.mpf(0.1) / mpmath.pi) % 1 < mpmath.mpf(0.3) else -1), 0
+
+
+def tooth(begin, middle):
+    share, part = mpmath.mpf(0.4), (middle / TURN) % 1
+    rate = (2 / share if part < share else -2 / (1 - share)) / TURN
+    value = 2 * part / share - 1 if part < share else 1 - 2 * (part - share) / (1 - share)
+    return 0, value - rate * (middle - begin), rate
+
+
+def train(begin, middle):
+    w, first = mpmath.pi / mpmath.mpf(0.35), 2 * mpmath.mpf(0.1)
+    within = (middle - first) % mpmath.mpf(0.9)
+    if within > 0.35:
+        return 0, 0, 0
+    within -= middle - begin
+    return -(w**2), mpmath.sin(w * within), w * mpmath.cos(w * within)
+
+
+SHOCK = [mpmath.mpf(0.4) + k * mpmath.mpf(0.7) / 2 for k in range(3)]
 CASES = {
     "half_sine": ([0.7], half_sine),
     "ramp": ([0.4], line([0, mpmath.mpf(0.4)], [0, 1])),
@@ -115,6 +142,24 @@ CASES = {
             1,
         ),
     ),
+    "duty": (
+        [
+            k * TURN - mpmath.mpf(0.2) / mpmath.mpf(2.5) + part
+            for k in range(4)
+            for part in (0, mpmath.mpf(0.3) * TURN)
+        ],
+        duty,
+    ),
+    "tooth": ([(k + part) * TURN for k in range(4) for part in (0, mpmath.mpf(0.4))], tooth),
+    "train": (
+        [
+            2 * mpmath.mpf(0.1) + k * mpmath.mpf(0.9) + part
+            for k in range(-1, 7)
+            for part in (0, mpmath.mpf(0.35))
+        ],
+        train,
+    ),
+    "shock": (SHOCK, line(SHOCK, [0, 1, 0])),
     "record": (
         [p + mpmath.mpf(0.1) for p in POINTS],
         line([p + mpmath.mpf(0.1) for p in POINTS], VALUES),
@@ -136,7 +181,9 @@ def test_the_linear_oscillator_under_each_input(name):
 def test_amplitudes_and_all_inputs_together():
     """The equation is linear: responses from rest add up, whatever breaks the others bring."""
     rest = (0.0, 0.0)
-    amplitudes = dict(zip(CASES, [2.0, -1.0, 0.5, 3.0, -2.0, 1.5], strict=True))
+    amplitudes = dict(
+        zip(CASES, [2.0, -1.0, 0.5, 3.0, -2.0, 1.0, 0.7, -4.0, 2.5, 1.5], strict=True)
+    )
     together = sl.simulate(
         driven.with_values(**amplitudes), rest, t_end=SPAN, samples=1, method=METHOD
     )

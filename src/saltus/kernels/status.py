@@ -17,6 +17,7 @@ INVALID = 9
 NOT_COMPUTED = 10
 INTERRUPTED = 11
 LONG_TRANSIENT = 12
+TURNED = 13
 
 #: Name and meaning of every status code.
 STATUS = {
@@ -50,6 +51,11 @@ STATUS = {
         "still on its way to an attractor after all periods that were allowed",
     ),
     INTERRUPTED: ("interrupted", "stopped on its way"),
+    TURNED: (
+        "turned",
+        "a gap turned about in the step that crossed its boundary (a graze), which steps in the "
+        "gap and inverse interpolation can't follow",
+    ),
 }
 
 # Kinds of contact record.

@@ -40,6 +40,7 @@ from saltus.system.functions import (
     tanh,
 )
 from saltus.system.guards import Guard
+from saltus.system.inputs import pulse, recorded, sawtooth, square
 from saltus.system.laws import freeplay, friction, impact, jump
 from saltus.system.regularisation import regularise
 from saltus.system.system import System
@@ -49,8 +50,8 @@ from saltus.system.trace import system
 __all__ = [
     "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp",
     "freeplay", "friction", "heaviside", "hypot", "impact", "jump", "log", "max",
-    "min", "mod", "pi", "piecewise", "regularise", "sign", "sin", "sinh", "sqrt", "system", "table",
-    "tan", "tanh", "where",
+    "min", "mod", "pi", "piecewise", "pulse", "recorded", "regularise", "sawtooth", "sign", "sin",
+    "sinh", "sqrt", "square", "system", "table", "tan", "tanh", "where",
 ]  # fmt: skip
 
 

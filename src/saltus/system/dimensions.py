@@ -112,6 +112,8 @@ class DimensionCheck:
                 return self._units.get(node.payload)
             case "time":
                 return self._time
+            case "table":
+                return dimension(node.payload.unit) if node.payload.unit else None
             case "neg":
                 return args[0]
             case "add" | "sub" | "select" | "mod":

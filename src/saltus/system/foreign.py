@@ -47,7 +47,7 @@ ADVICE: dict[str, str] = {
     "arccos": "Write sl.acos.",
     "absolute": "Write sl.abs or abs.", "fabs": "Write sl.abs or abs.", "maximum": "Write sl.max.",
     "minimum": "Write sl.min.",
-    "square": "Write x**2.", "pow": "Write x**2.", "power": "Write x**2.",
+    "pow": "Write x**2.", "power": "Write x**2.",
     "signum": "Write sl.sign.",
     "step": "Write sl.heaviside(t - t0).",
     "select": "Write sl.where or sl.piecewise.", "Piecewise": "Write sl.piecewise((value, "
@@ -72,8 +72,12 @@ ADVICE: dict[str, str] = {
     **dict.fromkeys(("sim", "simulation", "integrate", "odeint", "run", "solve_ode"),
         "Write sl.simulate(system, "
         "start, t_end=...)."),
-    **dict.fromkeys(("ode45", "RK45", "ode23", "ode15s", "DOP853"), "Write sl.simulate(system, "
+    **dict.fromkeys(("ode45", "RK45", "DOP853"), "Write sl.simulate(system, "
         "start, t_end=..., method=sl.ODE45())."),
+    **dict.fromkeys(("ode23", "RK23"), "Write sl.simulate(system, start, t_end=..., "
+                                       "method=sl.ODE23())."),
+    **dict.fromkeys(("rk4", "rungekutta", "runge_kutta"), "Write sl.simulate(system, start, "
+                                                          "t_end=..., method=sl.RK4(step))."),
     **dict.fromkeys(("transmission", "transmissibilities"), "Write sl.transmissibility(response, "
         "output, input)."),
     **dict.fromkeys(("interp1d", "interp1", "lookup"), "Write sl.table(x, points, values)."),
@@ -117,6 +121,6 @@ OWN_FUNCTIONS = (
     "Use saltus's own: sl.sqrt, sl.exp, sl.log, sl.sin, sl.cos, sl.tan, sl.asin, sl.acos, sl.atan, "
     "sl.atan2, sl.sinh, sl.cosh, sl.tanh, "
     "sl.hypot, sl.abs, sl.sign, sl.heaviside, sl.min, sl.max, sl.clip, sl.where, sl.piecewise; "
-    "sl.mod(t, T) for a time that repeats; sl.table(x, points, values) for measured points, in "
-    "place of np.interp or a spline."
+    "sl.mod(t, T) for a time that repeats, sl.square, sl.sawtooth, sl.pulse; sl.table(x, points, "
+    "values) for measured points, in place of np.interp or a spline."
 )

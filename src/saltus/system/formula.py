@@ -20,6 +20,7 @@ from saltus.errors import SaltusError, TraceError, nearest, shown
 from saltus.system import compositions, functions
 from saltus.system.clocks import mod
 from saltus.system.expression import Condition
+from saltus.system.inputs import pulse, sawtooth, square
 from saltus.system.laws import freeplay
 from saltus.system.names import why_no_name
 from saltus.system.tables import Table, look_up
@@ -47,7 +48,7 @@ _COMPOSED = ("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "sig
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(functions, name) for name in _SIMPLE},
     **{name: getattr(compositions, name) for name in _COMPOSED},
-    "freeplay": freeplay, "mod": mod,
+    "freeplay": freeplay, "mod": mod, "square": square, "sawtooth": sawtooth, "pulse": pulse,
 }  # fmt: skip
 _CONSTANTS = {"pi": functions.pi}
 _BINARY: dict[type[ast.AST], Callable[[Any, Any], Any]] = {

@@ -11,14 +11,16 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import reduce
 from typing import Any
 
 from saltus.errors import ParameterError, TraceError, among, nearest, shown
 from saltus.system import checks
 from saltus.system.blend import STEPS, Step, blended
 from saltus.system.dimensions import gap_units
+from saltus.system.expression import Expr
 from saltus.system.names import why_no_name
-from saltus.system.singular import set_aside
+from saltus.system.singular import assuming, set_aside
 from saltus.system.system import System
 from saltus.units import coherent_unit
 
@@ -70,7 +72,8 @@ def regularise(
     Raises
     ------
     ParameterError, UnitError
-        If the system has no boundary, or a width, law or name can't be used.
+        If the system has no boundary or one at which the state jumps, or a width, law or name can't
+        be used.
     TraceError
         If a piece has no values on the other side of its boundary, as ``depth**1.5`` has none.
 
@@ -95,6 +98,7 @@ def regularise(
     if not system.guards:
         raise ParameterError(f"{system.name} has no boundary: there is nothing to regularise.")
     step = _step(law)
+    system = _without_laws(system)
     named = _names(system, width)
     parameters, values, units = _parameters(system, named)
     _check_both_sides(system, parameters)
@@ -113,6 +117,34 @@ def regularise(
         values={**system.values, **values},
         units={**system.units, **units},
     )
+
+
+def _without_laws(system: System) -> System:
+    """The system of which friction only slips: nothing is held. Raises a ParameterError if the
+    state jumps at a contact.
+    """
+    laws = [guard.law for guard in system.guards]
+    for guard, law in zip(system.guards, laws, strict=True):
+        if law is not None and law.kind not in ("surface", "hold"):
+            raise ParameterError(
+                f"{system.name}: at {guard.name!r} the state jumps, and nothing smooth stands for "
+                f"that. Write the contact as a stiff spring and a damper."
+            )
+    if not any(laws):
+        return system
+    holds = [number for number, law in enumerate(laws) if law is not None and law.kind == "hold"]
+    guards = system.guards[: len(laws) - len(holds)]  # hold guards stand behind all others
+    return replace(
+        system,
+        field=tuple(reduce(_not_held, holds, entry) for entry in system.field),
+        guards=tuple(
+            replace(guard, gap=reduce(_not_held, holds, guard.gap), law=None) for guard in guards
+        ),
+    )
+
+
+def _not_held(root: Expr, hold: int) -> Expr:
+    return assuming(root, hold, False)
 
 
 # -- arguments -------------------------------------------------------------------------------------

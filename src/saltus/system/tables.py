@@ -21,6 +21,7 @@ from saltus.system import expression as ex
 from saltus.system.clocks import affine
 from saltus.system.expression import Expr, Operand
 from saltus.system.functions import piecewise
+from saltus.units import check_declared
 
 KINDS = ("linear", "pchip", "spline")
 OUTSIDE = ("hold", "extend", "periodic")
@@ -42,12 +43,23 @@ class Table:
         knots, m = n - 1. Else also before the first and after the last, m = n + 1.
     periodic : bool
         Whether it repeats after points[-1] - points[0].
+    unit : str
+        Coherent SI unit of its values, ``""`` if it isn't known.
     """
 
-    def __init__(self, points: np.ndarray, pieces: np.ndarray, periodic: bool, name: str = "table"):
+    def __init__(
+        self,
+        points: np.ndarray,
+        pieces: np.ndarray,
+        periodic: bool,
+        name: str = "table",
+        unit: str = "",
+    ):
         self.points, self.pieces, self.periodic, self.name = points, pieces, bool(periodic), name
+        self.unit = unit
+        words = f"{name} {unit}" if unit else name
         digest = hashlib.sha256(
-            self.points.tobytes() + self.pieces.tobytes() + bytes([self.periodic]) + name.encode()
+            self.points.tobytes() + self.pieces.tobytes() + bytes([self.periodic]) + words.encode()
         )
         self.fingerprint = digest.hexdigest()
 
@@ -98,6 +110,7 @@ class Table:
             "periodic": self.periodic,
             "points": self.points.tolist(),
             "pieces": self.pieces.tolist(),
+            **({"unit": self.unit} if self.unit else {}),
         }
 
     @classmethod
@@ -120,7 +133,8 @@ class Table:
         )
         if not (sound and isinstance(name, str) and name.isidentifier()):
             raise ValueError("the numbers of a table don't fit together")
-        return cls(points, pieces, periodic, name)
+        unit = data.get("unit", "")
+        return cls(points, pieces, periodic, name, check_declared(unit, name) if unit else "")
 
 
 def table(
@@ -193,7 +207,7 @@ def look_up(x: Operand, data: Table) -> Any:
     return Expr("table", (x,), data)
 
 
-def curve(points: Any, values: Any, kind: str, outside: str, name: str) -> Table:
+def curve(points: Any, values: Any, kind: str, outside: str, name: str, unit: str = "") -> Table:
     """The table of :func:`table`, checked. Raises TraceError as it does."""
     for what, word, known in (("kind", kind, KINDS), ("outside", outside, OUTSIDE)):
         if not among(word, known):
@@ -233,7 +247,7 @@ def curve(points: Any, values: Any, kind: str, outside: str, name: str) -> Table
             f"sl.table: outside='periodic' needs the same first and last value, not "
             f"{y[0]:g} and {y[-1]:g}."
         )
-    return Table(x, _pieces(x, y, kind, outside), outside == "periodic", name)
+    return Table(x, _pieces(x, y, kind, outside), outside == "periodic", name, unit)
 
 
 def _pieces(x: np.ndarray, y: np.ndarray, kind: str, outside: str) -> np.ndarray:
