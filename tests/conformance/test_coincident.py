@@ -118,16 +118,15 @@ def test_boundary_that_jumps_past_the_state():
     assert int(run.mode_violations) == 0
 
 
-def test_sliding_is_given_up_by_name():
-    """Friction stronger than the drive when the velocity reaches the belt's: both sides push onto
-    it. A named status at that instant.
+def test_a_block_sticks_where_both_sides_push_onto_the_belt():
+    """Friction stronger than the drive when the velocity reaches the belt's: held from that instant
+    until the drive is as strong again.
     """
-    run = sl.simulate(slider.with_values(force=2.0, friction=1.9), (0.3,), t_end=5.0, samples=4)
-    assert str(run.status.values) == "sliding"
-    assert float(run.end_v) == 0.0
-    first = contacts(run)[0]
-    assert (float(run.end_time), first.direction) == (first.time, -1)
+    run = sl.simulate(slider.with_values(force=2.0, friction=1.9), (0.3,), t_end=0.6, samples=4)
+    stuck, free = contacts(run)[:2]
+    assert (str(run.status.values), stuck.kind, free.kind) == ("ok", "hold", "release")
     assert (
-        abs(0.3 + 2 * math.sin(2 * math.pi * first.time) / (2 * math.pi) - 1.9 * first.time) < 1e-15
+        abs(0.3 + 2 * math.sin(2 * math.pi * stuck.time) / (2 * math.pi) - 1.9 * stuck.time) < 1e-15
     )
+    assert free.time == pytest.approx(0.5 - math.acos(0.95) / (2 * math.pi), abs=1e-15)
     assert int(run.steps) < 200

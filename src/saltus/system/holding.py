@@ -14,15 +14,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
 
 from saltus.system import expression as ex
-from saltus.system.canonical import Canonical
 from saltus.system.derivatives import differentiate
+from saltus.system.evaluate import evaluate
 from saltus.system.expression import Bit, Expr
 from saltus.system.guards import Guard, Law, bits_in
 from saltus.system.singular import assuming
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
+#: Places on a boundary at which a force is looked at from both sides, and the relative difference
+#: that is rounding.
+PLACES, SAME = 5, 1e-9
 #: Stands for the sign of a two-valued force while its middle and its direction are worked out; no
 #: parameter has this name.
 _SIGN = ex.parameter("sign of a surface")
@@ -210,20 +216,49 @@ def surfaces(
 
     ``limits`` holds static over kinetic force of those that have one.
     """
-    found, canonical = [], Canonical()
+    found = []
     for number, guard in enumerate(guards):
         row = [differentiate(guard.gap, ex.state(name)) for name in states]
         rate = _dot(row, field)
-        if number not in bits_in([rate]):
-            continue
-        above, below = (assuming(rate, number, value) for value in (True, False))
-        if above is below or not canonical.polynomial(ex.sub(above, below)):
+        if number not in bits_in([rate]) or not _jumps(rate, number, guard.gap, states, guards):
             continue
         limit = limits.get(number, _ONE)
         law = Law("surface", limit=limit, zeros=2 if _is(limit, 1.0) else 1)
         direction = middle_and_direction(field, number)[1]
         found.append(Contact(number, guard.gap, law, direction))
     return found
+
+
+def _jumps(
+    rate: Expr, number: int, gap: Expr, states: Sequence[str], guards: Sequence[Guard]
+) -> bool:
+    """Whether an expression differs on the two sides of a boundary, at places on it: of a law that
+    begins with zero there it doesn't.
+    """
+    random = np.random.default_rng(2)
+    gaps = [guard.gap for guard in guards]
+    leaves = {node for node in ex.walk(rate, *gaps) if node.op == "param"}
+    known: dict[str, Any] = {
+        "t": random.uniform(0.5, 2.0, PLACES),
+        "values": {node.payload: random.uniform(0.5, 2.0) for node in leaves},
+    }
+    bits: list[Any] = []
+    at = {name: random.uniform(-2.0, 2.0, PLACES) for name in states}
+    slopes = [differentiate(gap, ex.state(name)) for name in states]
+    for _ in range(3):  # onto the boundary, along the gradient
+        bits = []
+        for one in gaps:
+            bits.append(evaluate([one], states=at, bits=bits, **known)[0] > 0)
+        distance, *normal = evaluate([gap, *slopes], states=at, bits=bits, **known)
+        square = sum(np.square(n) for n in normal)
+        at = {
+            name: place - distance * n / square
+            for (name, place), n in zip(at.items(), normal, strict=True)
+        }
+    sides = [assuming(rate, number, value) for value in (True, False)]
+    above, below = evaluate(sides, states=at, bits=bits, **known)
+    with np.errstate(invalid="ignore"):
+        return bool(np.any(np.abs(above - below) > SAME * (np.abs(above) + np.abs(below))))
 
 
 def middle_and_direction(

@@ -264,7 +264,8 @@ def _law(data: Mapping[str, Any], nodes: Sequence[Expr], states: int, guards: in
             _require(len(value) in (0, states), "a law has another number of states")
             value = tuple(nodes[_place(one, nodes)] for one in value)
         elif name in ("side", "partner", "zeros"):
-            _require(isinstance(value, int) and -1 <= value < max(guards, 4), f"wrong {name}")
+            known = isinstance(value, int) and -1 <= value < max(guards, 4)
+            _require(known, "a law names an unknown guard")
         values[name] = value
     _require(values["kind"] in _LAW_KINDS, f"unknown law {shown(values['kind'])}")
     return Law(**values)
