@@ -111,8 +111,8 @@ _HOMES = {
     ),
     **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
         "sinh"), "saltus.system"),
-    **dict.fromkeys(("friction", "impact", "jump", "pulse", "recorded", "regularise", "sawtooth",
-        "square", "table", "where"),
+    **dict.fromkeys(("friction", "impact", "jump"), "saltus.system"),
+    **dict.fromkeys(("pulse", "recorded", "regularise", "sawtooth", "square", "table", "where"),
         "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")

@@ -18,12 +18,14 @@ from saltus.system.compositions import (
     atan2,
     clip,
     cosh,
+    friction,
     heaviside,
     hypot,
     sign,
     sinh,
     where,
 )
+from saltus.system.declared import impact, jump
 from saltus.system.functions import (
     abs,
     atan,
@@ -41,7 +43,7 @@ from saltus.system.functions import (
 )
 from saltus.system.guards import Guard
 from saltus.system.inputs import pulse, recorded, sawtooth, square
-from saltus.system.laws import freeplay, friction, impact, jump
+from saltus.system.laws import freeplay
 from saltus.system.regularisation import regularise
 from saltus.system.system import System
 from saltus.system.tables import table

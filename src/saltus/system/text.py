@@ -11,7 +11,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation, operands, walk
 
@@ -31,11 +31,7 @@ class Boundary(Protocol):
 
     @property
     def name(self) -> str:
-        """Its name."""
-
-    @property
-    def law(self) -> Any:
-        """What happens at it."""
+        """What it is called."""
 
     @property
     def gap(self) -> Expr:
@@ -48,6 +44,10 @@ class Boundary(Protocol):
     @property
     def boundary(self) -> Expr | None:
         """That level."""
+
+    @property
+    def law(self) -> object:
+        """Its law of contact, if any."""
 
 
 class Writer:
@@ -240,7 +240,7 @@ class Writer:
         return self.name(name), _ATOM
 
     def _guard_sides(self, guard: Boundary) -> tuple[str, str]:
-        if guard.law is not None and guard.law.kind == "hold":
+        if getattr(guard.law, "kind", None) == "hold":  # its gap is no boundary that anyone wrote
             return guard.name, f"not {guard.name}"
         if guard.state is not None and guard.boundary is not None:
             state, boundary = self.name(guard.state), self.text(guard.boundary)

@@ -148,12 +148,25 @@ def test_contacts_with_laws():
     def belt(t, x, v, *, speed=0.3):
         return v, -x - sl.piecewise((1.0, v > speed), otherwise=-1.0)
 
-    assert [guard.law.kind for guard in belt.guards] == ["surface", "hold"]
     smooth = sl.regularise(belt, width=0.1)
     assert smooth.guards == ()
     assert smooth.rhs(0.0, [0.2, 0.35])[1] == pytest.approx(-0.2 - np.tanh(0.5), rel=1e-14)
-    jumps = sl.system(states="x v")(
-        lambda t, x, v: (v, -1.0, sl.impact(x > 0, -v, restitution=0.5))
-    )
+
+    @sl.system(states="x v")
+    def stop(t, x, v, *, gap=1.0):
+        return v, -x, sl.impact(x < gap, v, restitution=0.5)
+
     with pytest.raises(ParameterError, match="the state jumps"):
-        sl.regularise(jumps, width=0.1)
+        sl.regularise(stop, width=0.1)
+
+
+def test_friction_that_stays_keeps_its_limit():
+    @sl.system(states="x v")
+    def block(t, x, v, *, wall=1.0, slip=0.5, stick=0.8):
+        stop = sl.where(x > wall, 50.0 * (x - wall), 0)
+        return v, -x - stop - sl.friction(v, slip=slip, stick=stick)
+
+    smooth = sl.regularise(block, width={"wall": 0.01})
+    friction, hold = smooth.guards
+    assert (friction.name, hold.name) == ("v = 0", "v = 0 held")
+    assert repr(friction.law.limit) == "stick/slip"
