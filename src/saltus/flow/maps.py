@@ -270,8 +270,9 @@ class Stroboscope:
                 row[np.flatnonzero(np.diff(row, prepend=-1))] for row in outcome.sample_mode
             ]
         outcome = self.run(start, count, record=0)
-        contacts = outcome.contacts
+        contacts = outcome.contacts.rows(~outcome.contacts.chatters)
         codes = np.ravel_multi_index(
-            (contacts.kind, contacts.direction + 1, contacts.guard), (3, 3, 2**31)
+            (contacts.kind, contacts.direction + 1, contacts.guard),
+            (len(st.CONTACT_KIND), 3, 2**31),
         )
         return outcome.state, np.split(codes, contacts.begins(len(start))[1:-1])
