@@ -15,12 +15,12 @@ from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import basin_plan
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.lyapunov.lyapunov import lyapunov
-from saltus.analysis.methods.compare_methods import compare_methods, method_label, methods_dataset
+from saltus.analysis.methods.compare_methods import compare_methods, methods_dataset
 from saltus.analysis.methods.method_errors import one_period_errors
 from saltus.analysis.motion.simulate import simulate
 from saltus.analysis.motion.stroboscope import stroboscope
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.capture import Neighbourhoods
-from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
 from saltus.analysis.orbits.portrait import portraits
 from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
@@ -415,7 +415,7 @@ def halved(
     for orbit in closed.rows(closed.period > 0):
         if not any(same(orbit, one, scale, SAME) and orbit.period == one.period for one in orbits):
             orbits.append(orbit)
-    table = portraits(map_, Found(Neighbourhoods.none(len(system.states)), orbits))
+    table = portraits(map_, AttractorSet(Neighbourhoods.none(len(system.states)), orbits))
     return attractors_dataset(
         subject(system, provenance(system, map_.method, system.values)), table
     )
@@ -427,7 +427,7 @@ def compared(
     """Both of the paper's ways of integrating beside the exact one, from the three Datasets that
     exist already.
     """
-    known = dict(zip(map(method_label, (method, ON, OFF)), three, strict=True))
+    known = {one.label: ds for one, ds in zip((method, ON, OFF), three, strict=True)}
     return compare_methods(system, analysis, (ON, OFF), computed=known, **how)
 
 
@@ -438,7 +438,7 @@ def tighter(
     errors = [one_period_errors(system, method, way, exact, threads=threads) for way in TIGHTER]
     no_long_runs = np.full((len(TIGHTER), *exact["response_of"].shape), -1, np.int8)
     return methods_dataset(
-        base=exact, labels=[method_label(way) for way in TIGHTER], columns={},
+        base=exact, labels=[way.label for way in TIGHTER], columns={},
         fields={"agrees": no_long_runs,
             **{name: np.stack([error[name] for error in errors]) for name in errors[0]}},
         attrs=provenance(system, TIGHTER[0], system.values) | {"analysis": "bifurcation_diagram"},

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
-    from saltus.flow import ODE45, Interrupted, Taylor
+    from saltus.flow import ODE23, ODE45, RK4, Interrupted, Taylor
     from saltus.interrupt import Stop
     from saltus.results import contacts, load, samples, save, to_csv, to_mat
     from saltus.results.describe import describe
@@ -55,8 +55,11 @@ if TYPE_CHECKING:
         cosh,
         exp,
         freeplay,
+        friction,
         heaviside,
         hypot,
+        impact,
+        jump,
         log,
         max,
         min,
@@ -103,7 +106,7 @@ _HOMES = {
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
     "Stop": "saltus.interrupt",
-    **dict.fromkeys(("ODE45", "Interrupted", "Taylor"), "saltus.flow"),
+    **dict.fromkeys(("ODE23", "ODE45", "RK4", "Interrupted", "Taylor"), "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"),
         "saltus.results"),
     **dict.fromkeys(
@@ -113,6 +116,7 @@ _HOMES = {
     ),
     **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
         "sinh"), "saltus.system"),
+    **dict.fromkeys(("friction", "impact", "jump"), "saltus.system"),
     **dict.fromkeys(("pulse", "recorded", "regularise", "sawtooth", "square", "table", "where"),
         "saltus.system"),
     **dict.fromkeys(("Contact", "Force", "structure"), "saltus.system"),
@@ -120,7 +124,9 @@ _HOMES = {
 _MODULES = ("models", "plot")
 
 __all__ = [
+    "ODE23",
     "ODE45",
+    "RK4",
     "Contact",
     "Force",
     "Interrupted",
@@ -148,9 +154,12 @@ __all__ = [
     "exp",
     "freeplay",
     "frequency_response",
+    "friction",
     "heaviside",
     "hypot",
+    "impact",
     "impact_statistics",
+    "jump",
     "load",
     "log",
     "lyapunov",

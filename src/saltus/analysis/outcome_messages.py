@@ -27,14 +27,15 @@ _ADVICE = {
     "raise max_events of the method.",
     st.NONFINITE: "The motion left the range of numbers, or met a pole or a root of something "
     "negative: check the equations at that state.",
+    st.TURNED: 'Take sl.RK4(..., events="bisect"), a shorter step, or sl.Taylor().',
     st.INVALID: "Check the starts and values of these trajectories.",
     st.INTERRUPTED: "The run was stopped; its end_* are where it stood. Start it again.",
     st.NOT_COMPUTED: "The run was stopped; start it again.",
 }
 
-#: What may have ended a run of ODE45 long before the motion met anything.
+#: What may have ended a run of such a method long before the motion met anything.
 _BELOW_A_ROOT = (
-    " A trial step of ODE45 that goes below a root ends it too: end the law before it, as "
+    " A trial step of {method} that goes below a root ends it too: end the law before it, as "
     "sl.piecewise((-c*sl.sqrt(h), h > 1e-9), otherwise=0.0) does."
 )
 #: A step of one trajectory alone, for systems of two states on one core of a server [s]. Good to a
@@ -72,8 +73,8 @@ def messages(run: xr.Dataset, asked: Span | None = None, system: System | None =
             if code == st.BUDGET_STEPS and asked is not None:
                 stuck = "" if system is None else _singular(run, asked, int(here[0]), system)
                 advice = stuck or f"{_outlook(run, asked, int(here[0]))} {advice}"
-            if code == st.NONFINITE and run.attrs.get("method") == "ODE45":
-                advice += _BELOW_A_ROOT
+            if code == st.NONFINITE and run.attrs.get("method", "Taylor") != "Taylor":
+                advice += _BELOW_A_ROOT.format(method=run.attrs["method"])
             texts.append(
                 f"{len(here)} of {len(status)} trajectories: {name} - {meaning} (first: "
                 f"{_where(run, int(here[0]))}). {advice}"

@@ -107,27 +107,40 @@ TAYLOR = Interface(
     truths=("turns",),
 )  # fmt: skip
 
-ODE45 = Interface(
-    entry="propagate",
-    arguments=(*BATCH, _F1),
-    layout="ode45_layout",
-    templates=("clocks", "dormand_prince", "odezero", "ode45"),
-    sizes=("NSTATES", "NGUARDS", "NCONST", "NDRIVE", "NCLOCKS"),
-    flags=("TANGENT", "GAPS_IN_TIME"),
-    tables=MappingProxyType({"CLOCK_KIND": WHOLE, "CLOCK_TABLE": WHOLE}),
-    functions=MappingProxyType(
-        {
-            "prepare": (ARRAY, ARRAY),
-            "drive": (REAL, ARRAY, ARRAY, ARRAY),
-            "field": (REAL,) + (ARRAY,) * 5,
-            "gaps": (REAL,) + (ARRAY,) * 5,
-            "gap_rates": (REAL,) + (ARRAY,) * 6,
-            **_CLOCKS,
-            **_JUMP,
-        }
-    ),
-    truths=(),
+_OF_RATES = MappingProxyType(
+    {
+        "prepare": (ARRAY, ARRAY),
+        "drive": (REAL, ARRAY, ARRAY, ARRAY),
+        "field": (REAL,) + (ARRAY,) * 4 + (WHOLE, ARRAY),
+        "gaps": (REAL,) + (ARRAY,) * 5,
+        "gap_rates": (REAL,) + (ARRAY,) * 6,
+        **_CLOCKS,
+        **_JUMP,
+    }
 )
+_TABLEAU = ("STAGE_TIME", "WEIGHT", "ERROR_WEIGHT", "DENSE_WEIGHT")
+
+
+def _one_by_one(templates: tuple[str, ...], *tables: str) -> Interface:
+    """What the head of a method supplies that runs one trajectory after the other."""
+    return Interface(
+        entry="propagate",
+        arguments=(*BATCH, _F1),
+        layout="steps_layout",
+        templates=("clocks", "rates", *templates, "trajectory"),
+        sizes=("NSTATES", "NGUARDS", "NCONST", "NDRIVE", "NCLOCKS", "STAGES"),
+        flags=("TANGENT", "GAPS_IN_TIME"),
+        tables=MappingProxyType(
+            {"CLOCK_KIND": WHOLE, "CLOCK_TABLE": WHOLE} | dict.fromkeys(tables, REAL)
+        ),
+        functions=_OF_RATES,
+        truths=(),
+    )
+
+
+#: Runge-Kutta pairs with MATLAB's rules, and Runge-Kutta steps of a fixed length.
+PAIR = _one_by_one(("runge_kutta", "odezero", "step_control"), *_TABLEAU, "RULES")
+FIXED_STEP = _one_by_one(("runge_kutta", "fixed_step", "landing"), *_TABLEAU)
 
 #: The test of capture: nothing of it depends on an equation.
 CAPTURE = Interface(

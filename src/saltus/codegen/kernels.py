@@ -37,7 +37,10 @@ STEADY = FULL
 #: processor, and gains a tenth.
 STEADY_AFTER = 2.0
 #: Constants that the generic code knows too: loops over them are unrolled.
-_BAKED = ("ORDER", "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "HORNER", "FINER", "SHORTEST")
+_BAKED = (
+    "ORDER", "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "HORNER", "FINER", "SHORTEST",
+    "STAGES", "STAGE_TIME", "WEIGHT", "ERROR_WEIGHT", "DENSE_WEIGHT", "RULES",
+)  # fmt: skip
 _DTYPES = {"float64": np.dtype(np.float64), "int64": np.dtype(np.int64)}
 
 

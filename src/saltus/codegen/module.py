@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from importlib import resources
 from types import ModuleType
 from typing import Any, Protocol
 
 from saltus.codegen import machine, templates
-from saltus.codegen.head import Head
-from saltus.codegen.interface import CAPTURE, ODE45, TAYLOR, Interface
+from saltus.codegen.head import Constant, Head
+from saltus.codegen.interface import CAPTURE, FIXED_STEP, PAIR, TAYLOR, Interface
 from saltus.codegen.kernels import Kernels
-from saltus.codegen.ode45_head import ode45_head
+from saltus.codegen.rates_head import rates_head
+from saltus.codegen.tableaux import BOGACKI_SHAMPINE, CLASSICAL, DORMAND_PRINCE
 from saltus.codegen.taylor_head import taylor_head
 from saltus.errors import TraceError
 from saltus.system.quantity import acting_guards
@@ -77,11 +78,23 @@ def taylor_module(system: System, order: int, lanes: int) -> Flow:
     return _flow(TAYLOR, f"taylor_{lanes}", head, title, f"{_described(system)} for Taylor")
 
 
+#: Name of each other method: templates, their bitcode, and the numbers that they are given.
+_STEPS: dict[str, tuple[Interface, str, Mapping[str, Constant]]] = {
+    "ODE45": (PAIR, "pair", DORMAND_PRINCE),
+    "ODE23": (PAIR, "pair", BOGACKI_SHAMPINE),
+    "RK4": (FIXED_STEP, "fixed_step", CLASSICAL),
+}
+
+
 @lru_cache(maxsize=64)
-def ode45_module(system: System) -> Flow:
-    """The compiled ode45 of a system."""
-    head = _printed(system, lambda: ode45_head(system))
-    return _flow(ODE45, "ode45", head, f"{system.name}, ode45", f"{_described(system)} for ODE45")
+def steps_module(system: System, method: str) -> Flow:
+    """The compiled flow of a system by a method that runs one trajectory after the other: ODE45,
+    ODE23 or RK4.
+    """
+    interface, template, numbers = _STEPS[method]
+    head = _printed(system, lambda: rates_head(system, numbers))
+    title = f"{system.name}, {method}"
+    return _flow(interface, template, head, title, f"{_described(system)} for {method}")
 
 
 def _printed(system: System, head: Callable[[], Head]) -> Head:

@@ -2,7 +2,7 @@
 :mod:`saltus.analysis`.
 """
 
-from saltus.flow.methods import ODE45, Taylor
+from saltus.flow.methods import ODE23, ODE45, RK4, Taylor
 from saltus.interrupt import Interrupted
 
-__all__ = ["ODE45", "Interrupted", "Taylor"]
+__all__ = ["ODE23", "ODE45", "RK4", "Interrupted", "Taylor"]

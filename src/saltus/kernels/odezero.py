@@ -1,5 +1,5 @@
-"""Template: MATLAB's odezero, the root finder behind ode45's events. codegen puts it, with
-ode45.py, behind a generated head.
+"""Template: MATLAB's odezero, the root finder behind ode45's events. codegen puts it
+behind a generated head.
 
 A step from t to t_new has the values of all gaps at both ends. While a gap differs in sign between
 the ends of the bracket [t_left, t_right], regula falsi proposes a place for each such gap, the
@@ -11,42 +11,13 @@ ode45 applies them to terminal events in either direction.
 Symbols
 -------
 t_left, t_right the bracket; t_try the last place tried, after a move: the end that was given up;
-LEFT, RIGHT, TRY in `work` (laid out in ode45.py): the gaps at these three. Only the signs and
-ratios of gaps matter, so halved values do no harm.
+LEFT, RIGHT, TRY in `work` (steps_layout.py): the gaps at these three. Only the signs and ratios of
+gaps matter, so halved values do no harm.
 """
-
-from saltus.kernels.lanes import spacing
 
 # Ends of the bracket that moved last.
 NEITHER, MOVED_LEFT, MOVED_RIGHT = range(3)
 SMALLEST_NORMAL = 2.2250738585072014e-308
-
-
-@inner
-def ulp(x):
-    """Distance from |x| to the next larger double (MATLAB's eps(x))."""
-    return spacing(abs(x))
-
-
-@inner
-def sign(x):
-    """-1, 0 or 1."""
-    return int(x > 0.0) - int(x < 0.0)
-
-
-@inner
-def changes_sign(work, one, other, g):
-    """Whether gap g has another sign at `other` than at `one`; zero is a sign of its own."""
-    return sign(work[one + g]) != sign(work[other + g])
-
-
-@inner
-def any_sign_change(work, one, other):
-    """Whether any gap has another sign at `other` than at `one`."""
-    changes = False
-    for g in range(NGUARDS):
-        changes |= changes_sign(work, one, other, g)
-    return changes
 
 
 @kernel

@@ -17,6 +17,7 @@ INVALID = 9
 NOT_COMPUTED = 10
 INTERRUPTED = 11
 LONG_TRANSIENT = 12
+TURNED = 13
 
 #: Name and meaning of every status code.
 STATUS = {
@@ -40,13 +41,21 @@ STATUS = {
     BUDGET_STEPS: ("budget_steps", "the step budget was used up"),
     BUDGET_EVENTS: ("budget_events", "the event budget was used up: contacts accumulate"),
     NONFINITE: ("nonfinite", "the state or its derivatives overflowed or became NaN"),
-    INVALID: ("invalid", "the start or a parameter isn't a finite number"),
+    INVALID: (
+        "invalid",
+        "the start or a parameter isn't a finite number, or the start lies beyond a stop",
+    ),
     NOT_COMPUTED: ("not_computed", "stopped before this trajectory was begun"),
     LONG_TRANSIENT: (
         "long_transient",
         "still on its way to an attractor after all periods that were allowed",
     ),
     INTERRUPTED: ("interrupted", "stopped on its way"),
+    TURNED: (
+        "turned",
+        "a gap turned about in the step that crossed its boundary (a graze), which steps in the "
+        "gap and inverse interpolation can't follow",
+    ),
 }
 
 # Kinds of contact record.

@@ -110,9 +110,13 @@ def method_text(ds: xr.Dataset, suffix: str = "") -> str:
         options = dict(json.loads(ds.attrs.get(f"method_options{suffix}", "{}")))
     except (ValueError, TypeError):  # of another program
         options = {}
-    tolerances = [f"{key} {float(options[key]):g}" for key in ("rtol", "atol") if key in options]
-    ignored = ["contacts not located"] if options.get("events") == "ignore" else []
-    return ", ".join([name.lower(), *tolerances, *ignored])
+    tolerances = [
+        f"{key} {float(options[key]):g}" for key in ("rtol", "atol", "step") if key in options
+    ]
+    ways = {"ignore": "contacts not located", "locate": ""}
+    way = str(options.get("events", "locate"))
+    spoken = name.lower() if name.startswith("ODE") else name
+    return ", ".join(filter(None, [spoken, *tolerances, ways.get(way, f"contacts by {way}")]))
 
 
 def share_text(fraction: float) -> str:

@@ -58,25 +58,26 @@ def summary(ds: xr.Dataset) -> list[str]:
 
 
 def own_errors(attrs: Mapping[Any, Any]) -> str:
-    """What errors of ode45 have to do with starts that never settled, in a sentence or two; "" for
-    another method.
+    """What errors of a method have to do with starts that never settled, in a sentence or two; ""
+    for one whose errors are rounding.
     """
-    if str(attrs.get("method", "")) != "ODE45":
+    method = str(attrs.get("method", ""))
+    if method != "RK4" and not method.startswith("ODE"):
         return ""
+    name, knob = (method, "step") if method == "RK4" else (method.lower(), "rtol")
     if "unconverged_exactly" not in attrs:
         return (
-            "Errors of ode45 itself can keep a motion from settling. A smaller rtol, or "
-            "Taylor, "
-            "tells."
+            f"Errors of {name} itself can keep a motion from settling. A smaller {knob}, or "
+            "Taylor, tells."
         )
     if not attrs["unconverged_exactly"]:
         return "By exact integration from where they stand they settle to no orbit either."
     return (
-        "Errors of ode45 itself keep them from having a type: exact integration from where they "
+        f"Errors of {name} itself keep them from having a type: exact integration from where they "
         "stand settles to "
-        f"{attrs['unconverged_exactly']}, and ode45 strays from there by up to "
+        f"{attrs['unconverged_exactly']}, and {name} strays from there by up to "
         f"{float(attrs['unconverged_stray']):.0%} of the range of a "
-        "state. Take a smaller rtol, or Taylor."
+        f"state. Take a smaller {knob}, or Taylor."
     )
 
 

@@ -18,12 +18,14 @@ from saltus.system.compositions import (
     atan2,
     clip,
     cosh,
+    friction,
     heaviside,
     hypot,
     sign,
     sinh,
     where,
 )
+from saltus.system.declared import impact, jump
 from saltus.system.functions import (
     abs,
     atan,
@@ -50,9 +52,9 @@ from saltus.system.trace import system
 
 __all__ = [
     "Contact", "Force", "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos",
-    "cosh", "exp", "freeplay", "heaviside", "hypot", "log", "max", "min", "mod", "pi",
-    "piecewise", "pulse", "recorded", "regularise", "sawtooth", "sign", "sin", "sinh", "sqrt",
-    "square", "structure", "system", "table", "tan", "tanh", "where",
+    "cosh", "exp", "freeplay", "friction", "heaviside", "hypot", "impact", "jump", "log", "max",
+    "min", "mod", "pi", "piecewise", "pulse", "recorded", "regularise", "sawtooth", "sign", "sin",
+    "sinh", "sqrt", "square", "structure", "system", "table", "tan", "tanh", "where",
 ]  # fmt: skip
 
 

@@ -2,9 +2,9 @@
 cross, a power to integrate.
 
 A quantity is traced as an equation is. Comparisons in it that mean a guard of the system read that
-guard's side; others become guards of their own, behind those of the system. With it the flow needs
-nothing new: a surface is one more guard, an integral one more state, and both come with the flow's
-own precision.
+guard's side; others become guards of their own, behind those of the system. The sign of friction
+that sticks is the one that holds it. With it the flow needs nothing new: a surface is one more
+guard, an integral one more state, and both come with the flow's own precision.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from typing import Any
 
 from saltus.errors import ParameterError, TraceError, nearest, shown
 from saltus.system.expression import TIME, Expr, as_expr, parameter, state, sub
-from saltus.system.guards import Guard, bits_in, join_guards, surface_guard
+from saltus.system.guards import Guard, bits_in, expressions_of, join_guards, surface_guard
 from saltus.system.names import why_no_name
 from saltus.system.singular import lifted
+from saltus.system.surfaces import with_held_signs
 from saltus.system.system import System
 from saltus.system.trace import explained, place
 from saltus.units import check_declared, to_si
@@ -63,6 +64,7 @@ def quantity(
     try:
         (root,), guards = join_guards([expression], system.guards)
         (root,) = lifted([root], guards)
+        root = with_held_signs(root, guards, system.states)
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
     return root, guards
@@ -234,10 +236,11 @@ def acting_guards(system: System) -> tuple[int, ...]:
     """Numbers of the guards on whose side the equations depend: all but the surfaces that were
     added.
     """
-    acting = bits_in(system.field)
-    for number in reversed(range(len(system.guards))):
-        if number in acting:
-            acting |= bits_in([system.guards[number].gap])
+    waiting = bits_in(system.field) | {n for n, guard in enumerate(system.guards) if guard.law}
+    acting: set[int] = set()
+    while waiting:  # hold guards ask about one another in circles
+        acting |= waiting
+        waiting = bits_in(expressions_of([system.guards[number] for number in waiting])) - acting
     return tuple(sorted(acting))
 
 
@@ -290,8 +293,13 @@ def with_integrals(
         rate, guards = quantity(extended, function, f"the integrand {shown(name)}")
         extended = replace(extended, guards=guards)
         rates.append(rate)
+    integrals = tuple(map(state, integrands))
     return replace(
         extended,
+        guards=tuple(
+            replace(guard, law=guard.law.extended(integrals)) if guard.law else guard
+            for guard in extended.guards
+        ),
         states=(*system.states, *integrands),
         field=(*system.field, *rates),
         units={**system.units, **{name: new_units.get(name, "") for name in integrands}},

@@ -15,7 +15,7 @@ from saltus.analysis.motion import time_errors
 from saltus.codegen.module import lane_width
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
-from saltus.flow.methods import SMALL_BATCH
+from saltus.flow.taylor import SMALL_BATCH
 from saltus.interrupt import Interrupted
 from saltus.kernels import status as st
 from saltus.system.dimensions import gap_units

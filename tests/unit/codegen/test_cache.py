@@ -505,7 +505,7 @@ def test_damaged_bitcode_is_told(monkeypatch, tmp_path, damage):
     if damage is not None:
         (tmp_path / "bitcode" / "manifest.json").write_bytes(damage)
     monkeypatch.setattr(templates.resources, "files", lambda _: tmp_path)
-    for read in (templates.manifest.__wrapped__, lambda: templates._brought("ode45.bc.xz")):
+    for read in (templates.manifest.__wrapped__, lambda: templates._brought("pair.bc.xz")):
         with pytest.raises(
             CacheError,
             match=r"bitcode/\S+ (is damaged|can't be read: .*): install "

@@ -20,7 +20,7 @@ from saltus.codegen.kernels import FULL, GENERIC, TIERS, Call
 needs_jit = pytest.mark.skipif(module.jit_disabled(), reason="nothing is compiled with the JIT off")
 METHODS = {
     "taylor": lambda system: module.taylor_module.__wrapped__(system, 20, 4),
-    "ode45": module.ode45_module.__wrapped__,
+    "ode45": lambda system: module.steps_module.__wrapped__(system, "ODE45"),
 }
 
 

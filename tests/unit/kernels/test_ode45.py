@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from saltus.codegen.head import Head
-from saltus.codegen.interface import ODE45
+from saltus.codegen.interface import PAIR
 from saltus.codegen.kernels import Kernels
+from saltus.codegen.tableaux import DORMAND_PRINCE
 from saltus.kernels import status as st
 
 REFERENCE = Path(__file__).parents[2] / "reference"
@@ -34,7 +35,7 @@ def drive(t, c, h, q):
     q[0] = c[6] * math.cos(c[7] * t) / c[8]
 
 @kernel
-def field(t, y, c, q, h, out):
+def field(t, y, c, q, h, mode, out):
     below, above = y[0] - c[0], y[0] - c[1]
     beyond = below if not below > 0.0 else (above if above > 0.0 else 0.0)
     out[0] = y[1]
@@ -64,7 +65,7 @@ def drive(t, c, h, q):
     q[0] = c[4] * t
 
 @kernel
-def field(t, y, c, q, h, out):
+def field(t, y, c, q, h, mode, out):
     out[0] = c[0] + c[1] * (y[0] * y[0])
 
 @kernel
@@ -101,9 +102,9 @@ B4 = {
 
 def build(sizes, functions):
     return Kernels(
-        ODE45,
-        "ode45",
-        Head(sizes | NO_CLOCKS, functions + NUMBERS_OF_NO_CLOCKS),
+        PAIR,
+        "pair",
+        Head(sizes | NO_CLOCKS | DORMAND_PRINCE, functions + NUMBERS_OF_NO_CLOCKS),
         "a test",
         "a test",
     )

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from saltus.errors import StudyError
-from saltus.study.tables.methods import ODE45, Taylor
+from saltus.study.tables.methods import METHODS
 from saltus.study.tables.read import parse, read
 from saltus.study.tables.spec import Study
 
@@ -23,7 +23,7 @@ def refusal(text: str) -> str:
 
 def test_smallest_study():
     study = parse(WHOLE)
-    assert study.method == Taylor(name="Taylor")
+    assert study.method == METHODS["Taylor"](name="Taylor")
     assert study.simulate.start == {"x": "0 mm"}
     assert study.compare is None
 
@@ -34,7 +34,7 @@ def test_values_keep_their_text_and_their_bits():
         '0.03\n[method]\nname = "ODE45"\nrtol = 1e-4\n'
     )
     assert study.system.values == {"force": "4 N", "damping_ratio": 0.03}
-    assert study.method == ODE45(name="ODE45", rtol=1e-4, atol=1e-6, events="locate")
+    assert study.method == METHODS["ODE45"](name="ODE45", rtol=1e-4, atol=1e-6, events="locate")
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,9 @@ def test_options_are_those_of_the_methods():
     for name, made in METHODS.items():
         parameters = inspect.signature(getattr(sl, name)).parameters
         assert {
-            key: field.default for key, field in made.model_fields.items() if key != "name"
+            key: inspect.Parameter.empty if field.is_required() else field.default
+            for key, field in made.model_fields.items()
+            if key != "name"
         } == {key: parameter.default for key, parameter in parameters.items()}
 
 

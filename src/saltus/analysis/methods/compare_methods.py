@@ -76,8 +76,8 @@ def compare_methods(
     reference : Method
         What it is compared with; default :class:`saltus.Taylor`, exact but for rounding.
     computed : mapping of str to Dataset, optional
-        Results that exist already, by :func:`method_label`; they aren't computed again, and their
-        cost stays unknown.
+        Results that exist already, by the ``label`` of their method; they aren't computed again,
+        and their cost stays unknown.
     progress : bool or callable
         As for the analysis; each method is one bar.
     **arguments
@@ -128,7 +128,7 @@ def compare_methods(
         )
     results, costs = [], []
     for method in everything:
-        known = (computed or {}).get(method_label(method))
+        known = (computed or {}).get(method.label)
         ds, cost = (
             _timed(system, name, method, {**arguments, "progress": progress})
             if known is None
@@ -148,7 +148,7 @@ def compare_methods(
     low, high = wilson(agreeing, settled)
     return methods_dataset(
         base=results[0],
-        labels=[method_label(method) for method in everything],
+        labels=[method.label for method in everything],
         columns={"method_cpu_seconds": np.array(costs), "method_agreement": agreeing / settled,
             "method_agreement_low": low,
                  "method_agreement_high": high},
@@ -201,21 +201,6 @@ def methods_dataset(
         grid=dims,
         flags=labelled,
         carried=carried,
-    )
-
-
-def method_label(method: Method) -> str:
-    """A method in a few words: ``Taylor``, ``ode45 located (0.0001, 1e-07)``, ``ode45 not located
-    (0.0001, 1e-07)``.
-    """
-    if isinstance(method, ODE45):
-        return (
-            f"ode45 {'' if method.events == 'locate' else 'not '}located ({method.rtol:g}, "
-            f"{method.atol:g})"
-        )
-    usual = {f: v for f, v in method.options().items() if v != type(method)().options()[f]}
-    return method.name + (
-        f" ({', '.join(f'{f}={v:g}' for f, v in usual.items())})" if usual else ""
     )
 
 

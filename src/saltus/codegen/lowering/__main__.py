@@ -87,6 +87,8 @@ def main() -> None:
         sys.stdout.write(
             f"{name}: {len(data) / 1000:.0f} kB in {time.perf_counter() - begun:.0f} s\n"
         )
+    for name in known["bitcode"].keys() - set(templates.BITCODE):
+        del known["bitcode"][name]
     # an edited comment leaves a bitcode current: its hash of the text to the character follows
     for name in known["bitcode"].keys() & set(templates.BITCODE):
         if known["bitcode"][name]["sources"] == templates.source_hash(name):

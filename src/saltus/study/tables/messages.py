@@ -119,7 +119,8 @@ def _fault(place: tuple, details: list[dict], data: Any) -> str:
             f"{nearest(alike[0] if alike else given, METHODS)}"
         )
     if kind == "union_tag_not_found":
-        return f'[{".".join(path)}] needs \'name\'. Write name = "Taylor" or name = "ODE45".'
+        names = " or ".join(f'name = "{name}"' for name in METHODS)
+        return f"[{'.'.join(path)}] needs 'name'. Write {names}."
     if kind == "value_error":
         return (
             f"[{'.'.join(path)}] {first['ctx']['error']}." if path else f"{first['ctx']['error']}."

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pydantic import Field, model_validator
 
-from saltus.study.tables.methods import Method, Taylor
+from saltus.study.tables.methods import METHODS, Method
 from saltus.study.tables.parts import Header, Named, SystemTable, Table, distinct_names, one_or_many
 from saltus.study.tables.questions import (
     REFERENCE,
@@ -39,7 +39,7 @@ class Study(Table):
 
     study: Header
     system: SystemTable = SystemTable()
-    method: Method = Taylor(name="Taylor")
+    method: Method = METHODS["Taylor"](name="Taylor")
     simulate: Simulate | None = None
     compare: Compare | None = None
     poincare: one_or_many(Poincare) = Field(default_factory=list)  # type: ignore[valid-type]

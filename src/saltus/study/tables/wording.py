@@ -16,7 +16,7 @@ from saltus.system import freeplay, piecewise
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 #: Texts in quotes, which repeat what somebody wrote; calls and arguments of Python.
 _QUOTED = r"(?<!\w)(?:'[^'\n]*'|\"[^\"\n]*\")(?!\w)"
-_METHOD = r"\bsl\.(?P<method>Taylor|ODE45)\((?P<options>[^()]*)\)"
+_METHOD = r"\bsl\.(?P<method>Taylor|RK4|ODE\d+s?)\((?P<options>[^()]*)\)"
 _SYSTEM = r"@?\bsl\.system(?:\(\.\.\., (?P<inside>[^()]*)\))?"
 _CALL = r"\bsl\.(?P<call>\w+)(?:\(\.\.\.\))?"
 _KEY = r"(?<![\w.])(?P<key>[A-Za-z_]\w*)=(?!=)"

@@ -1,5 +1,5 @@
-"""The generated head of an ode45 module: the right-hand side in the user's own order of operations,
-split by what changes when.
+"""The generated head of the methods that run one trajectory after the other: the right-hand side in
+the user's own order of operations, split by what changes when.
 
 Parameter-only parts are worked out once a trajectory (``prepare``), time-only parts once a stage
 time (``drive``): the same operations on the same numbers, so not a digit changes, but the cosine of
@@ -8,7 +8,7 @@ two stages at one time is computed once.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from saltus.codegen.clocks import Clocks
@@ -70,8 +70,12 @@ class _Stages:
         return self.constants.code(node) if _level(node) == 0 and node.op != "const" else None
 
 
-def _with_sides(system: System, stages: _Stages, roots: Iterable[Expr]) -> ScalarCode:
-    """Code that first takes from the state the sides that the roots ask about."""
+def _with_sides(
+    system: System, stages: _Stages, roots: Iterable[Expr], *, of_mode: bool = False
+) -> ScalarCode:
+    """Code that first takes from the state the sides that the roots ask about; ``of_mode``: from
+    the bits of the mode, unless that is negative.
+    """
     roots = list(roots)
     asked = {g for root in roots for g in _asked_by(root)}
     code = ScalarCode(stages.state_leaf, side=lambda i: f"b{i}", switch=stages.clocks.side)
@@ -83,7 +87,9 @@ def _with_sides(system: System, stages: _Stages, roots: Iterable[Expr]) -> Scala
     for i in evaluation_order(system):
         if i in asked:
             value = code.value(system.guards[i].gap)
-            code.lines.append(f"b{i} = {value} > 0.0")
+            side = f"{value} > 0.0"
+            bit = f"(mode < 0 and {side}) or (mode >= 0 and ((mode >> {i}) & 1) == 1)"
+            code.lines.append(f"b{i} = {bit if of_mode else side}")
     return code
 
 
@@ -139,12 +145,14 @@ def never_held(system: System) -> System:
     return system if field is system.field else replace(system, field=field, guards=tuple(guards))
 
 
-def ode45_head(system: System) -> Head:
-    """Everything that kernels/ode45.py expects to stand above it."""
+def rates_head(system: System, numbers: Mapping[str, Constant]) -> Head:
+    """Everything that kernels/trajectory.py and the templates of a method expect to stand above
+    them; ``numbers`` are those of the method (codegen/tableaux.py).
+    """
     system = never_held(system)
     stages = _Stages(system)
     gaps = [guard.gap for guard in system.guards]
-    field = _outputs(_with_sides(system, stages, system.field), system.field)
+    field = _outputs(_with_sides(system, stages, system.field, of_mode=True), system.field)
     gap_values = _outputs(_with_sides(system, stages, gaps), gaps)
     gap_rates = _gap_rates(system, stages)
     drive = ScalarCode(stages.drive_leaf)
@@ -160,13 +168,13 @@ def ode45_head(system: System) -> Head:
         NDRIVE=len(stages.drives.nodes),
         TANGENT=system.tangent_of is not None,
         GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
-        **stages.clocks.constants(),
+        **stages.clocks.constants(), **numbers,
     )  # fmt: skip
     functions = [
         f"@kernel\ndef prepare(p, c):\n{indented(prepare.lines)}\n",
         stages.clocks.function(),
         f"@kernel\ndef drive(t, c, h, q):\n{indented(drive.lines)}\n",
-        f"@kernel\ndef field(t, y, c, q, h, out):\n{field}\n",
+        f"@kernel\ndef field(t, y, c, q, h, mode, out):\n{field}\n",
         f"@kernel\ndef gaps(t, y, c, q, h, out):\n{gap_values}\n",
         jump_function(system, stages.clocks),
         f"@kernel\ndef gap_rates(t, y, dy, c, q, h, out):\n{gap_rates}\n",

@@ -1,5 +1,5 @@
-"""Template: what the work array of ode45 holds. codegen puts a generated head before it; it needs
-the sizes of that head only.
+"""Template: what the work array of the methods holds that run one trajectory after the other.
+codegen puts a generated head before it; it needs the sizes of that head only.
 """
 
 import numpy as np
@@ -8,24 +8,24 @@ from saltus.kernels.clocks_layout import HELD, NUMBERS
 
 # `work` is one array for everything, so that the compiler sees that its parts don't overlap and
 # keeps them in registers (measured: a few per cent). Where its parts start: vectors of states - the
-# stages, the states at the ends of the step, a point between them, the error estimate divided by h,
-# zeros -
-VECTORS, GAPS, DRIVES = 12, 7, 6
-K1, K2, K3, K4, K5, K6, K7, NODE, NEXT, POINT, ERROR, REST = (
-    NSTATES * row for row in range(VECTORS)
-)
+# stages, the first of them the rate at the start of the step and the last the rate at its end; the
+# states there, a point between them, the error estimate divided by h, zeros -
+K1, K_END = 0, NSTATES * (STAGES - 1)
+VECTORS, GAPS, DRIVES = STAGES + 5, 7, 2
+NODE, NEXT, POINT, ERROR, REST = (NSTATES * (STAGES + row) for row in range(5))
 # gaps - at the ends of the step, the three of the root finder, their rates at a contact and those
 # of a state at rest -
 AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST = (
     VECTORS * NSTATES + NGUARDS * row for row in range(GAPS)
 )
-# q at each stage time and at any other, and c.
-Q2, Q3, Q4, Q5, Q6, Q = (VECTORS * NSTATES + GAPS * NGUARDS + NDRIVE * row for row in range(DRIVES))
+# q at the time of a stage, last at the end of the step, and at any other; c.
+Q_STAGE, Q = (VECTORS * NSTATES + GAPS * NGUARDS + NDRIVE * row for row in range(DRIVES))
 C = VECTORS * NSTATES + GAPS * NGUARDS + DRIVES * NDRIVE
-# What the clocks hold, and their numbers.
+# What the clocks hold, and their numbers; a number for each stage.
 H = C + NCONST
 N = H + HELD * NCLOCKS
-WORK = N + (NUMBERS + 1) * NCLOCKS
+S = N + (NUMBERS + 1) * NCLOCKS
+WORK = S + STAGES
 
 
 # Columns of `carry`, what a paused trajectory needs besides its state: time, start of the leg, next

@@ -1,17 +1,18 @@
-"""Template: ode45 as MATLAB runs it, digit for digit. codegen puts a generated head,
-dormand_prince.py and odezero.py before this text.
+"""Template: one trajectory after the other, by any method that goes from node to node. codegen puts
+a generated head, rates.py and the templates of a method before this text.
 
-One trajectory after the other; one step reads: step -> find the contact -> write samples -> land or
-go on. The right-hand side picks its sides from the state at every stage; with location on, a step
-that ends beyond a boundary is cut there and the method starts afresh from the contact with its
-default first step. Rules of error control and step length: Shampine & Reichelt, The MATLAB ODE
-Suite, SIAM J. Sci. Comput. 18 (1997).
+One step reads: step -> find the contact -> write samples -> land or go on. A method supplies
+
+- ``begin_leg``, at the start, after a contact and at a break of time;
+- ``step``, from NODE to NEXT, with the rate there at K_END and q at Q_STAGE;
+- ``dense``, the state inside the step, to POINT;
+- ``find_contact``, whose LEFT and RIGHT differ in sign where a gap closes;
+- ``law_mode`` and ``settle_sides``: the sides that its right-hand side sees.
 
 Symbols
 -------
 t, t_new ends of a step; t_leg start of the leg (the first time, or the last contact); t_end end of
-the trajectory; h = t_new - t; length what is asked for h; theta = AbsTol/RelTol; err the error
-estimate on RelTol's scale. Times in s.
+the trajectory; h = t_new - t. Times in s.
 """
 
 import math
@@ -45,84 +46,11 @@ from saltus.kernels.status import (
     VIOLATIONS,
 )
 
-# Columns of `options`.
-RTOL, ATOL, LOCATE, MAX_STEPS, MAX_EVENTS = range(5)
-
-#: Exponent of the step length rules, 1 / (order of the error estimate + 1).
-POWER = 1 / 5
-#: Below this err/RelTol the rule 1.25 (err/RelTol)^(1/5) <= 0.2 lets a step grow five times; 0.16^5
-#: = 1.048576e-4, less a little.
-TINY = 1.04e-4
-
-
-# -- step length -----------------------------------------------------------------------------------
-@inner
-def step(t, t_end, longest, length, rtol, theta, work):
-    """One accepted step: (t_new, h, its length, err, rejections). Failed if not err <= rtol: NaN,
-    or no step is short enough.
-    """
-    shortest = 16.0 * ulp(t)
-    length = min(longest, max(shortest, length))
-    last = 1.1 * length >= t_end - t
-    if last:
-        length = t_end - t
-    rejections = 0
-    while True:
-        t_new = t_end if last else t + length
-        h = try_step(t, length, t_new, work)
-        err = length * error_norm(theta, work)
-        if not err > rtol or length <= shortest:
-            return t_new, h, length, err, rejections
-        length = max(
-            shortest,
-            length * max(0.1, 0.8 * (rtol / err) ** POWER) if rejections == 0 else 0.5 * length,
-        )
-        last = False
-        rejections += 1
-
-
-@inner
-def next_length(length, err, rejections, rtol):
-    """Length of the step after an accepted one."""
-    if rejections > 0:
-        return length
-    ratio = err / rtol
-    if ratio < TINY:
-        return 5.0 * length
-    shrink = 1.25 * ratio**POWER
-    return length / shrink if shrink > 0.2 else 5.0 * length
-
-
-@inner
-def first_length(t, t_end, rtol, theta, work):
-    """Default length of the first step of a leg, from NODE and K1."""
-    norm = 0.0
-    for i in range(NSTATES):
-        norm = max(norm, abs(work[K1 + i] / max(abs(work[NODE + i]), theta)))
-    rate = norm / (0.8 * rtol**POWER)
-    length = longest_step(t, t_end)
-    if length * rate > 1.0:
-        length = 1.0 / rate
-    return max(length, 16.0 * ulp(t))
-
-
-@inner
-def longest_step(t_leg, t_end):
-    """A tenth of the leg's span."""
-    return 0.1 * (t_end - t_leg)
+# Columns of `options` that all methods have.
+LOCATE, MAX_STEPS, MAX_EVENTS = range(2, 5)
 
 
 # -- sides -----------------------------------------------------------------------------------------
-@inner
-def sides(at, work):
-    """Mode bits: bit g is set where gap g is positive."""
-    bits = 0
-    for g in range(NGUARDS):
-        if work[at + g] > 0.0:
-            bits |= 1 << g
-    return bits
-
-
 @inner
 def check_sides(i, batch, work):
     """After a step without contact: the sides are those of the gaps. A gap that has changed sides
@@ -198,12 +126,12 @@ def land(i, t, t_hit, t_new, h, batch, work):
             work[NEXT + j] = work[POINT + j]
     write_samples(i, t, h, t_hit, batch, work)
     drive_at(t_hit, Q, work)
-    rate_at(t_hit, NEXT, Q, K1, work)
+    rate_at(t_hit, NEXT, Q, law_mode(i, batch), K1, work)
     gap_rates_at(t_hit, NEXT, K1, Q, RATE, work)
     gap_errors(i, t_hit, batch, work)
     record_contacts(i, t_hit, batch, work)
-    if TANGENT:
-        rate_at(t_hit, NEXT, Q, K1, work)
+    if TANGENT or law_mode(i, batch) != FROM_STATE:
+        rate_at(t_hit, NEXT, Q, law_mode(i, batch), K1, work)
     gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
 
 
@@ -306,25 +234,27 @@ def go_on(rate, work):
 
 
 @kernel
-def take_up(i, theta, batch, work):
+def take_up(i, t_end, batch, work):
     """Load a trajectory, from its start (mode < 0) or from where it was paused: (t, start of the
-    leg, next step length, next break).
+    leg, next break).
     """
     prepare(batch.param[i * batch.stride], part(work, C, NCONST))
-    t, t_leg, length = batch.carry[i, TIME], batch.carry[i, LEG], batch.carry[i, LENGTH]
-    if batch.mode[i] < 0:
+    begins = batch.mode[i] < 0
+    t, t_leg = batch.carry[i, TIME], batch.carry[i, LEG]
+    if begins:
         t = batch.origin[i] + batch.count[i] * batch.period[i] + batch.phase[i]
     for j in range(NSTATES):
         work[NODE + j], work[REST + j] = batch.state[i, j], 0.0
     t_break = follow_clocks(i, t, False, batch, work)
-    drive_at(t, Q, work)
-    gaps_at(t, NODE, Q, AT_NODE, work)
-    rate_at(t, NODE, Q, K1, work)
-    if batch.mode[i] < 0:
-        t_leg, length = t, first_length(t, end_time(i, batch), batch.options[i, RTOL], theta, work)
-        batch.mode[i] = sides(AT_NODE, work)
+    if begins:
+        start_leg(i, t, t_end, True, batch, work)
         write_samples_here(i, t, batch, work)
-    return t, t_leg, length, t_break
+        t_leg = t
+    else:
+        drive_at(t, Q, work)
+        gaps_at(t, NODE, Q, AT_NODE, work)
+        rate_at(t, NODE, Q, law_mode(i, batch), K1, work)
+    return t, t_leg, t_break
 
 
 @kernel
@@ -340,24 +270,26 @@ def follow_clocks(i, t, known, batch, work):
 
 
 @kernel
-def start_leg(i, t, t_end, rtol, theta, batch, work):
-    """Start afresh at a break, where the equations change: rates, gaps and sides at NODE; returns
-    the length of the next step.
+def start_leg(i, t, t_end, look, batch, work):
+    """Start afresh where the equations change, or begin: rates, gaps and, if they are to be looked
+    at, sides at NODE.
     """
     drive_at(t, Q, work)
     gaps_at(t, NODE, Q, AT_NODE, work)
-    rate_at(t, NODE, Q, K1, work)
-    if batch.options[i, LOCATE] != 0.0:
+    if look:
         batch.mode[i] = sides(AT_NODE, work)
-    return first_length(t, t_end, rtol, theta, work)
+    rate_at(t, NODE, Q, law_mode(i, batch), K1, work)
+    if look:
+        settle_sides(i, t, batch, work)
+    begin_leg(i, t, t_end, batch, work)
 
 
 @kernel
-def put_back(i, t, t_leg, length, status, batch, work):
+def put_back(i, t, t_leg, status, batch, work):
     """Store a trajectory that has ended or is paused."""
     for j in range(NSTATES):
         batch.state[i, j] = work[NODE + j]
-    batch.carry[i, TIME], batch.carry[i, LEG], batch.carry[i, LENGTH] = t, t_leg, length
+    batch.carry[i, TIME], batch.carry[i, LEG] = t, t_leg
     batch.status[i] = status
     if batch.options[i, LOCATE] == 0.0:
         drive_at(t, Q, work)
@@ -385,56 +317,47 @@ def has_room(batch):
     return batch.rec_i.shape[0] == 0 or batch.rec_used[0] + NGUARDS <= batch.rec_i.shape[0]
 
 
-@inner
-def find_contact(t, t_new, t_leg, h, work):
-    """(time of the first contact of the step, or its end; whether there is one)."""
-    gaps_at(t_new, NEXT, Q6, AT_NEXT, work)
-    if any_sign_change(work, AT_NODE, AT_NEXT):
-        return odezero(t, t_new, t_leg, h, work)
-    return t_new, False
-
-
 @kernel
 def advance(i, budget, batch, work):
     """Move a trajectory to its end, or until the budget of tries is used up or the table of
     contacts is full; returns the budget left.
     """
-    rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]
     locate = batch.options[i, LOCATE] != 0.0
     t_end = end_time(i, batch)
-    t, t_leg, length, t_break = take_up(i, theta, batch, work)
+    t, t_leg, t_break = take_up(i, t_end, batch, work)
     status = status_at(i, t, t_end, batch)
     while status == RUNNING and budget > 0 and has_room(batch):
-        t_new, h, length, err, rejections = step(
-            t, min(t_end, t_break), longest_step(t_leg, t_end), length, rtol, theta, work
-        )
+        t_new, h, fine, rejections = step(i, t, min(t_end, t_break), t_leg, t_end, batch, work)
         budget -= 1 + rejections
         batch.counters[i, REJECTED] += rejections
-        if not err <= rtol:
+        if not fine:
             status = NONFINITE
             break
+        t_hit, lands = t_new, False
+        if locate:
+            t_hit, t_new, h, lands, status = find_contact(i, t, t_new, t_leg, h, batch, work)
+            if status != RUNNING:
+                break
         batch.counters[i, STEPS] += 1
         for j in range(NSTATES):
             batch.carry[i, ERRORS + j] += abs(h * work[ERROR + j])
-        t_hit, lands = find_contact(t, t_new, t_leg, h, work) if locate else (t_new, False)
         if lands:
             land(i, t, t_hit, t_new, h, batch, work)
             go_on(K1, work)
-            length = first_length(t_hit, t_end, rtol, theta, work)
+            begin_leg(i, t_hit, t_end, batch, work)
             t = t_leg = t_hit
         else:
             write_samples(i, t, h, t_new, batch, work)
             if locate:
                 check_sides(i, batch, work)
-            go_on(K7, work)
-            length = next_length(length, err, rejections, rtol)
+            go_on(K_END, work)
             t = t_new
         if NCLOCKS > 0 and t + SAME_BREAK * abs(t) >= t_break:
             t_break = follow_clocks(i, t, True, batch, work)
-            length = start_leg(i, t, t_end, rtol, theta, batch, work)
+            start_leg(i, t, t_end, locate, batch, work)
             t_leg = t
         status = status_at(i, t, t_end, batch)
-    put_back(i, t, t_leg, length, status, batch, work)
+    put_back(i, t, t_leg, status, batch, work)
     return budget
 
 

@@ -1,0 +1,145 @@
+"""What every method is: a small option object that names a compiled flow and hands it its
+numbers.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, TypeVar
+
+import numpy as np
+
+from saltus.codegen.module import Flow
+from saltus.errors import ParameterError, nearest, shown
+from saltus.system.system import System
+
+#: Steps that a trajectory may take for each of its periods; a healthy one takes ten to a hundred.
+STEPS_PER_PERIOD = 10_000
+#: Steps that any trajectory may take.
+STEPS_AT_LEAST = 1_000_000
+
+
+def step_budget(given: int | None, periods: float) -> float:
+    """Steps that a trajectory of so many periods may take, if not so many are given."""
+    return (
+        float(given)
+        if given is not None
+        else STEPS_AT_LEAST + STEPS_PER_PERIOD * math.ceil(periods)
+    )
+
+
+def check_positive(name: str, value: Any) -> None:
+    """Raise ParameterError for an option that isn't a positive number."""
+    if (
+        isinstance(value, bool | np.timedelta64)
+        or not isinstance(value, int | float | np.integer | np.floating)
+        or not 0 < value <= sys.float_info.max
+    ):
+        raise ParameterError(f"{name} must be a positive number, not {shown(value)}.")
+
+
+_M = TypeVar("_M", bound="Method")
+#: Names of ode45's options here.
+_MATLAB: Mapping[str, str] = {"reltol": "rtol", "abstol": "atol", "events": "events"}
+
+
+def explain_unknown_options(cls: type[_M]) -> type[_M]:
+    """Raise a clear error for options that a method doesn't have."""
+    signature, made = inspect.signature(cls), cls.__init__
+
+    @functools.wraps(made)
+    def init(self: _M, *args: Any, **kwargs: Any) -> None:
+        known = signature.parameters
+        for word in kwargs:
+            if word not in known:
+                own = _MATLAB.get(word.lower())
+                raise ParameterError(
+                    f"sl.{cls.__name__} has no option {shown(word)}. "
+                    f"{f'Write {own}=.' if own in known else nearest(word, known)}"
+                )
+        if len(args) > len(known):
+            raise ParameterError(
+                f"sl.{cls.__name__} takes "
+                f"{', '.join(f'{name}=' for name in known)}, not {len(args)} "
+                f"values in a row."
+            )
+        made(self, *args, **kwargs)
+
+    cls.__init__ = init  # type: ignore[assignment, method-assign]
+    return cls
+
+
+class Method:
+    """What every method offers to the engine."""
+
+    @property
+    def name(self) -> str:
+        """Name as users write it."""
+        return type(self).__name__
+
+    def options(self) -> dict[str, Any]:
+        """The options, for provenance."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
+
+    def kernels(self, system: System) -> Flow:
+        """The compiled module of this method for a system."""
+        raise NotImplementedError
+
+    def numbers(self, periods: float) -> np.ndarray:
+        """The options as the kernel reads them, for a run of ``periods``."""
+        raise NotImplementedError
+
+    def due(self, periods: float) -> float | None:  # noqa: ARG002
+        """Least progress in :data:`saltus.flow.pace.LONG_CHECK_STEPS` steps, in periods; None if
+        there is a budget of steps.
+        """
+        return None
+
+    def suited_to(self, count: int) -> Method:  # noqa: ARG002  (unused by most methods)
+        """The fastest variant of the method for ``count`` trajectories; its results are the same to
+        the bit.
+        """
+        return self
+
+    @property
+    def label(self) -> str:
+        """The method in a few words: its name, and the options that aren't the usual ones."""
+        usual = {f.name: f.default for f in fields(self)}  # type: ignore[arg-type]
+        own = {name: value for name, value in self.options().items() if value != usual[name]}
+        listed = ", ".join(
+            f"{name}={f'{value:g}' if isinstance(value, float) else value}"
+            for name, value in own.items()
+        )
+        return f"{self.name} ({listed})" if listed else self.name
+
+    @property
+    def records_contacts(self) -> bool:
+        """Whether contacts are located, so that there is something to count."""
+        return True
+
+    @property
+    def noise(self) -> float:
+        """Mismatch of a periodic orbit, relative to the range of the states, that this method's own
+        errors explain.
+        """
+        raise NotImplementedError
+
+    @property
+    def exact(self) -> bool:
+        """Whether its errors are rounding, so that Newton's method closes its orbits."""
+        return False
+
+    def noise_of(self, scale: np.ndarray) -> np.ndarray:
+        """The noise, float64[k], where the states of k motions have the ranges float64[k, D]."""
+        return np.full(len(scale), self.noise)
+
+    def companion(self) -> Method:
+        """A more exact method: the distance of its contact times from this one's measures their
+        errors.
+        """
+        raise NotImplementedError
