@@ -39,7 +39,7 @@ class Contact:
         Viscous damping in contact only [N*s/m]. Default: none.
     name : str, optional
         Its parameters are ``NAME_gap``, ``NAME_stiffness`` and ``NAME_damping``. Default ``stop``;
-        ``stop1``, ``stop2``, ... if there are several.
+        ``stop1``, ``stop2``, ... if several have none.
     """
 
     at: str
@@ -66,8 +66,8 @@ class Force:
     harmonic : int
         Multiple of the forcing frequency; 0 is a constant force.
     name : str, optional
-        Its parameters are ``NAME`` and ``NAME_phase``. Default ``force``; ``force1``, ... if there
-        are several.
+        Its parameters are ``NAME`` and ``NAME_phase``. Default ``force``; ``force1``, ... if
+        several have none.
     """
 
     at: str
@@ -100,9 +100,11 @@ def parts(kind: type[P], given: Any, word: str, known: Iterable[str]) -> list[tu
         raise ParameterError(f"{word}s must be a list of them, not {shown(given)}.")
     degrees = list(known)
     found = [one if isinstance(one, kind) else _made(kind, one) for one in given]
+    unnamed = [one for one in found if one.name is None]
+    numbers = iter(range(1, len(unnamed) + 1))
     names = [
-        one.name or (word if len(found) == 1 else f"{word}{number}")
-        for number, one in enumerate(found, 1)
+        (word if len(unnamed) == 1 else f"{word}{next(numbers)}") if one.name is None else one.name
+        for one in found
     ]
     for name, one in zip(names, found, strict=True):
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):

@@ -23,13 +23,13 @@ def test_names_parameters_and_units():
         forces=[sl.Force("floor", "2 kN", phase="90 deg"), sl.Force("xa", 1.0)],
     )  # fmt: skip
     assert made.states == ("roof", "xa", "floor", "roof_rate", "va", "floor_rate")
-    assert [guard.name for guard in made.guards] == ["stop1 lower", "stop1 upper", "left"]
+    assert [guard.name for guard in made.guards] == ["stop lower", "stop upper", "left"]
     assert dict(made.values) == {
-        "stop1_gap": 1e-3, "stop1_stiffness": 3e3, "stop1_damping": 2.0,
+        "stop_gap": 1e-3, "stop_stiffness": 3e3, "stop_damping": 2.0,
         "left_gap": 2.0, "left_stiffness": 1.0,
         "force1": 2e3, "force1_phase": np.pi / 2, "force2": 1.0, "frequency": 2.0,
     }  # fmt: skip
-    assert made.units["stop1_damping"] == "N*s/m"
+    assert made.units["stop_damping"] == "N*s/m"
     assert made.units["roof_rate"] == "m/s"
     assert type(made).from_dict(made.to_dict()).fingerprint() == made.fingerprint()
     assert made.with_values(left_gap="3 mm").fingerprint() == made.fingerprint()
