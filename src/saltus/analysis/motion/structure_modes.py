@@ -76,7 +76,8 @@ def structure_modes(
     places, vectors = _directions(at, degrees if known.shapes.shape[1] == size else [], degrees)
     total, residual = flexibility(stiffness, known, count, vectors)
     kept = known.kept(count)
-    share = np.where(np.isfinite(total), 1 - residual / total, np.nan)
+    with np.errstate(invalid="ignore"):  # of what a rigid body moves, or nothing does
+        share = np.where(np.isfinite(total), 1 - residual / total, np.nan)
 
     def values(dims: Any, array: np.ndarray, unit: str, name: str) -> xr.Variable:
         return xr.Variable(dims, array, {"units": unit, "long_name": name})

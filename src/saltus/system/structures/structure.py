@@ -215,6 +215,6 @@ def _words(
     at = np.array([direction(one, degrees) for _, one in contacts])
     totals, residuals = flexibility(stiffness, modes, count, at)
     for (name, _), total, residual in zip(contacts, totals, residuals, strict=True):
-        share = f", {100 * (1 - residual / total):.4g} % of it kept" if np.isfinite(total) else ""
+        share = f", {100 * (1 - residual / total):.4g} % of it kept" if 0 < total < np.inf else ""
         words += f" Static flexibility at {name}: {residual:.3g} m/N left out{share}."
     return words
