@@ -21,6 +21,8 @@ MADE = {
     "RK4 bisect": sl.RK4("0.2 ms", "bisect"),
     "ODE23": sl.ODE23(1e-6, 1e-9),
     "ODE45": sl.ODE45(1e-6, 1e-9),
+    "ODE113": sl.ODE113(1e-7, 1e-10),
+    "ODE15s": sl.ODE15s(1e-8, 1e-11),
 }
 every = pytest.mark.parametrize("method", MADE.values(), ids=MADE)
 

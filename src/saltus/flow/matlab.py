@@ -129,3 +129,29 @@ class ODE23(Matlab):
     Bogacki & Shampine, Appl. Math. Lett. 2 (1989) 321-325; Shampine & Reichelt, SIAM J. Sci.
     Comput. 18 (1997) 1-22.
     """
+
+
+@_documented
+@dataclass(frozen=True)
+class ODE113(Matlab):
+    """MATLAB's ode113 with odezero, re-implemented from the published rules: Adams formulas of
+    orders 1 to 13, for tight tolerances and costly equations. Starts at order 1 at every contact.
+
+    References
+    ----------
+    Shampine & Gordon, Computer Solution of Ordinary Differential Equations (1975); Shampine &
+    Reichelt, SIAM J. Sci. Comput. 18 (1997) 1-22.
+    """
+
+
+@_documented
+@dataclass(frozen=True)
+class ODE15s(Matlab):
+    """MATLAB's ode15s with odezero, re-implemented from the published rules, for stiff systems:
+    numerical differentiation formulas of orders 1 to 5, with the Jacobian derived from the
+    equation. Starts at order 1 at every contact.
+
+    References
+    ----------
+    Shampine & Reichelt, SIAM J. Sci. Comput. 18 (1997) 1-22.
+    """
