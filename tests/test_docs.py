@@ -99,6 +99,8 @@ def test_every_public_name_is_documented():
     named = set(re.findall(r"`sl\.(\w+)`", text))
     assert set(saltus.__all__) - {"models", "plot"} - documented - named == set()
     assert set(saltus.models.MODELS) <= documented
+    drawn = (DOCS / "models.md").read_text(encoding="utf-8")
+    assert [name for name in saltus.models.MODELS if f"sl.models.{name}(" not in drawn] == []
     assert {name for name in saltus.plot.__all__ if name.islower()} <= documented
 
 

@@ -9,7 +9,7 @@ import math
 import pytest
 
 import saltus as sl
-from conformance.systems import contacts, latch, pair, slider, walls
+from conformance.systems import contacts, latch, pair, walls
 
 # these tests look at the status themselves
 pytestmark = pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
@@ -116,18 +116,3 @@ def test_boundary_that_jumps_past_the_state():
     assert run.mode.values[1:].tolist() == [1 if t < math.pi else 2 for t in run.time.values[1:]]
     assert {round(c.time, 9) for c in contacts(run)} == {round(math.pi, 9)}
     assert int(run.mode_violations) == 0
-
-
-def test_sliding_is_given_up_by_name():
-    """Friction stronger than the drive when the velocity reaches the belt's: both sides push onto
-    it. A named status at that instant.
-    """
-    run = sl.simulate(slider.with_values(force=2.0, friction=1.9), (0.3,), t_end=5.0, samples=4)
-    assert str(run.status.values) == "sliding"
-    assert float(run.end_v) == 0.0
-    first = contacts(run)[0]
-    assert (float(run.end_time), first.direction) == (first.time, -1)
-    assert (
-        abs(0.3 + 2 * math.sin(2 * math.pi * first.time) / (2 * math.pi) - 1.9 * first.time) < 1e-15
-    )
-    assert int(run.steps) < 200

@@ -35,10 +35,9 @@ def guards_over(system: System, values: Mapping[str, Any], shape: tuple[int, ...
     """The guards with their boundaries; of this shape where a parameter that is given as an array
     moves one of them.
     """
-    places = []
-    for guard in system.guards:
-        place = np.nan if guard.boundary is None else evaluate([guard.boundary], values=values)[0]
-        places.append(np.broadcast_to(place, shape if np.ndim(place) else ()))
+    boundaries = [guard.boundary for guard in system.guards]
+    found = iter(evaluate([one for one in boundaries if one is not None], values=values))
+    places = [np.nan if one is None else next(found) for one in boundaries]
     if any(np.ndim(place) for place in places):
         places = [np.broadcast_to(place, shape) for place in places]
     return Guards(

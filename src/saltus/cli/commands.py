@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import textwrap
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,6 +16,7 @@ from saltus.errors import StudyError
 if TYPE_CHECKING:
     from saltus.study.run.running import Resources
     from saltus.study.setting.inputs import Inputs
+    from saltus.study.table import TextTable
     from saltus.study.tables.spec import Study
     from saltus.system import System
 
@@ -379,7 +381,9 @@ def reproduce(
 
 @app.command()
 def models(
-    name: Annotated[str, typer.Argument(help="A model, to see its equations and values.")] = "",
+    name: Annotated[
+        str, typer.Argument(help="A model, to see its equations, values and source.")
+    ] = "",
 ) -> None:
     """List the published systems that come with saltus, or show one.
 
@@ -387,19 +391,34 @@ def models(
     """
     from saltus import models as published
     from saltus.cli import screen
+
+    if not name:
+        screen.show(_models_table(screen.console().width))
+        return
+    screen.say(published.describe()[published.find(name).__name__])
+    screen.say(repr(published.find(name)()))
+    if published.has_energy(name):
+        screen.say(f'energy      sl.models.energy("{name}"), as sl.energy_balance takes it')
+
+
+def _models_table(width: int) -> TextTable:
+    """A line for each model; sources are cut where the screen ends."""
+    from saltus import models as published
     from saltus.study.table import TextTable
 
-    if name:
-        screen.say(repr(published.find(name)()))
-        screen.say(f'energy      sl.models.energy("{name}"), as sl.energy_balance takes it')
-    else:
-        screen.show(
-            TextTable(
-                "Models; `saltus models NAME` shows one",
-                ("name", "description"),
-                tuple(published.describe().items()),
-            )
+    systems = {name: model() for name, model in published.MODELS.items()}
+    left = max(width - max(map(len, systems)) - len("  states  contacts  "), 20)
+    rows = tuple(
+        (
+            name,
+            str(len(system.states)),
+            str(sum(guard.law is None or guard.law.kind != "hold" for guard in system.guards)),
+            textwrap.shorten(system.source, left, placeholder=" ..."),
         )
+        for name, system in systems.items()
+    )
+    title = "Models; `saltus models NAME` shows one"
+    return TextTable(title, ("name", "states", "contacts", "source"), rows)
 
 
 @app.command()

@@ -13,14 +13,40 @@ from typing import Any
 
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.models.aeroelastic import aeroelastic
+from saltus.models.bang_bang import bang_bang
+from saltus.models.bilinear_rig import bilinear_rig
 from saltus.models.chain import chain
 from saltus.models.delangre import delangre
+from saltus.models.double_scroll import double_scroll
 from saltus.models.gear_pair import gear_pair
+from saltus.models.hertz_stop import hertz_stop
+from saltus.models.one_sided_spring import one_sided_spring
+from saltus.models.soft_stop import soft_stop
+from saltus.models.spring_rebound import spring_rebound
+from saltus.models.switched_rotor import switched_rotor
+from saltus.models.thrown_mass import thrown_mass
+from saltus.models.two_masses import two_masses
 from saltus.system import System
 
 #: Every model by name.
 MODELS: dict[str, Callable[..., System]] = {
-    one.__name__: one for one in (delangre, chain, gear_pair, aeroelastic)
+    one.__name__: one
+    for one in (
+        delangre,
+        chain,
+        gear_pair,
+        aeroelastic,
+        bilinear_rig,
+        soft_stop,
+        one_sided_spring,
+        spring_rebound,
+        thrown_mass,
+        hertz_stop,
+        two_masses,
+        bang_bang,
+        switched_rotor,
+        double_scroll,
+    )
 }
 
 
@@ -55,9 +81,19 @@ def energy(name: str) -> dict[str, Callable[..., Any]]:
     Raises
     ------
     ParameterError
-        If there is no such model.
+        If there is no such model, or it brings no energies along.
     """
-    return dict(sys.modules[find(name).__module__].ENERGY)
+    if not has_energy(name):
+        raise ParameterError(
+            f"{name} brings no energies along. Write the energy, and the powers supplied and "
+            f"dissipated, as functions, or as formulas in a study."
+        )
+    return dict(sys.modules[MODELS[name].__module__].ENERGY)
+
+
+def has_energy(name: str) -> bool:
+    """Whether a model brings its energies along. Raises ParameterError for an unknown model."""
+    return hasattr(sys.modules[find(name).__module__], "ENERGY")
 
 
 def describe() -> dict[str, str]:
@@ -74,4 +110,24 @@ def __getattr__(name: str) -> Any:
     )
 
 
-__all__ = ["MODELS", "aeroelastic", "chain", "delangre", "describe", "energy", "find", "gear_pair"]
+__all__ = [
+    "MODELS",
+    "aeroelastic",
+    "bang_bang",
+    "bilinear_rig",
+    "chain",
+    "delangre",
+    "describe",
+    "double_scroll",
+    "energy",
+    "find",
+    "gear_pair",
+    "has_energy",
+    "hertz_stop",
+    "one_sided_spring",
+    "soft_stop",
+    "spring_rebound",
+    "switched_rotor",
+    "thrown_mass",
+    "two_masses",
+]

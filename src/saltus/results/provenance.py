@@ -20,6 +20,8 @@ import xarray as xr
 
 #: Packages whose versions can change the digits of a result or the layout of its file.
 _PACKAGES = ("numpy", "llvmlite", "xarray", "saltus")
+#: Made once: ``json.dumps`` with an option makes one each time.
+_JSON = json.JSONEncoder(ensure_ascii=False)
 
 
 def attributes(
@@ -83,7 +85,7 @@ def attributes(
 
 def to_json(value: Any) -> str:
     """JSON text of plain values in the order given; numbers keep all their digits."""
-    return json.dumps(value, ensure_ascii=False)
+    return _JSON.encode(value)
 
 
 @cache  # reading it takes a millisecond, and what this process runs doesn't change
@@ -154,4 +156,5 @@ def _canonical(values: np.ndarray) -> bytes | memoryview:
         return np.ascontiguousarray(values, dtype="<f8").data
     if values.dtype.kind in "iub":
         return np.ascontiguousarray(values, dtype="<i8").data
-    return "\0".join(map(str, values.ravel().tolist())).encode()
+    words = values.ravel().tolist()
+    return "\0".join(words if values.dtype.kind == "U" else map(str, words)).encode()

@@ -18,12 +18,14 @@ from saltus.system.compositions import (
     atan2,
     clip,
     cosh,
+    friction,
     heaviside,
     hypot,
     sign,
     sinh,
     where,
 )
+from saltus.system.declared import impact, jump
 from saltus.system.functions import (
     abs,
     atan,
@@ -49,7 +51,7 @@ from saltus.system.trace import system
 
 __all__ = [
     "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp",
-    "freeplay", "heaviside", "hypot", "log", "max",
+    "freeplay", "friction", "heaviside", "hypot", "impact", "jump", "log", "max",
     "min", "mod", "pi", "piecewise", "pulse", "recorded", "regularise", "sawtooth", "sign", "sin",
     "sinh", "sqrt", "square", "system", "table", "tan", "tanh", "where",
 ]  # fmt: skip

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from saltus.errors import TraceError
 from saltus.system import expression as ex
-from saltus.system.expression import And, Bit, Condition, Expr, Not, Or, Relation
+from saltus.system.contacts import find_contacts, renamed
+from saltus.system.expression import And, Bit, Condition, Expr, Friction, Not, Or, Relation
 from saltus.system.functions import atan, piecewise, sqrt, tanh
-from saltus.system.guards import Guard, find_guards, number_of
-from saltus.system.singular import check_finite, check_gaps, lifted
+from saltus.system.guards import Guard, number_of
+from saltus.system.singular import assuming
 from saltus.system.system import System
 
 #: A smoothed step of a gap and a width, from 0 far below the boundary to 1 far above.
@@ -58,12 +58,10 @@ def blended(
     """Field and guards of the stand-in."""
     blend = _Blend(step, parameters)
     for guard in system.guards:
-        blend.add(blend.rewrite(guard.gap))
+        blend.add(guard)
     try:
-        field, guards = find_guards([blend.rewrite(entry) for entry in system.field])
-        field = lifted(field, guards)
-        check_finite(field, guards, system.states)
-        check_gaps(guards)
+        rates = [blend.rewrite(entry) for entry in system.field]
+        field, guards = find_contacts(rates, (), system.states)
     except TraceError as error:
         raise TraceError(f"{system.name}, regularised: {error}") from error
     return field, _with_old_names(system.guards, blend.sides, guards)
@@ -74,13 +72,11 @@ def _with_old_names(
 ) -> tuple[Guard, ...]:
     """The guards, those that stay with the names that they had."""
     kept = {
-        number_of(side, guards): guard.name
+        number: guard.name
         for guard, side in zip(old, sides, strict=True)
-        if isinstance(side, Relation)
+        if isinstance(side, Relation) and (number := number_of(side, guards)) is not None
     }
-    return tuple(
-        replace(guard, name=kept.get(number, guard.name)) for number, guard in enumerate(guards)
-    )
+    return renamed(guards, kept)
 
 
 class _Blend:
@@ -91,12 +87,16 @@ class _Blend:
         self.sides: list[Expr | Relation] = []
         self._rewritten: dict[Expr, Expr] = {}
 
-    def add(self, gap: Expr) -> None:
+    def add(self, guard: Guard) -> None:
         """The next guard: its weight, or the comparison that it stays."""
-        name = self._parameters.get(len(self.sides))
-        self.sides.append(
-            Relation(gap) if name is None else ex.as_expr(self._step(gap, ex.parameter(name)))
-        )
+        number, gap = len(self.sides), self.rewrite(guard.gap)
+        name = self._parameters.get(number)
+        if name is not None:
+            self.sides.append(ex.as_expr(self._step(gap, ex.parameter(name))))
+        elif guard.law is None or guard.law.limit is None:
+            self.sides.append(Relation(gap))
+        else:  # both sides have one limit on the boundary itself
+            self.sides.append(Friction(gap, self.rewrite(assuming(guard.law.limit, number, True))))
 
     def rewrite(self, root: Expr) -> Expr:
         """The expression with blends in place of pieces."""

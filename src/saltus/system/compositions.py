@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from saltus.system.expression import Condition, Expr, Operand
+from saltus.errors import TraceError
+from saltus.system.expression import Condition, Expr, Friction, Operand, as_expr, select
 from saltus.system.functions import atan, exp, max, min, of_numbers, pi, piecewise, sqrt, tanh
 
 
@@ -28,12 +29,55 @@ def where(condition: Condition | bool, value: Operand, otherwise: Operand) -> An
 def sign(a: Operand) -> Any:
     """1 where ``a > 0``, -1 where ``a < 0``; a boundary at ``a = 0``. Of the number 0 it is 0.
 
-    As the direction of friction it makes the motion stick where both sides push onto ``a = 0``;
-    saltus stops there with status `sliding`. ``sl.tanh(a/width)`` is its smooth stand-in.
+    At ``a = 0`` it is any value between: where both sides push onto ``a = 0`` the motion stays
+    there, and the sign takes the value that this needs (Filippov's rule). So ``mu*sl.sign(v)`` is
+    Coulomb friction, which sticks. ``sl.tanh(a/width)`` is its smooth stand-in.
     """
     if _traced(a):
         return piecewise((1.0, a > 0), otherwise=-1.0)
     return of_numbers("sign", lambda a: 1.0 if a > 0 else -1.0 if a < 0 else 0.0, a)
+
+
+def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) -> Any:
+    """The force of dry friction, ``slip*sign(velocity)``: it sticks where the force that this needs
+    is smaller than ``stick``.
+
+    Parameters
+    ----------
+    velocity : Expr or float
+        Sliding velocity [m/s, or any], zero where it sticks.
+    slip : Expr or float
+        Force in motion [N, or any], > 0; it may depend on the velocity (Stribeck).
+    stick : Expr or float, optional
+        Largest force at rest [as slip], at least ``slip`` at rest; default: the same.
+
+    Returns
+    -------
+    Expr or float
+        Force in the direction of the velocity: it stands with a minus in the equation of motion.
+
+    Raises
+    ------
+    TraceError
+        If ``stick`` is smaller than ``slip``.
+    """
+    if not _traced(velocity):
+        return slip * sign(velocity)
+    if stick is None:
+        return slip * sign(velocity)
+    limit, least = as_expr(stick) / as_expr(slip), as_expr(stick) - as_expr(slip)
+    if least.op == "const" and least.payload < 0:
+        raise TraceError(sticks_less(as_expr(stick).payload / as_expr(slip).payload))
+    gap = as_expr(velocity)
+    return slip * select(Friction(gap, limit), 1.0, -1.0)
+
+
+def sticks_less(limit: float) -> str:
+    """What to say of a friction force that is smaller at rest than in motion."""
+    return (
+        f"stick is {limit:g} times slip: a friction that holds less at rest than in motion has no "
+        f"motion at all where it reverses. Let stick be at least slip."
+    )
 
 
 def heaviside(a: Operand, at_zero: float = 0.5) -> Any:

@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from saltus.errors import UnitError
+from saltus.system.declared import Declared, Jump
 from saltus.system.expression import ELEMENTARY, Expr, walk
 from saltus.system.text import PI_MULTIPLES
 from saltus.units import dimension, unit_text
@@ -87,6 +88,28 @@ class DimensionCheck:
                     f"{_in(found)}: "
                     f"{_missing(found, wanted)}. {_WAY_OUT}"
                 )
+
+    def check_law(self, law: Declared) -> None:
+        """Raise a UnitError unless the velocity of an impact is the unit of its gap per second, its
+        restitution a plain number, and each new value of a jump in the unit of its state; where
+        they are known.
+        """
+        for name, part in law.parts.items():
+            found, gap = self._dimension(part), self._dimension(law.condition.gap)
+            wanted: Dimension | None = None
+            if name == "restitution":
+                wanted = _PLAIN
+            elif name == "velocity":
+                known = gap is not None and not isinstance(gap, _Number) and self._time is not None
+                wanted = _product(gap, self._time, -1) if known else None  # type: ignore[arg-type]
+            elif isinstance(law, Jump):
+                wanted = self._units.get(name)
+            if wanted is None or found is None or isinstance(found, _Number) or found == wanted:
+                continue
+            raise UnitError(
+                f"{law!r}: {name} is to be {_in(wanted)}, but {_brief(part)} is {_in(found)}. "
+                f"{_WAY_OUT}"
+            )
 
     def unit(self, node: Expr) -> str:
         """Coherent SI unit of a node, ``""`` if it isn't known, or may be that of an angle."""

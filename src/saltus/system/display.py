@@ -5,10 +5,12 @@ from __future__ import annotations
 import html
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from saltus.system.expression import ELEMENTARY, Condition, Expr
+from saltus.system.expression import ELEMENTARY, Condition, Expr, state, varies
+from saltus.system.guards import Law, is_hold
+from saltus.system.reduction import free_field
 from saltus.system.text import _ATOM, _PRODUCT, PI_MULTIPLES, Writer
 from saltus.units import from_si
 
@@ -56,19 +58,34 @@ _GREEK = frozenset(
 # -- text ------------------------------------------------------------------------------------------
 def equation_lines(system: System) -> list[str]:
     """The equations, one line each, named parts first."""
-    writer = _writer(Writer, system)
+    field = free_field(system.field, system.guards)
+    writer = _writer(Writer, system, field)
     lines = [
         f"d{name}/dt = {writer.text(entry)}"
-        for name, entry in zip(system.states, system.field, strict=True)
+        for name, entry in zip(system.states, field, strict=True)
+    ]
+    lines += [
+        f"{place}: {name} becomes {writer.text(entry)}"
+        for place, name, entry in _jumps(system, writer)
     ]
     return writer.lines + lines
+
+
+def _jumps(system: System, writer: Writer) -> Iterator[tuple[str, str, Expr]]:
+    """Where the state jumps: the place, a state and its new value."""
+    for number, guard in enumerate(system.guards):
+        if guard.law is None:
+            continue
+        for name, entry in zip(system.states, guard.law.reset, strict=False):
+            if entry is not state(name):
+                yield writer.side(number, guard.law.side < 0), name, entry
 
 
 def system_text(system: System) -> str:
     """The block that ``repr`` shows: equations, guards, parameters."""
     head = (
         f"System {system.name}: {_counted(len(system.states), 'state')}, "
-        f"{_counted(len(system.guards), 'guard')}{_forcing(system)}"
+        f"{_counted(_boundaries(system), 'guard')}{_forcing(system)}"
     )
     states = [
         f"{name} [{system.units[name]}]" if system.units[name] else name for name in system.states
@@ -87,6 +104,11 @@ def system_text(system: System) -> str:
     return "\n".join(line for block in blocks for line in block)
 
 
+def _boundaries(system: System) -> int:
+    """How many boundaries there are: hold guards aren't any."""
+    return sum(not is_hold(guard) for guard in system.guards)
+
+
 def _forcing(system: System) -> str:
     if system.forced_at is None:
         return ", not forced"
@@ -100,9 +122,11 @@ def _guard_rows(system: System) -> list[tuple[str, str]]:
     """Name and place of each guard."""
     from saltus.system.evaluate import evaluate
 
-    writer = _writer(Writer, system)
+    writer = _writer(Writer, system, free_field(system.field, system.guards))
     rows = []
     for number, guard in enumerate(system.guards):
+        if is_hold(guard):
+            continue
         place = writer.side(number).replace(" > ", " = ", 1)
         if guard.boundary is not None and guard.state is not None:
             (value,) = evaluate([guard.boundary], values=system.values)
@@ -111,8 +135,24 @@ def _guard_rows(system: System) -> list[tuple[str, str]]:
                 if guard.boundary.op != "const"
                 else ""
             )
-        rows.append((guard.name, place))
+        rows.append((guard.name, _by_law(guard.law, place, system, writer)))
     return rows
+
+
+def _by_law(law: Law | None, place: str, system: System, writer: Writer) -> str:
+    """What happens at a boundary, and where it is."""
+    if law is None:
+        return place
+    if law.kind == "surface":
+        return f"sticks or slides at {place}"
+    if law.restitution is None:
+        return f"jump at {place}"
+    if varies(law.restitution):
+        return f"impact with restitution {writer.text(law.restitution)} at {place}"
+    from saltus.system.evaluate import evaluate
+
+    (value,) = evaluate([law.restitution], values=system.values)
+    return f"impact with restitution {from_si(float(value) + 0.0, '1')} at {place}"
 
 
 def _parameter_rows(system: System) -> list[tuple[str, str]]:
@@ -129,8 +169,9 @@ def _parameter_rows(system: System) -> list[tuple[str, str]]:
     ]
 
 
-def _writer(kind: type, system: System) -> Writer:
-    roots = (*system.field, *(guard.gap for guard in system.guards))
+def _writer(kind: type, system: System, field: Sequence[Expr]) -> Writer:
+    roots = [*field, *(guard.gap for guard in system.guards if not is_hold(guard))]
+    roots += [entry for guard in system.guards if guard.law for entry in guard.law.reset]
     return kind(system.guards, shared=roots, taken=(*system.states, *system.values, "t"))
 
 
@@ -252,10 +293,15 @@ def latex_name(name: str) -> str:
 
 def latex_lines(system: System) -> list[str]:
     """The equations as LaTeX, aligned at ``&=``."""
-    writer = _writer(LatexWriter, system)
+    field = free_field(system.field, system.guards)
+    writer = _writer(LatexWriter, system, field)
     lines = [
         f"\\dot{{{latex_name(name)}}} &= {writer.text(entry)}"
-        for name, entry in zip(system.states, system.field, strict=True)
+        for name, entry in zip(system.states, field, strict=True)
+    ]
+    lines += [
+        rf"{place}: \quad {latex_name(name)}^{{+}} &= {writer.text(entry)}"
+        for place, name, entry in _jumps(system, writer)
     ]
     return writer.lines + lines
 

@@ -88,7 +88,7 @@ def sides(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = Non
     """Side of each guard where the state is: True if the gap is positive.
 
     On a boundary itself (gap exactly 0) this says False; which side the motion enters is decided by
-    derivatives, in the flow.
+    derivatives, in the flow. Contacts that can be held count as not held.
 
     Parameters
     ----------
@@ -109,6 +109,9 @@ def sides(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = Non
     states, values = _arguments(system, y, values)
     bits: list[Any] = []
     for guard in system.guards:
+        if guard.law is not None and guard.law.kind == "hold":
+            bits.append(np.zeros(np.shape(bits[guard.law.partner]), dtype=bool)[()])
+            continue
         (gap,) = evaluate([guard.gap], t=t, states=states, values=values, bits=bits)
         bits.append(gap > 0)
     return bits

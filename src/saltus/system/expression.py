@@ -212,12 +212,6 @@ def _no_number() -> str:
     return OWN_FUNCTIONS
 
 
-def _rebound() -> str:
-    from saltus.system.foreign import ADVICE  # foreign.py builds on this module
-
-    return ADVICE["impact"].partition(": ")[2]
-
-
 @contextmanager
 def observed(observer: Callable[[Expr], None] | None) -> Iterator[None]:
     """Every node that is asked for inside is shown to the observer, which may raise: the error then
@@ -283,6 +277,15 @@ class Relation(Condition):
     """
 
     gap: Expr
+
+
+@dataclass(frozen=True, eq=False)
+class Friction(Relation):
+    """A comparison that decides the direction of a friction force; at rest that force may be
+    ``limit`` times as large as in motion.
+    """
+
+    limit: Expr
 
 
 @dataclass(frozen=True)

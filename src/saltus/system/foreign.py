@@ -36,11 +36,6 @@ UFUNCS: dict[str, Callable[..., Any]] = {
     "degrees": lambda a: a * (180 / own.pi),
 }  # fmt: skip
 
-_STOP = (
-    "a stiff spring and damper, stop = sl.piecewise((k*(x - gap) + c*v, x > gap), otherwise=0), "
-    "with c = 2*z*sqrt(k*mass) and "
-    "z = -log(e)/sqrt(pi**2 + log(e)**2) rebounds with e"
-)
 #: Names of other packages, and their equivalents here.
 ADVICE: dict[str, str] = {
     "arctan2": "Write sl.atan2(y, x).", "arctan": "Write sl.atan.", "arcsin": "Write sl.asin.",
@@ -59,11 +54,8 @@ ADVICE: dict[str, str] = {
     "erf": "There is none; sl.tanh is the nearest smooth step.",
     "log10": "Write sl.log(x)/math.log(10).",
     "expm1": "Write sl.exp(x) - 1.", "log1p": "Write sl.log(1 + x).",
-    "impact": f"An instantaneous impact isn't supported yet: {_STOP}.",
-    "restitution": f"An instantaneous impact isn't supported yet: {_STOP}.",
+    "restitution": "Return sl.impact(x < gap, v, restitution=0.8) after the rates.",
     "delay": "There are no delays: a rate depends on the states at the time t only.",
-    "friction": "Write mu*normal*sl.tanh(v/eps), with eps small against the sliding speed: it "
-                "sticks by creeping.",
     "continuation": "There is no continuation by arc length; sl.frequency_response and "
                     "sl.bifurcation_diagram follow branches.",
     "solve": "Write sl.simulate(system, start, t_end=...).",

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from saltus.errors import TraceError, shown
+from saltus.system.contacts import renamed
 from saltus.system.expression import Condition, Relation
-from saltus.system.guards import equation_of, number_of
+from saltus.system.guards import equation_of, is_hold, number_of
 from saltus.system.names import why_no_title
 from saltus.system.quantity import Quantity, called
 from saltus.system.system import System
@@ -47,10 +48,7 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
                 f"{shown(name)}. Keep one of the two."
             )
         new[number] = name
-    guards = [
-        replace(guard, name=new.get(number, guard.name))
-        for number, guard in enumerate(system.guards)
-    ]
+    guards = renamed(system.guards, new)
     taken = {*system.states, *(f"{state} turns" for state in system.states)}
     for number, guard in enumerate(guards):
         if guard.name in taken:
@@ -63,7 +61,7 @@ def with_guard_names(system: System, names: Mapping[str, Quantity]) -> System:
                 f"{system.name}: {shown(guard.name)} is the name of {what}. Choose another one."
             )
         taken.add(guard.name)
-    return replace(system, guards=tuple(guards))
+    return replace(system, guards=guards)
 
 
 def _meant(system: System, name: str, function: Quantity) -> int:
@@ -78,7 +76,11 @@ def _meant(system: System, name: str, function: Quantity) -> int:
     number = number_of(condition, system.guards)
     if number is None:
         have = (
-            ", ".join(equation_of(each, system.guards) for each in range(len(system.guards)))
+            ", ".join(
+                equation_of(each, system.guards)
+                for each, guard in enumerate(system.guards)
+                if not is_hold(guard)
+            )
             or "none"
         )
         raise TraceError(

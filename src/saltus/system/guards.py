@@ -69,6 +69,23 @@ class Law:
     restitution: Expr | None = None
     zeros: int = 1
 
+    def expressions(self) -> tuple[Expr, ...]:
+        """All expressions of the law."""
+        single = (self.constraint, self.drive, self.pivot, self.limit, self.restitution)
+        several = (*self.reset, *self.settled, *self.normal, *self.direction)
+        return (*several, *(one for one in single if one is not None))
+
+    def extended(self, states: Sequence[Expr]) -> Law:
+        """The law of a system with more states, which it doesn't touch."""
+        none = (ex.constant(0.0),) * len(states)
+        return replace(
+            self,
+            reset=self.reset and (*self.reset, *states),
+            settled=self.settled and (*self.settled, *states),
+            normal=self.normal and (*self.normal, *none),
+            direction=self.direction and (*self.direction, *none),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Guard:
@@ -96,6 +113,20 @@ class Guard:
     state: str | None = None
     boundary: Expr | None = None
     law: Law | None = None
+
+
+def expressions_of(guards: Iterable[Guard]) -> list[Expr]:
+    """Gaps of guards and the expressions of their laws."""
+    return [
+        root
+        for guard in guards
+        for root in (guard.gap, *(guard.law.expressions() if guard.law else ()))
+    ]
+
+
+def is_hold(guard: Guard) -> bool:
+    """Whether a guard says that another one's contact is held."""
+    return guard.law is not None and guard.law.kind == "hold"
 
 
 def find_guards(field: Iterable[Expr]) -> tuple[tuple[Expr, ...], tuple[Guard, ...]]:
@@ -202,7 +233,7 @@ class _Finder:
         self.guards: list[Guard] = list(known)
         self._canonical = Canonical()
         self.polynomials: list[Polynomial] = [
-            self._canonical.polynomial(guard.gap) for guard in known
+            {} if is_hold(guard) else self._canonical.polynomial(guard.gap) for guard in known
         ]
         self.outcome: dict[Relation, Condition | bool] = {}
         self._rewritten: dict[Expr, Expr] = {}

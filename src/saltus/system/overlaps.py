@@ -19,7 +19,7 @@ from saltus.errors import ParameterError
 from saltus.system.canonical import Canonical
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Bit, Condition, Expr, Not, add, neg, walk
-from saltus.system.guards import Guard, equation_of
+from saltus.system.guards import Guard, equation_of, is_hold
 
 if TYPE_CHECKING:
     from saltus.system.system import System
@@ -81,6 +81,8 @@ def _pairs(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> Iterator[tuple
             continue
         first, second = _side(node.payload), _side(behind.payload)
         if first is None or second is None or (first, second) in seen:
+            continue
+        if is_hold(guards[first[0]]) or is_hold(guards[second[0]]):
             continue
         seen.add((first, second))
         width = add(

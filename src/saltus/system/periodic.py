@@ -15,7 +15,18 @@ from saltus.errors import TraceError
 from saltus.system.clocks import cycles_of
 from saltus.system.derivatives import differentiate, time_derivative
 from saltus.system.evaluate import evaluate, sides
-from saltus.system.expression import TIME, Expr, depends_on, div, operands, relations_in, walk
+from saltus.system.expression import (
+    TIME,
+    Expr,
+    constant,
+    depends_on,
+    div,
+    operands,
+    relations_in,
+    walk,
+)
+from saltus.system.guards import Guard, is_hold
+from saltus.system.reduction import free_field
 
 if TYPE_CHECKING:
     from saltus.system.system import System
@@ -110,8 +121,15 @@ def check_periodic(system: System) -> None:
 
 
 def _entries(system: System) -> list[Expr]:
-    """The field, then the gaps of the guards."""
-    return [*system.field, *(guard.gap for guard in system.guards)]
+    """The field where no contact is held, then the gaps of the guards and what laws set."""
+    return list(_written(system.field, system.guards))
+
+
+@functools.lru_cache(maxsize=256)
+def _written(field: tuple[Expr, ...], guards: tuple[Guard, ...]) -> tuple[Expr, ...]:
+    gaps = [constant(0.0) if is_hold(guard) else guard.gap for guard in guards]
+    resets = [entry for guard in guards if guard.law for entry in guard.law.reset]
+    return (*free_field(field, guards), *gaps, *resets)
 
 
 def _clocks_repeat(timing: Timing, system: System, period: float) -> bool:
@@ -170,7 +188,9 @@ def _not_periodic(system: System, entry: int, period: float) -> str:
     what = (
         f"d{system.states[entry]}/dt"
         if entry < count
-        else (f"the boundary {system.guards[entry - count].name!r}")
+        else f"the boundary {system.guards[entry - count].name!r}"
+        if entry < count + len(system.guards)
+        else "what an impact or a jump sets"
     )
     name = system.forced_at or ""
     unit = system.units[name]

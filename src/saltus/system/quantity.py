@@ -16,7 +16,7 @@ from typing import Any
 
 from saltus.errors import ParameterError, TraceError, nearest, shown
 from saltus.system.expression import TIME, Expr, as_expr, parameter, state, sub
-from saltus.system.guards import Guard, bits_in, join_guards, surface_guard
+from saltus.system.guards import Guard, bits_in, expressions_of, join_guards, surface_guard
 from saltus.system.names import why_no_name
 from saltus.system.singular import lifted
 from saltus.system.system import System
@@ -234,10 +234,11 @@ def acting_guards(system: System) -> tuple[int, ...]:
     """Numbers of the guards on whose side the equations depend: all but the surfaces that were
     added.
     """
-    acting = bits_in(system.field)
-    for number in reversed(range(len(system.guards))):
-        if number in acting:
-            acting |= bits_in([system.guards[number].gap])
+    waiting = bits_in(system.field) | {n for n, guard in enumerate(system.guards) if guard.law}
+    acting: set[int] = set()
+    while waiting:  # hold guards ask about one another in circles
+        acting |= waiting
+        waiting = bits_in(expressions_of([system.guards[number] for number in waiting])) - acting
     return tuple(sorted(acting))
 
 
@@ -290,8 +291,13 @@ def with_integrals(
         rate, guards = quantity(extended, function, f"the integrand {shown(name)}")
         extended = replace(extended, guards=guards)
         rates.append(rate)
+    integrals = tuple(map(state, integrands))
     return replace(
         extended,
+        guards=tuple(
+            replace(guard, law=guard.law.extended(integrals)) if guard.law else guard
+            for guard in extended.guards
+        ),
         states=(*system.states, *integrands),
         field=(*system.field, *rates),
         units={**system.units, **{name: new_units.get(name, "") for name in integrands}},

@@ -11,16 +11,16 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import reduce
 from typing import Any
 
 from saltus.errors import ParameterError, TraceError, among, nearest, shown
 from saltus.system import checks
 from saltus.system.blend import STEPS, Step, blended
 from saltus.system.dimensions import gap_units
-from saltus.system.expression import Expr
+from saltus.system.guards import is_hold
 from saltus.system.names import why_no_name
-from saltus.system.singular import assuming, set_aside
+from saltus.system.reduction import free_field
+from saltus.system.singular import set_aside
 from saltus.system.system import System
 from saltus.units import coherent_unit
 
@@ -123,28 +123,17 @@ def _without_laws(system: System) -> System:
     """The system of which friction only slips: nothing is held. Raises a ParameterError if the
     state jumps at a contact.
     """
-    laws = [guard.law for guard in system.guards]
-    for guard, law in zip(system.guards, laws, strict=True):
-        if law is not None and law.kind not in ("surface", "hold"):
+    for guard in system.guards:
+        if guard.law is not None and guard.law.reset:
             raise ParameterError(
                 f"{system.name}: at {guard.name!r} the state jumps, and nothing smooth stands for "
                 f"that. Write the contact as a stiff spring and a damper."
             )
-    if not any(laws):
-        return system
-    holds = [number for number, law in enumerate(laws) if law is not None and law.kind == "hold"]
-    guards = system.guards[: len(laws) - len(holds)]  # hold guards stand behind all others
     return replace(
         system,
-        field=tuple(reduce(_not_held, holds, entry) for entry in system.field),
-        guards=tuple(
-            replace(guard, gap=reduce(_not_held, holds, guard.gap), law=None) for guard in guards
-        ),
+        field=free_field(system.field, system.guards),
+        guards=tuple(guard for guard in system.guards if not is_hold(guard)),
     )
-
-
-def _not_held(root: Expr, hold: int) -> Expr:
-    return assuming(root, hold, False)
 
 
 # -- arguments -------------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from saltus.system.expression import (
     varies,
     walk,
 )
-from saltus.system.guards import Guard, bits_in
+from saltus.system.guards import Guard, Law, bits_in, expressions_of, is_hold
 from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
 from saltus.system.tables import Table
 from saltus.units import check_declared
@@ -30,8 +30,12 @@ from saltus.units import check_declared
 if TYPE_CHECKING:
     from saltus.system.system import System
 
-#: Changes whenever the meaning of the data does.
-FORMAT = "saltus-system/1"
+#: Changes whenever the meaning of the data does. Systems without a law of contact, and with one.
+FORMAT, WITH_LAWS = "saltus-system/1", "saltus-system/2"
+#: Entries of a law's data, by what they hold: expressions, one of them or none, anything else.
+_TUPLES = ("reset", "settled", "normal", "direction")
+_SINGLE = ("constraint", "drive", "pivot", "limit", "restitution")
+_PLAIN = ("kind", "side", "partner", "zeros")
 
 _OPERANDS = {
     "const": 0,
@@ -53,7 +57,7 @@ _OPERANDS |= dict.fromkeys(ELEMENTARY, 1)
 def to_dict(system: System) -> dict[str, Any]:
     """A system as JSON-able data; floats are exact."""
     return {
-        "format": FORMAT,
+        "format": _format(system),
         "name": system.name,
         "description": system.description,
         "source": system.source,
@@ -63,11 +67,17 @@ def to_dict(system: System) -> dict[str, Any]:
     }
 
 
+def _format(system: System) -> str:
+    return WITH_LAWS if any(guard.law for guard in system.guards) else FORMAT
+
+
 def _equations(system: System) -> dict[str, Any]:
     """The part that the generated code depends on."""
     roots = [*system.field]
     for guard in system.guards:
         roots += [guard.gap] if guard.boundary is None else [guard.gap, guard.boundary]
+    for guard in system.guards:
+        roots += guard.law.expressions() if guard.law else ()
     index: dict[Expr, int] = {}
     nodes = []
     for node in walk(*roots):
@@ -88,17 +98,26 @@ def _equations(system: System) -> dict[str, Any]:
                 index[guard.gap],
                 guard.state,
                 None if guard.boundary is None else index[guard.boundary],
+                *([_law_data(guard.law, index)] if guard.law else []),
             ]
             for guard in system.guards
         ],
     }
 
 
+def _law_data(law: Law, index: Mapping[Expr, int]) -> dict[str, Any]:
+    """The entries of a law that hold anything; expressions by their numbers."""
+    data = {name: getattr(law, name) for name in _PLAIN}
+    data |= {name: [index[one] for one in getattr(law, name)] for name in _TUPLES}
+    single = {name: getattr(law, name) for name in _SINGLE}
+    return data | {name: index[one] for name, one in single.items() if one is not None}
+
+
 def fingerprint(system: System) -> str:
     """SHA-256 of the equations: field, guards, names of states and parameters, and what sets the
     period. Not of values, name or source.
     """
-    data = {"format": FORMAT, **_equations(system)}
+    data = {"format": _format(system), **_equations(system)}
     data["forced_at_unit"] = system.units[system.forced_at] if system.forced_at else None
     data["nodes"] = [
         [op, args, payload.hex() if isinstance(payload, float) else payload]
@@ -134,11 +153,11 @@ def arguments(data: Mapping[str, Any]) -> dict[str, Any]:
         If the data isn't a system of this format: every node, name and number is checked, because
         code is generated from it.
     """
-    if not isinstance(data, Mapping) or not among(data.get("format"), (FORMAT,)):
+    if not isinstance(data, Mapping) or not among(data.get("format"), (FORMAT, WITH_LAWS)):
         found = data.get("format") if isinstance(data, Mapping) else type(data).__name__
         raise SaltusError(
             f"this isn't a system written by this version of saltus (format {shown(found)}, "
-            f"expected {FORMAT!r}). Trace it again."
+            f"expected {FORMAT!r} or {WITH_LAWS!r}). Trace it again."
         )
     try:
         return _read(data)
@@ -185,16 +204,22 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         nodes.append(_node(op, tuple(nodes[i] for i in args), payload, names, nodes))
     places = [
         *data["field"],
-        *(gap for _, gap, _, _ in data["guards"]),
-        *(level for *_, level in data["guards"] if level is not None),
+        *(guard[1] for guard in data["guards"]),
+        *(guard[3] for guard in data["guards"] if guard[3] is not None),
     ]
     _require(
         all(0 <= place < len(nodes) for place in places),
         "a derivative or a boundary stands in no node",
     )
     guards = tuple(
-        Guard(name, nodes[gap], state, None if boundary is None else nodes[boundary])
-        for name, gap, state, boundary in data["guards"]
+        Guard(
+            name,
+            nodes[gap],
+            state,
+            None if boundary is None else nodes[boundary],
+            _law(*law, nodes=nodes, states=len(states), guards=len(data["guards"])),
+        )
+        for name, gap, state, boundary, *law in data["guards"]
     )
     field = tuple(nodes[i] for i in data["field"])
     _require(len(field) == len(states), "the number of derivatives and of states differ")
@@ -207,9 +232,23 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         all(guard.state is None or guard.state in states for guard in guards),
         "a guard names an unknown state",
     )
+    holds = {number for number, guard in enumerate(guards) if is_hold(guard)}
     for number, guard in enumerate(guards):
-        _require(bits_in([guard.gap]) <= set(range(number)), "a gap depends on a later guard")
-    _require(bits_in(field) <= set(range(len(guards))), "a condition names an unknown guard")
+        if number not in holds:
+            known = set(range(number)) | holds
+            _require(bits_in([guard.gap]) <= known, "a gap depends on a later guard")
+        if guard.law is not None and guard.law.partner >= 0:
+            partner = guards[guard.law.partner].law
+            _require(
+                partner is not None
+                and partner.partner == number
+                and (partner.kind == "hold") != (number in holds),
+                "a hold guard and its owner don't name each other",
+            )
+    _require(
+        bits_in([*field, *expressions_of(guards)]) <= set(range(len(guards))),
+        "a condition names an unknown guard",
+    )
     _require(
         data["forced_at"] is None or data["forced_at"] in parameters, "forced_at is no parameter"
     )
@@ -226,6 +265,41 @@ def _read(data: Mapping[str, Any]) -> dict[str, Any]:
         "field": field,
         "guards": guards,
     }
+
+
+def _law(
+    data: Mapping[str, Any] | None = None,
+    *,
+    nodes: Sequence[Expr],
+    states: int,
+    guards: int,
+) -> Law | None:
+    """The law of a guard from its data, checked."""
+    if data is None:
+        return None
+    expressions = [i for name in _TUPLES for i in data[name]]
+    expressions += [data[name] for name in _SINGLE if name in data]
+    _require(all(0 <= i < len(nodes) for i in expressions), "a law stands in no node")
+    kind, side, partner, zeros = (data[name] for name in _PLAIN)
+    _require(
+        among(kind, ("impact", "jump", "surface", "hold"))
+        and all(type(number) is int for number in (side, partner, zeros))
+        and abs(side) <= 1
+        and -1 <= partner < guards
+        and 1 <= zeros <= 3
+        and (partner < 0) == (kind == "jump"),
+        "a law isn't one of contact",
+    )
+    several: dict[str, Any] = {name: tuple(nodes[i] for i in data[name]) for name in _TUPLES}
+    _require(all(len(one) in (0, states) for one in several.values()), "a law has other states")
+    single: dict[str, Any] = {name: nodes[data[name]] for name in _SINGLE if name in data}
+    needed = {"impact": _SINGLE[:3] + _SINGLE[4:], "surface": _SINGLE[:4]}.get(kind, ())
+    rows = {"impact": _TUPLES, "surface": _TUPLES[1:], "jump": _TUPLES[:1]}.get(kind, ())
+    _require(
+        all(name in single for name in needed) and all(several[name] for name in rows),
+        "a law isn't whole",
+    )
+    return Law(kind, side, partner, zeros=zeros, **several, **single)
 
 
 def _node(

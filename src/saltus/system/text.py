@@ -30,6 +30,10 @@ class Boundary(Protocol):
     """What a writer asks of a guard."""
 
     @property
+    def name(self) -> str:
+        """What it is called."""
+
+    @property
     def gap(self) -> Expr:
         """Signed distance."""
 
@@ -40,6 +44,10 @@ class Boundary(Protocol):
     @property
     def boundary(self) -> Expr | None:
         """That level."""
+
+    @property
+    def law(self) -> object:
+        """Its law of contact, if any."""
 
 
 class Writer:
@@ -232,6 +240,8 @@ class Writer:
         return self.name(name), _ATOM
 
     def _guard_sides(self, guard: Boundary) -> tuple[str, str]:
+        if getattr(guard.law, "kind", None) == "hold":  # its gap is no boundary that anyone wrote
+            return guard.name, f"not {guard.name}"
         if guard.state is not None and guard.boundary is not None:
             state, boundary = self.name(guard.state), self.text(guard.boundary)
             return state + self.greater + boundary, state + self.less + boundary

@@ -26,13 +26,14 @@ from saltus.errors import (
     shown,
 )
 from saltus.system import checks
+from saltus.system.contacts import find_contacts
+from saltus.system.declared import Declared, declarations
 from saltus.system.dimensions import DimensionCheck
 from saltus.system.expression import TIME, Expr, as_expr, observed, parameter, state, walk
 from saltus.system.foreign import OWN_FUNCTIONS
 from saltus.system.formula import Equations, Formula
-from saltus.system.guards import find_guards
+from saltus.system.guards import expressions_of
 from saltus.system.names import why_no_name, why_no_text, why_no_title, why_not_together
-from saltus.system.singular import check_finite, check_gaps, lifted
 from saltus.system.system import System
 from saltus.units import check_declared, coherent_unit
 
@@ -47,6 +48,8 @@ _LIBRARIES = tuple(
 _CALLS = {
     "freeplay": "sl.freeplay(x, stiffness=..., gap=...), or lower_gap= and upper_gap=, damping= "
     "with velocity=, preload=",
+    "friction": "sl.friction(v, slip=..., stick=...)",
+    "impact": "sl.impact(x < gap, v, restitution=0.8), after the rates",
     "piecewise": "sl.piecewise((value, condition), ..., otherwise=value)",
     "table": 'sl.table(t, points, values, kind="linear", outside="hold")',
 }
@@ -342,22 +345,21 @@ def _traced(
 ) -> tuple[Any, Any]:
     """Field and guards."""
     try:
-        with observed(dimensions):
+        with observed(dimensions), declarations() as made:
             returned = function(
                 TIME, *map(state, states), **{name: parameter(name) for name in parameters}
             )
-            derivatives = _as_derivatives(returned, states)
+            derivatives, laws = _as_derivatives(returned, states)
+        _check_returned(made, laws)
         if dimensions is not None:
             dimensions.check_rates(derivatives)
+            for law in laws:
+                dimensions.check_law(law)
     except Exception as error:
         kind = UnitError if isinstance(error, UnitError) else TraceError
         raise kind(explained(error, function, title)) from error
     try:
-        field, guards = find_guards(derivatives)
-        field = lifted(field, guards)
-        check_finite(field, guards, states)
-        check_gaps(guards)
-        return field, guards
+        return find_contacts(derivatives, laws, states)
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
 
@@ -367,9 +369,7 @@ def _warn_of_unused(
 ) -> None:
     """Warn of parameters on which nothing depends: a name forgotten in the equation."""
     used = {
-        node.payload
-        for node in walk(*field, *(guard.gap for guard in guards))
-        if node.op == "param"
+        node.payload for node in walk(*field, *expressions_of(guards)) if node.op == "param"
     } | {forced_at}
     if unused := [name for name in parameters if name not in used]:
         one = len(unused) == 1
@@ -383,16 +383,27 @@ def _warn_of_unused(
         )
 
 
-def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
-    """What the function returned, as one expression per state."""
+def _as_derivatives(returned: Any, states: tuple[str, ...]) -> tuple[list[Expr], list[Declared]]:
+    """What the function returned: one expression per state, and the laws behind them."""
     if returned is None:
         raise TraceError(
             "it returns nothing. End it with: return " + ", ".join(f"d{name}/dt" for name in states)
         )
-    if isinstance(returned, Expr | int | float):
+    if isinstance(returned, Expr | int | float | Declared):
         returned = (returned,)
     try:
-        derivatives = [as_expr(value) for value in returned]
+        returned = list(returned)
+        last = max(
+            (i for i, one in enumerate(returned) if not isinstance(one, Declared)), default=-1
+        )
+        for one in returned[:last]:
+            if isinstance(one, Declared):
+                raise TraceError(
+                    f"it returns {one!r} before a rate. Laws of contacts follow the rates of all "
+                    f"states: return "
+                    f"{', '.join(f'd{name}/dt' for name in states)}, {one.name}(...)."
+                )
+        derivatives = [as_expr(value) for value in returned[: last + 1]]
     except TypeError:
         raise TraceError(
             f"it returns {shown(returned)} in place of the time derivatives of {', '.join(states)}."
@@ -403,7 +414,17 @@ def _as_derivatives(returned: Any, states: tuple[str, ...]) -> list[Expr]:
             f"{len(states)} states "
             f"({', '.join(states)}): one time derivative for each, in this order."
         )
-    return derivatives
+    return derivatives, returned[last + 1 :]
+
+
+def _check_returned(made: Sequence[Declared], laws: Sequence[Declared]) -> None:
+    """Raise a TraceError for a law that was written but isn't returned."""
+    for law in made:
+        if not any(law is one for one in laws):
+            raise TraceError(
+                f"{law!r} isn't returned, so it would do nothing. Return it after the rates: "
+                f"return v, force/mass, {law.name}(...)."
+            )
 
 
 def explained(error: Exception, function: Callable[..., Any], title: str) -> str:

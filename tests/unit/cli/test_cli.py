@@ -88,7 +88,7 @@ def test_memory_that_is_used_up_is_said(monkeypatch):
         raise MemoryError
 
     monkeypatch.setattr("saltus.models.describe", full)
-    result = saltus("models")
+    result = saltus("models", "chain")
     assert result.exit_code == 2
     assert "memory is used up. Ask for fewer starts" in result.output + result.stderr
 
@@ -159,8 +159,17 @@ def test_schema_is_json():
 
 
 def test_models():
-    assert "delangre" in saltus("models").output
-    assert "contact_stiffness" in saltus("models", "delangre").output
+    from saltus.models import MODELS
+
+    lines = saltus("models").output.splitlines()
+    assert [line.split()[0] for line in lines[2:]] == list(MODELS), "one line each"
+    (rig,) = (line for line in lines if line.startswith("two_masses"))
+    assert rig.split(maxsplit=3)[1:3] == ["4", "1"]
+    assert "NLvib, example 03" in rig
+    shown = saltus("models", "thrown_mass").output
+    assert all(text in shown for text in ("-gravity", "10 m/s^2", "SDND108", "falls onto"))
+    assert "sl.models.energy" not in shown
+    assert 'sl.models.energy("delangre")' in saltus("models", "delangre").output
     result = saltus("models", "delange")
     assert result.exit_code == 2
     assert "Did you mean 'delangre'?" in result.output

@@ -182,13 +182,17 @@ def test_numpy_scalars_on_the_left():
         (lambda x: 7 // x, "the whole part 7 // x|the whole part x // 7"),
         (lambda x: x(ex.TIME - 0.1), "There are no delays"),
         (lambda x: sl.arctan2(x, 1), r"saltus has no 'arctan2'. Write sl.atan2\(y, x\)"),
-        (lambda x: sl.impact(x), r"z = -log\(e\)/sqrt\(pi\*\*2 \+ log\(e\)\*\*2\)"),
+        (lambda x: sl.restitution(x), r"sl.impact\(x < gap, v, restitution=0.8\)"),
+        (
+            lambda x: sl.impact(x),
+            r"sl.impact\(x < gap, v, restitution=0.8\), after",
+        ),
         (lambda x: sl.interp1d([0, 1], [0, 1])(x), r"Write sl.table\(x, points, values\)"),
         (lambda x: x ^ 2, r"a power is written x\*\*2"),
         (lambda x: -xx, r"'xx' is no state, no parameter.*Did you mean 'x'\?$"),  # noqa: F821
         (lambda x: sl.sine(x), r"Did you mean 'sin'\?$"),
         (lambda x: sl.piecewise((x, x > 1)), "needs otherwise="),
-        (lambda x: 1.0 if x > 1 else 0.0, "rebounds with e"),
+        (lambda x: 1.0 if x > 1 else 0.0, r"Write the branches as sl\.piecewise"),
     ],
 )
 def test_mistakes(mistake, teaches):

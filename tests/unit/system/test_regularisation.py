@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import saltus as sl
 from saltus.errors import ParameterError, TraceError, UnitError
-from saltus.system import expression as ex
 from saltus.system.blend import STEPS
-from saltus.system.guards import Law
 
 RIG = sl.models.delangre("b", force="4 N", frequency="15 Hz")
 
@@ -152,13 +148,25 @@ def test_contacts_with_laws():
     def belt(t, x, v, *, speed=0.3):
         return v, -x - sl.piecewise((1.0, v > speed), otherwise=-1.0)
 
-    (guard,) = belt.guards
-    held = tuple(ex.select(ex.Bit(1), 0.0, entry) for entry in belt.field)
-    surface = replace(guard, law=Law("surface", partner=1))
-    hold = replace(guard, name="held", law=Law("hold", partner=0))
-    smooth = sl.regularise(replace(belt, field=held, guards=(surface, hold)), width=0.1)
+    smooth = sl.regularise(belt, width=0.1)
     assert smooth.guards == ()
     assert smooth.rhs(0.0, [0.2, 0.35])[1] == pytest.approx(-0.2 - np.tanh(0.5), rel=1e-14)
-    jumps = replace(belt, guards=(replace(guard, law=Law("impact", reset=belt.field)),))
+
+    @sl.system(states="x v")
+    def stop(t, x, v, *, gap=1.0):
+        return v, -x, sl.impact(x < gap, v, restitution=0.5)
+
     with pytest.raises(ParameterError, match="the state jumps"):
-        sl.regularise(jumps, width=0.1)
+        sl.regularise(stop, width=0.1)
+
+
+def test_friction_that_stays_keeps_its_limit():
+    @sl.system(states="x v")
+    def block(t, x, v, *, wall=1.0, slip=0.5, stick=0.8):
+        stop = sl.where(x > wall, 50.0 * (x - wall), 0)
+        return v, -x - stop - sl.friction(v, slip=slip, stick=stick)
+
+    smooth = sl.regularise(block, width={"wall": 0.01})
+    friction, hold = smooth.guards
+    assert (friction.name, hold.name) == ("v = 0", "v = 0 held")
+    assert repr(friction.law.limit) == "stick/slip"

@@ -13,6 +13,7 @@ import numpy as np
 from saltus.flow import engine
 from saltus.flow.engine import Outcome, Request, RunInterrupted, Schedule
 from saltus.flow.methods import Method
+from saltus.kernels import status as st
 from saltus.system import expression as ex
 from saltus.system.evaluate import evaluate
 from saltus.system.system import System
@@ -31,6 +32,8 @@ BY_ITSELF = 0.3
 #: Seed of the signs of the nudges. They are the same for every trajectory, so that no result
 #: depends on its neighbours.
 SEED = 20
+#: What must be the same of two contacts that are compared.
+_EVENT = [st.REC_GUARD, st.REC_DIRECTION]
 
 
 def local(outcome: Outcome) -> np.ndarray:
@@ -63,12 +66,10 @@ def measured(
     RunInterrupted
         On Ctrl-C, with the Outcome so far.
     """
-    n, silent = len(request.start), replace(request, schedule=Schedule.none())
-    runs = _nudged(system, silent) if method.exact else [silent]
-    if method.exact and n <= FEW:
-        outcome, distance = _in_one_call(system, method, request, runs, threads, show)
+    if method.exact and len(request.start) <= FEW:
+        outcome, distance = _in_one_call(system, method, request, threads, show)
     else:
-        outcome, distance = _one_by_one(system, method, request, runs, threads, show)
+        outcome, distance = _one_by_one(system, method, request, threads, show)
     error = (SAFETY if method.exact else SAFETY_OF_EXACT_COMPANION) * distance
     return outcome, np.maximum(
         error, local(outcome) + 4.0 * np.spacing(np.abs(outcome.contacts.time))
@@ -79,29 +80,28 @@ def _in_one_call(
     system: System,
     method: Method,
     request: Request,
-    runs: list[Request],
     threads: int | None,
     show: Callable[[float], None] | None,
 ) -> tuple[Outcome, np.ndarray]:
     """Outcome and largest distances, trajectories and copies moved together: copies fill lanes that
     would stay empty.
     """
-    n, total = len(request.start), (1 + len(runs)) * len(request.start)
-    together = replace(_together([request, *runs]), checks=total - n)
+    n, total = len(request.start), (1 + COPIES) * len(request.start)
     try:
-        whole = engine.run(system, method.suited_to(total), together, threads, show)
+        whole = engine.run(
+            system, method.suited_to(total), _with_copies(system, request), threads, show
+        )
     except RunInterrupted as stop:
         so_far = stop
         raise RunInterrupted(lambda: so_far.partial.of(0, n)) from None
     outcome, check = whole.of(0, n), whole.of(n, total)
-    return outcome, np.max([_distances(outcome, check, i * n) for i in range(len(runs))], axis=0)
+    return outcome, np.max([_distances(outcome, check, i * n) for i in range(COPIES)], axis=0)
 
 
 def _one_by_one(
     system: System,
     method: Method,
     request: Request,
-    runs: list[Request],
     threads: int | None,
     show: Callable[[float], None] | None,
 ) -> tuple[Outcome, np.ndarray]:
@@ -110,7 +110,13 @@ def _one_by_one(
     def part(begin: float, share: float) -> Callable[[float], None] | None:
         return None if show is None else lambda done: show(begin + share * done)
 
-    n = len(request.start)
+    n, silent = len(request.start), replace(request, schedule=Schedule.none())
+    runs = [silent]
+    if method.exact:
+        runs = [
+            replace(silent, start=start, parameters=parameters)
+            for start, parameters in zip(*_nudged(system, request), strict=True)
+        ]
     outcome = engine.run(system, method.suited_to(n), request, threads, part(0.0, BY_ITSELF))
     companion, share = method.companion().suited_to(n), (1.0 - BY_ITSELF) / len(runs)
     distance = np.zeros(len(outcome.contacts))
@@ -126,26 +132,28 @@ def _one_by_one(
 
 
 # -- nudges ----------------------------------------------------------------------------------------
-def _nudged(system: System, request: Request) -> list[Request]:
-    """The request with starts and values wrong by an ulp, differently in each copy. What moves a
-    boundary, or time, stays.
+def _nudged(system: System, request: Request) -> tuple[np.ndarray, np.ndarray]:
+    """Starts float64[copy, n, D] and values float64[copy, n or 1, P] of the copies: wrong by an
+    ulp, differently in each. What moves a boundary, or time, stays.
     """
-    fixed = _fixed(system.origin)
-    resting = _on_a_boundary(system, request)[:, None]
-    copies = []
-    for copy in range(COPIES):
-        nudge = 1.0 + _signs(copy, len(system.states) + len(system.values)) * np.finfo(float).eps
-        by_state = np.where(resting, 1.0, nudge[: len(system.states)])
-        by_value = np.where(fixed, 1.0, nudge[len(system.states) :])
-        copies.append(
-            replace(
-                request, start=request.start * by_state, parameters=request.parameters * by_value
-            )
-        )
-    return copies
+    of_states, of_values = _nudges(system.origin)
+    resting = _on_a_boundary(system, request)
+    starts = request.start * of_states
+    starts[:, resting] = request.start[resting]
+    return starts, request.parameters * of_values
 
 
 @lru_cache(maxsize=64)
+def _nudges(system: System) -> tuple[np.ndarray, np.ndarray]:
+    """Factors of the states float64[copy, 1, D] and of the values float64[copy, 1, P]: the same for
+    all values of the system.
+    """
+    states = len(system.states)
+    signs = np.array([_signs(copy, states + len(system.values)) for copy in range(COPIES)])
+    factors = 1.0 + signs[:, None] * np.finfo(float).eps
+    return factors[..., :states], np.where(_fixed(system), 1.0, factors[..., states:])
+
+
 def _fixed(system: System) -> np.ndarray:
     """Parameters that move a boundary, or time: bool[P], the same for all values."""
     places = {
@@ -154,7 +162,6 @@ def _fixed(system: System) -> np.ndarray:
     return np.array([name in places for name in system.values], bool)
 
 
-@lru_cache(maxsize=64)
 def _signs(copy: int, count: int) -> np.ndarray:
     """Up or down, for each state and value of a copy."""
     return np.random.default_rng([SEED, copy]).choice([-1.0, 1.0], count)
@@ -169,23 +176,26 @@ def _on_a_boundary(system: System, request: Request) -> np.ndarray:
         values=dict(zip(system.values, request.parameters.T, strict=True)),
         bits=[False] * len(system.guards),
     )
-    return np.any([np.broadcast_to(gap, len(request.start)) == 0.0 for gap in gaps], axis=0)
+    resting = np.zeros(len(request.start), bool)
+    for gap in gaps:
+        resting |= gap == 0.0
+    return resting
 
 
-def _together(requests: list[Request]) -> Request:
-    """Several requests of the same kind as one."""
-    first = requests[0]
-    if len(requests) == 1:
-        return first
+def _with_copies(system: System, request: Request) -> Request:
+    """The request with its trajectories, and after them their copies."""
+    starts, parameters = _nudged(system, request)
+    n, times = len(request.start), 1 + COPIES
+    shape = (COPIES, n, parameters.shape[2])
+    values = np.broadcast_to(request.parameters, shape[1:])
     return replace(
-        first,
-        start=np.concatenate([r.start for r in requests]),
-        parameters=np.concatenate(
-            [np.broadcast_to(r.parameters, (len(r.start), r.parameters.shape[1])) for r in requests]
-        ),
-        period=np.concatenate([r.period for r in requests]),
-        end_count=np.concatenate([r.end_count for r in requests]),
-        end_phase=np.concatenate([r.end_phase for r in requests]),
+        request,
+        start=np.concatenate([request.start, *starts]),
+        parameters=np.concatenate([values, *np.broadcast_to(parameters, shape)]),
+        period=np.tile(request.period, times),
+        end_count=np.tile(request.end_count, times),
+        end_phase=np.tile(request.end_phase, times),
+        checks=COPIES * n,
     )
 
 
@@ -203,19 +213,13 @@ def _distances(outcome: Outcome, check: Outcome, offset: int) -> np.ndarray:
         outcome.contacts.begins(count),
         check.contacts.begins(count, offset),
     )
+    ours, theirs = (one.contacts.integers[:, _EVENT] for one in (outcome, check))
     for i in range(count):
         a, b = slice(*bounds_ours[i : i + 2]), slice(*bounds_theirs[i : i + 2])
-        times, same = _in_order(
-            _events(outcome, a), _events(check, b), check.contacts.time[b].copy()
-        )
+        times, same = _in_order(ours[a], theirs[b], check.contacts.time[b].copy())
         here = slice(a.start, a.start + same)
         distance[here] = np.maximum.accumulate(np.abs(outcome.contacts.time[here] - times[:same]))
     return distance
-
-
-def _events(outcome: Outcome, rows: slice) -> np.ndarray:
-    """Guard and direction of contacts, int64[k, 2]."""
-    return np.stack([outcome.contacts.guard[rows], outcome.contacts.direction[rows]], axis=1)
 
 
 def _in_order(ours: np.ndarray, theirs: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, int]:

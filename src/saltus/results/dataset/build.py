@@ -153,7 +153,7 @@ def build(
         large for its variable.
     """
     work = _Building(kind, subject, tuple(grid), along or {}, words or {}, flags or {})
-    work.coords |= carried or {}
+    work.coords |= {name: one.copy(deep=False) for name, one in (carried or {}).items()}
     given = list(values.items() if isinstance(values, Mapping) else values)
     if subject.guards is not None and "guard" in work.table:
         given += subject.guards.values(subject.units).items()
@@ -346,31 +346,26 @@ def finish(
         key: value if isinstance(value, str | int | float) else to_json(value)
         for key, value in attrs.items()
     }
+    variables = data | coords
     plain["result_hash"] = hash_of(
-        {name: (one.dims, one.values) for name, one in (data | coords).items()}
+        {name: (one.dims, one.values) for name, one in variables.items()}
     )
-    return Result(data, indexed(coords), plain)
-
-
-def indexed(coords: Mapping[str, xr.Variable]) -> xr.Coordinates:
-    """Coordinates, with an index for each that has the name of its dim."""
     indexes = {
         name: _index(name, one.values) for name, one in coords.items() if one.dims == (name,)
     }
-    variables: dict[str, Any] = dict(coords)
     for name, index in indexes.items():
-        variables |= index.create_variables({name: coords[name]})
-    return xr.Coordinates(variables, indexes)
+        variables |= index.create_variables({name: variables[name]})
+    return Result.of(variables, coords, indexes, plain)
 
 
 def _index(name: str, values: np.ndarray) -> xr.indexes.PandasIndex:
     """What a coordinate is looked up by; numbers stay where they are."""
     if values.dtype.kind == "U":
         return _text_index(name, values.dtype, tuple(values.tolist()))
-    return xr.indexes.PandasIndex(pd.Index(values, copy=False), name, values.dtype)
+    return xr.indexes.PandasIndex(pd.Index(values, copy=False, name=name), name, values.dtype)
 
 
 # the names of guards are the same in every run, and take longer to index than all numbers
 @lru_cache(maxsize=64)
 def _text_index(name: str, dtype: np.dtype, words: tuple[str, ...]) -> xr.indexes.PandasIndex:
-    return xr.indexes.PandasIndex(pd.Index(np.array(words, dtype)), name, dtype)
+    return xr.indexes.PandasIndex(pd.Index(np.array(words, dtype), name=name), name, dtype)

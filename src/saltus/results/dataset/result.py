@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
 import xarray as xr
@@ -21,6 +21,37 @@ class Result(xr.Dataset):
     """
 
     __slots__ = ()
+
+    @classmethod
+    def of(
+        cls,
+        variables: dict[str, xr.Variable],
+        coords: Iterable[str],
+        indexes: Mapping[str, xr.Index],
+        attrs: dict[str, Any],
+    ) -> Result:
+        """The Dataset of variables that fit each other, and that nobody else holds.
+
+        xarray's own constructor aligns, merges and copies them first, which for the thirty of a run
+        takes as long as its hash. That two of them give a dim two lengths is found here too.
+
+        Parameters
+        ----------
+        variables : dict of str to xarray.Variable
+            All of them; those with an index as that made them.
+        coords : iterable of str
+            The names of those that are coordinates.
+        indexes : mapping of str to xarray.Index
+            By the name of their coordinate.
+        attrs : dict
+            Attributes of the Dataset.
+
+        Raises
+        ------
+        ValueError
+            If a dim has two lengths.
+        """
+        return cls._construct_direct(variables, set(coords), attrs=attrs, indexes=dict(indexes))
 
     def to_dataframe(self, dim_order: Sequence[Hashable] | None = None) -> Any:
         """A pandas.DataFrame with a row for each point of the dims, as that of a Dataset; of one

@@ -65,3 +65,30 @@ def test_it_stays_what_it_is(batch, tmp_path):
     assert kept[10].identical(batch)
     assert isinstance(batch, xr.Dataset)
     assert float(batch["x"].mean()) == pytest.approx(float(np.mean(batch["x"].values)))
+
+
+@pytest.mark.parametrize("name", ["run", "batch"])
+def test_it_is_what_xarray_makes_of_the_same_variables(name, request):
+    """The builder goes past xarray's constructor; the two agree, the order included."""
+    made = request.getfixturevalue(name)
+    again = Result(
+        {name: made.variables[name] for name in made.data_vars},
+        xr.Coordinates(dict(made.coords.variables), dict(made.xindexes)),
+        made.attrs,
+    )
+    xr.testing.assert_identical(made, again)
+    assert list(made.variables) == list(again.variables)
+    assert list(made.sizes.items()) == list(again.sizes.items())
+    assert (
+        set(made.xindexes)
+        == set(again.xindexes)
+        == {name for name, one in made.coords.items() if one.dims == (name,)}
+    )
+    assert [type(one) for one in made.variables.values()] == [
+        type(one) for one in again.variables.values()
+    ]
+
+
+def test_a_dim_has_one_length():
+    with pytest.raises(ValueError, match="conflicting sizes"):
+        Result.of({"a": xr.Variable("t", [1.0, 2.0]), "b": xr.Variable("t", [1.0])}, (), {}, {})

@@ -1,0 +1,346 @@
+"""From the laws that an equation declares, and from two-valued forces, to laws of guards."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from saltus.errors import TraceError, nearest, shown
+from saltus.system import expression as ex
+from saltus.system.canonical import Canonical, proportion
+from saltus.system.declared import Declared, Impact, Jump
+from saltus.system.derivatives import gradient, time_derivative
+from saltus.system.evaluate import evaluate
+from saltus.system.expression import Bit, Expr, Friction, Not
+from saltus.system.guards import (
+    Guard,
+    Law,
+    bits_in,
+    equation_of,
+    find_guards,
+    is_hold,
+    relations,
+)
+from saltus.system.reduction import Elimination, Held, dot, held_contact, hold_gap, with_pivots
+from saltus.system.singular import check_finite, check_gaps, lifted
+from saltus.system.surfaces import (
+    OnSurface,
+    averaged,
+    has_clock,
+    is_surface,
+    level,
+    split,
+    with_middle,
+)
+
+_ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
+#: States and parameters at which a velocity is compared with the rate of its gap, and the part of
+#: their size by which rounding may make them differ.
+_PLACES, _ROUNDING = 16, 1e-9
+
+Field = tuple[Expr, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Met:
+    """A declared law, its comparison and parts written with bits."""
+
+    law: Declared
+    number: int
+    positive: bool
+    parts: dict[str, Expr]
+
+
+def find_contacts(
+    rates: Sequence[Expr], declared: Sequence[Declared], states: Sequence[str]
+) -> tuple[Field, tuple[Guard, ...]]:
+    """Field and guards of traced rates and the laws that follow them. Hold guards stand behind all
+    others.
+
+    Raises
+    ------
+    TraceError
+        If a guard can't be followed, or a law doesn't fit its contact.
+    """
+    frictions = {one: None for one in relations(tuple(rates)) if isinstance(one, Friction)}
+    roots = list(rates)
+    for law in declared:
+        roots += law.roots()
+    for friction in frictions:
+        roots += [ex.select(friction, 1.0, 0.0), friction.limit]
+    found, guards = find_guards(roots)
+    rest = iter(found[len(rates) :])
+    met = [_met(law, next(rest), [next(rest) for _ in law.parts]) for law in declared]
+    limits = _limits([(next(rest), next(rest)) for _ in frictions], guards)
+    field = lifted(found[: len(rates)], guards)
+    check_finite(field, guards, states)
+    check_gaps(guards)
+    return with_laws(field, guards, states, met, limits)
+
+
+def _met(law: Declared, comparison: Expr, parts: Sequence[Expr]) -> _Met:
+    """A declared law by the guard of its comparison, checked."""
+    found = comparison.payload if comparison.op == "select" else None
+    bit = found.inner if isinstance(found, Not) else found
+    if not isinstance(bit, Bit):
+        raise TraceError(
+            f"{law!r}: the comparison is decided by the time alone, and no motion meets it. A "
+            f"force or a law of the time is written into the rates."
+        )
+    for name, part in zip(law.parts, parts, strict=True):
+        if has_clock(part):
+            raise TraceError(
+                f"{law!r}: {name} = {part!r} holds a clock (sl.mod, sl.table, or a comparison of "
+                f"time), which a law of contact can't. Write it with functions such as sl.cos."
+            )
+    return _Met(law, bit.guard, bit is found, dict(zip(law.parts, parts, strict=True)))
+
+
+def _limits(found: Sequence[tuple[Expr, Expr]], guards: Sequence[Guard]) -> dict[int, Expr]:
+    """Static over kinetic force by the number of the guard."""
+    limits: dict[int, Expr] = {}
+    for comparison, limit in found:
+        for number in bits_in([comparison]):
+            if number in limits and limits[number] is not limit:
+                raise TraceError(
+                    f"two friction laws with different limits act where "
+                    f"{equation_of(number, guards)}. Write one, with the sum of their forces."
+                )
+            limits[number] = limit
+    return limits
+
+
+def with_laws(
+    field: Field,
+    guards: tuple[Guard, ...],
+    states: Sequence[str],
+    met: Sequence[_Met] = (),
+    limits: dict[int, Expr] | None = None,
+) -> tuple[Field, tuple[Guard, ...]]:
+    """The field, reduced where contacts are held, and the guards with their laws; hold guards stand
+    behind them. Where no guard has a law both are as they were.
+
+    Raises
+    ------
+    TraceError
+        If a law doesn't fit its contact.
+    """
+    limits = limits or {}
+    laws: dict[int, Law] = {}
+    for declared in met:
+        if declared.number in laws:
+            place = equation_of(declared.number, guards)
+            raise TraceError(f"two laws stand for the contact at {place}. Keep one.")
+        laws[declared.number] = (
+            _impact(declared, field, guards, states)
+            if isinstance(declared.law, Impact)
+            else _jump(declared, states)
+        )
+    laws |= {
+        number: Law("surface", constraint=guards[number].gap)
+        for number in range(len(guards))
+        if number not in laws and is_surface(number, field, guards, states)
+    }
+    if not laws:
+        return field, guards
+    held, field = _held_contacts(field, guards, states, laws)
+    elimination = Elimination(field, held)
+    owners, holds = list(guards), []
+    for number, law in laws.items():
+        owners[number] = replace(guards[number], law=law)
+    for one in held:
+        law = _completed(laws[one.owner], one, elimination, limits.get(one.owner, _ONE), states)
+        owners[one.owner] = replace(owners[one.owner], law=law)
+        assert law.drive is not None
+        assert law.pivot is not None
+        gap = hold_gap(law.kind, law.drive, law.pivot, law.limit)
+        holds.append(Guard(hold_name(owners[one.owner]), gap, law=Law("hold", partner=one.owner)))
+    return elimination.reduced(), (*owners, *holds)
+
+
+def hold_name(owner: Guard) -> str:
+    """Name of the hold guard of a guard."""
+    assert owner.law is not None
+    return f"{owner.name} {'at rest' if owner.law.kind == 'impact' else 'held'}"
+
+
+def renamed(guards: Sequence[Guard], names: Mapping[int, str]) -> tuple[Guard, ...]:
+    """Guards with other names for some; hold guards follow the names of their owners."""
+    new = [
+        replace(guard, name=names.get(number, guard.name)) for number, guard in enumerate(guards)
+    ]
+    return tuple(
+        replace(guard, name=hold_name(new[guard.law.partner]))
+        if guard.law is not None and is_hold(guard) and guard.law.partner in names
+        else guard
+        for guard in new
+    )
+
+
+def _held_contacts(
+    field: Field, guards: Sequence[Guard], states: Sequence[str], laws: Mapping[int, Law]
+) -> tuple[list[Held], Field]:
+    """The contacts that can be held, and the field with the middle of each surface where it is
+    held.
+    """
+    surfaces = sorted(number for number, law in laws.items() if law.kind == "surface")
+    order = sorted(number for number, law in laws.items() if law.kind != "jump")
+    holds = {number: len(guards) + place for place, number in enumerate(order)}
+    directions: dict[int, Field] = {}
+    for number in surfaces:
+        surface = split(number, field, OnSurface(guards[number].gap, states))
+        directions = {
+            other: tuple(averaged(entry, number, holds[number]) for entry in direction)
+            for other, direction in directions.items()
+        }
+        directions[number] = surface.halves
+        field = with_middle(field, surface, holds[number])
+    held = []
+    for number in order:
+        law = laws[number]
+        assert law.constraint is not None
+        direction = directions[number] if number in surfaces else law.direction
+        held.append(held_contact(number, holds[number], law.constraint, direction, states))
+    return with_pivots(held), field
+
+
+def _completed(
+    law: Law, held: Held, elimination: Elimination, limit: Expr, states: Sequence[str]
+) -> Law:
+    """The law of a contact with what holding it needs."""
+    drive, pivot, direction = elimination.own(held)
+    surface = law.kind == "surface"
+    return replace(
+        law,
+        partner=held.hold,
+        settled=_settled(held, states) if surface else law.settled,
+        direction=direction,
+        normal=held.normal,
+        drive=drive,
+        pivot=pivot,
+        limit=limit if surface else None,
+        zeros=(2 if limit is _ONE else 1) if surface else 3,
+    )
+
+
+def _settled(held: Held, states: Sequence[str]) -> Field:
+    """The state on a surface: its pivot from the constraint, or else a step along the normal."""
+    own = [ex.state(name) for name in states]
+    if held.pivot is not None:
+        i = held.pivot
+        own[i] = level(held.constraint, states[i], held.normal[i])
+        return tuple(own)
+    share = ex.div(held.constraint, dot(held.normal, held.normal))
+    return tuple(
+        ex.sub(state, ex.mul(slope, share)) if slope is not _ZERO else state
+        for state, slope in zip(own, held.normal, strict=True)
+    )
+
+
+# -- impacts ---------------------------------------------------------------------------------------
+def _impact(met: _Met, field: Field, guards: Sequence[Guard], states: Sequence[str]) -> Law:
+    """Newton's law of impact."""
+    assert isinstance(met.law, Impact)
+    w, restitution = met.parts["velocity"], met.parts["restitution"]
+    guard = guards[met.number]
+    _check_velocity(met, guard, field, states)
+    normal = gradient(w, states)
+    for name in met.law.moved:
+        slope = normal[states.index(name)]
+        if any(ex.state(other) in set(ex.walk(slope)) for other in met.law.moved):
+            raise TraceError(
+                f"{met.law!r}: the velocity {w!r} isn't linear in {name}. The closing velocity is "
+                f"a sum of velocities times functions of positions and time."
+            )
+    impulse = [
+        ex.div(normal[i], met.parts[name]) if name in met.law.moved else _ZERO
+        for i, name in enumerate(states)
+    ]
+    side = 1 if met.positive else -1
+    return Law(
+        "impact",
+        side=side,
+        reset=_struck(w, impulse, restitution, met.law.moved, states),
+        settled=_struck(w, impulse, _ZERO, met.law.moved, states),
+        constraint=w,
+        direction=tuple(ex.neg(one) for one in impulse),
+        restitution=restitution,
+    )
+
+
+def _struck(
+    w: Expr, impulse: Sequence[Expr], restitution: Expr, moved: Sequence[str], states: Sequence[str]
+) -> Field:
+    """The state after an impact: w becomes -restitution*w by an impulse."""
+    after = [ex.state(name) for name in states]
+    normal = gradient(w, states)
+    if len(moved) == 1:
+        i = states.index(moved[0])
+        wall = level(w, moved[0], normal[i])
+        if wall is _ZERO:
+            after[i] = ex.mul(ex.neg(restitution), after[i])
+            return tuple(after)
+        after[i] = ex.sub(wall, ex.mul(restitution, ex.sub(after[i], wall)))
+        return tuple(after)
+    share = ex.div(ex.mul(ex.add(1.0, restitution), w), dot(normal, impulse))
+    for name in moved:
+        i = states.index(name)
+        after[i] = ex.sub(after[i], ex.mul(impulse[i], share))
+    return tuple(after)
+
+
+def _check_velocity(met: _Met, guard: Guard, field: Field, states: Sequence[str]) -> None:
+    """Raise a TraceError unless the closing velocity is minus the rate of the gap, to a positive
+    number.
+    """
+    w = met.parts["velocity"]
+    rate = ex.add(dot(gradient(guard.gap, states), field), time_derivative(guard.gap))
+    closing = ex.neg(rate) if met.positive else rate
+    canonical = Canonical()
+    sign = proportion(canonical.polynomial(w), canonical.polynomial(closing))
+    if sign > 0 or (sign == 0 and _equal(w, closing)):
+        return
+    raise TraceError(
+        f"{met.law!r}: the velocity at which this contact closes is {closing!r}, but {w!r} was "
+        f"given. Give minus the rate of what is positive on the allowed side."
+    )
+
+
+def _equal(a: Expr, b: Expr) -> bool:
+    """Whether two expressions have equal values at samples."""
+    random = np.random.default_rng(11)
+    leaves = {(node.op, node.payload) for node in ex.walk(a, b) if node.op in ("state", "param")}
+    states, values = (
+        {
+            name: random.uniform(low, 1.5, _PLACES)
+            for op, name in sorted(leaves, key=str)
+            if op == kind
+        }
+        for kind, low in (("state", -1.5), ("param", 0.5))
+    )
+    bits = [random.random(_PLACES) < 0.5 for _ in range(1 + max(bits_in([a, b]), default=-1))]
+    t = random.uniform(0.0, 1.5, _PLACES)
+    first, second = evaluate([a, b], t=t, states=states, values=values, bits=bits)
+    size = np.maximum(np.abs(first), np.abs(second))
+    known = np.isfinite(size)
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(first - second) > _ROUNDING * size
+    return bool(np.any(known) and not np.any(apart & known))
+
+
+# -- jumps -----------------------------------------------------------------------------------------
+def _jump(met: _Met, states: Sequence[str]) -> Law:
+    """A jump of the state, from the side where the comparison doesn't hold."""
+    assert isinstance(met.law, Jump)
+    for name in met.parts:
+        if name not in states:
+            raise TraceError(
+                f"{met.law!r} sets {shown(name)}, which is no state. {nearest(name, states)}"
+            )
+    return Law(
+        "jump",
+        side=-1 if met.positive else 1,
+        reset=tuple(met.parts.get(name, ex.state(name)) for name in states),
+    )

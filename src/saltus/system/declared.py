@@ -1,0 +1,230 @@
+"""Laws that an equation returns after its rates: impacts and jumps of the state.
+
+They are plain values: a law that isn't returned does nothing, and the trace says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, ClassVar
+
+from saltus.errors import TraceError, shown
+from saltus.system.expression import Condition, Expr, Operand, Relation, as_expr, select, walk
+
+_MADE: ContextVar[list[Declared] | None] = ContextVar("made", default=None)
+
+
+class Declared:
+    """A law of a contact, as it was written: its comparison, and expressions by their names."""
+
+    name: ClassVar[str] = ""
+
+    def __init__(self, condition: Relation, parts: Mapping[str, Expr]) -> None:
+        self.condition, self.parts = condition, dict(parts)
+        made = _MADE.get()
+        if made is not None:
+            made.append(self)
+
+    def roots(self) -> list[Expr]:
+        """The comparison as a piece, then the parts."""
+        return [select(self.condition, 1.0, 0.0), *self.parts.values()]
+
+    def misused(self, *_: Any) -> Any:
+        """Refuse arithmetic. Raises TraceError."""
+        raise TraceError(
+            f"{self.name}(...) is a law of the contact, not a force: it stands in no sum. Return "
+            f"it after the rates: return v, force/mass, {self.name}(...)."
+        )
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = misused
+    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = misused
+    __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __float__ = __iter__ = __getitem__ = misused
+    __array_ufunc__ = None
+
+    def __repr__(self) -> str:
+        return f"{self.name}({self.condition.gap!r} > 0)"
+
+
+class Impact(Declared):
+    """What :func:`impact` returns."""
+
+    name = "sl.impact"
+
+    def __init__(
+        self, allowed: Relation, velocity: Expr, restitution: Expr, inertia: Mapping[str, Expr]
+    ) -> None:
+        super().__init__(
+            allowed, {"velocity": velocity, "restitution": restitution, **dict(inertia.items())}
+        )
+        self.moved = tuple(inertia)
+
+
+class Jump(Declared):
+    """What :func:`jump` returns."""
+
+    name = "sl.jump"
+
+
+@contextmanager
+def declarations() -> Iterator[list[Declared]]:
+    """The laws that are made inside."""
+    made: list[Declared] = []
+    token = _MADE.set(made)
+    try:
+        yield made
+    finally:
+        _MADE.reset(token)
+
+
+def impact(
+    allowed: Condition,
+    velocity: Operand,
+    *,
+    restitution: Operand,
+    inertia: Sequence[Operand] | Mapping[str, Operand] | None = None,
+) -> Impact:
+    """A rigid stop: the state never leaves the allowed side, and at the stop its velocity jumps by
+    Newton's law, ``velocity`` to ``-restitution*velocity``.
+
+    An equation returns it after its rates. Rest and release come with it: where the rebounds
+    become smaller and smaller the contact comes to rest, and it is left when the stop would have
+    to pull.
+
+    Parameters
+    ----------
+    allowed : comparison
+        What always holds: ``x < gap``, ``x1 < x2``, ``x < height(t)``.
+    velocity : Expr
+        Velocity at which the contact closes [unit of the gap per second]: minus the rate of what is
+        positive on the allowed side. Of ``x < gap`` it is ``v``, of ``x > 0`` it is ``-v``, of ``x1
+        < x2`` it is ``v1 - v2``, of a moving stop it is relative to it. It is linear in velocities.
+    restitution : Expr or float
+        Coefficient of restitution [1], between 0 (no rebound) and 1 (no loss). It may depend on
+        the state.
+    inertia : sequence or mapping of str to Expr or float, optional
+        Masses or moments of inertia [kg, kg*m**2] of the states whose velocities are in
+        ``velocity``, in the order in which they stand there, or by the state's name. Needed where
+        there are several; then momentum is kept.
+
+    Returns
+    -------
+    Impact
+        To be returned after the rates.
+
+    Raises
+    ------
+    TraceError
+        If ``allowed`` isn't one comparison, a restitution is outside [0, 1], or the inertias don't
+        fit the velocity.
+
+    Notes
+    -----
+    Newton's law of impact; Brogliato, Nonsmooth Mechanics (2016), section 4.1.
+    """
+    condition, closing = _one_comparison("impact", allowed), as_expr(velocity)
+    bounce = as_expr(restitution)
+    if bounce.op == "const" and not 0 <= bounce.payload <= 1:
+        raise TraceError(outside(bounce.payload))
+    return Impact(condition, closing, bounce, _inertias(closing, inertia))
+
+
+def outside(restitution: float) -> str:
+    """What to say of a coefficient of restitution outside [0, 1]."""
+    return (
+        f"the restitution {restitution:g} is outside [0, 1]: 0 is an impact without a rebound, 1 "
+        f"one without a loss."
+    )
+
+
+def _inertias(velocity: Expr, inertia: Any) -> dict[str, Expr]:
+    """Inertia of each state that an impact moves, by its name."""
+    states = list(
+        dict.fromkeys(
+            node.payload for node in walk(velocity, conditions=False) if node.op == "state"
+        )
+    )
+    if not states:
+        raise TraceError(
+            f"sl.impact needs the velocity at which the contact closes, such as v of x < gap, not "
+            f"{shown(velocity)}."
+        )
+    if inertia is None and len(states) > 1:
+        raise TraceError(
+            f"sl.impact: the velocity {velocity!r} holds the states {', '.join(states)}, and how "
+            f"they share the impulse depends on their inertia. Add inertia=("
+            f"{', '.join(f'mass of {name}' for name in states)}), or by name "
+            f"inertia={{{states[0]!r}: ...}} for those that jump."
+        )
+    if inertia is None:
+        return {states[0]: as_expr(1.0)}
+    if not isinstance(inertia, Mapping):
+        given = (
+            list(inertia)
+            if isinstance(inertia, Sequence) and not isinstance(inertia, str)
+            else [inertia]
+        )
+        if len(given) != len(states):
+            raise TraceError(
+                f"sl.impact got {len(given)} inertias, but the velocity {velocity!r} holds "
+                f"{len(states)} states: {', '.join(states)}. Give one for each, or by name "
+                f"inertia={{{states[0]!r}: ...}} for those that jump."
+            )
+        inertia = dict(zip(states, given, strict=True))
+    for name, value in inertia.items():
+        if name not in states:
+            raise TraceError(
+                f"sl.impact: inertia= names {shown(name)}, but the velocity {velocity!r} holds "
+                f"{', '.join(states)}."
+            )
+        if as_expr(value).op == "const" and not as_expr(value).payload > 0:
+            raise TraceError(f"sl.impact: the inertia of {name} must be positive.")
+    if not inertia:
+        raise TraceError("sl.impact: inertia={} names no state that could jump.")
+    return {name: as_expr(value) for name, value in inertia.items()}
+
+
+def jump(condition: Condition, /, **states: Operand) -> Jump:
+    """A jump of the state: where the comparison becomes true, the named states get new values.
+
+    An equation returns it after its rates. Nothing happens where the comparison becomes false.
+
+    Parameters
+    ----------
+    condition : comparison
+        ``x > gap``: the jump happens when it becomes true.
+    **states : Expr or float
+        New value of each state that jumps, a function of the time, the states before the jump and
+        parameters: ``v=-0.8*v, count=count + 1``.
+
+    Returns
+    -------
+    Jump
+        To be returned after the rates.
+
+    Raises
+    ------
+    TraceError
+        If the condition isn't one comparison, or no state is named.
+    """
+    if not states:
+        raise TraceError(
+            "sl.jump needs the states that jump, with their new values: sl.jump(x > gap, v=-0.8*v)."
+        )
+    return Jump(
+        _one_comparison("jump", condition), {name: as_expr(new) for name, new in states.items()}
+    )
+
+
+def _one_comparison(name: str, condition: Any) -> Relation:
+    if isinstance(condition, Relation):
+        return condition
+    given = (
+        "several joined by & or |"
+        if isinstance(condition, Condition)
+        else "a plain truth value"
+        if isinstance(condition, bool)
+        else shown(condition)
+    )
+    raise TraceError(f"sl.{name} takes one comparison of traced values, x < gap, not {given}.")
