@@ -174,7 +174,7 @@ def test_only_what_was_not_written_here_is_tried_elsewhere_and_once(stranger, mo
         load(stranger / "theirs.nc")
         known._HERE.clear()
     assert tried == ["theirs.nc"]
-    (stranger / "known").chmod(0o770)  # others could have written there
+    (stranger / "known").chmod(0o777)  # others could have written there
     load(mine)
     assert tried == ["theirs.nc", "mine.nc"]
 

@@ -15,7 +15,7 @@ from saltus.flow.counts import whole
 from saltus.flow.engine import Request, Schedule
 from saltus.flow.maps import NO_PERIOD
 from saltus.system import expression as ex
-from saltus.system.overlaps import check_overlaps
+from saltus.system.checks import check_values
 from saltus.system.system import System
 from saltus.units import to_si
 
@@ -111,7 +111,7 @@ def ensemble(system: System, start: Any, values: Mapping[str, Any] | None) -> En
         **{name: value for name, value in given.items() if not np.ndim(value)}
     ).values
     if varied:
-        check_overlaps(system, {**shared, **varied})
+        check_values(system, {**shared, **varied})
         _check_period_of_each(system, shared, varied, count)
         rows = [varied.get(name, np.full(count, value)) for name, value in shared.items()]
         return Ensemble(states, np.stack(rows, axis=1), varied, True)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import time
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,13 +20,13 @@ import platformdirs
 
 from saltus.cache import entry
 from saltus.errors import SaltusWarning
+from saltus.whole_files import ABANDONED, is_older
 
 #: Suffixes of the names of entries, by content.
 KERNEL, HASH = ".kernel", ".hash"
 _CALLED = {KERNEL: "compiled kernel", HASH: "hash of the code"}
-#: Age from which an unfinished entry belongs to a process that was killed, and from which the hash
-#: of code is one of old code [s].
-_ABANDONED, _OLD = 86_400.0, 30 * 86_400.0
+#: Age from which the hash of code is one of old code [s].
+_OLD = 30 * ABANDONED
 
 
 @dataclass(frozen=True)
@@ -136,14 +135,14 @@ def _usable() -> bool:
 
 def _sweep(place: Path) -> None:
     """Delete what processes left unfinished that were killed long ago, and hashes of old code."""
-    for pattern, age in ((f"{entry.DRAFT}*", _ABANDONED), (f"*{HASH}", _OLD)):
+    for pattern, age in ((f"{entry.DRAFT}*", ABANDONED), (f"*{HASH}", _OLD)):
         _sweep_older(place, pattern, age)
 
 
 def _sweep_older(place: Path, pattern: str, age: float) -> None:
     for path in place.glob(pattern):
         try:
-            if time.time() - path.lstat().st_mtime > age:
+            if is_older(path, age):
                 _delete(path)
         except OSError:  # its process has finished it
             continue

@@ -9,12 +9,13 @@ exchanged between the question and the reading.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import os
 import stat
-import tempfile
+import uuid
 from pathlib import Path
+
+from saltus.whole_files import put, sha256
 
 #: First word of an entry; another one is another format.
 FORMAT = "saltus-kernel/1"
@@ -85,17 +86,10 @@ def write(path: Path, title: str, data: bytes) -> None:
         "format": FORMAT,
         "key": path.stem,
         "title": title,
-        "sha256": hashlib.sha256(data).hexdigest(),
+        "sha256": sha256(data),
     }
-    handle, draft = tempfile.mkstemp(prefix=DRAFT, dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(json.dumps(header).encode() + b"\n" + data)
-        os.chmod(draft, 0o400)
-        os.replace(draft, path)
-    except BaseException:
-        remove(Path(draft))
-        raise
+    draft = path.with_name(f"{DRAFT}{uuid.uuid4().hex}")
+    put(path, json.dumps(header).encode() + b"\n" + data, draft, lasting=False, mode=0o400)
 
 
 def read(path: Path) -> bytes:
@@ -114,7 +108,7 @@ def read(path: Path) -> bytes:
         whole = (
             fields["format"] == FORMAT
             and fields["key"] == path.stem
-            and fields["sha256"] == hashlib.sha256(data).hexdigest()
+            and fields["sha256"] == sha256(data)
         )
     except (ValueError, KeyError, TypeError, RecursionError):
         whole = False

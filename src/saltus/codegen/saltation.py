@@ -76,9 +76,7 @@ def reset_function(system: System, clocks: Clocks) -> str:
     """
     head = "@kernel\ndef reset(t, y, p, h, mode, g, out):\n"
     base = system.tangent_of or system
-    laws = [
-        (g, one.gap, one.law) for g, one in enumerate(base.guards) if one.law and one.law.settled
-    ]
+    laws = [(g, one.gap, one.law) for g, one in enumerate(base.guards) if one.law and one.law.reset]
     if not laws:
         return head + "    pass\n"
     size, leaf = len(base.states), parameter_leaf(base, "y", clocks.value)

@@ -98,6 +98,28 @@ class ContactTable:
         """Whether the guard's own side changed, bool[c]: it doesn't at a graze."""
         return ((self.mode_before ^ self.mode_after) >> self.guard) & 1 == 1
 
+    @property
+    def chatters(self) -> np.ndarray:
+        """Whether a contact is one of the impacts, ever smaller, with which one guard's contact
+        comes to rest, bool[c]: how many of them there are says nothing.
+        """
+        impact = self.kind == st.IMPACT
+        rows = np.flatnonzero(impact)
+        if not len(rows):
+            return impact
+        # runs of impacts of one guard, and the row behind each
+        same = (np.diff(rows) == 1) & (np.diff(self.trajectory[rows]) == 0)
+        same &= np.diff(self.guard[rows]) == 0
+        run = np.cumsum(np.append(True, ~same)) - 1
+        behind = np.minimum(
+            rows[np.append(np.flatnonzero(~same), len(rows) - 1)] + 1, len(self) - 1
+        )
+        rests = (self.kind[behind] == st.HOLD) & (
+            self.trajectory[behind] == self.trajectory[behind - 1]
+        )
+        impact[rows] = rests[run]
+        return impact
+
     def moved(self, by: int) -> ContactTable:
         """The same contacts of trajectories with other numbers."""
         integers = self.integers.copy()

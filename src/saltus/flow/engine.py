@@ -27,6 +27,7 @@ from saltus.flow.threads import may_wait, on_threads, usable_processors
 from saltus.interrupt import Interrupted, Stop
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
+from saltus.system.evaluate import evaluate, sides
 from saltus.system.system import System
 
 #: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show
@@ -219,7 +220,7 @@ def run(
     """
     threads = threads if threads is None else whole_number(threads, "threads", 1, MOST_THREADS)
     module = method.kernels(system.origin)
-    outcome, whole = allocate(request, len(system.states), module)
+    outcome, whole = allocate(request, system, module)
     periods = float(np.max(request.end_count + request.end_phase / request.period, initial=0.0))
     data, due = tables_of(system.origin), method.due(periods)
     whole["options"] = options_of(method, periods, len(request.start), request.checks)
@@ -262,13 +263,16 @@ def tables_of(system: System) -> np.ndarray:
 
 
 # -- arrays ----------------------------------------------------------------------------------------
-def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict[str, np.ndarray]]:
+def allocate(
+    request: Request, system: System, module: Flow
+) -> tuple[Outcome, dict[str, np.ndarray]]:
     """The arrays that all chunks write to, at the start of a run, and the outcome
     that shows them.
     """
-    n, m = len(request.start), len(request.schedule.count)
+    n, m, states = len(request.start), len(request.schedule.count), len(system.states)
     sampled = n - request.checks
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
+    finite &= ~beyond_a_stop(system, request)
     whole = {
         "period": request.period,
         "origin": np.full(n, float(request.origin)),
@@ -294,6 +298,24 @@ def allocate(request: Request, states: int, module: Flow) -> tuple[Outcome, dict
         whole["sample_mode"], ContactTable.empty(0, states),
     )  # fmt: skip
     return outcome, whole
+
+
+def beyond_a_stop(system: System, request: Request) -> np.ndarray:
+    """Which starts lie where an impact allows no motion, bool[n]."""
+    beyond = np.zeros(len(request.start), bool)
+    stops = [(g, one.law.side) for g, one in enumerate(system.guards) if one.law and one.law.reset]
+    if not stops:
+        return beyond
+    values = dict(zip(system.values, request.parameters.T, strict=True))
+    states = dict(zip(system.states, request.start.T, strict=True))
+    bits = sides(system, request.origin, list(states.values()), values)
+    for g, side in stops:
+        if system.guards[g].law.kind == "impact":  # type: ignore[union-attr]
+            (gap,) = evaluate(
+                [system.guards[g].gap], t=request.origin, states=states, values=values, bits=bits
+            )
+            beyond |= gap * side < 0.0
+    return beyond
 
 
 #: Order of the arguments of every `propagate`.

@@ -65,7 +65,7 @@ class Flight:
         count = len(start)
         self._module = method.kernels(system.origin)
         request = Request.periods(start, parameters, period, 0)
-        _, self._arrays = allocate(request, start.shape[1], self._module)
+        _, self._arrays = allocate(request, system, self._module)
         self._arrays["param"] = np.ascontiguousarray(parameters, float)
         self._arrays["options"] = options_of(method, longest, count)
         self._data, self._due = tables_of(system.origin), method.due(longest)

@@ -17,7 +17,7 @@ from saltus.flow.engine import Request, Schedule
 from saltus.flow.flight import Flight
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
-from saltus.system.overlaps import check_overlaps
+from saltus.system.checks import check_values
 from saltus.system.system import System
 from saltus.system.tangent import tangent_system
 
@@ -158,7 +158,7 @@ class Stroboscope:
         self.parameters = np.atleast_2d(
             np.array(list(system.values.values()) if parameters is None else parameters, float)
         )
-        check_overlaps(system, self.values)
+        check_values(system, self.values)
         period = system.period(self.values) if every is None else every
         self.period = np.broadcast_to(np.asarray(period, float), len(self)).copy()
 
@@ -270,8 +270,9 @@ class Stroboscope:
                 row[np.flatnonzero(np.diff(row, prepend=-1))] for row in outcome.sample_mode
             ]
         outcome = self.run(start, count, record=0)
-        contacts = outcome.contacts
+        contacts = outcome.contacts.rows(~outcome.contacts.chatters)
         codes = np.ravel_multi_index(
-            (contacts.kind, contacts.direction + 1, contacts.guard), (3, 3, 2**31)
+            (contacts.kind, contacts.direction + 1, contacts.guard),
+            (len(st.CONTACT_KIND), 3, 2**31),
         )
         return outcome.state, np.split(codes, contacts.begins(len(start))[1:-1])

@@ -41,7 +41,10 @@ STATUS = {
     BUDGET_STEPS: ("budget_steps", "the step budget was used up"),
     BUDGET_EVENTS: ("budget_events", "the event budget was used up: contacts accumulate"),
     NONFINITE: ("nonfinite", "the state or its derivatives overflowed or became NaN"),
-    INVALID: ("invalid", "the start or a parameter isn't a finite number"),
+    INVALID: (
+        "invalid",
+        "the start or a parameter isn't a finite number, or the start lies beyond a stop",
+    ),
     NOT_COMPUTED: ("not_computed", "stopped before this trajectory was begun"),
     LONG_TRANSIENT: (
         "long_transient",

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from saltus.errors import ParameterError, TraceError
+from saltus.system.compositions import sticks_less
+from saltus.system.declared import outside
+from saltus.system.evaluate import evaluate
+from saltus.system.expression import varies
+from saltus.system.overlaps import check_overlaps
 from saltus.units import to_si
 
 if TYPE_CHECKING:
@@ -25,6 +31,35 @@ def check_guards(system: str, count: int) -> None:
             f"those of a section or of turning points "
             "and each knot of a table in a state among them. Take fewer stops, or coarser tables."
         )
+
+
+def check_values(system: System, values: Mapping[str, Any]) -> None:
+    """Raise a ParameterError if pieces overlap with some values of the parameters, a restitution is
+    outside [0, 1], or friction holds less at rest than in motion.
+
+    Parameters
+    ----------
+    system : System
+        Its equations.
+    values : mapping of str to float or array
+        Values of all parameters [SI]; arrays of one length, one for each trajectory.
+    """
+    check_overlaps(system, values)
+    for guard in system.guards:
+        restitution = guard.law.restitution if guard.law else None
+        limit = guard.law.limit if guard.law else None
+        for part, low, high, why in (
+            (restitution, 0.0, 1.0, outside),
+            (limit, 1.0, np.inf, sticks_less),
+        ):
+            if part is None or part.op == "const" or varies(part):
+                continue
+            found = np.ravel(evaluate([part], values=values)[0])
+            wrong = ~((found >= low) & (found <= high))
+            if wrong.any():
+                raise ParameterError(
+                    f"{system.name}, contact {guard.name!r}: {why(float(found[wrong][0]))}"
+                )
 
 
 def check_range(name: str, value: Any, forced_at: str | None) -> None:

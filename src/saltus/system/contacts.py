@@ -29,10 +29,10 @@ from saltus.system.surfaces import (
     OnSurface,
     averaged,
     has_clock,
+    held_at,
     is_surface,
     level,
     split,
-    with_middle,
 )
 
 _ZERO, _ONE = ex.constant(0.0), ex.constant(1.0)
@@ -196,7 +196,7 @@ def _held_contacts(
             for other, direction in directions.items()
         }
         directions[number] = surface.halves
-        field = with_middle(field, surface, holds[number])
+        field = held_at(field, surface, holds[number])
     held = []
     for number in order:
         law = laws[number]
@@ -296,6 +296,11 @@ def _check_velocity(met: _Met, guard: Guard, field: Field, states: Sequence[str]
     number.
     """
     w = met.parts["velocity"]
+    if has_clock(guard.gap):
+        raise TraceError(
+            f"{met.law!r}: the place of the stop holds a clock (sl.mod, sl.table, or a comparison "
+            f"of time), so it may jump. Write a stop that moves with functions such as sl.cos."
+        )
     rate = ex.add(dot(gradient(guard.gap, states), field), time_derivative(guard.gap))
     closing = ex.neg(rate) if met.positive else rate
     canonical = Canonical()

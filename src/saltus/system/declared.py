@@ -44,7 +44,9 @@ class Declared:
     __array_ufunc__ = None
 
     def __repr__(self) -> str:
-        return f"{self.name}({self.condition.gap!r} > 0)"
+        gap = self.condition.gap
+        left, right = gap.args if gap.op == "sub" else (gap, 0)
+        return f"{self.name}({left!r} > {right!r})"
 
 
 class Impact(Declared):
@@ -122,6 +124,18 @@ def impact(
     Notes
     -----
     Newton's law of impact; Brogliato, Nonsmooth Mechanics (2016), section 4.1.
+
+    Examples
+    --------
+    A ball that falls from 10 m comes to rest after 3 times the time of its first impact.
+
+    >>> import saltus as sl
+    >>> @sl.system(states="x v")
+    ... def ball(t, x, v, *, gravity=9.81, restitution=0.5):
+    ...     return v, -gravity, sl.impact(x > 0, -v, restitution=restitution)
+    >>> fall = sl.simulate(ball, (10.0, 0.0), t_end=5.0)
+    >>> round(float(fall["contact_time"][-1] / fall["contact_time"][0]), 12), float(fall["end_v"])
+    (3.0, 0.0)
     """
     condition, closing = _one_comparison("impact", allowed), as_expr(velocity)
     bounce = as_expr(restitution)
@@ -207,6 +221,16 @@ def jump(condition: Condition, /, **states: Operand) -> Jump:
     ------
     TraceError
         If the condition isn't one comparison, or no state is named.
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> @sl.system(states="x v")
+    ... def kicked(t, x, v, *, level=1.0, kick=0.5):
+    ...     return v, -x, sl.jump(x > level, v=v + kick)
+    >>> run = sl.simulate(kicked, (0.0, 2.0), t_end=1.0)
+    >>> round(float(run["end_x"] ** 2 + run["end_v"] ** 2), 12), round((3**0.5 + 0.5) ** 2 + 1, 12)
+    (5.982050807569, 5.982050807569)
     """
     if not states:
         raise TraceError(

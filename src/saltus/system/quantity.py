@@ -2,9 +2,9 @@
 cross, a power to integrate.
 
 A quantity is traced as an equation is. Comparisons in it that mean a guard of the system read that
-guard's side; others become guards of their own, behind those of the system. With it the flow needs
-nothing new: a surface is one more guard, an integral one more state, and both come with the flow's
-own precision.
+guard's side; others become guards of their own, behind those of the system. The sign of friction
+that sticks is the one that holds it. With it the flow needs nothing new: a surface is one more
+guard, an integral one more state, and both come with the flow's own precision.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from saltus.system.expression import TIME, Expr, as_expr, parameter, state, sub
 from saltus.system.guards import Guard, bits_in, expressions_of, join_guards, surface_guard
 from saltus.system.names import why_no_name
 from saltus.system.singular import lifted
+from saltus.system.surfaces import with_held_signs
 from saltus.system.system import System
 from saltus.system.trace import explained, place
 from saltus.units import check_declared, to_si
@@ -63,6 +64,7 @@ def quantity(
     try:
         (root,), guards = join_guards([expression], system.guards)
         (root,) = lifted([root], guards)
+        root = with_held_signs(root, guards, system.states)
     except TraceError as error:
         raise TraceError(f"{title} ({place(function)}): {error}") from error
     return root, guards

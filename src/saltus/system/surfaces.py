@@ -36,9 +36,9 @@ class Surface:
     ----------
     number : int
         Of the guard.
-    middle : dict of Expr to Expr
-        Pieces that its side decides, each with its value halfway, where the field is linear in
-        sigma.
+    pieces : dict of Expr to (Expr, Expr)
+        Pieces that its side decides, where the field is linear in sigma: each with its value
+        halfway, and its change for a unit of sigma.
     halves : tuple of Expr
         Change of the field for each unit of sigma.
     whole : dict of int to Expr
@@ -46,7 +46,7 @@ class Surface:
     """
 
     number: int
-    middle: dict[Expr, Expr]
+    pieces: dict[Expr, tuple[Expr, Expr]]
     halves: tuple[Expr, ...]
     whole: dict[int, Expr]
 
@@ -172,15 +172,15 @@ def _jumps(
 
 def split(number: int, field: Sequence[Expr], place: OnSurface) -> Surface:
     """Middle and halves of a field in terms of the sigma of a guard."""
-    middle: dict[Expr, Expr] = {}
+    pieces: dict[Expr, tuple[Expr, Expr]] = {}
     spread: dict[Expr, Expr] = {}
     for node in ex.walk(*field, conditions=False):
         spread[node] = ex.rebuild(node, tuple(spread[child] for child in node.args), node.payload)
         if node.op == "select" and node.payload in (Bit(number), Not(Bit(number))):
             up, down = (assuming(node, number, side) for side in (True, False))
-            middle[node] = _mean(up, down, place)
             half = _ZERO if place.is_zero(ex.sub(up, down)) else _half(up, down, place)
-            spread[node] = ex.add(middle[node], ex.mul(_SIGMA, half))
+            pieces[node] = (_mean(up, down, place), half)
+            spread[node] = _at(*pieces[node], _SIGMA)
     halves: list[Expr] = []
     whole: dict[int, Expr] = {}
     for i, entry in enumerate(field):
@@ -189,7 +189,7 @@ def split(number: int, field: Sequence[Expr], place: OnSurface) -> Surface:
             up, down = (assuming(entry, number, side) for side in (True, False))
             half, whole[i] = _half(up, down, place), _mean(up, down, place)
         halves.append(half)
-    return Surface(number, middle, tuple(halves), whole)
+    return Surface(number, pieces, tuple(halves), whole)
 
 
 def _mean(up: Expr, down: Expr, place: OnSurface) -> Expr:
@@ -203,20 +203,42 @@ def _half(up: Expr, down: Expr, place: OnSurface) -> Expr:
     return up if place.is_zero(ex.add(up, down)) else ex.mul(0.5, ex.sub(up, down))
 
 
-def with_middle(field: Sequence[Expr], surface: Surface, hold: int) -> tuple[Expr, ...]:
-    """The field with the middle values of a surface where its hold guard says so; elsewhere as it
-    was.
-    """
+def _at(mean: Expr, half: Expr, sigma: Expr) -> Expr:
+    return ex.add(mean, ex.mul(sigma, half))
+
+
+def held_at(
+    field: Sequence[Expr], surface: Surface, hold: int, sigma: Expr = _ZERO
+) -> tuple[Expr, ...]:
+    """The field at a sigma of a surface where its hold guard says so; elsewhere as it was."""
     memo: dict[Expr, Expr] = {}
     for node in ex.walk(*field, conditions=False):
         new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
-        if node in surface.middle:
-            new = ex.select(Bit(hold), surface.middle[node], new)
+        if node in surface.pieces:
+            new = ex.select(Bit(hold), _at(*surface.pieces[node], sigma), new)
         memo[node] = new
     return tuple(
-        ex.select(Bit(hold), surface.whole[i], entry) if i in surface.whole else memo[entry]
+        ex.select(Bit(hold), _at(surface.whole[i], surface.halves[i], sigma), entry)
+        if i in surface.whole
+        else memo[entry]
         for i, entry in enumerate(field)
     )
+
+
+def with_held_signs(root: Expr, guards: Sequence[Guard], states: Sequence[str]) -> Expr:
+    """An expression that joins a system, with the sign that a held surface takes: the force of
+    friction that sticks is the one that holding it needs.
+    """
+    for number, guard in enumerate(guards):
+        law = guard.law
+        if law is None or law.kind != "surface" or number not in bits_in([root]):
+            continue
+        assert law.drive is not None
+        assert law.pivot is not None
+        surface = split(number, [root], OnSurface(guard.gap, states))
+        sigma = ratio(ex.neg(law.drive), law.pivot)
+        (root,) = held_at([root], surface, law.partner, sigma)
+    return root
 
 
 def averaged(entry: Expr, number: int, hold: int) -> Expr:

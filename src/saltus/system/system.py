@@ -16,7 +16,6 @@ from saltus.system import checks, serial
 from saltus.system.derivatives import gradient
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
-from saltus.system.overlaps import check_overlaps
 from saltus.system.periodic import check_periodic
 
 
@@ -65,7 +64,7 @@ class System:
         for name, value in self.values.items():
             checks.check_range(name, value, self.forced_at)
         checks.check_guards(self.name, len(self.guards))
-        check_overlaps(self, self.values)
+        checks.check_values(self, self.values)
         check_periodic(self)
 
     # -- values ------------------------------------------------------------------------------------

@@ -166,6 +166,9 @@ def contact_sides(system: System, given: Mapping[int, Any]) -> np.ndarray:
     rest = dict.fromkeys(system.states, 0.0)
     bits: list[bool] = []
     for guard in system.guards:
+        if guard.law and guard.law.kind in ("hold", "impact"):
+            bits.append(guard.law.side > 0)  # at rest is in contact; so is the side not allowed
+            continue
         gap = evaluate([guard.gap], states=rest, values=system.values, bits=bits)[0]
         if gap == 0:
             gap = evaluate([guard.gap], states=rest, values=values, bits=bits)[0]

@@ -164,12 +164,12 @@ def _smallest_repeat(strobe: np.ndarray, scale: np.ndarray, tolerance: float) ->
 
 
 def _contacts(run: xr.Dataset, number: int | None, first: int, final: int) -> int:
-    """Crossings between two samples, the later end included."""
+    """Crossings and impacts between two samples, the later end included."""
     time, contact = run["time"].values, run["contact_time"].values
     inside = (
         (contact > time[first])
         & (contact <= time[final])
-        & (run["contact_kind"].values == "crossing")
+        & np.isin(run["contact_kind"].values, ("crossing", "impact"))
     )
     if number is not None:
         inside &= run["contact_trajectory"].values == number

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from saltus.analysis.motion.window import Stretch
+from saltus.flow.contact_table import ContactTable
 from saltus.flow.engine import Outcome
+from saltus.kernels import status as st
+from saltus.system.evaluate import evaluate
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,8 @@ def find(
     """
     contacts = outcome.contacts
     time, who, guard = contacts.time, contacts.trajectory, contacts.guard
-    usable = contacts.changes_side & (time > seen.begin[who])
+    struck = contacts.kind == st.IMPACT
+    usable = (contacts.changes_side | struck) & (time > seen.begin[who])
     ends = contacts.begins(seen.group.size)
     parts, spells = [], {}
     for i in range(seen.group.size):
@@ -75,8 +79,10 @@ def find(
         for g, side in enumerate(sides):
             rows = mine[guard[mine] == g]
             enters = contacts.direction[rows] == side
-            part = _pairs(rows, enters)
-            parts.append(part)
+            sudden = struck[rows]
+            parts.append(rows[sudden, None].repeat(2, axis=1))  # over as it begins
+            rows, enters = rows[~sudden], enters[~sudden]
+            parts.append(_pairs(rows, enters))
             end = min(float(seen.begin[i] + seen.duration[i]), float(outcome.time[i]))
             touching = _touching_first(outcome, i, g, int(side), enters)
             spells[i, g] = _spells(time[rows], enters, touching, float(seen.begin[i]), end)
@@ -85,16 +91,34 @@ def find(
     first, final = pairs.T
     ended = final >= 0
     speed = np.abs(contacts.velocity)
+    after = np.where(struck, _rebounds(seen, contacts), speed)
     return Touchdowns(
         trajectory=who[first],
         guard=guard[first],
         begin=time[first],
         end=np.where(ended, time[final], np.nan),
         speed=speed[first],
-        exit_speed=np.where(ended, speed[final], np.nan),
+        exit_speed=np.where(ended, after[final], np.nan),
         impulse=_impulses(contacts.state, guard, first, final, integrals) if integrals else None,
         spells=spells,
     )
+
+
+def _rebounds(seen: Stretch, contacts: ContactTable) -> np.ndarray:
+    """Speed at which an impact's guard is left, float64[c]; zero for other contacts."""
+    system, speed = seen.system, np.zeros(len(contacts))
+    values = dict(zip(system.values, seen.group.parameters.T, strict=True))
+    if len(seen.group.parameters) > 1:
+        values = {name: column[contacts.trajectory] for name, column in values.items()}
+    states = dict(zip(system.states, contacts.state.T, strict=False))
+    bits = [(contacts.mode_after >> i) & 1 == 1 for i in range(len(system.guards))]
+    for g, guard in enumerate(system.guards):
+        if guard.law and guard.law.kind == "impact" and guard.law.constraint is not None:
+            (closing,) = evaluate(
+                [guard.law.constraint], t=contacts.time, states=states, values=values, bits=bits
+            )
+            speed = np.where(contacts.guard == g, np.abs(closing), speed)
+    return speed
 
 
 def _pairs(rows: np.ndarray, enters: np.ndarray) -> np.ndarray:

@@ -1,20 +1,19 @@
-"""Files of results that are there in full or not at all; store/durable.py has those of a store."""
+"""The files of single results, written: what goes wrong with one is a ResultFileError."""
 
 from __future__ import annotations
 
 import os
 import re
-import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from saltus.errors import ParameterError, SaltusError, shown
+from saltus.whole_files import flush, is_older, rename
 
-#: Names of drafts, and the age [s] from which on nobody is writing one any more.
+#: Names of drafts.
 _DRAFT = re.compile(r"\.(.+\.)?[0-9a-f]{8}\.part")
-_DRAFT_AGE = 86400.0
 
 
 class ResultFileError(SaltusError, OSError):
@@ -58,10 +57,8 @@ def replacing(*paths: Path) -> Iterator[list[Path]]:
     try:
         yield temporary
         for part in temporary:
-            _flush(part)
-        for part, path in zip(temporary, paths, strict=True):
-            os.replace(part, path)
-        _flush(paths[-1].parent)
+            flush(part)
+        rename(temporary, paths)
     except OSError as error:
         raise ResultFileError(
             f"{paths[-1]} can't be written: {error.strerror or error}. Nothing was left behind. "
@@ -102,11 +99,7 @@ def remove_old_drafts(folder: Path) -> None:
     """
     for draft in folder.glob(".*.part"):
         with suppress(OSError):  # it isn't ours to remove, or has just taken its place
-            if (
-                _DRAFT.fullmatch(draft.name)
-                and draft.is_file()
-                and time.time() - draft.stat().st_mtime > _DRAFT_AGE
-            ):
+            if _DRAFT.fullmatch(draft.name) and draft.is_file() and is_older(draft):
                 draft.unlink()
 
 
@@ -131,14 +124,3 @@ def usable_folder(path: Path) -> Path:
             f"another folder."
         ) from error
     return path
-
-
-def _flush(path: Path) -> None:
-    """Have what was written to a file, or the names in a folder, reach the disk."""
-    if path.is_dir() and os.name == "nt":  # Windows can't open a folder
-        return
-    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

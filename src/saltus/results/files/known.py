@@ -13,7 +13,9 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from saltus.cache import entry
 from saltus.cache import folder as cache_folder
+from saltus.cache.entry import NotOurs, check_folder
 
 #: Names that are kept: where there are more when a process writes its first, all of them are
 #: forgotten.
@@ -32,8 +34,9 @@ def is_known(digest: str) -> bool:
     if digest in _HERE:
         return True
     try:
-        return _ours(place) and stat.S_ISREG(os.lstat(place / digest).st_mode)
-    except OSError:
+        check_folder(place)
+        return stat.S_ISREG(os.lstat(place / digest).st_mode)
+    except (OSError, NotOurs):
         return False
 
 
@@ -41,15 +44,13 @@ def note(digest: str) -> None:
     """Remember a checksum: in this process, and for others where the folder can be used."""
     _HERE.add(digest)
     place = folder()
-    with suppress(OSError):
+    with suppress(OSError, NotOurs):
         place.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if _ours(place):
-            _sweep(place)
-            os.close(
-                os.open(
-                    place / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600
-                )
-            )
+        check_folder(place)
+        _sweep(place)
+        os.close(
+            os.open(place / digest, os.O_CREAT | os.O_WRONLY | getattr(os, "O_NOFOLLOW", 0), 0o600)
+        )
 
 
 def count() -> int:
@@ -66,26 +67,15 @@ def forget() -> int:
     """
     before, place = count(), folder()
     _HERE.clear()
-    with suppress(OSError):
-        if _ours(place):
-            for name in os.listdir(place):
-                with suppress(OSError):
-                    (place / name).unlink()
+    with suppress(OSError, NotOurs):
+        check_folder(place)
+        for name in os.listdir(place):
+            entry.remove(place / name)
     return before - count()
-
-
-def _ours(place: Path) -> bool:
-    """Whether a folder is this user's, and nobody else may write to it."""
-    seen = os.lstat(place)
-    mine = not hasattr(os, "geteuid") or (
-        seen.st_uid == os.geteuid() and not seen.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    )
-    return stat.S_ISDIR(seen.st_mode) and mine
 
 
 @cache
 def _sweep(place: Path) -> None:
     names = os.listdir(place)
     for name in names if len(names) > MOST else ():
-        with suppress(OSError):
-            (place / name).unlink()
+        entry.remove(place / name)

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from saltus.errors import ParameterError, shown
-from saltus.results.store.durable import StoreError, read, seal, unseal, write_whole
+from saltus.results.store.durable import StoreError, read, write_whole
 from saltus.results.store.lock import WHOLE, exclusive
+from saltus.whole_files import seal, unseal
 
 
 def put_artifact(

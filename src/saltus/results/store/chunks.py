@@ -1,5 +1,5 @@
 """The grid of a map, cut into chunks, and a chunk as bytes that know what they are. store.py writes
-them, durable.py makes them last; nothing here touches the disk.
+them, whole_files.py makes them last; nothing here touches the disk.
 
 A chunk is one file: its arrays in the order of their names, as little-endian numbers; then its
 number and the hash of its store; then the SHA-256 of all that. In another place, or another store,

@@ -6,14 +6,14 @@ from __future__ import annotations
 
 import os
 import shutil
-import time
 import uuid
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from saltus.results.store.durable import StoreError, flush_names, write
+from saltus.results.store.durable import StoreError
 from saltus.results.store.lock import exclusive, is_held
+from saltus.whole_files import flush, is_older, write
 
 #: A folder takes a moment to make: a draft of one that is older than this [s], and not locked, was
 #: left by a process that was killed.
@@ -49,9 +49,9 @@ def write_folder(path: Path, files: Mapping[str, bytes], folders: Iterable[str])
             for name, data in files.items():
                 write(draft / name, data)
             for place in [draft, *(place for place in draft.rglob("*") if place.is_dir())]:
-                flush_names(place)
+                flush(place)
             os.rename(draft, path)
-        flush_names(path.parent)
+        flush(path.parent)
     except OSError as error:
         raise StoreError(
             f"{path} can't be made: {error.strerror or error}. Nothing was left behind; make room "
@@ -80,8 +80,4 @@ def remove_old_drafts(path: Path) -> None:
 
 
 def _abandoned(draft: Path) -> bool:
-    try:
-        old = time.time() - draft.stat().st_mtime > _DRAFT_AGE
-    except FileNotFoundError:  # it has just taken its name
-        return False
-    return old and not ((draft / _LOCK).exists() and is_held(draft / _LOCK))
+    return is_older(draft, _DRAFT_AGE) and not ((draft / _LOCK).exists() and is_held(draft / _LOCK))

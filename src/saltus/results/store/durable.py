@@ -1,20 +1,13 @@
-"""Files that reach the disk complete or not at all, and JSON that knows when it was damaged. The
-ground under a store; files of single results are files/atomic.py's.
-"""
+"""The files of a store, read and written: what goes wrong with one is a StoreError."""
 
 from __future__ import annotations
 
 import errno
-import hashlib
-import json
 import os
-from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
-from saltus import fence
-from saltus.errors import ParameterError, SaltusError
+from saltus import fence, whole_files
+from saltus.errors import SaltusError
 
 
 class StoreError(SaltusError, OSError):
@@ -44,39 +37,14 @@ def write_whole(path: Path, data: bytes, drafts: Path, name: str) -> None:
     StoreError
         If the disk is full, the folder is missing or may not be written to.
     """
-    draft = drafts / f"{name}.part"
     try:
-        write(draft, data)
-        os.replace(draft, path)
-        flush_names(path.parent)
+        whole_files.put(path, data, drafts / f"{name}.part")
     except OSError as error:
         raise StoreError(
             f"{path} can't be written: {error.strerror or error}. Nothing half-written was left "
             f"behind, and what was done stays done: "
             "make room or mend the disk, then start again."
         ) from error
-    finally:
-        with suppress(OSError):  # swept away at the next start
-            draft.unlink(missing_ok=True)
-
-
-def write(path: Path, data: bytes) -> None:
-    """Write a file and wait until its bytes are on the disk."""
-    with path.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def flush_names(folder: Path) -> None:
-    """Wait until the names in a folder are on the disk."""
-    if os.name == "nt":  # Windows can't open a folder
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def read(path: Path, most: int = fence.STORED_BYTES) -> bytes | None:
@@ -109,38 +77,3 @@ def tail(path: Path, count: int) -> bytes:
             return file.read(count)
     except OSError:
         return b""
-
-
-def sha256(data: bytes) -> str:
-    """SHA-256 in hexadecimal."""
-    return hashlib.sha256(data).hexdigest()
-
-
-def seal(values: Mapping[str, Any]) -> bytes:
-    """JSON text with a checksum of itself; the same values give the same bytes, whatever their
-    order.
-    """
-    return _text({**values, "checksum": sha256(_text(values))})
-
-
-def unseal(data: bytes) -> dict[str, Any] | None:
-    """What :func:`seal` was given; None if one bit of it is not what it was."""
-    try:
-        values = json.loads(data)
-        return (
-            values
-            if seal({name: value for name, value in values.items() if name != "checksum"}) == data
-            else None
-        )
-    except (ValueError, AttributeError, RecursionError):
-        return None
-
-
-def _text(values: Mapping[str, Any]) -> bytes:
-    try:
-        return json.dumps(values, indent=1, sort_keys=True).encode() + b"\n"
-    except TypeError as error:
-        raise ParameterError(
-            f"only plain values can be stored: None, booleans, numbers, text, lists, dicts with "
-            f"text keys ({error})."
-        ) from None

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from saltus.results.store.chunks import TRAILER, Chunks, is_whole
-from saltus.results.store.durable import StoreError, read, seal, sha256, unseal, write_whole
+from saltus.results.store.durable import StoreError, read, write_whole
 from saltus.results.store.lock import exclusive
+from saltus.whole_files import seal, sha256, unseal
 
 #: Layout of the files. A store of another one is refused, not guessed at.
 FORMAT = 3

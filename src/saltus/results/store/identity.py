@@ -1,4 +1,4 @@
-"""What a store was made from, and the refusal to add results of anything else."""
+"""What a kept result was made from: it stands for another question's only if nothing differs."""
 
 from __future__ import annotations
 
@@ -26,6 +26,13 @@ def texts(identity: Mapping[str, str]) -> dict[str, str]:
     return dict(sorted(identity.items()))
 
 
+def differing(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
+    """Names of what differs between the identity of what is kept and that of a question, or what
+    only one of them has.
+    """
+    return [name for name in {**there, **here} if there.get(name) != here.get(name)]
+
+
 def agree(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None:
     """Compare the identity of a store with that of a computation that would resume it.
 
@@ -34,7 +41,7 @@ def agree(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None
     StoreError
         If a value differs, or only one of them has it: names each, with both values.
     """
-    differ = [name for name in dict.fromkeys([*there, *here]) if there.get(name) != here.get(name)]
+    differ = differing(there, here)
     if differ:
         both = [
             (name, _near(there.get(name), here.get(name)), _near(here.get(name), there.get(name)))

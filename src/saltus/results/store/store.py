@@ -31,9 +31,7 @@ from saltus.results.store.chunks import TRAILER, Chunks
 from saltus.results.store.draft_folder import remove_old_drafts, write_folder
 from saltus.results.store.durable import (
     StoreError,
-    flush_names,
     read,
-    seal,
     size,
     tail,
     write_whole,
@@ -49,6 +47,7 @@ from saltus.results.store.head import (
 )
 from saltus.results.store.identity import agree, texts
 from saltus.results.store.lock import WHOLE, holders, locked
+from saltus.whole_files import flush, seal
 
 __all__ = ["Store", "StoreError", "StoreStatus"]
 
@@ -398,7 +397,7 @@ class Store:
         for index in damaged:
             self._file(index).unlink(missing_ok=True)
         if damaged:
-            flush_names(self.path / CHUNKS)
+            flush(self.path / CHUNKS)
         return damaged
 
     def damaged(self, *, checksums: bool = True) -> list[int]:

@@ -12,8 +12,8 @@ from typing import Any
 from saltus import fence
 from saltus.errors import StudyError
 from saltus.results.files.atomic import ResultFileError, replacing
-from saltus.results.store.durable import seal, sha256, unseal
 from saltus.study.setting.inputs import Input, Inputs, KeptInputs
+from saltus.whole_files import seal, sha256, unseal
 
 #: Names of the copy of the study, of the seal with its hashes, and of the folder of copies of its
 #: files.

@@ -14,6 +14,7 @@ from saltus.interrupt import Interrupted
 from saltus.results import load, save
 from saltus.results.files.atomic import ResultFileError
 from saltus.results.provenance import to_json
+from saltus.results.store.identity import differing
 from saltus.study.run.running import Report, Running
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def _stored(
     except (ResultFileError, json.JSONDecodeError) as error:
         say(f"{title}: computed again, as {error}")
         return None
-    changed = [name for name in {**before, **identity} if before.get(name) != identity.get(name)]
+    changed = differing(before, identity)
     if changed:
         say(
             f"{title}: computed again, as the {', '.join(changed)} changed since {file.name} was "

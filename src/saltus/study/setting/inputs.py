@@ -9,7 +9,7 @@ from pathlib import Path
 
 from saltus import fence
 from saltus.errors import StudyError
-from saltus.results.store.durable import sha256
+from saltus.whole_files import sha256
 
 
 @dataclass(frozen=True)

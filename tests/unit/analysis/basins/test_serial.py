@@ -24,7 +24,7 @@ from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.orbits import Orbit
 from saltus.errors import SaltusError
-from saltus.results.store.durable import seal, unseal
+from saltus.whole_files import seal, unseal
 
 SCALE = np.array([3.0, 1.0])
 

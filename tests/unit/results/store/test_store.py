@@ -12,11 +12,12 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 
+from saltus import whole_files
 from saltus.errors import ParameterError
-from saltus.results.store import draft_folder, durable, lock
-from saltus.results.store.durable import seal, unseal
+from saltus.results.store import draft_folder, lock
 from saltus.results.store.lock import overlap
 from saltus.results.store.store import Store, StoreError
+from saltus.whole_files import seal, unseal
 
 IDENTITY = {"study": "a" * 60 + "b" + "c" * 60, "system": "rig"}
 MAKE = {"shape": (3, 7), "chunk": 4, "arrays": {"basin": "i2", "peak": float}}
@@ -294,7 +295,7 @@ def test_a_young_draft_that_looks_old_is_left_alone_while_it_is_filled(tmp_path,
         os.utime(path.parents[len(path.relative_to(tmp_path).parts) - 2], (time.time() - 3600,) * 2)
         draft_folder.remove_old_drafts(tmp_path / "map")
         looked.append(path.parent.is_dir())
-        durable.write(path, data)
+        whole_files.write(path, data)
 
     monkeypatch.setattr(draft_folder, "write", write_slowly)
     Store.create(tmp_path / "map", IDENTITY, **MAKE)

@@ -1,0 +1,132 @@
+"""Files that are there in full or not at all, and JSON that knows when it was damaged: what the
+cache, stores, results and the copies of studies are written by.
+
+A file is written under another name, its draft, and renamed into place. What is to outlast the
+machine's power as well reaches the disk before it has its name, and the name before the call
+returns.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from saltus.errors import ParameterError
+
+#: Age [s] from which on nobody is writing a draft any more.
+ABANDONED = 86_400.0
+
+
+# -- writing ---------------------------------------------------------------------------------------
+def put(path: Path, data: bytes, draft: Path, *, lasting: bool = True, mode: int = 0o666) -> None:
+    """Write a file that appears under its name complete or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    data : bytes
+        What is in it.
+    draft : Path
+        Where it is written first, on the same disk; no other process writes there.
+    lasting : bool
+        Whether it must be on the disk when this returns. What can be made again needn't.
+    mode : int
+        Its permissions, less those that the process never gives.
+
+    Raises
+    ------
+    OSError
+        If it can't be written. What stood under the name before stays, and no draft.
+    """
+    try:
+        write(draft, data, lasting=lasting, mode=mode)
+        if lasting:
+            rename([draft], [path])
+        else:
+            os.replace(draft, path)
+    finally:
+        with suppress(OSError):  # of a killed process it stays, and is swept away later
+            draft.unlink(missing_ok=True)
+
+
+def write(path: Path, data: bytes, *, lasting: bool = True, mode: int = 0o666) -> None:
+    """Write a file, and wait until its bytes are on the disk unless it needn't last."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0)
+    with os.fdopen(os.open(path, flags, mode), "wb") as file:
+        file.write(data)
+        file.flush()
+        if lasting:
+            os.fsync(file.fileno())
+
+
+def rename(drafts: Iterable[Path], paths: Iterable[Path]) -> None:
+    """Give drafts that are on the disk their names, in this order, and wait until the last of these
+    is there too.
+    """
+    path = None
+    for draft, path in zip(drafts, paths, strict=True):
+        os.replace(draft, path)
+    if path is not None:
+        flush(path.parent)
+
+
+def flush(path: Path) -> None:
+    """Wait until what is in a file, or the names in a folder, are on the disk."""
+    if path.is_dir() and os.name == "nt":  # Windows can't open a folder
+        return
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def is_older(path: Path, age: float = ABANDONED) -> bool:
+    """Whether a file was last written longer ago [s]; not, if it is gone."""
+    try:
+        return time.time() - path.lstat().st_mtime > age
+    except FileNotFoundError:  # a draft that has just taken its name
+        return False
+
+
+# -- seals -----------------------------------------------------------------------------------------
+def sha256(data: bytes) -> str:
+    """SHA-256 in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def seal(values: Mapping[str, Any]) -> bytes:
+    """JSON text with a checksum of itself; the same values give the same bytes, whatever their
+    order.
+    """
+    return _text({**values, "checksum": sha256(_text(values))})
+
+
+def unseal(data: bytes) -> dict[str, Any] | None:
+    """What :func:`seal` was given; None if one bit of it is not what it was."""
+    try:
+        values = json.loads(data)
+        return (
+            values
+            if seal({name: value for name, value in values.items() if name != "checksum"}) == data
+            else None
+        )
+    except (ValueError, AttributeError, RecursionError):
+        return None
+
+
+def _text(values: Mapping[str, Any]) -> bytes:
+    try:
+        return json.dumps(values, indent=1, sort_keys=True).encode() + b"\n"
+    except TypeError as error:
+        raise ParameterError(
+            f"only plain values can be stored: None, booleans, numbers, text, lists, dicts with "
+            f"text keys ({error})."
+        ) from None
