@@ -39,7 +39,8 @@ def den_hartog(
     -----
     At the default values it moves without stops, with the amplitude 1.5506028546868353. At omega =
     0.5 and f = 0.5 it stops twice a cycle, 1.0997616902589446 each time, and its amplitude is
-    1.3034292041955001. Half the natural frequency is special: without stops up to f = F/3.
+    1.3034292041955001. At half the natural frequency the symmetric response has no stops up to f =
+    F/3, and isn't isolated.
     """
     rubbing = friction(v, slip=friction_force)
     return v, (force * cos(frequency * t) - stiffness * x - rubbing) / mass

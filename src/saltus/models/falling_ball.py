@@ -16,7 +16,7 @@ from saltus.system import impact
     "DISODE45, ACM Trans. Math. Softw. 43(3), 25 (2016), example 5.",
 )
 def falling_ball(t, x, v, *, gravity="9.81 m/s^2", restitution=0.9):
-    r"""Ball that bounces on the ground until it rests (Siconos, BouncingBallED; DISODE45, example 5).
+    r"""Ball that bounces on the ground until it rests (Siconos; DISODE45, example 5).
 
     States are the height ``x`` [m] and ``v`` [m/s]. It isn't forced.
 

@@ -43,6 +43,8 @@ def pulled_pair(
     :math:`\pi/2 \sqrt{m/k}` = 0.0351240737 s. The manual prints 0.03512 s.
     """
     spring = stiffness * (x2 - x1)
-    rubbing = friction(v1, slip=kinetic_friction * normal_force, stick=static_friction * normal_force)
+    rubbing = friction(
+        v1, slip=kinetic_friction * normal_force, stick=static_friction * normal_force
+    )
     pull = where(t < pull_time, force, 0.0)
     return v1, v2, (spring - rubbing) / mass, (pull - spring) / mass

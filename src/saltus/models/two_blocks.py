@@ -37,7 +37,7 @@ def two_blocks(
     Notes
     -----
     From (-2, 3, 0, 0) there are 18 switches up to t = 12, the first at 1.0524788191283, the last at
-    10.82038526.
+    10.8197283087107; the paper prints 1.05248095 and 10.82038526.
     """
     first = piecewise((first_right, y1 > 0), otherwise=first_left)
     second = piecewise((second_right, y2 > 0), otherwise=second_left)
