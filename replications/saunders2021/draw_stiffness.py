@@ -76,12 +76,12 @@ def _plain_numbers(ax: Axes) -> None:
 
 
 def _legend_of_kinds(figure: Figure, data: Data) -> None:
-    from saltus.plot import kinds
+    from saltus.plot import motion_colors
 
     codes, periods = set(), []
     for case in CASES:
         ds = data[f"fig3/{case}, exact"]
-        codes |= set(np.unique(kinds.of(ds)).tolist())
+        codes |= set(np.unique(motion_colors.of(ds)).tolist())
         periods.append(ds["response_period"].values)
     every = np.concatenate(periods)
     handles = []
@@ -90,8 +90,8 @@ def _legend_of_kinds(figure: Figure, data: Data) -> None:
             "ls": "none",
             "marker": "o",
             "ms": 5,
-            "color": kinds.color(code),
-            "label": kinds.label(code, every),
+            "color": motion_colors.color(code),
+            "label": motion_colors.label(code, every),
         }
         handles.append(Line2D([], [], **look))
     handles.append(

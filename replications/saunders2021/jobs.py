@@ -19,8 +19,8 @@ from saltus.analysis.methods.compare_methods import compare_methods, methods_dat
 from saltus.analysis.methods.method_errors import one_period_errors
 from saltus.analysis.motion.simulate import simulate
 from saltus.analysis.motion.stroboscope import stroboscope
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.capture import Neighbourhoods
-from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
 from saltus.analysis.orbits.portrait import portraits
 from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
@@ -415,7 +415,7 @@ def halved(
     for orbit in closed.rows(closed.period > 0):
         if not any(same(orbit, one, scale, SAME) and orbit.period == one.period for one in orbits):
             orbits.append(orbit)
-    table = portraits(map_, Found(Neighbourhoods.none(len(system.states)), orbits))
+    table = portraits(map_, AttractorSet(Neighbourhoods.none(len(system.states)), orbits))
     return attractors_dataset(
         subject(system, provenance(system, map_.method, system.values)), table
     )

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
-from saltus.plot import kinds, regions
+from saltus.plot import motion_colors, regions
 from saltus.plot import response_points as points
 from saltus.plot.picture import caller, picture
 from saltus.plot.style import QUIET, Scale
@@ -117,15 +117,15 @@ def _size(count: int) -> float:
 
 def _kinds(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> dict[str, Any]:
     """A colour for each kind of motion; chaos in small dots below the others."""
-    of = kinds.of(one.ds)
+    of = motion_colors.of(one.ds)
     for code in np.unique(of).tolist():
         x, y = _flat(one, values, of == code, across)
-        aperiodic = not kinds.repeats(code)
+        aperiodic = not motion_colors.repeats(code)
         size = _size(x.size) * (0.5 if aperiodic else 1.0)
         marks = {
             "marker": "o",
             "ms": max(size, _SMALLEST),
-            "mfc": kinds.color(code),
+            "mfc": motion_colors.color(code),
             "mec": "none",
             "gid": f"kind {code}",
         }

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from saltus.errors import ParameterError, UnitError, among, nearest, shown
 from saltus.plot import axes as draw
-from saltus.plot import kinds
+from saltus.plot import motion_colors
 from saltus.plot import response_points as points
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, Scale
@@ -162,11 +162,13 @@ def _size(count: int) -> float:
 
 def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[str, Any]:
     """A colour for each kind of motion: lines along branches, dots at every response."""
-    of = kinds.of(one.ds)
+    of = motion_colors.of(one.ds)
     # chaos lies under the others
-    for code in sorted(np.unique(of).tolist(), key=lambda code: (code != kinds.CHAOTIC, code)):
-        color, mine = kinds.color(code), of == code
-        if kinds.repeats(code):
+    for code in sorted(
+        np.unique(of).tolist(), key=lambda code: (code != motion_colors.CHAOTIC, code)
+    ):
+        color, mine = motion_colors.color(code), of == code
+        if motion_colors.repeats(code):
             line = points.branch_lines(one, y, mine)
             ax.plot(
                 line[0] * across.factor,
@@ -177,8 +179,8 @@ def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[st
                 gid=f"branches {code}",
             )
         # of its marker half is seen
-        size = _size(mine.sum()) * (1.2 if code == kinds.CHAOTIC else 1.0)
-        marks = {"marker": kinds.marker(code), "mfc": color, "mec": "none"}
+        size = _size(mine.sum()) * (1.2 if code == motion_colors.CHAOTIC else 1.0)
+        marks = {"marker": motion_colors.marker(code), "mfc": color, "mec": "none"}
         draw.draw_points(
             ax,
             one.values[mine] * across.factor,

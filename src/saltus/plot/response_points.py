@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from saltus.errors import ParameterError
-from saltus.plot import kinds
+from saltus.plot import motion_colors
 from saltus.plot.picture import caller, check
 from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
 from saltus.results.dataset.schema import RESPONSES, event_name, parameters_of, response_name
@@ -215,7 +215,9 @@ def kind_handles(one: Shown, of: np.ndarray, markers: bool = False) -> dict[str,
     """
     periods = one.ds["response_period"].values
     return {
-        kinds.label(code, periods): dot(kinds.color(code), kinds.marker(code) if markers else "o")
+        motion_colors.label(code, periods): dot(
+            motion_colors.color(code), motion_colors.marker(code) if markers else "o"
+        )
         for code in np.unique(of).tolist()
     }
 

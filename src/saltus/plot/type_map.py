@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from saltus.errors import ParameterError, shown
 from saltus.plot import axes as draw
-from saltus.plot import kinds, maps
+from saltus.plot import maps, motion_colors
 from saltus.plot import response_points as points
 from saltus.plot.picture import caller, picture
 from saltus.plot.style import Scale
@@ -70,7 +70,7 @@ def type_map(ds: xr.Dataset, *, start: int = 0, legend: bool = True, ax: Any = N
     code = np.where(
         one["response_of"].values < 0,
         one["response_of"].values,
-        kinds.codes(one["type"].values, one["period"].values),
+        motion_colors.codes(one["type"].values, one["period"].values),
     )
     with draw.panels(ax, 1, (5.8, 3.9)) as (panel,):
         _cells(panel, ds, (pair[0], pair[1]), code)
@@ -142,11 +142,11 @@ def _order(code: np.ndarray) -> list[int]:
 
 
 def _color(key: int) -> np.ndarray:
-    return kinds.color(key, dots=False) if key > 0 else np.array(to_rgb(_UNSETTLED[key][1]))
+    return motion_colors.color(key, dots=False) if key > 0 else np.array(to_rgb(_UNSETTLED[key][1]))
 
 
 def _handle(key: int, code: np.ndarray, period: np.ndarray) -> Patch:
-    name = kinds.label(key, period) if key > 0 else _UNSETTLED[key][0]
+    name = motion_colors.label(key, period) if key > 0 else _UNSETTLED[key][0]
     return Patch(
         fc=_color(key),
         ec="#999999",

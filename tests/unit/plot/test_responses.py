@@ -15,7 +15,7 @@ from saltus.errors import ParameterError
 from saltus.plot import (
     bifurcation_diagram,
     frequency_response,
-    kinds,
+    motion_colors,
     palette,
     response_points,
     type_map,
@@ -54,11 +54,11 @@ def diagram():
 
 # -- kinds -----------------------------------------------------------------------------------------
 def test_a_kind_has_one_colour_whatever_else_is_there():
-    assert kinds.codes(
+    assert motion_colors.codes(
         ["periodic", "periodic", "chaotic", "quasi_periodic", "periodic"], [1, 3, 0, 0, 24]
-    ).tolist() == [1, 3, kinds.CHAOTIC, kinds.QUASI_PERIODIC, kinds.LONG]
+    ).tolist() == [1, 3, motion_colors.CHAOTIC, motion_colors.QUASI_PERIODIC, motion_colors.LONG]
     a, b = frequency_response(resonance()), bifurcation_diagram(cascade(200, keep=40))
-    for code in ("kind 1", "kind 3", f"kind {kinds.CHAOTIC}"):
+    for code in ("kind 1", "kind 3", f"kind {motion_colors.CHAOTIC}"):
         first, second = (
             next(one for one in ax.lines if one.get_gid() == code).get_markerfacecolor()
             for ax in (a, b)
@@ -68,16 +68,24 @@ def test_a_kind_has_one_colour_whatever_else_is_there():
 
 @pytest.mark.parametrize("dots", [True, False])
 def test_kinds_are_far_apart(dots):
-    lab = palette.oklab(np.array([kinds.color(code, dots) for code in range(1, kinds.CHAOTIC + 1)]))
+    lab = palette.oklab(
+        np.array([motion_colors.color(code, dots) for code in range(1, motion_colors.CHAOTIC + 1)])
+    )
     far = np.linalg.norm(lab[:, None] - lab[None], axis=-1)[~np.eye(len(lab), dtype=bool)]
     assert far.min() > 0.06  # one just noticeable difference is about 0.02
 
 
 def test_long_periods_are_named():
     periods = np.array([1, 24, 36])
-    assert kinds.label(kinds.LONG, periods) == "24T, 36T"
-    assert kinds.label(kinds.LONG, np.arange(40)) == f"{kinds.OWN_HUES + 1}T to 39T"
-    assert [kinds.label(code, periods) for code in (1, 2, kinds.QUASI_PERIODIC, kinds.CHAOTIC)] == [
+    assert motion_colors.label(motion_colors.LONG, periods) == "24T, 36T"
+    assert (
+        motion_colors.label(motion_colors.LONG, np.arange(40))
+        == f"{motion_colors.OWN_HUES + 1}T to 39T"
+    )
+    assert [
+        motion_colors.label(code, periods)
+        for code in (1, 2, motion_colors.QUASI_PERIODIC, motion_colors.CHAOTIC)
+    ] == [
         "T",
         "2T",
         "quasi-periodic",
@@ -322,8 +330,10 @@ def test_every_cell_has_the_colour_of_its_kind(log):
     image = (ax.collections[0] if log else ax.images[0]).get_array()
     cells = np.asarray(image).reshape(30, 40, -1)[..., :3].swapaxes(0, 1) / 255
     for i, j in ((20, 10), (35, 25), (10, 3)):
-        code = int(kinds.codes([ds["type"].values[i, j, 0]], [ds["period"].values[i, j, 0]])[0])
-        assert np.allclose(cells[i, j], kinds.color(code, dots=False), atol=1 / 255)
+        code = int(
+            motion_colors.codes([ds["type"].values[i, j, 0]], [ds["period"].values[i, j, 0]])[0]
+        )
+        assert np.allclose(cells[i, j], motion_colors.color(code, dots=False), atol=1 / 255)
     assert np.allclose(cells[0, 0], to_rgb("white"))
     assert ax.get_yscale() == ("log" if log else "linear")
     assert ax.get_title(loc="left") == "x = 0.32 mm, v = 0 m/s"

@@ -9,7 +9,7 @@ import xarray as xr
 
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
-from saltus.analysis.orbits.found import Found
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.verb import verb
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting, stage
@@ -121,7 +121,7 @@ def map_of(
 
 def label_all(
     plan: BasinPlan,
-    found: Found,
+    found: AttractorSet,
     chunks: Sequence[int],
     done: Callable[[int, Settling], None],
     threads: int | None,

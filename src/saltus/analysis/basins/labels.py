@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.find_attractors import find_attractors, keeps_to_sampled
-from saltus.analysis.orbits.found import Found
 from saltus.flow.maps import Map, Travel
 from saltus.flow.threads import on_threads
 from saltus.kernels import status as st
@@ -71,7 +71,7 @@ class Settling:
             getattr(self, name)[where] = getattr(other, name)
 
 
-def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
+def settle(map_: Map, start: np.ndarray, found: AttractorSet, most: int) -> Settling:
     """Follow trajectories until an attractor captures them, float64[k, D], for ``most`` iterates at
     the longest.
     """
@@ -105,7 +105,7 @@ def settle(map_: Map, start: np.ndarray, found: Found, most: int) -> Settling:
 def settle_all(
     map_: Map,
     start: np.ndarray,
-    found: Found,
+    found: AttractorSet,
     most: int,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -135,11 +135,11 @@ def _write(
 def complete(
     map_: Map,
     result: Settling,
-    found: Found,
+    found: AttractorSet,
     scale: np.ndarray,
     most: int,
     threads: int | None = None,
-) -> Found:
+) -> AttractorSet:
     """Search new attractors where nothing captured, label what they capture, and give all
     attractors their final ids.
 
@@ -163,7 +163,7 @@ def complete(
     return wider
 
 
-def _renumber(label: np.ndarray, before: Found, after: Found) -> None:
+def _renumber(label: np.ndarray, before: AttractorSet, after: AttractorSet) -> None:
     ids = np.array([*map(after.index, before.orbits), *map(after.index, before.sampled)], np.int64)
     if len(ids):
         label[label >= 0] = ids[label[label >= 0]]

@@ -20,8 +20,8 @@ from saltus.analysis.basins import uncertainty
 from saltus.analysis.basins.halton import halton
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.find_attractors import find_attractors
-from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
 from saltus.analysis.starts import check_system, fill, fixed_states
@@ -132,7 +132,7 @@ class BasinPlan:
     # -- the three stages --------------------------------------------------------------------------
     def scout(
         self, threads: int | None = None, progress: Callable[[float], None] | None = None
-    ) -> Found:
+    ) -> AttractorSet:
         """The attractors that a fixed quasi-random sample of the box leads to."""
         unit = halton(self.scouts, 2)
         low, high = (
@@ -155,18 +155,22 @@ class BasinPlan:
             np.random.default_rng(0).choice(self.cells, min(count, self.cells), replace=False)
         )
 
-    def chunk(self, index: int, found: Found, map_: Stroboscope | None = None) -> Settling:
+    def chunk(self, index: int, found: AttractorSet, map_: Stroboscope | None = None) -> Settling:
         """Where the starts of one chunk lead. One thread."""
         return settle(map_ or self.map(1), self.starts(self.cells_of(index)), found, self.periods)
 
-    def finish(self, result: Settling, found: Found, threads: int | None = None) -> xr.Dataset:
+    def finish(
+        self, result: Settling, found: AttractorSet, threads: int | None = None
+    ) -> xr.Dataset:
         """The Dataset; what is still open is settled first, and a sample is checked. Changes
         ``result``.
         """
         found = complete(self.map(threads), result, found, self.scale, self.periods, threads)
         return self.dataset(result, found, threads).assign_attrs(self._check(result, found))
 
-    def dataset(self, result: Settling, found: Found, threads: int | None = None) -> xr.Dataset:
+    def dataset(
+        self, result: Settling, found: AttractorSet, threads: int | None = None
+    ) -> xr.Dataset:
         """The Dataset of what is known; what is still open counts as unconverged. Changes
         ``result``.
         """
@@ -208,7 +212,7 @@ class BasinPlan:
             | every
         )
 
-    def _check(self, result: Settling, found: Found) -> dict[str, float | int]:
+    def _check(self, result: Settling, found: AttractorSet) -> dict[str, float | int]:
         """Recompute a random sample of settled cells by a more exact method: the share that leads
         elsewhere, with its interval.
         """

@@ -11,8 +11,8 @@ import numpy as np
 
 from saltus.analysis.basins.labels import Settling
 from saltus.analysis.orbits.aperiodic import SampledAttractor
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.capture import Neighbourhoods
-from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.noisy import Noisy
 from saltus.analysis.orbits.orbits import Orbit
 from saltus.errors import SaltusError
@@ -26,7 +26,7 @@ CELL: dict[str, Any] = {
 }
 
 
-def found_data(found: Found) -> dict[str, Any]:
+def found_data(found: AttractorSet) -> dict[str, Any]:
     """Attractors as numbers, texts, lists and dicts."""
     return {
         "orbits": [_orbit_data(orbit) for orbit in found.orbits],
@@ -40,7 +40,7 @@ def found_data(found: Found) -> dict[str, Any]:
     }
 
 
-def found_from(data: Mapping[str, Any], size: int) -> Found:
+def found_from(data: Mapping[str, Any], size: int) -> AttractorSet:
     """Attractors from :func:`found_data`'s result, of a system with this number of states.
 
     Raises
@@ -60,7 +60,7 @@ def found_from(data: Mapping[str, Any], size: int) -> Found:
     return found
 
 
-def _holds_together(found: Found, size: int) -> bool:
+def _holds_together(found: AttractorSet, size: int) -> bool:
     """Whether sizes fit one another, and numbers what they count."""
     near, orbits = (
         found.near,
@@ -84,9 +84,9 @@ def _holds_together(found: Found, size: int) -> bool:
     )
 
 
-def _found(data: Mapping[str, Any], size: int) -> Found:
+def _found(data: Mapping[str, Any], size: int) -> AttractorSet:
     near = data["near"]
-    return Found(
+    return AttractorSet(
         Neighbourhoods(
             _array(near["centres"], size),
             _array(near["weights"], size, size),

@@ -16,9 +16,9 @@ from saltus.analysis.orbits.aperiodic import (
     mismatch,
     survey,
 )
+from saltus.analysis.orbits.attractor_set import INSIDE, AttractorSet, is_about
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.equilibria import autonomous
-from saltus.analysis.orbits.found import INSIDE, Found, is_about
 from saltus.analysis.orbits.limit_cycles import limit_cycles
 from saltus.analysis.orbits.noisy import Noisy, Stray, blurred, keep_to, stray_of
 from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
@@ -40,9 +40,9 @@ def find_attractors(
     start: np.ndarray,
     scale: np.ndarray,
     most: int,
-    known: Found | None = None,
+    known: AttractorSet | None = None,
     progress: Callable[[float], None] | None = None,
-) -> tuple[Found, np.ndarray, np.ndarray]:
+) -> tuple[AttractorSet, np.ndarray, np.ndarray]:
     """The attractors that trajectories from given starts settle to.
 
     Parameters
@@ -55,22 +55,22 @@ def find_attractors(
         Range of each state.
     most : int
         Iterates after which a trajectory that hasn't settled is surveyed for chaos.
-    known : Found, optional
+    known : AttractorSet, optional
         Attractors that are known already.
     progress : callable, optional
         Called with the share done.
 
     Returns
     -------
-    found : Found
+    found : AttractorSet
         Known and new attractors, in the order of their ids.
     label : int64[k]
         The attractor of each start; -1 where none was established.
     settled : int64[k]
         Iterates after which it was captured; -1 if it wasn't.
     """
-    found = known or Found(Neighbourhoods.none(start.shape[1]))
-    found = Found(found.near, list(found.orbits), list(found.sampled), list(found.unstable))
+    found = known or AttractorSet(Neighbourhoods.none(start.shape[1]))
+    found = AttractorSet(found.near, list(found.orbits), list(found.sampled), list(found.unstable))
     owner: list[Orbit | SampledAttractor | None] = [None] * len(start)
     settled = np.full(len(start), -1, np.int64)
     travel, going = map_.launch(start, most), np.arange(len(start))
@@ -124,7 +124,12 @@ def find_attractors(
 
 
 def _captured(
-    found: Found, points: np.ndarray, who: np.ndarray, age: int, owner: list, settled: np.ndarray
+    found: AttractorSet,
+    points: np.ndarray,
+    who: np.ndarray,
+    age: int,
+    owner: list,
+    settled: np.ndarray,
 ) -> np.ndarray:
     """Note which of the trajectories are captured, and after how many iterates."""
     label, when = found.near.capture(points)
@@ -135,7 +140,7 @@ def _captured(
 
 
 def _keeping(
-    found: Found,
+    found: AttractorSet,
     kind: str,
     points: np.ndarray,
     who: np.ndarray,
@@ -153,7 +158,9 @@ def _keeping(
     return on >= 0
 
 
-def _add_orbits(map_: Map, points: np.ndarray, scale: np.ndarray, found: Found, most: int) -> bool:
+def _add_orbits(
+    map_: Map, points: np.ndarray, scale: np.ndarray, found: AttractorSet, most: int
+) -> bool:
     """Add the attracting orbits not known yet that some of the trajectories float64[k, ROUND, D]
     follow; whether there are any.
     """
@@ -225,9 +232,8 @@ def _lies_on(place: np.ndarray, orbit: Orbit, scale: np.ndarray, tolerance: floa
 
 
 def _on_cycles(
-    map_: Map, found: Found, points: np.ndarray, who: np.ndarray, travel: Travel, rows: np.ndarray,
-    scale: np.ndarray, owner: list,
-    settled: np.ndarray,
+    map_: Map, found: AttractorSet, points: np.ndarray, who: np.ndarray, travel: Travel,
+    rows: np.ndarray, scale: np.ndarray, owner: list, settled: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Which trajectories of a flow without forcing go round a limit cycle, bool[k]; new ones are
     looked for. Notes their owners.
@@ -249,8 +255,8 @@ def _on_cycles(
 
 
 def _survey(
-    map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: Found, owner: list,
-    settled: np.ndarray, most: int
+    map_: Map, travel: Travel, going: np.ndarray, scale: np.ndarray, found: AttractorSet,
+    owner: list, settled: np.ndarray, most: int
 ) -> None:  # fmt: skip
     """Find out what the trajectories do that never settled: watch them much longer, and call an
     attractor only what none of them leaves.
@@ -294,7 +300,7 @@ def _survey(
 
 
 def _watch(
-    travel: Travel, going: np.ndarray, found: Found, owner: list, settled: np.ndarray
+    travel: Travel, going: np.ndarray, found: AttractorSet, owner: list, settled: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:  # fmt: skip
     """Trajectories that don't settle for SURVEY_ITERATES more, int64[k], their iterates, and those
     of the ones that do.
@@ -336,7 +342,7 @@ def _blurred(
 
 
 def _leave(
-    map_: Map, state: np.ndarray, found: Found, noisy: list[Noisy], scale: np.ndarray
+    map_: Map, state: np.ndarray, found: AttractorSet, noisy: list[Noisy], scale: np.ndarray
 ) -> np.ndarray:
     """Which of some trajectories, watched for very long, come to an orbit after all, bool[k]; those
     beside a noisy one don't.
@@ -357,7 +363,7 @@ def _leave(
     return left
 
 
-def keeps_to_sampled(found: Found, runs: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def keeps_to_sampled(found: AttractorSet, runs: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """For trajectories float64[k, m, D]: which attractor of those that never repeat each keeps to,
     -1 if none; none if it repeats.
     """

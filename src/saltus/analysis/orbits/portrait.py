@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from saltus.analysis.orbits.aperiodic import SampledAttractor
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.equilibria import autonomous, find_equilibria
-from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.limit_cycles import cycle_of
 from saltus.analysis.orbits.noisy import Noisy
 from saltus.analysis.orbits.orbit_measures import Measures, measure, unknown
@@ -24,7 +24,7 @@ APERIODIC_PERIODS = 256
 ASIDE = 23
 
 
-def portraits(map_: Map, found: Found) -> AttractorTable:
+def portraits(map_: Map, found: AttractorSet) -> AttractorTable:
     """The table of attractors, in the order of their ids.
 
     Parameters
@@ -32,7 +32,7 @@ def portraits(map_: Map, found: Found) -> AttractorTable:
     map_ : Map
         The map; a flow's stroboscope shows what happens between its points, another map only the
         points.
-    found : Found
+    found : AttractorSet
         The attractors.
     """
     if isinstance(map_, Stroboscope) and autonomous(map_.system):
@@ -92,7 +92,7 @@ def _first(one: SampledAttractor) -> np.ndarray:
     return np.asarray(one.points[0] if isinstance(one, Noisy) else one.points[-1])
 
 
-def _unforced(map_: Stroboscope, found: Found) -> AttractorTable:
+def _unforced(map_: Stroboscope, found: AttractorSet) -> AttractorTable:
     """The table of a system without forcing: equilibria, limit cycles, and what never repeats."""
     size, rests = len(map_.states), len(found.orbits)
     kind = np.array(

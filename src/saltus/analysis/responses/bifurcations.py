@@ -16,7 +16,7 @@ import numpy as np
 from saltus.analysis.orbits.orbits import orbit_distance
 from saltus.analysis.responses.continuation import LINK, Follower
 from saltus.analysis.responses.followed import Followed
-from saltus.analysis.responses.responses import Found
+from saltus.analysis.responses.responses import GridResponses
 from saltus.results.dataset.kinds import CLOSED, Kind
 
 #: A complex leading multiplier is on its way to the unit circle beyond this, if it grew by so much
@@ -53,13 +53,18 @@ class Event:
 
 
 def why_they_end(
-    found: Found, followed: Followed, values: np.ndarray, ends: np.ndarray, way: int, exact: bool
+    found: GridResponses,
+    followed: Followed,
+    values: np.ndarray,
+    ends: np.ndarray,
+    way: int,
+    exact: bool,
 ) -> list[Event]:
     """Why branches end upwards (way 1) or begin (way -1).
 
     Parameters
     ----------
-    found : Found
+    found : GridResponses
         The responses.
     followed : Followed
         Where they go.
@@ -104,7 +109,7 @@ def why_they_end(
     ]
 
 
-def _leading(found: Found, response: int) -> complex:
+def _leading(found: GridResponses, response: int) -> complex:
     """Leading multiplier; of a limit cycle the largest but the trivial one, of an equilibrium the
     leading eigenvalue [1/s].
     """
@@ -114,7 +119,7 @@ def _leading(found: Found, response: int) -> complex:
     )
 
 
-def _told_by_neighbours(found: Found, last: int, beyond: int, multiplier: complex) -> str:
+def _told_by_neighbours(found: GridResponses, last: int, beyond: int, multiplier: complex) -> str:
     """What the responses at the next value say, ``end`` if nothing; "" if another branch reports
     it.
     """
@@ -142,7 +147,7 @@ def _told_by_neighbours(found: Found, last: int, beyond: int, multiplier: comple
     return "end"
 
 
-def _turns(found: Found, last: int, before: int, size: float) -> bool:
+def _turns(found: GridResponses, last: int, before: int, size: float) -> bool:
     """Whether a leading multiplier of this size reaches the unit circle soon, by how it grew from
     the value before.
     """
@@ -162,7 +167,7 @@ def _turns(found: Found, last: int, before: int, size: float) -> bool:
     return apart[nearest] < LINK and AHEAD * grown >= 1.0 - size
 
 
-def _is_twice(found: Found, longer: int, shorter: int) -> bool:
+def _is_twice(found: GridResponses, longer: int, shorter: int) -> bool:
     """Whether one response takes twice as long as another."""
     if found.kind[longer] != found.kind[shorter]:
         return False
@@ -173,7 +178,7 @@ def _is_twice(found: Found, longer: int, shorter: int) -> bool:
     )
 
 
-def _covers(found: Found, longer: int, shorter: int) -> bool:
+def _covers(found: GridResponses, longer: int, shorter: int) -> bool:
     """Whether every point of an orbit of period 2n lies near one of an orbit of period n."""
     scale = found.motions.scale[found.row[shorter]]
     apart = (
@@ -196,7 +201,7 @@ def middle(values: np.ndarray, a: int, b: int) -> float:
 
 # -- folds and Hopf bifurcations -------------------------------------------------------------------
 def _located(
-    found: Found, follower: Follower, rows: np.ndarray, values: np.ndarray, ends: np.ndarray
+    found: GridResponses, follower: Follower, rows: np.ndarray, values: np.ndarray, ends: np.ndarray
 ) -> list[tuple[str, float]]:
     """Kind and place of what ends branches whose leading multiplier is real and positive, or that
     rest, followed as far as they go.

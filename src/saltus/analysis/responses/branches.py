@@ -16,7 +16,7 @@ from saltus.analysis.responses.bifurcations import Event, middle, why_they_end
 from saltus.analysis.responses.continuation import LINK
 from saltus.analysis.responses.followed import Followed
 from saltus.analysis.responses.grid import Grid
-from saltus.analysis.responses.responses import Found
+from saltus.analysis.responses.responses import GridResponses
 from saltus.results import AttractorTable
 from saltus.results.dataset.kinds import CLOSED
 
@@ -26,7 +26,7 @@ MISSED = 3
 _NEVER = 1e6
 
 
-def follow(found: Found, followed: Followed, places: int) -> np.ndarray:
+def follow(found: GridResponses, followed: Followed, places: int) -> np.ndarray:
     """Branch of every response of a grid with one axis of values, int64[m]; numbered in the order
     in which they begin.
     """
@@ -53,7 +53,7 @@ def follow(found: Found, followed: Followed, places: int) -> np.ndarray:
     return branch
 
 
-def _before(found: Found, followed: Followed) -> np.ndarray:
+def _before(found: GridResponses, followed: Followed) -> np.ndarray:
     """The response that each was at a value before, int64[m], -1 where it was none: each of the two
     becomes the other.
     """
@@ -65,7 +65,7 @@ def _before(found: Found, followed: Followed) -> np.ndarray:
     return result
 
 
-def _matches(found: Found, before: list[int], here: np.ndarray) -> list[tuple[int, int]]:
+def _matches(found: GridResponses, before: list[int], here: np.ndarray) -> list[tuple[int, int]]:
     """Pairs (index into before, response) of motions that never repeat and are one, each used once,
     the nearest first.
     """
@@ -76,7 +76,7 @@ def _matches(found: Found, before: list[int], here: np.ndarray) -> list[tuple[in
     return [(int(i), int(here[j])) for i, j in zip(rows, columns, strict=True) if cost[i, j] < LINK]
 
 
-def _distance(found: Found, a: int, b: int) -> float:
+def _distance(found: GridResponses, a: int, b: int) -> float:
     """How far two motions at different values that never repeat lie apart, in units of their range;
     inf if they differ in kind.
     """
@@ -93,7 +93,7 @@ def _distance(found: Found, a: int, b: int) -> float:
 
 
 def events(
-    found: Found,
+    found: GridResponses,
     table: AttractorTable,
     branch: np.ndarray,
     followed: Followed,
@@ -123,7 +123,11 @@ def events(
 
 
 def _grazes(
-    found: Found, table: AttractorTable, members: np.ndarray, values: np.ndarray, number: int
+    found: GridResponses,
+    table: AttractorTable,
+    members: np.ndarray,
+    values: np.ndarray,
+    number: int,
 ) -> list[Event]:
     """Where the number of contacts changes along a periodic branch."""
     if found.kind[members[0]] not in CLOSED:

@@ -18,7 +18,7 @@ from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits, orbit_distanc
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.orbits.unforced import close_again
 from saltus.analysis.responses.grid import Grid
-from saltus.analysis.responses.responses import Found
+from saltus.analysis.responses.responses import GridResponses
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 
@@ -67,7 +67,7 @@ class Follower:
 
     Parameters
     ----------
-    found : Found
+    found : GridResponses
         The responses.
     grid, method, threads
         As they were computed. Responses of an inexact method are followed by the exact orbits that
@@ -91,7 +91,12 @@ class Follower:
     """
 
     def __init__(
-        self, found: Found, grid: Grid, method: Method, rows: np.ndarray, threads: int | None = None
+        self,
+        found: GridResponses,
+        grid: Grid,
+        method: Method,
+        rows: np.ndarray,
+        threads: int | None = None,
     ):
         ((name, values),) = grid.axes.items()
         self._column = list(grid.system.values).index(name)

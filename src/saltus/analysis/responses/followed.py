@@ -9,7 +9,7 @@ import numpy as np
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.responses.continuation import HALVINGS, INEXACT, Follower
 from saltus.analysis.responses.grid import Grid
-from saltus.analysis.responses.responses import Found
+from saltus.analysis.responses.responses import GridResponses
 from saltus.flow.methods import Method
 from saltus.results.dataset.kinds import CLOSED
 
@@ -36,7 +36,9 @@ class Followed:
         The first response that each becomes; -1 where it becomes none.
     """
 
-    def __init__(self, found: Found, grid: Grid, method: Method, threads: int | None = None):
+    def __init__(
+        self, found: GridResponses, grid: Grid, method: Method, threads: int | None = None
+    ):
         closed = np.flatnonzero(np.isin(found.kind, CLOSED))
         self._index = np.full((len(WAYS), len(found)), -1, np.int64)
         self._index[:, closed] = np.arange(len(WAYS) * len(closed)).reshape(len(WAYS), -1)
@@ -63,7 +65,7 @@ class Followed:
 
     def _follow(
         self,
-        found: Found,
+        found: GridResponses,
         grid: Grid,
         rows: np.ndarray,
         ways: np.ndarray,
@@ -90,14 +92,14 @@ class Followed:
         return arrived
 
 
-def _alike(found: Found, response: int) -> np.ndarray:
+def _alike(found: GridResponses, response: int) -> np.ndarray:
     """The responses of the kind and period of one, int64[n]."""
     return np.flatnonzero(
         (found.kind == found.kind[response]) & (found.period == found.period[response])
     )
 
 
-def _last(found: Found, response: int, way: int) -> int:
+def _last(found: GridResponses, response: int, way: int) -> int:
     """How many values ahead the last one lies that a response may become."""
     ahead = way * (found.place[_alike(found, response)] - found.place[response])
     return int(ahead[(ahead > 0) & (ahead <= FARTHEST)].max(initial=0))

@@ -16,7 +16,7 @@ from saltus.analysis.responses import branches
 from saltus.analysis.responses.bifurcations import Event
 from saltus.analysis.responses.followed import Followed
 from saltus.analysis.responses.grid import Grid
-from saltus.analysis.responses.responses import Found, find, numbers_of, table_of
+from saltus.analysis.responses.responses import GridResponses, find, numbers_of, table_of
 from saltus.analysis.responses.samples import sampled
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
@@ -53,7 +53,7 @@ def _dataset(
     grid: Grid,
     method: Method,
     periods: int,
-    found: Found,
+    found: GridResponses,
     threads: int | None,
     sample: str,
     outputs: Outputs,

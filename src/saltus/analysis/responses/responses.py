@@ -29,7 +29,7 @@ APERIODIC_PERIODS = 64
 
 
 @dataclass
-class Found:
+class GridResponses:
     """The responses of a grid, m of them, in the order of their places, at each place by period and
     size.
 
@@ -97,7 +97,7 @@ def find(
     most: int,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Found:
+) -> GridResponses:
     """The responses of a grid; on Ctrl-C those that are known, with ``complete`` False."""
     map_, count = grid.map(method, threads), len(grid.starts)
     result = SettledMotions.empty(grid.places * count, grid.starts.shape[1])
@@ -150,7 +150,7 @@ def _sweep(
 
 def _gathered(
     result: SettledMotions, places: int, count: int, tolerance: np.ndarray, complete: bool
-) -> Found:
+) -> GridResponses:
     """Which trajectories at a value settled to the same response."""
     of = result.kind.copy()
     rows: list[int] = []
@@ -174,7 +174,7 @@ def _gathered(
             of[group] = len(rows)
             rows.append(group[0])
     chosen = np.array(rows, np.int64)
-    return Found(result, chosen, chosen // count, of.reshape(places, count), complete)
+    return GridResponses(result, chosen, chosen // count, of.reshape(places, count), complete)
 
 
 def _same(result: SettledMotions, a: int, b: int, tolerance: float) -> bool:
@@ -208,7 +208,7 @@ def _order(result: SettledMotions, row: int) -> tuple[float, ...]:
 
 
 def numbers_of(
-    found: Found, outputs: Outputs, grid: Grid, method: Method, threads: int | None = None
+    found: GridResponses, outputs: Outputs, grid: Grid, method: Method, threads: int | None = None
 ) -> Measures:
     """The numbers of each response."""
     map_, times = grid.map(method, threads).rows(found.place), own_times(found, grid)
@@ -224,7 +224,7 @@ def numbers_of(
     return numbers
 
 
-def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
+def table_of(found: GridResponses, numbers: Measures, grid: Grid, method: Method) -> AttractorTable:
     """What is known of each response."""
     map_ = grid.map(method).rows(found.place)
     kind, s = found.kind, found.motions
@@ -262,14 +262,14 @@ def table_of(found: Found, numbers: Measures, grid: Grid, method: Method) -> Att
     )
 
 
-def spans_of(found: Found) -> np.ndarray:
+def spans_of(found: GridResponses) -> np.ndarray:
     """Periods of each response, int64[m]: n of an nT, 1 of a limit cycle or an equilibrium, 0 of
     one that never repeats.
     """
     return np.where(found.kind == Kind.PERIODIC, found.period, np.where(found.period > 0, 1, 0))
 
 
-def own_times(found: Found, grid: Grid) -> np.ndarray | None:
+def own_times(found: GridResponses, grid: Grid) -> np.ndarray | None:
     """Time of one of these periods [s], of a system without forcing: that of the limit cycle, else
     that between two samples.
     """

@@ -8,7 +8,12 @@ import numpy as np
 
 from saltus.analysis.orbits.orbit_measures import Measures
 from saltus.analysis.responses.grid import Grid
-from saltus.analysis.responses.responses import APERIODIC_PERIODS, Found, own_times, spans_of
+from saltus.analysis.responses.responses import (
+    APERIODIC_PERIODS,
+    GridResponses,
+    own_times,
+    spans_of,
+)
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome
 from saltus.flow.maps import Stroboscope
@@ -47,7 +52,7 @@ def sampled(
     numbers: Measures,
     grid: Grid,
     method: Method,
-    found: Found,
+    found: GridResponses,
     threads: int | None = None,
 ) -> list[np.ndarray]:
     """The sampled states of each response, float64[n, D], over one period of a response, or many of

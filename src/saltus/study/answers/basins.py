@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from saltus.analysis.basins.basins import map_of
 from saltus.analysis.basins.pipeline import BasinPlan, basin_plan
 from saltus.study.answers.basins_rows import agreement_table, attractor_table
-from saltus.study.answers.question import Found, Question, Show
+from saltus.study.answers.question import Answers, Question, Show
 from saltus.study.identity import identity
 from saltus.study.setting import quantities
 from saltus.study.setting.arguments import arguments
@@ -89,11 +89,11 @@ class BasinMap(Question):
         asked = {"axes": axes, "at": dict(plan.fixed), "periods": plan.periods, "every": plan.every}
         return identity(plan.system, plan.method, asked)
 
-    def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
+    def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
         """The map, all at once; nothing is stored before it is complete."""
         return map_of(self.plan, threads, progress)
 
-    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """A row for each attractor."""
         return [attractor_table(self.title, ds)]
 
@@ -133,7 +133,7 @@ class Agreement(Question):
         )
         self.stem, self.needs = f"{one.stem}{AGREEMENT}", (other_stem, one.stem)
 
-    def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
+    def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
         """Compare the maps, cell by cell."""
         from saltus.analysis.basins.compare import compare
 
@@ -141,7 +141,7 @@ class Agreement(Question):
             name_a=self.names[0], name_b=self.names[1]
         )
 
-    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """A row for each pair of attractors."""
         return [agreement_table(ds)]
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import StudyError
 from saltus.study.answers.lyapunov_rows import exponent_table
-from saltus.study.answers.question import Found, OneVerb, first_figure
+from saltus.study.answers.question import Answers, OneVerb, first_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +27,7 @@ class Exponents(OneVerb):
                 f'every = "1 s", about a turn of the motion.'
             )
 
-    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """A row for each motion."""
         return [exponent_table(self.title, ds)]
 

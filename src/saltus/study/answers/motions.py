@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from saltus.errors import StudyError, nearest
 from saltus.fence import shown
 from saltus.study.answers.motion_rows import TABLES
-from saltus.study.answers.question import Found, OneVerb, first_figure
+from saltus.study.answers.question import Answers, OneVerb, first_figure
 from saltus.study.code import code_hash
 from saltus.study.setting import quantities
 from saltus.study.tables.signature import verb
@@ -63,7 +63,7 @@ class OfMotions(OneVerb):
     def check_more(self, table: Any, setting: Setting) -> None:
         """What this question asks besides."""
 
-    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """The one table."""
         return [TABLES[self.place](self.title, ds)]
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from saltus.study.setting.setting import Setting
     from saltus.study.table import TextTable
 
-#: Datasets of a study by the stems of their files.
-Found = Mapping[str, "xr.Dataset"]
+#: Datasets that answer a study, by the stems of their files.
+Answers = Mapping[str, "xr.Dataset"]
 #: Callable that takes the share done.
 Show = Callable[[float], None]
 
@@ -72,11 +72,11 @@ class Question(ABC):
         return None
 
     @abstractmethod
-    def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:
+    def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:
         """The answer."""
 
     @abstractmethod
-    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:
         """The answer in rows: tables to print, the first of which is the CSV file."""
 
     @abstractmethod
@@ -134,7 +134,7 @@ class OneVerb(Question):
         """What must be the same for a file to hold the answer."""
         return identity(self.system, self.method, self.arguments)
 
-    def compute(self, found: Found, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
+    def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:  # noqa: ARG002
         """Call the function."""
         try:
             return self.call({self.how: self.method, "threads": threads, "progress": progress})

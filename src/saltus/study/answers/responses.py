@@ -10,7 +10,7 @@ import numpy as np
 
 from saltus.errors import SaltusError, StudyError
 from saltus.results.files.measured import measured_points
-from saltus.study.answers.question import Found, OneVerb, first_figure
+from saltus.study.answers.question import Answers, OneVerb, first_figure
 from saltus.study.answers.responses_rows import tables
 from saltus.study.tables.wording import fault
 
@@ -47,7 +47,7 @@ class Responses(OneVerb):
         """The responses."""
         return super().call(how | {self.axes: self.varied()})
 
-    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """Branches, and what happens to them; kinds of motion over two parameters."""
         return tables(self.title, ds)
 

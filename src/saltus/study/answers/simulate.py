@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import StudyError
 from saltus.study.answers.compare import contact_table, exact_times, printed_rows
-from saltus.study.answers.question import Found, OneVerb, Question, first_figure
+from saltus.study.answers.question import Answers, OneVerb, Question, first_figure
 from saltus.study.answers.simulate_rows import run_table
 from saltus.study.setting import quantities
 from saltus.study.tables.questions import REFERENCE, RUN
@@ -74,7 +74,7 @@ class Motion(OneVerb):
         self.exact = exact_times(files[1].data, files[1].path) if len(files) > 1 else {}
         self.inputs = files
 
-    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:
         """A row for each trajectory, or for each contact that was printed."""
         if self.compare is None:
             return [run_table(self.title, ds)]
@@ -110,7 +110,7 @@ class Reference(Motion):
         assert self.compare is not None
         self.method = setting.method(self.compare.reference, "compare.reference")
 
-    def rows(self, ds: xr.Dataset, found: Found) -> list[TextTable]:  # noqa: ARG002
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """It stands in the table of the run."""
         return []
 

@@ -19,7 +19,7 @@ from saltus.errors import StudyError
 if TYPE_CHECKING:
     from saltus.analysis.basins.labels import Settling
     from saltus.analysis.basins.pipeline import BasinPlan
-    from saltus.analysis.orbits.found import Found
+    from saltus.analysis.orbits.attractor_set import AttractorSet
 
 #: Chunks handed out at a time, for each worker: enough to keep it busy, few enough that a large map
 #: doesn't fill the scheduler.
@@ -76,7 +76,7 @@ def check_scheduler(address: str) -> None:
 def _run(
     client: Any,
     plan: BasinPlan,
-    found: Found,
+    found: AttractorSet,
     missing: list[int],
     keep: Callable,
     show: Callable[[float], None],
@@ -134,6 +134,6 @@ def _submit(client: Any, shared: Any, index: int) -> Any:
     return client.submit(_chunk, shared, index, retries=MAX_RETRIES, pure=False)
 
 
-def _chunk(shared: tuple[BasinPlan, Found], index: int) -> Settling:
+def _chunk(shared: tuple[BasinPlan, AttractorSet], index: int) -> Settling:
     plan, found = shared
     return plan.chunk(index, found)

@@ -30,7 +30,7 @@ from saltus.study.run.running import Report, Resources
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.analysis.orbits.found import Found
+    from saltus.analysis.orbits.attractor_set import AttractorSet
 
 #: Chunks of a map from which its time is estimated.
 LARGE = 20
@@ -107,7 +107,7 @@ def compute(
     return not store.missing()
 
 
-def _attractors(job: BasinMap, store: Store, resources_: Resources) -> Found:
+def _attractors(job: BasinMap, store: Store, resources_: Resources) -> AttractorSet:
     """The attractors that all chunks are labelled with: found once, by whoever comes first."""
     if not store.has("attractors"):
         store.put("attractors", found_data(job.plan.scout(resources_.threads)), existing="keep")
@@ -124,7 +124,7 @@ def _runner(resources_: Resources) -> AbstractContextManager[Callable[..., None]
         return nullcontext(partial(run_on_processes, resources_.workers))
 
     def run(
-        plan: BasinPlan, found: Found, missing: list[int], keep: Callable, show: Callable
+        plan: BasinPlan, found: AttractorSet, missing: list[int], keep: Callable, show: Callable
     ) -> None:
         label_all(plan, found, missing, keep, resources_.threads, show)
 
@@ -137,7 +137,7 @@ def finish(job: BasinMap, store: Store, threads: int | None = None) -> xr.Datase
     return job.plan.finish(settling_from(store.read_all(), job.plan.system.states), found, threads)
 
 
-def estimate(plan: BasinPlan, found: Found, resources_: Resources) -> str:
+def estimate(plan: BasinPlan, found: AttractorSet, resources_: Resources) -> str:
     """A sentence on the time, memory and disk that a map will take, from a few hundred of its
     cells.
     """

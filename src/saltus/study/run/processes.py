@@ -20,7 +20,7 @@ from saltus.interrupt import ctrl_c_waits
 if TYPE_CHECKING:
     from saltus.analysis.basins.labels import Settling
     from saltus.analysis.basins.pipeline import BasinPlan
-    from saltus.analysis.orbits.found import Found
+    from saltus.analysis.orbits.attractor_set import AttractorSet
 
 #: Chunks that a process has at a time: one that it computes, one that it begins while the first is
 #: committed.
@@ -32,7 +32,7 @@ MAX_RETRIES = 5
 def run_on_processes(
     workers: int | None,
     plan: BasinPlan,
-    found: Found,
+    found: AttractorSet,
     missing: Sequence[int],
     keep: Callable[[int, Settling], None],
     show: Callable[[float], None],
@@ -47,7 +47,7 @@ def run_on_processes(
     ----------
     workers : int, optional
         Processes; by default one for each usable core.
-    plan, found : BasinPlan, Found
+    plan, found : BasinPlan, AttractorSet
         What is computed, and the attractors.
     missing : sequence of int
         Chunks to compute.
@@ -85,7 +85,7 @@ def run_on_processes(
 class _Worker:
     """A process, the pipe to it, and the chunks that it has."""
 
-    def __init__(self, plan: BasinPlan, found: Found):
+    def __init__(self, plan: BasinPlan, found: AttractorSet):
         self._job = plan, found
         self.held: deque[int] = deque()
         context = multiprocessing.get_context("spawn")
@@ -167,7 +167,7 @@ def _without_ctrl_c() -> Iterator[None]:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-def _work(pipe: Connection, plan: BasinPlan, found: Found) -> None:
+def _work(pipe: Connection, plan: BasinPlan, found: AttractorSet) -> None:
     """The life of a process: chunks come, answers go, until the other end of the pipe is closed."""
     from saltus.codegen.announce import silent
 

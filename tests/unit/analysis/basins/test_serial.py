@@ -19,9 +19,9 @@ from saltus.analysis.basins.serial import (
     settling_from,
 )
 from saltus.analysis.orbits.aperiodic import SampledAttractor
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.find_attractors import find_attractors
-from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.orbits import Orbit
 from saltus.errors import SaltusError
 from saltus.whole_files import seal, unseal
@@ -129,7 +129,7 @@ def test_numbers_that_text_may_lose():
     )
     matrices = np.arange(16.0).reshape(4, 2, 2) / 7
     orbit = Orbit(odd, np.array([0.3 + 0.4j, complex(-0.0, -0.4)]), np.float64(1e-17))
-    found = Found(
+    found = AttractorSet(
         Neighbourhoods(odd[:2].copy(), matrices[:2], np.array([0, 1])),
         [orbit],
         [SampledAttractor("quasi_periodic", -0.0, np.nan, odd, SCALE)],
@@ -146,7 +146,7 @@ def test_numbers_that_text_may_lose():
 
 
 def test_nothing_found():
-    again = through_a_store(Found(Neighbourhoods.none(2)))
+    again = through_a_store(AttractorSet(Neighbourhoods.none(2)))
     assert len(again) == 0
     assert again.near.centres.shape == (0, 2)
     assert again.near.weights.shape == (0, 2, 2)
@@ -191,7 +191,7 @@ def test_data_that_do_not_hold_together_are_refused(forge):
 
 def _periodic():
     orbit = Orbit(np.zeros((2, 2)), np.zeros(2, complex), 0.0)
-    return Found(
+    return AttractorSet(
         Neighbourhoods(np.zeros((2, 2)), np.stack([np.eye(2)] * 2), np.zeros(2, np.int64)), [orbit]
     )
 

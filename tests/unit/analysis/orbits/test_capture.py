@@ -9,9 +9,9 @@ import pytest
 
 from function_maps import FunctionMap, orbit_near
 from saltus.analysis.basins.labels import settle
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.capture import Neighbourhoods, _alike, neighbourhoods, sphere
 from saltus.analysis.orbits.find_attractors import find_attractors
-from saltus.analysis.orbits.found import Found
 
 
 def linear(matrix) -> FunctionMap:
@@ -283,7 +283,9 @@ def test_settling_takes_the_first_visit():
     """x -> x/2 from 1024: captured at the first iterate inside, whatever the size of the blocks."""
     map_ = linear([[0.5]])
     orbit = orbit_near(map_, np.array([0.1]), 1, np.array([1.0]))
-    found = Found(Neighbourhoods(np.zeros((1, 1)), np.array([[[1.0]]]), np.array([0])), [orbit])
+    found = AttractorSet(
+        Neighbourhoods(np.zeros((1, 1)), np.array([[[1.0]]]), np.array([0])), [orbit]
+    )
     result = settle(map_, np.array([[1024.0], [1.5], [0.1], [-(2.0**20)]]), found, 100)
     assert result.label.tolist() == [0, 0, 0, 0]
     assert result.periods.tolist() == [10, 1, 1, 20]

@@ -12,9 +12,9 @@ import pytest
 from function_maps import FunctionMap, orbit_near
 from saltus.analysis.basins.labels import OPEN, Settling, complete, settle
 from saltus.analysis.basins.serial import found_data, found_from
+from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.find_attractors import find_attractors
-from saltus.analysis.orbits.found import Found
 from saltus.analysis.orbits.noisy import NARROW, ROOM, Noisy, apart, blurred
 
 WIDE = np.array([1.0])
@@ -118,7 +118,7 @@ def test_starts_are_labelled_by_it(cycle, searched):
 
 def test_what_scouts_miss_is_found_by_the_post_pass():
     map_ = henon(1e-3)
-    nothing = Found(Neighbourhoods.none(2))
+    nothing = AttractorSet(Neighbourhoods.none(2))
     result = settle(map_, starts(40, 2), nothing, 256)
     assert set(result.label) == {OPEN}
     found = complete(map_, result, nothing, SCALE, 256, 1)
@@ -225,7 +225,7 @@ def test_orbits_beside_a_noisy_one_become_it(cycle):
     elsewhere = FunctionMap(
         lambda z: 0.5 * z + 5.0, "x y", lambda z: np.tile(0.5 * np.eye(2), (len(z), 1, 1))
     )
-    found = Found(Neighbourhoods.none(2))
+    found = AttractorSet(Neighbourhoods.none(2))
     far = orbit_near(elsewhere, np.full(2, 9.9), 1, SCALE)
     found.add(henon(0.0).exact_map, cycle, SCALE)
     found.add(elsewhere, far, SCALE)
@@ -239,7 +239,7 @@ def test_orbits_beside_a_noisy_one_become_it(cycle):
 
 def test_cells_that_have_a_label_keep_their_attractor_when_it_turns_out_to_be_noisy(cycle):
     far = replace(cycle, points=cycle.points + 9.0)
-    before = Found(Neighbourhoods.none(2), [cycle, far])
+    before = AttractorSet(Neighbourhoods.none(2), [cycle, far])
     result = Settling.empty(4, 2)
     result.label[:], result.end[:] = [0, 1, OPEN, OPEN], [[0, 0], [0, 0], *starts(2, 2)]
     after = complete(henon(1e-3), result, before, SCALE, 256, 1)
@@ -260,7 +260,7 @@ def test_errors_that_carry_the_motion_too_far_leave_it_without_a_type():
 
 
 def test_a_store_keeps_it_to_the_last_bit(cycle):
-    found = Found(Neighbourhoods.none(2))
+    found = AttractorSet(Neighbourhoods.none(2))
     found.add_sampled(noisy_cycle(cycle))
     data = json.loads(json.dumps(found_data(found)))
     (again,), (one,) = found_from(data, 2).sampled, found.sampled

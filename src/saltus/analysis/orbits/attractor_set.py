@@ -18,7 +18,7 @@ INSIDE = 0.9
 
 
 @dataclass
-class Found:
+class AttractorSet:
     """Attractors of a map, in the order of their ids.
 
     Attributes
@@ -66,7 +66,7 @@ class Found:
                 return i
         raise AssertionError("an attractor that wasn't found")
 
-    def ordered(self, scale: np.ndarray) -> Found:
+    def ordered(self, scale: np.ndarray) -> AttractorSet:
         """The same with ids that don't depend on the order of discovery: by period, then by size,
         then by place.
         """
@@ -76,7 +76,9 @@ class Found:
         )
         sampled = sorted(self.sampled, key=lambda w: (w.kind, *w.first))
         near = self.near.renumbered(np.argsort(np.array(order, np.int64)))
-        return Found(near, [self.orbits[i] for i in order], sampled, self.unstable, self.astray)
+        return AttractorSet(
+            near, [self.orbits[i] for i in order], sampled, self.unstable, self.astray
+        )
 
 
 def is_about(one: Orbit | SampledAttractor, orbit: Orbit) -> bool:
