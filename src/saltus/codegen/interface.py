@@ -90,7 +90,7 @@ TAYLOR = Interface(
             ),
             WHOLE,
         )
-        | {"GUARD_SIGN": REAL, "LAW_SIDE": REAL, "KNOWN_ZEROS": REAL}
+        | {"GUARD_SIGN": REAL, "LAW_SIDE": REAL}
     ),
     functions=MappingProxyType(
         {
