@@ -12,6 +12,7 @@ import xarray as xr
 from saltus.results.dataset.schema import (
     ENERGY,
     IMPACTS,
+    MODES,
     SECTION,
     SETTLED,
     SPECTRUM,
@@ -102,6 +103,15 @@ def _widths(ds: xr.Dataset) -> list[str]:
     ]
 
 
+def _modes(ds: xr.Dataset) -> list[str]:
+    frequency, share = ds["frequency"].values, ds["flexibility_share"].values
+    lines = [f"found    {len(frequency)} modes of {ds.sizes['degree']} degrees of freedom"]
+    lines += [f"extent   {frequency[0]:.4g} to {frequency[-1]:.4g} Hz"]
+    for place, one in zip(ds["place"].values.tolist(), share.tolist(), strict=True):
+        lines.append(f"  {place}: {one:.2%} of the static flexibility")
+    return lines
+
+
 #: For each kind, what writes its lines.
 WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SECTION: _section,
@@ -110,4 +120,5 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     ENERGY: _energy,
     SETTLED: _settled,
     WIDTHS: _widths,
+    MODES: _modes,
 }
