@@ -31,16 +31,19 @@ if TYPE_CHECKING:
     from saltus.analysis.motion.simulate import simulate
     from saltus.analysis.motion.spectrum import spectrum
     from saltus.analysis.motion.stroboscope import stroboscope
+    from saltus.analysis.motion.structure_modes import structure_modes
     from saltus.analysis.motion.transmissibility import transmissibility
     from saltus.analysis.recorded.wolf import wolf
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
-    from saltus.flow import ODE23, ODE45, RK4, Interrupted, Taylor
+    from saltus.flow import ODE23, ODE45, ODE113, RK4, Interrupted, ODE15s, Taylor
     from saltus.interrupt import Stop
     from saltus.results import contacts, load, samples, save, to_csv, to_mat
     from saltus.results.describe import describe
     from saltus.system import (
+        Contact,
+        Force,
         System,
         abs,
         acos,
@@ -72,6 +75,7 @@ if TYPE_CHECKING:
         sinh,
         sqrt,
         square,
+        structure,
         system,
         table,
         tan,
@@ -97,11 +101,13 @@ _HOMES = {
     "simulate": "saltus.analysis.motion.simulate",
     "spectrum": "saltus.analysis.motion.spectrum",
     "stroboscope": "saltus.analysis.motion.stroboscope",
+    "structure_modes": "saltus.analysis.motion.structure_modes",
     "transmissibility": "saltus.analysis.motion.transmissibility",
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
     "Stop": "saltus.interrupt",
-    **dict.fromkeys(("ODE23", "ODE45", "RK4", "Interrupted", "Taylor"), "saltus.flow"),
+    **dict.fromkeys(("ODE23", "ODE45", "ODE113", "RK4", "Interrupted", "ODE15s", "Taylor"),
+        "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"),
         "saltus.results"),
     **dict.fromkeys(
@@ -114,14 +120,19 @@ _HOMES = {
     **dict.fromkeys(("friction", "impact", "jump"), "saltus.system"),
     **dict.fromkeys(("pulse", "recorded", "regularise", "sawtooth", "square", "table", "where"),
         "saltus.system"),
+    **dict.fromkeys(("Contact", "Force", "structure"), "saltus.system"),
 }  # fmt: skip
 _MODULES = ("models", "plot")
 
 __all__ = [
     "ODE23",
     "ODE45",
+    "ODE113",
     "RK4",
+    "Contact",
+    "Force",
     "Interrupted",
+    "ODE15s",
     "SaltusError",
     "Stop",
     "System",
@@ -179,6 +190,8 @@ __all__ = [
     "sqrt",
     "square",
     "stroboscope",
+    "structure",
+    "structure_modes",
     "system",
     "table",
     "tan",

@@ -65,10 +65,7 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
     def called(*args: P.args, **kwargs: P.kwargs) -> R:
         if _INSIDE.get():
             return function(*args, **kwargs)
-        given = _check(function.__name__, signature, args, kwargs)
-        kinds.check(f"sl.{function.__name__}", given)
-        if given.get("threads") is not None:
-            whole(given["threads"], "threads", 1, MOST_THREADS)
+        _check(function.__name__, signature, kinds, args, kwargs)
         quiet: AbstractContextManager[Any] = (
             silent() if kwargs.get("progress") is False else nullcontext()
         )
@@ -86,18 +83,39 @@ def verb(function: Callable[P, R]) -> Callable[P, R]:
     return called
 
 
+def check_call(function: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
+    """Raise ParameterError for arguments that a verb doesn't take; for a verb that hands on
+    arguments to another.
+    """
+    function = inspect.unwrap(function)
+    _check(function.__name__, inspect.signature(function), Kinds(function), args, kwargs)
+
+
 def _check(
+    name: str,
+    signature: inspect.Signature,
+    kinds: Kinds,
+    args: tuple[Any, ...],
+    kwargs: Mapping[str, Any],
+) -> None:
+    """Raise ParameterError unless there are such arguments, of these kinds."""
+    given = _by_name(name, signature, args, kwargs)
+    kinds.check(f"sl.{name}", given)
+    if given.get("threads") is not None:
+        whole(given["threads"], "threads", 1, MOST_THREADS)
+
+
+def _by_name(
     name: str, signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]
 ) -> Mapping[str, Any]:
     """The arguments by name. Raises ParameterError unless there are such."""
     known = signature.parameters
-    if not any(parameter.kind == parameter.VAR_KEYWORD for parameter in known.values()):
-        for word in kwargs:
-            if word not in known:
-                raise ParameterError(
-                    f"sl.{name} has no argument {shown(word)}. "
-                    f"{_instead(word, known, args, kwargs)}"
-                )
+    open_ = any(parameter.kind == parameter.VAR_KEYWORD for parameter in known.values())
+    for word in [word for word in kwargs if word not in known]:
+        if not open_ or _misspelt(word, known, args, kwargs):
+            raise ParameterError(
+                f"sl.{name} has no argument {shown(word)}. {_instead(word, known, args, kwargs)}"
+            )
     try:
         given = signature.bind(*args, **kwargs).arguments
     except TypeError as error:
@@ -109,6 +127,26 @@ def _check(
             f"periods can't be {shown(given['periods'])}."
         )
     return given
+
+
+def _misspelt(
+    word: str,
+    known: Mapping[str, inspect.Parameter],
+    args: tuple[Any, ...],
+    kwargs: Mapping[str, Any],
+) -> bool:
+    """Whether a word that could be a state is nearly an argument, and neither a state nor a
+    parameter.
+    """
+    system = kwargs.get("system", args[0] if args else None)
+    return (
+        any(name in known for name in _RANGES)
+        and isinstance(system, System)
+        and word not in system.values
+        and word not in system.states
+        and nearest(word, [*known, *system.states]) == nearest(word, known)
+        and nearest(word, known).startswith("Did you mean")
+    )
 
 
 def _instead(

@@ -176,14 +176,13 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
 
 def _laws(system: System) -> dict[str, list]:
     """Tables of the laws of contact, for each guard: its kind, the guard that says whether it is
-    held (of that one: whose contact), its side, the zeros known where holding ends.
+    held (of that one: whose contact), its side.
     """
     laws = [guard.law for guard in system.guards]
     return dict(
         LAW=[LAW_KINDS[law.kind] if law else NO_LAW for law in laws],
         PARTNER=[law.partner if law else -1 for law in laws],
         LAW_SIDE=[float(law.side) if law else 0.0 for law in laws],
-        KNOWN_ZEROS=[float(law.zeros) if law else 1.0 for law in laws],
     )
 
 

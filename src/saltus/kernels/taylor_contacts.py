@@ -291,7 +291,9 @@ def gaps_here(lanes, lane, batch, slow):
     show_clocks(lanes, lane, slow)
     parameters = batch.param[lanes.memo[lane, WHO] * batch.stride]
     gaps(
-        lanes.clock[TAU, lane] + lanes.clock[BASE, lane],
+        time_of_law(lanes, lane, batch)
+        if LAWS
+        else lanes.clock[TAU, lane] + lanes.clock[BASE, lane],
         slow.state,
         parameters,
         slow.held,

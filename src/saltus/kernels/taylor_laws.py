@@ -29,6 +29,17 @@ def watch(lanes, lane):
         lanes.side[WATCHED + g, lane] = 1.0 if held == (LAW[g] == HOLD_LAW) else 0.0
 
 
+@inner
+def time_of_law(lanes, lane, batch):
+    """The time as laws read it: of a motion whose forcing repeats to the bit, that of its first
+    period, which is right to rounding after any number of them.
+    """
+    base = lanes.clock[BASE, lane]
+    if NCLOCKS == 0 and lanes.memo[lane, DRIFTS] == 0:
+        base = batch.origin[lanes.memo[lane, WHO]]
+    return lanes.clock[TAU, lane] + base
+
+
 # -- contacts by their laws ------------------------------------------------------------------------
 @kernel
 def meet(lanes, lane, batch, g, rate, slow):
@@ -180,7 +191,7 @@ def hold(lanes, lane, batch, g, later, slow):
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     show_clocks(lanes, lane, slow)
-    now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
+    now = time_of_law(lanes, lane, batch)
     settle(now, slow.state, batch.param[who * batch.stride], slow.held, before, g)
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
@@ -190,18 +201,20 @@ def hold(lanes, lane, batch, g, later, slow):
 @kernel
 def release(lanes, lane, batch, h, slow):
     """A contact is held no longer. Where its force fades out, more than the gap is known to be
-    zero; where it jumps, its rate at most.
+    zero; where it jumps, or falls from static to kinetic friction, its rate at most.
     """
     before, g = mode_of(lanes, lane), PARTNER[h]
     gaps_here(lanes, lane, batch, slow)
     fades = lanes.found[DELTA, lane] > 0.0
     lanes.side[h, lane] = -1.0
     if LAW[g] == SURFACE_LAW:
-        lanes.side[g, lane] = 1.0 if slow.gaps[NGUARDS + g] > 0.0 else -1.0
-        lanes.fresh[g, lane] = KNOWN_ZEROS[g] if fades else 1.0
+        needed, most = slow.gaps[NGUARDS + g], abs(slow.gaps[2 * NGUARDS + g])
+        lanes.side[g, lane] = 1.0 if needed > 0.0 else -1.0
+        starts_slowly = fades and abs(abs(needed) - most) <= SLOW_START * most
+        lanes.fresh[g, lane] = 2.0 if starts_slowly else 1.0
     else:
         lanes.side[g, lane] = LAW_SIDE[g]
-        lanes.fresh[g, lane] = KNOWN_ZEROS[g] if fades else 2.0
+        lanes.fresh[g, lane] = 3.0 if fades else 2.0
     watch(lanes, lane)
     if TANGENT and fades:
         saltate(lanes, lane, batch, h, before, slow)

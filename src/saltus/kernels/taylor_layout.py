@@ -17,7 +17,7 @@ zeros, of P and its derivatives.
 
 The head supplies the sizes LANES, NSTATES, NGUARDS, ORDER, NCONST, NTURNS, ROWS, NSERIES, the rows
 SERIES_ROW, GUARD_ROW, GUARD_SERIES, GUARD_SIGN, GAP_ROW, SCALE_ROW, SNAP_STATE, SNAP_CONST, the
-laws LAW, PARTNER, LAW_SIDE, KNOWN_ZEROS of the guards (LAWS: whether there is one), the
+laws LAW, PARTNER, LAW_SIDE of the guards (LAWS: whether there is one), the
 degrees NEWTON_DEGREE_1 and _2, and the functions constants(p, c, lane), gaps(t, y, p, h, out),
 turns(p, origin, period, count, lane, clock) -> whether they change from period to period, jets(y,
 side, c, clock, work) and rates(y, side, c, clock, work), the right-hand side alone; PROBED says
@@ -97,6 +97,9 @@ CARRY = CARRIED + (2 if LAWS else 1) * NGUARDS
 STEP_RECORDS = 2 * LANES * ((2 if LAWS else 1) * NGUARDS + MOST_TOUCHES)
 #: Row of `side` from which on the lanes stand in which a guard is watched (0/1).
 WATCHED = NGUARDS + NSINGULAR
+#: Part of a friction force by which the force needed exceeds it where slip begins, below which that
+#: is rounding.
+SLOW_START = 1.0e-9
 #: Part of the time scale of the acceleration that may be left of a chatter when it is completed.
 CHATTER = 1.0e-8
 #: Times within this many ulp are one event (EVENTS.md, rule 6).

@@ -8,7 +8,7 @@ from saltus.results.files.atomic import ResultFileError, usable_folder
 from saltus.results.files.export import save, to_csv, to_mat, to_netcdf
 from saltus.results.files.frames import contacts, samples
 from saltus.results.files.load import load
-from saltus.results.provenance import attributes, content_hash
+from saltus.results.provenance import attributes, content_hash, inherited, made_by
 
 __all__ = [
     "AttractorTable",
@@ -21,7 +21,9 @@ __all__ = [
     "contacts",
     "content_hash",
     "describe",
+    "inherited",
     "load",
+    "made_by",
     "samples",
     "save",
     "to_csv",

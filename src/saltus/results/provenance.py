@@ -67,7 +67,7 @@ def attributes(
     """
     varied = list(varied)
     return {
-        "saltus_version": version("saltus"),
+        **made_by(),
         "system": system,
         "source": source,
         "fingerprint": fingerprint,
@@ -79,8 +79,21 @@ def attributes(
         "units": to_json(dict(units)),
         "method": method,
         "method_options": to_json(dict(method_options)),
-        "versions": _versions(),
     }
+
+
+def inherited(ds: xr.Dataset) -> dict[str, Any]:
+    """Attributes of a result that one made of it takes over."""
+    return {
+        str(key): value
+        for key, value in ds.attrs.items()
+        if key not in ("result_hash", "forcing_period_s")
+    }
+
+
+def made_by() -> dict[str, str]:
+    """What made a result that comes from no system: the versions."""
+    return {"saltus_version": version("saltus"), "versions": _versions()}
 
 
 def to_json(value: Any) -> str:

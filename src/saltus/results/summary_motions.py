@@ -1,5 +1,5 @@
-"""What sections, spectra, impact statistics and energy balances say in a few lines, for
-``describe``.
+"""What sections, spectra, impact statistics, energy balances, settled responses and widths say in a
+few lines, for ``describe``.
 """
 
 from __future__ import annotations
@@ -9,7 +9,16 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
-from saltus.results.dataset.schema import ENERGY, IMPACTS, SECTION, SPECTRUM, states_of
+from saltus.results.dataset.schema import (
+    ENERGY,
+    IMPACTS,
+    SECTION,
+    SETTLED,
+    SPECTRUM,
+    WIDTHS,
+    period_text,
+    states_of,
+)
 from saltus.results.wording import unit_of
 
 #: Largest lines of a spectrum that are listed.
@@ -70,10 +79,33 @@ def _energy(ds: xr.Dataset) -> list[str]:
     ]
 
 
+def _settled(ds: xr.Dataset) -> list[str]:
+    found, counts = np.unique(ds["response_period"].values, return_counts=True)
+    each = [f"{count} {period_text(int(n))}" for n, count in zip(found, counts, strict=True)]
+    return [f"found    {', '.join(each)}"]
+
+
+def _widths(ds: xr.Dataset) -> list[str]:
+    width, unit = float(ds["equal_width"]), ds["equal_width"].attrs["units"]
+    found = (
+        "at none of the widths"
+        if np.isnan(width)
+        else f"at a width of {width:.3g} {unit}".rstrip()
+        + f", {float(ds['equal_steps_per_period']):.3g} steps a period"
+    )
+    return [
+        f"contacts error {float(ds['method_error']):.2g} of a period, "
+        f"{float(ds['method_steps_per_period']):.3g} steps",
+        f"equal    {found}",
+    ]
+
+
 #: For each kind, what writes its lines.
 WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SECTION: _section,
     SPECTRUM: _spectrum,
     IMPACTS: _impacts,
     ENERGY: _energy,
+    SETTLED: _settled,
+    WIDTHS: _widths,
 }

@@ -45,15 +45,16 @@ from saltus.system.guards import Guard
 from saltus.system.inputs import pulse, recorded, sawtooth, square
 from saltus.system.laws import freeplay
 from saltus.system.regularisation import regularise
+from saltus.system.structures import Contact, Force, structure
 from saltus.system.system import System
 from saltus.system.tables import table
 from saltus.system.trace import system
 
 __all__ = [
-    "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos", "cosh", "exp",
-    "freeplay", "friction", "heaviside", "hypot", "impact", "jump", "log", "max",
+    "Contact", "Force", "Guard", "System", "abs", "acos", "asin", "atan", "atan2", "clip", "cos",
+    "cosh", "exp", "freeplay", "friction", "heaviside", "hypot", "impact", "jump", "log", "max",
     "min", "mod", "pi", "piecewise", "pulse", "recorded", "regularise", "sawtooth", "sign", "sin",
-    "sinh", "sqrt", "square", "system", "table", "tan", "tanh", "where",
+    "sinh", "sqrt", "square", "structure", "system", "table", "tan", "tanh", "where",
 ]  # fmt: skip
 
 

@@ -145,7 +145,9 @@ def _by_law(law: Law | None, place: str, system: System, writer: Writer) -> str:
     if law is None:
         return place
     if law.kind == "surface":
-        return f"sticks or slides at {place}"
+        limit = writer.text(law.limit) if law.limit is not None else "1"
+        stronger = "" if limit == "1" else f", held by up to {limit} times the force of sliding"
+        return f"sticks or slides at {place}{stronger}"
     if law.restitution is None:
         return f"jump at {place}"
     if varies(law.restitution):

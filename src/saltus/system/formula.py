@@ -43,7 +43,19 @@ _SIMPLE = (
     "tan",
     "tanh",
 )
-_COMPOSED = ("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "sign", "sinh", "where")
+_COMPOSED = (
+    "acos",
+    "asin",
+    "atan2",
+    "clip",
+    "cosh",
+    "friction",
+    "heaviside",
+    "hypot",
+    "sign",
+    "sinh",
+    "where",
+)
 #: Functions of formulas.
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(functions, name) for name in _SIMPLE},

@@ -63,6 +63,8 @@ def set_aside(field: Sequence[Expr], guards: Sequence[Guard]) -> SetAside:
     """
     boundaries = _Boundaries(guards)
     roots = (*field, *(guard.gap for guard in guards))
+    if not _may_break(roots):
+        return SetAside(tuple(field), roots[len(field) :], (), len(guards))
     broken = {
         number: nodes
         for number in range(len(guards))
@@ -80,6 +82,8 @@ def check_finite(field: Sequence[Expr], guards: Sequence[Guard], states: Sequenc
     """Raise a TraceError if a piece of the field is infinite on its own boundary: nothing can be
     said of a motion that meets it.
     """
+    if not _may_break(field):
+        return
     boundaries = _Boundaries(guards)
     for number, guard in enumerate(guards):
         orders = boundaries.orders(field, number)
@@ -137,6 +141,26 @@ def lifted(field: Iterable[Expr], guards: Sequence[Guard]) -> tuple[Expr, ...]:
         new = ex.rebuild(node, tuple(memo[child] for child in node.args), node.payload)
         memo[node] = boundaries.lifted(new) if new.op in ("pow", "sqrt", "log") else new
     return tuple(memo[root] for root in roots)
+
+
+def _may_break(roots: Iterable[Expr]) -> bool:
+    """Whether anything below the roots could have no Taylor series: only these operations can, and
+    to look for zeros on every boundary takes long in a field of a thousand terms.
+    """
+    for node in ex.walk(*roots):
+        match node.op:
+            case "sqrt" | "log":
+                return True
+            case "pow" if not _is_whole(node.args[1]):
+                return True
+            case "div" if ex.depends_on(node.args[1], ("state",)):
+                return True
+    return False
+
+
+def _is_whole(exponent: Expr) -> bool:
+    """Whether an exponent is a whole number, not negative."""
+    return exponent.op == "const" and exponent.payload >= 0 and exponent.payload % 1 == 0
 
 
 def assuming(root: Expr, bit: int, value: bool) -> Expr:
@@ -347,9 +371,10 @@ def _order_of_power(base: Order, exponent: Expr) -> Order:
         return Order(math.inf, False)
     if exponent.op != "const":
         return Order(base.order, base.singular or base.order > 0)
-    number = float(exponent.payload)
-    whole = number == int(number) and number >= 0
-    return Order(base.order * number, base.singular or (base.order > 0 and not whole))
+    return Order(
+        base.order * exponent.payload,
+        base.singular or (base.order > 0 and not _is_whole(exponent)),
+    )
 
 
 def _order_of_function(op: str, inner: Order) -> Order:

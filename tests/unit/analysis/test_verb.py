@@ -105,17 +105,6 @@ def test_a_picture_that_is_not_there_is_answered_by_one_that_is():
         sl.plot.basin  # noqa: B018
 
 
-def test_every_public_verb_is_one():
-    verbs = [name for name, home in sl._HOMES.items() if home.startswith("saltus.analysis.")]
-    assert len(verbs) >= 17
-    for name in verbs:
-        with pytest.raises(sl.SaltusError, match=f"sl.{name}"):
-            getattr(sl, name)(**{"no such argument": 1}) if name not in (
-                "basins",
-                "basin_fractions",
-            ) else getattr(sl, name)()
-
-
 def test_ctrl_c_before_anything_is_finished_is_told_in_a_sentence():
     @verb
     def pressed(progress=None):

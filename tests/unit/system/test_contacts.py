@@ -310,7 +310,9 @@ class TestSystems:
         text = str(stop.with_values(restitution=0.3))
         assert "gap  impact with restitution 0.3 at x = gap  (1)" in text
         assert "2 states, 1 guard," in text
-        assert "speed  sticks or slides at v = speed  (0.2)" in str(belt)
+        assert "speed  sticks or slides at v = speed  (0.2), held by up to stick/slip times" in str(
+            belt
+        )
         assert "at rest" not in text + stop._repr_html_() + str(stop.equations())
 
     @pytest.mark.parametrize("system", [stop, belt], ids=lambda one: one.name)

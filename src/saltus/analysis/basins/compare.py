@@ -14,7 +14,7 @@ from saltus.analysis.orbits.orbits import orbit_distance
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.intervals import wilson
-from saltus.results import Subject, build
+from saltus.results import Subject, build, made_by
 from saltus.results.dataset.attractors import basin_meanings
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.reader import reader
@@ -334,4 +334,4 @@ def _provenance(a: xr.Dataset, b: xr.Dataset) -> dict[str, Any]:
             {name: value for name, value in first.items() if second.get(name) == value},
             ensure_ascii=False,
         )
-    return {**result, **common}
+    return {**made_by(), **result, **common}

@@ -23,10 +23,11 @@ from saltus.analysis.methods.method_errors import (
 from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
 from saltus.analysis.responses.frequency_response import frequency_response
 from saltus.analysis.starts import check_system
-from saltus.analysis.verb import verb
+from saltus.analysis.verb import check_call, verb
 from saltus.errors import ParameterError, among, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
+from saltus.interrupt import Interrupted
 from saltus.intervals import wilson
 from saltus.results import Subject, build
 from saltus.results.dataset.attractors import basin_meanings
@@ -126,6 +127,7 @@ def compare_methods(
         raise ParameterError(
             "there is nothing to compare: give at least one method beside the reference."
         )
+    check_call(_ANALYSES[name], system, method=everything[0], **arguments, progress=progress)
     results, costs = [], []
     for method in everything:
         known = (computed or {}).get(method.label)
@@ -215,7 +217,10 @@ def _timed(
     map_.tangent(start, 1)
     map_.run(start, 1)
     begin = time.process_time()
-    ds = _ANALYSES[name](system, method=method, **arguments)
+    try:
+        ds = _ANALYSES[name](system, method=method, **arguments)
+    except Interrupted:
+        raise Interrupted from None  # what one method has finished is no comparison
     return ds, time.process_time() - begin
 
 

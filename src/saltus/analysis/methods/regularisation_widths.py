@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from saltus.analysis.dataset_parts import provenance
+from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.orbits.find_responses import motion_range
 from saltus.analysis.starts import ensemble
 from saltus.analysis.verb import verb
@@ -18,6 +18,8 @@ from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import ODE45, Method, Taylor, check_method
 from saltus.kernels import status as st
+from saltus.results import build
+from saltus.results.dataset.schema import WIDTHS
 from saltus.system.blend import STEPS
 from saltus.system.dimensions import gap_units
 from saltus.system.evaluate import evaluate
@@ -128,26 +130,13 @@ def regularisation_widths(
     equal_steps = np.exp(np.interp(np.log(equal), np.log(tried[::-1]), np.log(steps[::-1])))
     if np.isnan(equal):
         equal_steps = np.nan
-    share = {"units": "1"}
-    return xr.Dataset(
-        {
-            "regularisation_error": ("width", by_width, share | {"long_name": "error of a forcing "
-                "period by the width"}),
-            "error": ("width", both, share | {"long_name": "error of a forcing period by width and "
-                "method"}),
-            "steps_per_period": ("width", steps, share | {"long_name": "steps tried in one forcing "
-                "period of the stand-in"}),
-            "method_error": ((), own, share | {"long_name": "error of a forcing period by the "
-                "method"}),
-            "method_steps_per_period": ((), own_steps, share | {"long_name": "steps tried in one "
-                "forcing period of the system with contacts"}),
-            "equal_width": ((), equal, {"units": unit, "long_name": "width of equal errors"}),
-            "equal_steps_per_period": ((), equal_steps, share | {"long_name": "steps tried in one "
-                "forcing period at the width of equal errors"}),
-        },
-        {"width": ("width", tried, {"units": unit, "long_name": "width of the blend"})},
-        provenance(system, method, system.values) | {"law": law},
-    )  # fmt: skip
+    values = {
+        "width": tried, "regularisation_error": by_width, "error": both, "steps_per_period": steps,
+        "method_error": own, "method_steps_per_period": own_steps, "equal_width": equal,
+        "equal_steps_per_period": equal_steps,
+    }  # fmt: skip
+    about = subject(system, provenance(system, method, system.values) | {"law": law})
+    return build(WIDTHS, about, values)
 
 
 def _orbit(map_: Stroboscope, start: np.ndarray, transient: int, points: int) -> np.ndarray:
@@ -158,7 +147,7 @@ def _orbit(map_: Stroboscope, start: np.ndarray, transient: int, points: int) ->
     orbit = np.concatenate(states)
     if not np.isfinite(orbit).all():
         raise ParameterError(
-            "regularisation_widths: the motion from this start doesn't last. Give another start="
+            "regularisation_widths: the motion from this start doesn't last. Give another start=."
         )
     return orbit
 

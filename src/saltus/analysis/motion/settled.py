@@ -8,14 +8,17 @@ Newton and Floquet multipliers do that.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole as whole_number
+from saltus.results import Subject, build, inherited
 from saltus.results.dataset.reader import reader
-from saltus.results.dataset.schema import TRAJECTORY, check, kind_of, states_of
+from saltus.results.dataset.schema import SETTLED, TRAJECTORY, check, kind_of, states_of
 
 #: Largest mismatch that counts as a repeat: far above rounding, far below what tells 24T from its
 #: neighbour 12T on the rig (1e-2).
@@ -179,26 +182,18 @@ def _contacts(run: xr.Dataset, number: int | None, first: int, final: int) -> in
 def _dataset(
     run: xr.Dataset, rows: list[dict[str, float]], batch: bool, longest: int
 ) -> xr.Dataset:
-    dims = ("trajectory",) if batch else ()
-    kinds = {
-        "response_period": ("1", "period of the response in forcing periods, 0 if none was found"),
-        "mismatch": ("1", "relative difference of states one response period apart"),
-        "contacts_per_response": ("1", "contacts in one period of the response"),
+    states = states_of(run)
+    values: dict[str, Any] = {
+        name: np.array([row[name] for row in rows])
+        for name in ("mismatch", "response_period", "contacts_per_response")
+        if name in rows[0]
     }
-    for name in states_of(run):
-        kinds[f"{name}_peak"] = (run[name].attrs.get("units", ""), f"largest |{name}|")
-        kinds[f"{name}_rms"] = (run[name].attrs.get("units", ""), f"root mean square of {name}")
-    data = {}
-    for name in rows[0]:
-        values = np.array(
-            [row[name] for row in rows], dtype=np.int64 if name == "response_period" else np.float64
-        )
-        data[name] = xr.Variable(
-            dims,
-            values if batch else values[0],
-            {"units": kinds[name][0], "long_name": kinds[name][1]},
-        )
-    coords = {"trajectory": run["trajectory"]} if batch else {}
-    return xr.Dataset(
-        data, coords, {"system": run.attrs.get("system", ""), "longest_period": longest}
-    )
+    for measure in ("peak", "rms") if kind_of(run) == TRAJECTORY else ():
+        values[f"<state>_{measure}"] = {
+            name: np.array([row[f"{name}_{measure}"] for row in rows]) for name in states
+        }
+    if batch:
+        values["trajectory"] = run["trajectory"].values
+    units = {name: run[name].attrs.get("units", "") for name in states}
+    attrs = inherited(run) | {"longest_period": longest}
+    return build(SETTLED, Subject(states, units, attrs, batch=batch), values)

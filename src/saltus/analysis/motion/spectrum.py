@@ -15,7 +15,7 @@ from saltus.analysis.motion.settled import settled
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole as whole_number
-from saltus.results import Subject, build
+from saltus.results import Subject, build, inherited
 from saltus.results.dataset import schema
 from saltus.results.dataset.reader import reader
 
@@ -125,11 +125,7 @@ def spectrum(
         if own
         else run.attrs.get("forcing_period_s"),
         varied=varied,
-        attrs={
-            key: value
-            for key, value in run.attrs.items()
-            if key not in ("result_hash", "forcing_period_s")
-        },
+        attrs=inherited(run),
         batch=batch,
     )
     places = {"trajectory": np.arange(len(chosen)), "frequency": stretch.frequency}

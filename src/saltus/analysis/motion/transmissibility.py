@@ -9,6 +9,7 @@ import xarray as xr
 
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
+from saltus.results.dataset.build import finish
 from saltus.results.dataset.reader import reader
 from saltus.results.dataset.schema import RESPONSES, check
 
@@ -71,13 +72,14 @@ def transmissibility(ds: xr.Dataset, output: str, to: str, by: By = "amplitude")
         ratio = upper[f"output_{by}"].values / lower[f"output_{by}"].values
     phase = np.angle(np.exp(1j * (upper["output_phase"].values - lower["output_phase"].values)))
     labels = {"units": unit, "long_name": f"{output} / {to}"}
-    return ds.assign(
-        transmissibility=("response", ratio, labels),
-        transmissibility_phase=(
-            "response",
-            phase,
-            {"units": "rad", "long_name": f"phase by which {output} leads {to}"},
-        ),
+    turn = {"units": "rad", "long_name": f"phase by which {output} leads {to}"}
+    added = {
+        "transmissibility": xr.Variable("response", ratio, labels),
+        "transmissibility_phase": xr.Variable("response", phase, turn),
+    }
+    kept = {str(name): variable.variable for name, variable in ds.data_vars.items()}
+    return finish(
+        kept | added, {str(name): one.variable for name, one in ds.coords.items()}, ds.attrs
     )
 
 

@@ -31,7 +31,7 @@ from saltus.analysis.statistics import BOUNDED, CONFIDENCE, UNCLEAR, batch_means
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, SaltusWarning, among, nearest, shown
 from saltus.flow.counts import whole
-from saltus.results import Subject, build
+from saltus.results import Subject, build, made_by
 from saltus.results.dataset import schema
 
 #: Default of the largest distance at most, as a share of the range: beyond it growth isn't that of
@@ -201,6 +201,7 @@ def wolf(
         )
     _warn(found, search, false, size, largest_distance is None)
     settings = {
+        **made_by(),
         "algorithm": "Wolf et al. (1985), fixed evolution time", "confidence": CONFIDENCE,
         "unit": unit, "sampling_interval_s": interval,
         "samples": len(columns), "dimension": size, "delay_samples": lag if single else 0,

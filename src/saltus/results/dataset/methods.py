@@ -1,4 +1,4 @@
-"""The table of what ``compare_methods`` returns."""
+"""The tables of what ``compare_methods`` and ``regularisation_widths`` return."""
 
 from __future__ import annotations
 
@@ -51,4 +51,22 @@ METHODS_VARIABLES = {
         _FIELD, "1", "root mean square error of one forcing period, in units of the motion's range"
     ),
     "steps_per_period": Variable(_FIELD, "1", "steps tried in one forcing period"),
+}
+
+#: Variables of what ``regularisation_widths`` returns.
+WIDTHS_VARIABLES = {
+    "width": Variable(("width",), "<gap>", "width of the blend", coord=True),
+    "regularisation_error": Variable(("width",), "1", "error of a forcing period by the width"),
+    "error": Variable(("width",), "1", "error of a forcing period by width and method"),
+    "steps_per_period": Variable(
+        ("width",), "1", "steps tried in one forcing period of the stand-in"
+    ),
+    "method_error": Variable((), "1", "error of a forcing period by the method"),
+    "method_steps_per_period": Variable(
+        (), "1", "steps tried in one forcing period of the system with contacts"
+    ),
+    "equal_width": Variable((), "<gap>", "width of equal errors"),
+    "equal_steps_per_period": Variable(
+        (), "1", "steps tried in one forcing period at the width of equal errors"
+    ),
 }

@@ -1,4 +1,6 @@
-"""Tables of the results of one motion: sections, spectra, impact statistics, energy balances."""
+"""Tables of the results of one motion: sections, spectra, impact statistics, energy balances,
+responses.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +11,7 @@ from saltus.results.dataset.variable import (
     GUARDS,
     SHARED,
     STATUS,
+    TRAJECTORY_NUMBER,
     Variable,
 )
 
@@ -67,6 +70,21 @@ SPECTRUM_VARIABLES = {
     ),
     "status": STATUS,
     **SHARED,
+}
+
+#: Variables of what ``settled`` returns. The last three are those of a run with samples between
+#: whole periods.
+SETTLED_VARIABLES = {
+    "mismatch": Variable(
+        ("trajectory",), "1", "relative difference of states one response period apart"
+    ),
+    "response_period": SPECTRUM_VARIABLES["response_period"],
+    "contacts_per_response": Variable(
+        ("trajectory",), "1", "contacts in one period of the response"
+    ),
+    "<state>_peak": Variable(("trajectory",), "<state>", "largest |<state>|"),
+    "<state>_rms": Variable(("trajectory",), "<state>", "root mean square of <state>"),
+    **TRAJECTORY_NUMBER,
 }
 
 #: Variables of what ``impact_statistics`` returns.

@@ -25,7 +25,7 @@ from saltus.results.dataset.attractors import (
 )
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
-from saltus.results.dataset.methods import METHODS_VARIABLES
+from saltus.results.dataset.methods import METHODS_VARIABLES, WIDTHS_VARIABLES
 from saltus.results.dataset.responses import RESPONSES_VARIABLES
 from saltus.results.dataset.result import Result
 from saltus.results.dataset.trajectories import STROBOSCOPE_VARIABLES, TRAJECTORY_VARIABLES
@@ -35,6 +35,7 @@ VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS, EXPONENTS = "methods", "exponents"
+SETTLED, WIDTHS = "settled", "widths"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
@@ -46,6 +47,7 @@ MAKERS = {
     SECTION: "sl.poincare", SPECTRUM: "sl.spectrum", IMPACTS: "sl.impact_statistics",
     ENERGY: "sl.energy_balance",
     EXPONENTS: "sl.lyapunov or sl.wolf",
+    SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
 }  # fmt: skip
 
 #: The table of each kind of result.
@@ -62,6 +64,8 @@ TABLES = {
     IMPACTS: motions.IMPACTS_VARIABLES,
     ENERGY: motions.ENERGY_VARIABLES,
     EXPONENTS: EXPONENTS_VARIABLES,
+    SETTLED: motions.SETTLED_VARIABLES,
+    WIDTHS: WIDTHS_VARIABLES,
 }
 
 
@@ -250,6 +254,8 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         IMPACTS: ("contact_speed", "contacts_per_second", "status"),
         ENERGY: ("energy", "residual", "status"),
         EXPONENTS: ("lyapunov_exponent", "running_exponent"),
+        SETTLED: ("response_period", "mismatch"),
+        WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 
 

@@ -1,0 +1,119 @@
+"""`structure_modes`: natural frequencies and shapes of a structure, and what a reduction to the
+lowest of them leaves out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError, shown
+from saltus.flow.counts import whole
+from saltus.system.structures import matrices
+from saltus.system.structures.parts import Contact, direction, parts
+from saltus.system.structures.reduction import flexibility, modes_of
+from saltus.system.structures.structure import degree_names
+
+
+@verb
+def structure_modes(
+    mass: Any,
+    stiffness: Any,
+    modes: int | None = None,
+    *,
+    at: Any = None,
+    names: Sequence[str] | str | None = None,
+) -> xr.Dataset:
+    """The lowest modes of a structure, and how much of the static flexibility they carry.
+
+    Contacts press on few degrees of freedom. What the modes left out would have given way there,
+    the residual flexibility, is missing in a reduced system: set beside that of the contact itself,
+    1/stiffness, it says whether enough modes are kept.
+
+    Parameters
+    ----------
+    mass, stiffness : array or SciPy sparse matrix, shape (n, n)
+        As of :func:`saltus.structure`; both symmetric.
+    modes : int, optional
+        How many are kept; default all.
+    at : str, or sequence of str and of pairs of them, optional
+        Degrees of freedom at which the flexibility is asked for; a pair ``("x2", "x1")`` is the
+        stretch between the two. Default all, or none of a structure of more than 1500.
+    names : sequence of str, or str
+        Names of the degrees of freedom.
+
+    Returns
+    -------
+    Dataset
+        Dims ``mode``, ``degree`` and ``place``. ``frequency`` [Hz]; ``shape`` over (degree, mode),
+        of unit modal mass; over place ``flexibility`` [m/N], the deflection under a unit force
+        there (inf where a rigid body moves), ``residual_flexibility``, the part that the modes left
+        out would carry, and ``flexibility_share``, that of the modes that are kept.
+
+    Raises
+    ------
+    ParameterError
+        If a matrix or a name can't be used.
+
+    Examples
+    --------
+    >>> import numpy as np, saltus as sl
+    >>> stiffness = 1e3 * np.array([[2, -1], [-1, 1]])
+    >>> table = sl.structure_modes(np.eye(2), stiffness, 1, at="x2")
+    >>> round(float(table["frequency"][0]), 3), round(float(table["flexibility_share"][0]), 3)
+    (3.111, 0.947)
+    """
+    mass = matrices.checked(mass, "mass", symmetric=True)
+    size = matrices.len_of(mass)
+    stiffness = matrices.checked(stiffness, "stiffness", size, symmetric=True)
+    count = size if modes is None else whole(modes, "modes", 1, size)
+    degrees = degree_names(names, size)
+    known = modes_of(mass, stiffness, count)
+    places, vectors = _directions(at, degrees if known.shapes.shape[1] == size else [], degrees)
+    total, residual = flexibility(stiffness, known, count, vectors)
+    kept = known.kept(count)
+    with np.errstate(invalid="ignore"):  # of what a rigid body moves, or nothing does
+        share = np.where(np.isfinite(total), 1 - residual / total, np.nan)
+
+    def values(dims: Any, array: np.ndarray, unit: str, name: str) -> xr.Variable:
+        return xr.Variable(dims, array, {"units": unit, "long_name": name})
+
+    return xr.Dataset(
+        {
+            "frequency": values("mode", kept.angular / (2 * np.pi), "Hz", "natural frequency"),
+            "shape": values(
+                ("degree", "mode"), kept.shapes, "kg^-0.5", "mode shape of unit modal mass"
+            ),
+            "flexibility": values("place", total, "m/N", "static flexibility"),
+            "residual_flexibility": values(
+                "place", residual, "m/N", "static flexibility of the modes left out"
+            ),
+            "flexibility_share": values(
+                "place", share, "1", "share of the static flexibility that the modes carry"
+            ),
+        },
+        {"mode": np.arange(1, count + 1), "degree": degrees, "place": places},
+    )
+
+
+def _directions(at: Any, usual: list[str], degrees: list[str]) -> tuple[list[str], np.ndarray]:
+    """Labels of the places, and the directions float64[m, n] of unit forces there."""
+    if isinstance(at, str):
+        at = at.replace(",", " ").split()
+    elif not isinstance(at, list | tuple | None):
+        raise ParameterError(f"at must be names of degrees of freedom, not {shown(at)}.")
+    pairs: list[tuple[Any, Any]] = [
+        one if isinstance(one, tuple) and len(one) == 2 else (one, None)
+        for one in (usual if at is None else at)
+    ]
+    labels = [first if second is None else f"{first} - {second}" for first, second in pairs]
+    contacts = [
+        Contact(first, 1.0, 1.0, to=second, name=f"place_{number}")
+        for number, (first, second) in enumerate(pairs)
+    ]
+    vectors = [direction(one, degrees) for _, one in parts(Contact, contacts, "place", degrees)]
+    return labels, np.array(vectors).reshape(len(vectors), len(degrees))

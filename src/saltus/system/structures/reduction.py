@@ -1,0 +1,130 @@
+"""Modes of a structure, and what is lost by keeping some of them only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError
+from saltus.system.structures.matrices import check_positive, dense, is_sparse, len_of
+
+#: Largest structure whose modes are all computed, as dense matrices.
+MOST_DENSE = 1500
+#: A frequency below this share of the next is one of a rigid body.
+RIGID = 1e-7
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The lowest modes of n degrees of freedom.
+
+    Attributes
+    ----------
+    angular : float64[k]
+        Angular natural frequencies [rad/s], ascending.
+    shapes : float64[n, k]
+        Mode shapes, one each column, of unit modal mass.
+    """
+
+    angular: np.ndarray
+    shapes: np.ndarray
+
+    def kept(self, count: int) -> Modes:
+        """The lowest of them."""
+        return Modes(self.angular[:count], self.shapes[:, :count])
+
+
+def modes_of(mass: Any, stiffness: Any, count: int) -> Modes:
+    """The lowest modes, or all of a structure that is small enough to be dense.
+
+    Raises
+    ------
+    ParameterError
+        If the mass matrix isn't positive definite or the stiffness matrix has a negative
+        eigenvalue.
+    """
+    from scipy.linalg import LinAlgError, eigh
+
+    if len_of(mass) <= MOST_DENSE or count > len_of(mass) // 2:
+        try:
+            squares, shapes = eigh(dense(stiffness), dense(mass))
+        except LinAlgError:
+            check_positive(False, dense(mass))
+    else:
+        squares, shapes = _lowest(mass, stiffness, count)
+    scale = abs(squares).max()
+    if squares[0] < -1e-9 * scale:
+        raise ParameterError(
+            f"stiffness has a negative eigenvalue, {squares[0]:.3g} 1/s^2 with respect to mass: "
+            f"its modes don't vibrate. Leave modes= out."
+        )
+    signs = np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])])
+    return Modes(np.sqrt(np.maximum(squares, 0.0)), shapes * signs)
+
+
+def _lowest(mass: Any, stiffness: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest eigenpairs of large matrices, by Lanczos' method about a shift below zero, which
+    rigid bodies don't disturb.
+    """
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import eigsh
+
+    shift = -1e-3 * abs(stiffness.diagonal()).max() / abs(mass.diagonal()).max() / len_of(mass)
+    start = np.random.default_rng(0).normal(size=len_of(mass))
+    squares, shapes = eigsh(
+        csc_matrix(stiffness), k=count, M=csc_matrix(mass), sigma=shift, v0=start
+    )
+    order = np.argsort(squares)
+    return squares[order], shapes[:, order]
+
+
+def flexibility(
+    stiffness: Any, modes: Modes, count: int, at: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """How far the lowest modes carry the static deflection under a unit force.
+
+    Parameters
+    ----------
+    stiffness : matrix
+        Dense or sparse [N/m].
+    modes : Modes
+        All of them, or those that are kept.
+    count : int
+        How many are kept.
+    at : float64[m, n]
+        Directions of the forces.
+
+    Returns
+    -------
+    total : float64[m]
+        Deflection along each force [m/N]; inf where a rigid body moves.
+    residual : float64[m]
+        The part that the other modes would carry.
+    """
+    first, kept = int((modes.angular <= RIGID * modes.angular.max()).sum()), modes.kept(count)
+    parts = (at @ kept.shapes[:, first:]) ** 2 / kept.angular[first:] ** 2
+    moves = np.abs(at @ kept.shapes[:, :first]).max(axis=1, initial=0.0) > RIGID
+    if modes.shapes.shape[1] == modes.shapes.shape[0]:
+        others = modes.shapes[:, max(count, first) :]
+        residual = ((at @ others) ** 2 / modes.angular[max(count, first) :] ** 2).sum(axis=1)
+    elif first:
+        residual = np.full(len(at), np.nan)  # the others aren't known, and K has no inverse
+    else:
+        from scipy.sparse import csc_matrix
+        from scipy.sparse.linalg import splu
+
+        whole = np.einsum("mn,nm->m", at, splu(csc_matrix(stiffness)).solve(at.T))
+        residual = whole - parts.sum(axis=1)
+    total = np.where(moves, np.inf, parts.sum(axis=1) + residual)
+    return total, residual
+
+
+def modal_damping(damping: Any, modes: Modes, count: int) -> np.ndarray:
+    """A damping matrix in the coordinates of the kept modes, float64[k, k]."""
+    shapes = modes.shapes[:, :count]
+    product = damping @ shapes if is_sparse(damping) else dense(damping) @ shapes
+    full = shapes.T @ product
+    tiny = np.abs(full) <= 1e-14 * np.abs(full).max(initial=0.0)
+    return np.where(tiny, 0.0, full)

@@ -1,0 +1,220 @@
+"""`structure`: a system from a mass, a damping and a stiffness matrix, with contacts and forces
+given as data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, shown
+from saltus.system.functions import pi
+from saltus.system.guards import number_of
+from saltus.system.structures import matrices
+from saltus.system.structures.equations import UNITS, Coordinates, traced
+from saltus.system.structures.parts import Contact, Force, direction, parts
+from saltus.system.structures.reduction import Modes, flexibility, modal_damping, modes_of
+from saltus.system.system import System
+
+#: Most coordinates of a system: what is compiled grows with them.
+MOST_COORDINATES = 128
+
+
+def structure(
+    mass: Any,
+    stiffness: Any,
+    damping: Any = None,
+    *,
+    contacts: Sequence[Any] = (),
+    forces: Sequence[Any] = (),
+    frequency: float | str | None = None,
+    damping_ratio: Any = None,
+    modes: int | None = None,
+    names: Sequence[str] | str | None = None,
+    unit: str = "m",
+    name: str = "structure",
+    source: str = "",
+) -> System:
+    """A system of n degrees of freedom, from its matrices, with contacts and forces given as data::
+
+        mass x'' + damping x' + stiffness x = forces - contacts
+
+    Parameters
+    ----------
+    mass : array or SciPy sparse matrix, shape (n, n)
+        Symmetric and positive definite [kg]. It is inverted once.
+    stiffness : array or sparse matrix, shape (n, n)
+        [N/m]
+    damping : array or sparse matrix, shape (n, n), optional
+        [N*s/m] Default: none.
+    contacts : sequence of Contact, or of mappings of its arguments
+        Springs behind gaps, such as ``sl.Contact("x3", stiffness="1 MN/m", gap="1 mm")``.
+    forces : sequence of Force, or of mappings of its arguments
+        Harmonic forces, such as ``sl.Force("x1", "2 N", phase="90 deg")``.
+    frequency : float or str, optional
+        Forcing frequency [Hz]; needed with forces that oscillate.
+    damping_ratio : float or sequence, optional
+        In place of ``damping``: the ratio of every mode, or one each for the lowest of them.
+    modes : int, optional
+        How many of the lowest modes are kept; the states are then their coordinates. Default: all
+        degrees of freedom, as they are. ``modes=n`` loses nothing, and makes a full mass matrix
+        quicker to compile.
+    names : sequence of str, or str
+        Names of the degrees of freedom; default ``x1``, ``x2``, ... The velocity of ``x1`` is
+        called ``v1``, that of any other name ``NAME_rate``.
+    unit : {"m", "rad", ""}
+        Unit of all degrees of freedom; ``""`` if they differ.
+    name, source : str
+        As of :func:`saltus.system`.
+
+    Returns
+    -------
+    System
+        States are the deflections, then their rates; those of modes are ``q1``, ``q2``, ... and
+        ``q1_rate``, ... What a contact or force is made of is a parameter: ``stop_gap``, ``force``;
+        so is the frequency. Each contact is a guard of its name, ``stop`` or, on two sides, ``stop
+        lower`` and ``stop upper``. The description says what the kept modes carry of the static
+        flexibility at each contact; so does :func:`saltus.structure_modes`.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If a matrix has a wrong shape, isn't finite, or the mass matrix isn't symmetric and positive
+        definite; if a contact or force can't be used, or there are too many degrees of freedom.
+
+    Notes
+    -----
+    Modes are those of the undamped structure without contacts, of unit modal mass. Numbers in the
+    matrices have no units, so the units of the equations aren't checked.
+
+    Examples
+    --------
+    >>> import numpy as np, saltus as sl
+    >>> stiffness = 1e3 * np.array([[2, -1], [-1, 1]])
+    >>> pair = sl.structure(
+    ...     np.eye(2), stiffness, 2e-3 * stiffness, frequency="4 Hz",
+    ...     contacts=[sl.Contact("x2", stiffness="50 kN/m", gap="1 mm")],
+    ...     forces=[sl.Force("x1", "2 N")],
+    ... )
+    >>> pair.states, list(pair.values), pair.guards[0].name
+    (('x1', 'x2', 'v1', 'v2'), ['stop_gap', 'stop_stiffness', 'force', 'frequency'], 'stop')
+    """
+    if unit not in UNITS:
+        raise ParameterError(f"unit must be 'm', 'rad' or '', not {shown(unit)}.")
+    reduced = modes is not None or damping_ratio is not None
+    mass = matrices.checked(mass, "mass", symmetric=True)
+    size = matrices.len_of(mass)
+    stiffness = matrices.checked(stiffness, "stiffness", size, symmetric=reduced)
+    if damping is not None:
+        damping = matrices.checked(damping, "damping", size)
+        if damping_ratio is not None:
+            raise ParameterError("give damping= or damping_ratio=, not both.")
+    degrees = degree_names(names, size)
+    touching = parts(Contact, contacts, "stop", degrees)
+    driving = parts(Force, forces, "force", degrees)
+    count = _count(modes, size)
+    known = modes_of(mass, stiffness, count) if reduced else None
+    if known is not None and damping_ratio is not None:
+        damping = _ratio(damping_ratio, known, count if modes is not None else size)
+    if known is None or modes is None:
+        if known is not None:  # the damping ratios of all modes, back among degrees of freedom
+            shapes = matrices.dense(mass) @ known.shapes
+            damping = shapes @ damping @ shapes.T
+        moving = _physical(mass, stiffness, damping, degrees)
+        words = f"Structure of {size} degrees of freedom."
+    else:
+        if damping is not None and damping_ratio is None:
+            damping = modal_damping(damping, known, count)
+        moving = _modal(known.kept(count), damping)
+        words = _words(stiffness, known, count, degrees, touching)
+    made, sides = traced(
+        moving, degrees, touching, driving, frequency, unit=unit, name=name, source=source
+    )
+    guards = list(made.guards)
+    for label, side in sides.items():
+        number = number_of(side, made.guards)
+        if number is not None:
+            guards[number] = replace(guards[number], name=label)
+    return replace(made, guards=tuple(guards), description=words)
+
+
+# -- coordinates -----------------------------------------------------------------------------------
+def degree_names(names: Any, size: int) -> list[str]:
+    """Names of the degrees of freedom. Raises ParameterError if others are given than there are."""
+    if names is None:
+        return [f"x{i}" for i in range(1, size + 1)]
+    found = names.replace(",", " ").split() if isinstance(names, str) else list(names)
+    if len(found) != size or not all(isinstance(one, str) for one in found):
+        raise ParameterError(f"names must name {size} degrees of freedom, not {shown(names)}.")
+    return found
+
+
+def rate_name(name: str) -> str:
+    """The name of the velocity of a degree of freedom."""
+    return f"v{name[1:]}" if name.startswith("x") else f"{name}_rate"
+
+
+def _count(modes: Any, size: int) -> int:
+    """How many coordinates the system has, checked."""
+    if modes is None:
+        if size > MOST_COORDINATES:
+            raise ParameterError(
+                f"{size} degrees of freedom are too many to compile. Keep the lowest ones by "
+                f"modes=, at most {MOST_COORDINATES}."
+            )
+        return size
+    if isinstance(modes, bool) or not isinstance(modes, int | np.integer) or modes < 1:
+        raise ParameterError(f"modes must be a whole number, 1 or more, not {shown(modes)}.")
+    if modes > min(size, MOST_COORDINATES):
+        raise ParameterError(f"modes = {modes}, but at most {min(size, MOST_COORDINATES)} can be.")
+    return int(modes)
+
+
+def _physical(mass: Any, stiffness: Any, damping: Any, degrees: list[str]) -> Coordinates:
+    inverse = matrices.inverse_of_mass(mass)
+    return Coordinates(
+        degrees, [rate_name(one) for one in degrees], inverse, stiffness, damping, None
+    )
+
+
+def _modal(kept: Modes, damping: Any) -> Coordinates:
+    names = [f"q{i}" for i in range(1, len(kept.angular) + 1)]
+    return Coordinates(
+        names, [f"{one}_rate" for one in names], None, np.diag(kept.angular**2), damping,
+        kept.shapes,
+    )  # fmt: skip
+
+
+def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
+    """The damping matrix of modes with given damping ratios."""
+    try:
+        ratios = np.broadcast_to(np.asarray(ratio, float), count)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"damping_ratio must be one number or {count} of them, not {shown(ratio)}."
+        ) from None
+    if not (np.isfinite(ratios).all() and (ratios >= 0).all()):
+        raise ParameterError(f"damping_ratio must be 0 or more, not {shown(ratio)}.")
+    return np.diag(2 * ratios * modes.angular[:count])
+
+
+def _words(
+    stiffness: Any, modes: Modes, count: int, degrees: list[str],
+    contacts: list[tuple[str, Contact]],
+) -> str:  # fmt: skip
+    """What is said of a reduction."""
+    words = (
+        f"Structure of {len(degrees)} degrees of freedom, by its lowest {count} modes, up to "
+        f"{modes.angular[count - 1] / (2 * pi):.6g} Hz."
+    )
+    if not contacts:
+        return words
+    at = np.array([direction(one, degrees) for _, one in contacts])
+    totals, residuals = flexibility(stiffness, modes, count, at)
+    for (name, _), total, residual in zip(contacts, totals, residuals, strict=True):
+        share = f", {100 * (1 - residual / total):.4g} % of it kept" if 0 < total < np.inf else ""
+        words += f" Static flexibility at {name}: {residual:.3g} m/N left out{share}."
+    return words

@@ -1,0 +1,248 @@
+"""The contract of a public verb: what it takes, what it refuses, how it stops, and what it gives.
+
+A verb that is added needs a line in CALLS; the rest holds for it as for the others.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import signal
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import saltus as sl
+from saltus.results.dataset import schema
+from saltus.results.dataset.result import Result
+from saltus.results.provenance import file_hash, to_json, versions
+
+RIG = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+#: The same start, numbers and names with units; and the same box.
+START = {"in SI": (0.75e-3, 0.0), "in units": {"v": "0 m/s", "x": "0.75 mm"}}
+BOX = {
+    "in SI": {"x": (-1e-3, 1e-3, 4), "v": (-0.02, 0.02, 4)},
+    "in units": {"x": ("-1 mm", "1 mm", 4), "v": ("-20 mm/s", "20 mm/s", 4)},
+}
+FREQUENCY = {"in SI": [17.0], "in units": ["17 Hz"]}
+
+
+def spring_force(x, mass, natural_frequency):
+    return mass * (2 * sl.pi * natural_frequency) ** 2 * x
+
+
+def started(**arguments):
+    """Arguments of a verb that takes a start."""
+    return lambda how: (RIG, {"start": START[how], **arguments})
+
+
+def of_result(verb, **arguments):
+    """Arguments of a verb that takes what another has given."""
+    return lambda how: (given(verb, how), arguments)
+
+
+def logistic():
+    """An orbit of x -> 4 x (1 - x), whose exponent is log 2."""
+    x = [0.3]
+    while len(x) < 600:
+        x.append(4 * x[-1] * (1 - x[-1]))
+    return np.array(x)
+
+
+#: A small call of every public verb: how -> what it looks at, and its arguments.
+CALLS = {
+    "attractors": started(),
+    "basin_fractions": lambda how: (
+        RIG,
+        {"samples": 16, **{name: span[:2] for name, span in BOX[how].items()}},
+    ),
+    "basins": lambda how: (RIG, BOX[how]),
+    "bifurcation_diagram": lambda how: (
+        RIG,
+        {"vary": {"frequency": FREQUENCY[how]}, "start": START[how]},
+    ),
+    "compare": lambda how: (given("basins", how), {"map_b": given("basins", "in SI")}),
+    "compare_methods": lambda how: (
+        RIG,
+        {
+            "analysis": sl.frequency_response,
+            "methods": [sl.ODE45(1e-6, 1e-9)],
+            "frequency": FREQUENCY[how],
+            "start": START[how],
+        },
+    ),
+    "energy_balance": started(periods=3, **sl.models.energy("delangre")),
+    "frequency_response": lambda how: (
+        RIG,
+        {
+            "frequency": FREQUENCY[how],
+            "start": START[how],
+            "outputs": {"spring_force": spring_force},
+        },
+    ),
+    "impact_statistics": started(periods=30),
+    "lyapunov": started(periods=64, transient=20),
+    "poincare": started(surface="x turns", periods=5),
+    "regularisation_widths": started(points=2, transient=20, widths=[1e-4, 1e-5]),
+    "settled": of_result("simulate"),
+    "simulate": started(periods=40),
+    "spectrum": of_result("simulate", state="x"),
+    "stroboscope": started(periods=5),
+    "transmissibility": of_result("frequency_response", output="spring_force", to="x"),
+    "wolf": lambda how: (
+        logistic(),
+        {"sampling_interval": {"in SI": 1.0, "in units": "1 s"}[how], "dimension": 2, "delay": 1},
+    ),
+}
+VERBS = [name for name, home in sl._HOMES.items() if home.startswith("saltus.analysis.")]
+_given: dict[tuple[str, str], xr.Dataset] = {}
+
+
+def given(verb, how="in SI"):
+    """What a verb gives; computed once."""
+    if (verb, how) not in _given:
+        _given[verb, how] = ask(verb, how)
+    return _given[verb, how]
+
+
+def numbers(found):
+    """A result without the times that its computation took, and without their hash."""
+    if "method_cpu_seconds" not in found:
+        return found
+    kept = {name: value for name, value in found.attrs.items() if name != "result_hash"}
+    return found.drop_vars("method_cpu_seconds").drop_attrs(deep=False).assign_attrs(kept)
+
+
+def ask(verb, how="in SI", **more):
+    subject, arguments = CALLS[verb](how)
+    return getattr(sl, verb)(subject, **{**arguments, **more})
+
+
+def takes(verb, argument):
+    return argument in inspect.signature(getattr(sl, verb)).parameters
+
+
+every = pytest.mark.parametrize("verb", VERBS)
+long = pytest.mark.parametrize("verb", [verb for verb in VERBS if takes(verb, "progress")])
+
+
+def test_there_is_a_call_of_each():
+    assert set(CALLS) == set(VERBS)
+
+
+# -- what it gives ---------------------------------------------------------------------------------
+@every
+def test_a_result_is_a_dataset_of_its_kind_in_which_all_has_units(verb):
+    found = given(verb)
+    assert isinstance(found, Result)
+    kind = schema.kind_of(found)
+    if verb != "transmissibility":  # which adds two variables to a response
+        assert f"sl.{verb}" in schema.MAKERS[kind].split(" or ")
+    schema.check(found, caller=f"sl.{verb}", kinds=(kind,))
+    for name, variable in found.variables.items():
+        assert isinstance(variable.attrs["units"], str), name
+        assert variable.attrs["long_name"], name
+        assert variable.dtype.kind in "fiU", name
+
+
+@every
+def test_a_result_says_where_it_comes_from(verb):
+    attrs = given(verb).attrs
+    assert attrs["saltus_version"]
+    assert attrs["versions"] == to_json(versions())
+    if verb == "wolf":  # a series has no system
+        return
+    assert attrs["system"] == RIG.name
+    assert set(json.loads(attrs["parameters"])) <= set(RIG.values)
+    assert {"x", "v"} <= set(json.loads(attrs["units"]))
+    for name in (
+        ("method_options_a", "method_options_b") if verb == "compare" else ("method_options",)
+    ):
+        assert json.loads(attrs[name])
+
+
+@every
+def test_asked_again_in_other_units_it_is_the_same_to_the_bit(verb):
+    assert file_hash(numbers(given(verb, "in units"))) == file_hash(numbers(given(verb)))
+
+
+@every
+def test_a_result_comes_back_from_its_file_as_it_was(verb, tmp_path):
+    file = sl.save(given(verb), tmp_path / "result.nc")
+    back = sl.load(file)
+    assert back.identical(given(verb))
+    assert type(back) is Result
+    assert sl.save(back, tmp_path / "again.nc").read_bytes() == file.read_bytes()
+
+
+# -- what it refuses -------------------------------------------------------------------------------
+@every
+def test_an_argument_that_is_nearly_one_is_answered_by_that_one(verb):
+    (last,) = [
+        name
+        for name, one in inspect.signature(getattr(sl, verb)).parameters.items()
+        if one.kind != one.VAR_KEYWORD
+    ][-1:]
+    with pytest.raises(sl.SaltusError, match=f"Did you mean '{last}'"):
+        ask(verb, **{f"{last}s": 1})
+
+
+@every
+def test_without_what_it_looks_at_it_says_how_it_is_called(verb):
+    with pytest.raises(sl.SaltusError, match=rf"sl\.{verb}.* Write sl\.{verb}\("):
+        getattr(sl, verb)()
+    with pytest.raises(sl.SaltusError, match=r"^[^\n]*\.$"):
+        getattr(sl, verb)(*[object()] * len(CALLS[verb]("in SI")[1]))
+
+
+def with_bad_start(verb, bad):
+    """A call whose start is no number; None for a verb that takes a result."""
+    subject, arguments = CALLS[verb]("in SI")
+    if "start" in arguments:
+        return subject, arguments | {"start": (bad, 0.0)}
+    if "x" in arguments:
+        return subject, arguments | {"x": (bad, *arguments["x"][1:])}
+    return None if isinstance(subject, xr.Dataset) else (np.append(subject, bad), arguments)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@every
+def test_a_start_that_is_no_number_is_refused(verb, bad):
+    if call := with_bad_start(verb, bad):
+        with pytest.raises(sl.SaltusError, match=r"finite|number"):
+            getattr(sl, verb)(call[0], **call[1])
+
+
+# -- how it stops ----------------------------------------------------------------------------------
+@long
+def test_a_request_ends_it(verb):
+    stop = sl.Stop()
+    stop.set()
+    with stop, pytest.raises(sl.Interrupted):
+        ask(verb)
+    assert file_hash(numbers(ask(verb))) == file_hash(numbers(given(verb)))
+
+
+@long
+def test_ctrl_c_ends_it_as_an_interruption_that_others_know_too(verb):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt) as stopped:
+            ask(verb, progress=lambda _: signal.raise_signal(signal.SIGINT))
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert isinstance(stopped.value, sl.Interrupted)
+    part = stopped.value.partial
+    assert part is None or schema.kind_of(part) == schema.kind_of(given(verb))
+
+
+@long
+def test_progress_can_be_off_and_is_a_share(verb, capfd):
+    shares = []
+    ask(verb, progress=shares.append)
+    assert shares == sorted(shares)
+    assert 0 <= shares[0] <= shares[-1] <= 1
+    capfd.readouterr()
+    ask(verb, progress=False)
+    assert capfd.readouterr() == ("", "")

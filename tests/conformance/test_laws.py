@@ -1,0 +1,241 @@
+"""Rule 10: impacts that accumulate, rest, sticking and sliding are modes. Each case has a closed
+form, or an invariant.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.errors import ParameterError, SaltusWarning
+
+
+@sl.system(states="x v")
+def ball(t, x, v, *, gravity=9.81, restitution=0.5, floor=0.0):
+    return v, -gravity, sl.impact(x > floor, -v, restitution=restitution)
+
+
+@sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+def stop(t, x, v, *, gap=0.2, restitution=0.6, damping=0.1, force=1.0, w=0.3):
+    push = force * sl.cos(w * t)
+    return v, push - damping * v - x, sl.impact(x < gap, v, restitution=restitution)
+
+
+@sl.system(states="x v")
+def belt(t, x, v, *, speed=0.2, slip=0.5, stick=1.0):
+    return v, -x - sl.friction(v - speed, slip=slip, stick=stick)
+
+
+def times(run, kind):
+    return run["contact_time"].values[run["contact_kind"].values == kind]
+
+
+# -- impacts, chatter, rest ------------------------------------------------------------------------
+@pytest.mark.parametrize("restitution", [0.0, 0.1, 0.5, 0.8, 0.9, 0.99])
+@pytest.mark.parametrize("floor", [0.0, 3.0])
+def test_a_ball_comes_to_rest_at_the_exact_time(restitution, floor):
+    fall = math.sqrt(2 * 10 / 9.81)
+    end = fall * (1 + 2 * restitution / (1 - restitution))
+    system = ball.with_values(restitution=restitution, floor=floor)
+    run = sl.simulate(system, (10.0 + floor, 0.0), t_end=1.5 * end, samples=3)
+    (rests,) = times(run, "hold")
+    assert rests == pytest.approx(end, rel=1e-13)
+    assert times(run, "impact")[0] == pytest.approx(fall, rel=1e-15)
+    assert (float(run.end_x), float(run.end_v), str(run.status.values)) == (floor, 0.0, "ok")
+
+
+def test_an_elastic_ball_keeps_its_energy_over_ten_thousand_bounces():
+    period = 2 * math.sqrt(2 / 9.81)
+    run = sl.simulate(ball.with_values(restitution=1.0), (1.0, 0.0), t_end=1e4 * period, samples=1)
+    energy = 9.81 * float(run.end_x) + float(run.end_v) ** 2 / 2
+    assert energy == pytest.approx(9.81, rel=1e-12)
+    assert int(run.events) == 10_000
+
+
+@pytest.mark.parametrize("restitution", [1.1, -0.1])
+def test_a_restitution_that_is_none_is_refused(restitution):
+    with pytest.raises(ParameterError, match=r"outside \[0, 1\]"):
+        ball.with_values(restitution=restitution)
+
+
+def test_chatter_rest_and_release_of_a_driven_stop():
+    """x'' + 0.1 x' + x = cos 0.3 t, x <= 0.2, e = 0.6: the contact force vanishes at acos(0.2)/0.3;
+    times of the first impact and of the end of the chatter from exact arcs.
+    """
+    run = sl.simulate(stop, (0.2, 0.0), periods=3, samples=50)
+    released, rests = times(run, "release"), times(run, "hold")
+    period = 2 * math.pi / 0.3
+    assert released == pytest.approx(
+        [math.acos(0.2) / 0.3 + k * period for k in range(3)], rel=1e-14
+    )
+    first = run["contact_kind"].values == "impact"
+    assert run["contact_time"].values[first][0] == pytest.approx(16.731266435103816, rel=1e-14)
+    assert run["contact_velocity"].values[first][0] == pytest.approx(0.46824636412950312, rel=1e-13)
+    assert rests[:2] == pytest.approx([20.0978528953867, 20.0978528953867 + period], rel=1e-13)
+    assert run["x"].values.max() <= 0.2, "never through the stop"
+
+
+def test_a_ball_that_rests_is_thrown_by_its_table():
+    """Gravity 1 on a table G sin t: it takes off where the table's acceleration is -1."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def bounced(t, x, v, *, amplitude=1.2, restitution=0.5, w=1.0):
+        rate = amplitude * w * sl.cos(w * t)
+        return v, -1.0, sl.impact(x > amplitude * sl.sin(w * t), rate - v, restitution=restitution)
+
+    run = sl.simulate(bounced, (0.0, 1.2), t_end=12.0, samples=10)
+    takes_off, rests = times(run, "release"), times(run, "hold")
+    assert takes_off[0] == pytest.approx(math.asin(1 / 1.2), rel=1e-14)
+    assert times(run, "impact")[0] == pytest.approx(3.3874157078481649, rel=1e-13)
+    assert rests[0] == pytest.approx(4.13360620053988, rel=1e-13)
+    assert takes_off[1] - rests[0] == pytest.approx(3.13468988997746, rel=1e-13)
+
+
+def test_three_bodies_share_their_momentum():
+    """An elastic row: the first body's velocity goes to the last; energy and momentum stay."""
+
+    @sl.system(states="a b c u v w")
+    def row(t, a, b, c, u, v, w, *, m=1.0, n=1.0, restitution=1.0):
+        return (
+            u, v, w, 0.0, 0.0, 0.0,
+            sl.impact(a < b, u - v, restitution=restitution, inertia=(m, m)),
+            sl.impact(b < c, v - w, restitution=restitution, inertia=(m, n)),
+        )  # fmt: skip
+
+    run = sl.simulate(row, (0.0, 1.0, 3.0, 2.0, 0.0, 0.0), t_end=4.0, samples=1)
+    assert [float(run[f"end_{name}"]) for name in "uvw"] == [0.0, 0.0, 2.0]
+    assert times(run, "impact") == pytest.approx([0.5, 1.5], abs=1e-15)
+    run = sl.simulate(
+        row.with_values(n=3.0, restitution=0.4), (0.0, 1.0, 3.0, 2.0, 0.0, 0.0), t_end=2.5
+    )
+    u, v, w = (float(run[f"end_{name}"]) for name in "uvw")
+    assert u + v + 3 * w == pytest.approx(2.0, rel=1e-15)
+
+
+def test_a_start_beyond_a_stop_is_invalid():
+    with pytest.warns(SaltusWarning, match="beyond a stop"):
+        run = sl.simulate(ball, (-1.0, 0.0), t_end=1.0)
+    assert str(run.status.values) == "invalid"
+
+
+def test_a_jump_happens_once_each_time_its_condition_becomes_true():
+    """A heater with hysteresis: off at 23.5, on at 22."""
+
+    @sl.system(states="T on")
+    def thermostat(t, T, on):
+        return (
+            -0.1 * (T - 18) + 2 * on, 0.0,
+            sl.jump(T > 23.5, on=0.0), sl.jump(T < 22.0, on=1.0),
+        )  # fmt: skip
+
+    run = sl.simulate(thermostat, (15.0, 1.0), t_end=30.0, samples=5)
+    heat = 10 * math.log((38 - 15) / (38 - 23.5))
+    cool, again = 10 * math.log(5.5 / 4.0), 10 * math.log((38 - 22) / (38 - 23.5))
+    switched = times(run, "impact")
+    exact = heat + np.cumsum([0.0, *([cool, again] * 10)])
+    assert switched == pytest.approx(exact[: len(switched)], rel=1e-13)
+    assert len(switched) == np.count_nonzero(exact <= 30.0)
+
+
+# -- sticking and sliding --------------------------------------------------------------------------
+def test_a_block_on_a_belt_sticks_and_slips():
+    """Static friction 1, kinetic 0.5: stick lasts 5, slip 3.902605407814523."""
+    run = sl.simulate(belt, (0.0, 0.0), t_end=60.0, samples=10)
+    stuck, free = times(run, "hold"), times(run, "release")
+    assert np.diff(stuck)[2:] == pytest.approx(8.902605407814523, rel=1e-13)
+    assert free[2:] - stuck[2 : len(free)] == pytest.approx(5.0, rel=1e-13)
+
+
+def test_two_surfaces_on_which_both_sides_push():
+    """x' = -2 or 2, y' = 1.5 or -3: x reaches y at 1/7, then both move at -3/8.5."""
+
+    @sl.system(states="x y")
+    def pair(t, x, y):
+        return (
+            sl.piecewise((-2.0, x > y), otherwise=2.0),
+            sl.piecewise((1.5, x > y), otherwise=-3.0),
+        )
+
+    run = sl.simulate(pair, (1.5, 1.0), t_end=1.0, samples=1)
+    assert times(run, "hold") == pytest.approx([1 / 7], rel=1e-15)
+    assert float(run.end_x) == pytest.approx(1.5 - 2 / 7 - 3 / 8.5 * (6 / 7), rel=1e-15)
+    assert float(run.end_x) == float(run.end_y)
+
+
+def test_two_friction_elements_stick_together_and_alone():
+    """A driver held to a follower by friction, the follower to the ground: both stuck, then the
+    lower slips alone; forces by hand.
+    """
+
+    @sl.system(states="v w")
+    def stacked(t, v, w, *, upper=1.0, lower=0.5, ramp=0.5):
+        between, below = sl.friction(v - w, slip=upper), sl.friction(w, slip=lower)
+        return ramp * t - between, between - below
+
+    run = sl.simulate(stacked, (0.0, 0.0), t_end=6.0, samples=20)
+    # both at rest until ramp*t = lower; then together at (ramp*t - lower)/2 until the force
+    # between them, (ramp*t + lower)/2, is upper
+    free = times(run, "release")
+    assert free == pytest.approx([1.0, 3.0], rel=1e-13)
+    assert float(run.end_w) == pytest.approx(0.5 + (1.0 - 0.5) * 3.0, rel=1e-13)
+    t = 6.0
+    assert float(run.end_v) == pytest.approx(0.5 + 0.25 * (t**2 - 9) - (t - 3), rel=1e-13)
+
+
+def test_filippov_slides_with_the_convex_combination_and_leaves():
+    """y > 0: (2, -1), y < 0: (1, 1 - x): from x = 0 to the exit at x = 1 in 1/2 + ln(3)/4."""
+
+    @sl.system(states="x y")
+    def plane(t, x, y):
+        return sl.piecewise((2.0, y > 0), otherwise=1.0), sl.piecewise(
+            (-1.0, y > 0), otherwise=1 - x
+        )
+
+    run = sl.simulate(plane, (-2.0, 1.0), t_end=3.0, samples=5)
+    (begins,), (ends,) = times(run, "hold"), times(run, "release")
+    assert (begins, ends - begins) == pytest.approx((1.0, 0.5 + math.log(3) / 4), rel=1e-14)
+
+
+# -- one lane, one life; tangents ------------------------------------------------------------------
+CASES = {
+    "chatter": (stop, [(0.2, 0.0), (-1.0, 0.3), (0.1, 0.2), (-0.4, -0.9), (0.2, -0.5)], 40.0),
+    "stick": (belt, [(0.0, 0.0), (1.0, 0.2), (2.0, -1.0), (-1.0, 0.5), (0.3, 0.2)], 40.0),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("lanes", [2, 8])
+def test_lanes_and_neighbours_change_no_bit(case, lanes):
+    system, starts, t_end = CASES[case]
+    many = sl.simulate(
+        system, np.array(starts), t_end=t_end, samples=7, method=sl.Taylor(lanes=lanes)
+    )
+    for i, one in enumerate(starts):
+        alone = sl.simulate(system, one, t_end=t_end, samples=7)
+        for name in system.states:
+            assert np.array_equal(many[name].values[i], alone[name].values)
+        mine = many["contact_trajectory"].values == i
+        assert np.array_equal(many["contact_time"].values[mine], alone["contact_time"].values)
+
+
+def test_exponents_of_an_impact_oscillator_sum_to_what_impacts_take():
+    """Without damping volume shrinks at impacts only, by e**2 each."""
+    system = stop.with_values(gap=0.0, damping=0.0, restitution=0.8, w=2.6)
+    found = sl.lyapunov(system, (-0.5, 0.0), periods=400, transient=400)
+    counted = sl.impact_statistics(system, (-0.5, 0.0), periods=400, transient=400)
+    rate = float(counted["contacts_per_second"][0])
+    assert found["exponent_sum"].item() == pytest.approx(2 * math.log(0.8) * rate, rel=1e-10)
+
+
+def test_a_stick_phase_makes_a_multiplier_zero():
+    """Of a driven block that sticks once a period the derivative of the return map is singular."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def hartog(t, x, v, *, force=1.0, slip=0.5, w=0.5):
+        return v, force * sl.cos(w * t) - x - sl.friction(v, slip=slip)
+
+    orbit = sl.attractors(hartog, (0.0, 0.0))
+    assert abs(float(orbit["attractor_multiplier_real"].values.ravel()[-1])) < 1e-12

@@ -1,0 +1,137 @@
+"""What `sl.structure` takes, refuses and returns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+import saltus as sl
+from saltus.errors import ParameterError, UnitError
+
+M, K = np.eye(3), 2 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
+STOP, PUSH = sl.Contact("x3", 50.0, 0.5), sl.Force("x1", 1.0)
+
+
+def test_names_parameters_and_units():
+    made = sl.structure(
+        M, K, 0.1 * K, frequency="2 Hz", names="roof xa floor", name="house", source="nowhere",
+        contacts=[
+            sl.Contact("roof", "3 kN/m", "1 mm", to="floor", side="both", damping="2 N*s/m"),
+            sl.Contact("xa", 1.0, 2.0, side="lower", name="left"),
+        ],
+        forces=[sl.Force("floor", "2 kN", phase="90 deg"), sl.Force("xa", 1.0)],
+    )  # fmt: skip
+    assert made.states == ("roof", "xa", "floor", "roof_rate", "va", "floor_rate")
+    assert [guard.name for guard in made.guards] == ["stop lower", "stop upper", "left"]
+    assert dict(made.values) == {
+        "stop_gap": 1e-3, "stop_stiffness": 3e3, "stop_damping": 2.0,
+        "left_gap": 2.0, "left_stiffness": 1.0,
+        "force1": 2e3, "force1_phase": np.pi / 2, "force2": 1.0, "frequency": 2.0,
+    }  # fmt: skip
+    assert made.units["stop_damping"] == "N*s/m"
+    assert made.units["roof_rate"] == "m/s"
+    assert type(made).from_dict(made.to_dict()).fingerprint() == made.fingerprint()
+    assert made.with_values(left_gap="3 mm").fingerprint() == made.fingerprint()
+    assert (made.name, made.source) == ("house", "nowhere")
+
+
+def test_without_forces_it_has_no_period():
+    free = sl.structure(M, K, contacts=[STOP], unit="rad")
+    assert free.forced_at is None
+    assert free.units["stop_stiffness"] == "N*m/rad"
+
+
+def test_every_analysis_takes_it():
+    made = sl.structure(
+        M, K, damping_ratio=0.1, modes=2, contacts=[STOP], forces=[PUSH], frequency=0.1
+    )
+    curve = sl.frequency_response(made, frequency=[0.1, 0.12], start=np.zeros(4), progress=False)
+    gaps = sl.bifurcation_diagram(made, {"stop_gap": [0.5, 0.6]}, np.zeros(4), progress=False)
+    one = sl.attractors(made, np.zeros(4), progress=False)
+    peaks = [curve.peak[0, 0], gaps.peak[0, 0], one.attractor_peak[0]]
+    assert np.allclose(peaks, peaks[0], rtol=1e-9)
+    assert sl.regularise(made, width={"stop": 1e-3}).guards == ()
+
+
+def changed(matrix, place, value):
+    copy = np.array(matrix, float)
+    copy[place] = value
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"mass": changed(M, (0, 1), 0.1)}, r"symmetric, but mass\[0, 1\] = 0.1"),
+        ({"mass": changed(M, (2, 2), 0.0)}, "positive definite, but its smallest eigenvalue is 0"),
+        ({"mass": np.ones((3, 3)) + 0.5 * M - 0.9 * np.eye(3)}, "positive definite"),
+        ({"mass": sp.csr_array(changed(M, (2, 2), -1.0)), "modes": 2}, "positive definite"),
+        ({"mass": np.ones(3)}, "square matrix"),
+        ({"mass": [[1.0, 2.0], [3.0]]}, "square matrix"),
+        ({"mass": M * 1j}, "real numbers"),
+        ({"stiffness": np.eye(2)}, "2 x 2, but mass is 3 x 3"),
+        ({"stiffness": changed(K, (0, 0), np.nan)}, "isn't finite"),
+        ({"stiffness": changed(K, (0, 1), 0.0), "modes": 2}, "stiffness must be symmetric"),
+        ({"stiffness": -K, "modes": 2}, "negative eigenvalue"),
+        ({"damping": sp.eye_array(4)}, "4 x 4"),
+        ({"damping": K, "damping_ratio": 0.1}, "not both"),
+        ({"damping_ratio": -0.1}, "0 or more"),
+        ({"damping_ratio": [0.1, 0.2]}, "3 of them"),
+        ({"modes": 4}, "at most 3"),
+        ({"modes": 1.5}, "whole number"),
+        ({"frequency": None}, "give frequency="),
+        ({"names": "a b"}, "3 degrees of freedom"),
+        ({"unit": "inch"}, "unit must be"),
+        ({"contacts": STOP}, "a list"),
+        ({"contacts": [sl.Contact("x4", 1.0, 1.0)]}, "x4"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, to="x1")]}, "both 'x1'"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, side="left")]}, "side="),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, name="a b")]}, "name of a stop"),
+        ({"contacts": [sl.Contact("x1", 1.0, 1.0, name="x2")]}, "as a degree of freedom"),
+        ({"contacts": [{"at": "x1", "stiffness": 1.0}]}, "needs gap"),
+        ({"contacts": [{"at": "x1", "stifness": 1.0}]}, "stiffness"),
+        ({"contacts": [sl.Contact("x1", 1, 1, name="a"), sl.Contact("x2", 1, 1, name="a")]},
+            "two stops"),
+        ({"forces": [sl.Force("x1", 1.0, harmonic=-1)]}, "harmonic"),
+        ({"forces": [sl.Force("x1", 1.0, name="stop_gap")]}, "two parameters"),
+        ({"forces": [3.0]}, "sl.Force"),
+    ],
+)  # fmt: skip
+def test_refusals(arguments, words):
+    usual = {"mass": M, "stiffness": K, "contacts": [STOP], "forces": [PUSH], "frequency": 1.0}
+    with pytest.raises(ParameterError, match=words):
+        sl.structure(**{**usual, **arguments})
+
+
+def test_too_many_degrees_of_freedom_are_reduced():
+    n = 300
+    stiffness = sp.diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)],
+        offsets=[-1, 0, 1])  # fmt: skip
+    with pytest.raises(ParameterError, match="modes="):
+        sl.structure(sp.eye_array(n), stiffness)
+    made = sl.structure(sp.eye_array(n), stiffness, modes=4, contacts=[sl.Contact("x9", 1.0, 1.0)])
+    assert len(made.states) == 8
+    assert "lowest 4 modes" in made.description
+    assert "left out" in made.description
+
+
+def test_a_contact_that_no_mode_moves():
+    free = 50.0 * np.array([[1, -1], [-1, 1]])
+    between = sl.Contact("x2", 1e3, 0.1, to="x1")
+    with pytest.raises(ParameterError, match="no mode that is kept moves stop"):
+        sl.structure(np.eye(2), free, modes=1, contacts=[between])
+
+
+def test_units_of_its_values():
+    with pytest.raises(UnitError, match="stop_gap"):
+        sl.structure(M, K, contacts=[sl.Contact("x1", 1.0, "1 N")])
+
+
+def test_modes_refuse():
+    with pytest.raises(ParameterError, match="x7"):
+        sl.structure_modes(M, K, at="x7")
+    with pytest.raises(ParameterError, match="at must be"):
+        sl.structure_modes(M, K, at=3)
+    with pytest.raises(ParameterError, match="modes"):
+        sl.structure_modes(M, K, 4)
