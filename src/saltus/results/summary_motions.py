@@ -20,6 +20,7 @@ from saltus.results.dataset.schema import (
     period_text,
     states_of,
 )
+from saltus.results.wording import unit_of
 
 #: Largest lines of a spectrum that are listed.
 _LINES = 5
@@ -41,10 +42,7 @@ def _spectrum(ds: xr.Dataset) -> list[str]:
         f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {one['window'].item()}"
     ]
     for name in states_of(ds):
-        amplitude, unit = (
-            one[f"{name}_amplitude"].values,
-            one[f"{name}_amplitude"].attrs.get("units", ""),
-        )
+        amplitude, unit = one[f"{name}_amplitude"].values, unit_of(one[f"{name}_amplitude"])
         largest = np.argsort(amplitude)[::-1][:_LINES]
         lines.append(
             f"  {name}: "
@@ -64,7 +62,7 @@ def _impacts(ds: xr.Dataset) -> list[str]:
             float(one[key].mean())
             for key in ("contacts_per_second", "speed_mean", "share_in_contact")
         )
-        unit = one["speed_mean"].attrs.get("units", "")
+        unit = unit_of(one["speed_mean"])
         lines.append(
             f"  {name}: {rate:.4g} a second, at {speed:.4g} {unit}".rstrip() + f" on average, "
             f"in contact {share:.2%} of the time"
