@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
-    from saltus.flow import ODE23, ODE45, RK4, Interrupted, Taylor
+    from saltus.flow import ODE23, ODE45, ODE113, RK4, Interrupted, ODE15s, Taylor
     from saltus.interrupt import Stop
     from saltus.results import contacts, load, samples, save, to_csv, to_mat
     from saltus.results.describe import describe
@@ -106,7 +106,8 @@ _HOMES = {
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
     "Stop": "saltus.interrupt",
-    **dict.fromkeys(("ODE23", "ODE45", "RK4", "Interrupted", "Taylor"), "saltus.flow"),
+    **dict.fromkeys(("ODE23", "ODE45", "ODE113", "RK4", "Interrupted", "ODE15s", "Taylor"),
+        "saltus.flow"),
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"),
         "saltus.results"),
     **dict.fromkeys(
@@ -126,10 +127,12 @@ _MODULES = ("models", "plot")
 __all__ = [
     "ODE23",
     "ODE45",
+    "ODE113",
     "RK4",
     "Contact",
     "Force",
     "Interrupted",
+    "ODE15s",
     "SaltusError",
     "Stop",
     "System",

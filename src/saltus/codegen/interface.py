@@ -8,6 +8,7 @@ With the JIT off, the head stands above the templates as plain Python.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -121,26 +122,52 @@ _OF_RATES = MappingProxyType(
 _TABLEAU = ("STAGE_TIME", "WEIGHT", "ERROR_WEIGHT", "DENSE_WEIGHT")
 
 
-def _one_by_one(templates: tuple[str, ...], *tables: str) -> Interface:
+_RUNGE_KUTTA = ("clocks", "rates", "runge_kutta")
+_MATLAB = ("odezero", "matlab")
+
+
+def _one_by_one(
+    templates: tuple[str, ...],
+    *tables: str,
+    sizes: tuple[str, ...] = (),
+    functions: Mapping[str, tuple[str, ...]] = _OF_RATES,
+) -> Interface:
     """What the head of a method supplies that runs one trajectory after the other."""
     return Interface(
         entry="propagate",
         arguments=(*BATCH, _F1),
         layout="steps_layout",
-        templates=("clocks", "rates", *templates, "trajectory"),
-        sizes=("NSTATES", "NGUARDS", "NCONST", "NDRIVE", "NCLOCKS", "STAGES"),
+        templates=(*templates, "trajectory"),
+        sizes=(
+            "NSTATES",
+            "NGUARDS",
+            "NCONST",
+            "NDRIVE",
+            "NCLOCKS",
+            "ROWS",
+            "NUMBERS_OF_METHOD",
+            "MATRICES",
+            "MULTISTEP",
+            *sizes,
+        ),
         flags=("TANGENT", "GAPS_IN_TIME"),
         tables=MappingProxyType(
             {"CLOCK_KIND": WHOLE, "CLOCK_TABLE": WHOLE} | dict.fromkeys(tables, REAL)
         ),
-        functions=_OF_RATES,
+        functions=MappingProxyType(dict(functions)),
         truths=(),
     )
 
 
 #: Runge-Kutta pairs with MATLAB's rules, and Runge-Kutta steps of a fixed length.
-PAIR = _one_by_one(("runge_kutta", "odezero", "step_control"), *_TABLEAU, "RULES")
-FIXED_STEP = _one_by_one(("runge_kutta", "fixed_step", "landing"), *_TABLEAU)
+PAIR = _one_by_one((*_RUNGE_KUTTA, *_MATLAB, "step_control"), *_TABLEAU, "RULES", sizes=("STAGES",))
+FIXED_STEP = _one_by_one((*_RUNGE_KUTTA, "fixed_step", "landing"), *_TABLEAU, sizes=("STAGES",))
+#: Adams' formulas of orders 1 to 13.
+ADAMS = _one_by_one(("clocks", "rates", *_MATLAB, "adams"))
+#: Numerical differentiation formulas, which need the Jacobian.
+NDF = _one_by_one(
+    ("clocks", "rates", *_MATLAB, "ndf"), functions=_OF_RATES | {"jacobian": (REAL,) + (ARRAY,) * 5}
+)
 
 #: The test of capture: nothing of it depends on an equation.
 CAPTURE = Interface(

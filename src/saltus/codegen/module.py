@@ -9,12 +9,11 @@ from importlib import resources
 from types import ModuleType
 from typing import Any, Protocol
 
-from saltus.codegen import machine, templates
+from saltus.codegen import machine, tableaux, templates
 from saltus.codegen.head import Constant, Head
-from saltus.codegen.interface import CAPTURE, FIXED_STEP, PAIR, TAYLOR, Interface
+from saltus.codegen.interface import ADAMS, CAPTURE, FIXED_STEP, NDF, PAIR, TAYLOR, Interface
 from saltus.codegen.kernels import Kernels
 from saltus.codegen.rates_head import rates_head
-from saltus.codegen.tableaux import BOGACKI_SHAMPINE, CLASSICAL, DORMAND_PRINCE
 from saltus.codegen.taylor_head import taylor_head
 from saltus.errors import TraceError
 from saltus.system.quantity import acting_guards
@@ -80,19 +79,19 @@ def taylor_module(system: System, order: int, lanes: int) -> Flow:
 
 #: Name of each other method: templates, their bitcode, and the numbers that they are given.
 _STEPS: dict[str, tuple[Interface, str, Mapping[str, Constant]]] = {
-    "ODE45": (PAIR, "pair", DORMAND_PRINCE),
-    "ODE23": (PAIR, "pair", BOGACKI_SHAMPINE),
-    "RK4": (FIXED_STEP, "fixed_step", CLASSICAL),
+    "ODE45": (PAIR, "pair", tableaux.DORMAND_PRINCE),
+    "ODE23": (PAIR, "pair", tableaux.BOGACKI_SHAMPINE),
+    "ODE113": (ADAMS, "adams", tableaux.ADAMS),
+    "ODE15s": (NDF, "ndf", tableaux.NDF),
+    "RK4": (FIXED_STEP, "fixed_step", tableaux.CLASSICAL),
 }
 
 
 @lru_cache(maxsize=64)
 def steps_module(system: System, method: str) -> Flow:
-    """The compiled flow of a system by a method that runs one trajectory after the other: ODE45,
-    ODE23 or RK4.
-    """
+    """The compiled flow of a system by a method that runs one trajectory after the other."""
     interface, template, numbers = _STEPS[method]
-    head = _printed(system, lambda: rates_head(system, numbers))
+    head = _printed(system, lambda: rates_head(system, numbers, "jacobian" in interface.functions))
     title = f"{system.name}, {method}"
     return _flow(interface, template, head, title, f"{_described(system)} for {method}")
 

@@ -152,7 +152,7 @@ def never_held(system: System) -> System:
     return system if field is system.field else replace(system, field=field, guards=tuple(guards))
 
 
-def rates_head(system: System, numbers: Mapping[str, Constant]) -> Head:
+def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool = False) -> Head:
     """Everything that kernels/trajectory.py and the templates of a method expect to stand above
     them; ``numbers`` are those of the method (codegen/tableaux.py).
     """
@@ -162,6 +162,8 @@ def rates_head(system: System, numbers: Mapping[str, Constant]) -> Head:
     field = _outputs(_with_sides(system, stages, system.field, of_mode=True), system.field)
     gap_values = _outputs(_with_sides(system, stages, gaps), gaps)
     gap_rates = _gap_rates(system, stages)
+    slopes = [entry for row in system.jacobian for entry in row] if jacobian else []
+    matrix = _outputs(_with_sides(system, stages, slopes), slopes)
     drive = ScalarCode(stages.drive_leaf)
     for node, i in stages.drives.nodes.items():
         value = drive.value(node)
@@ -186,4 +188,6 @@ def rates_head(system: System, numbers: Mapping[str, Constant]) -> Head:
         jump_function(system, stages.clocks),
         f"@kernel\ndef gap_rates(t, y, dy, c, q, h, out):\n{gap_rates}\n",
     ]
+    if jacobian:
+        functions.append(f"@kernel\ndef jacobian(t, y, c, q, h, out):\n{matrix}\n")
     return Head(sizes, "\n".join(functions))

@@ -11,6 +11,20 @@ from collections.abc import Sequence
 from saltus.codegen.head import Constant
 
 
+def rooms(
+    rows: int, numbers: int, *, matrices: int = 0, multistep: bool = False
+) -> dict[str, Constant]:
+    """How many vectors of states, numbers and matrices a method works with, and whether it looks
+    back (kernels/steps_layout.py).
+    """
+    return {
+        "ROWS": rows,
+        "NUMBERS_OF_METHOD": numbers,
+        "MATRICES": matrices,
+        "MULTISTEP": int(multistep),
+    }
+
+
 def _tableau(
     times: Sequence[float],
     weights: Sequence[Sequence[float]],
@@ -23,6 +37,7 @@ def _tableau(
     rows = [(*row, *[0.0] * (stages - len(row))) for row in ((), *weights)]
     return {
         "STAGES": stages,
+        **rooms(stages, stages),
         "STAGE_TIME": tuple(map(float, times)),
         "WEIGHT": tuple(float(weight) for row in rows for weight in row),
         "ERROR_WEIGHT": tuple(map(float, errors)),
@@ -74,3 +89,10 @@ CLASSICAL = _tableau(
     errors=(0, 0, 0, 1 / 6, -1 / 6),
     dense=((-3 / 2, 2 / 3), (1, -2 / 3), (1, -2 / 3), (1 / 2, -1 / 3), (-1, 1)),
 )
+
+#: Of kernels/adams.py: the rate at both ends, 14 differences, a state; seven arrays of 14, five
+#: numbers.
+ADAMS = rooms(17, 103, multistep=True)
+#: Of kernels/ndf.py: the rate at both ends, seven differences, seven vectors; eleven numbers and
+#: two matrices of 6 by 6; the Jacobian and its factors.
+NDF = rooms(16, 83, matrices=2, multistep=True)

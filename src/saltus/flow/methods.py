@@ -7,14 +7,26 @@ from typing import Any
 
 from saltus.errors import ParameterError, shown
 from saltus.flow.fixed_step import RK4
-from saltus.flow.matlab import ODE23, ODE45
+from saltus.flow.matlab import ODE23, ODE45, ODE113, ODE15s
 from saltus.flow.method import Method
 from saltus.flow.taylor import Taylor
 
-__all__ = ["METHODS", "ODE23", "ODE45", "RK4", "Method", "Taylor", "check_method"]
+__all__ = [
+    "METHODS",
+    "ODE23",
+    "ODE45",
+    "ODE113",
+    "RK4",
+    "Method",
+    "ODE15s",
+    "Taylor",
+    "check_method",
+]
 
 #: Every method, as people write it.
-METHODS: Mapping[str, type[Method]] = {one.__name__: one for one in (Taylor, RK4, ODE23, ODE45)}
+METHODS: Mapping[str, type[Method]] = {
+    one.__name__: one for one in (Taylor, RK4, ODE23, ODE45, ODE113, ODE15s)
+}
 
 
 def check_method(method: Any) -> Method:

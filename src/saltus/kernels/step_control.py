@@ -1,9 +1,6 @@
 """Template: steps of MATLAB's ode45 and ode23, each as long as the error estimate of a pair of
-Runge-Kutta formulas allows. Contacts are located on the dense output.
-
-Rules of error control and step length: Shampine & Reichelt, The MATLAB ODE Suite, SIAM J. Sci.
-Comput. 18 (1997). Sides are those of the state at every stage; a step that ends beyond a boundary
-is cut there, and the method starts afresh from the contact with its default first step.
+Runge-Kutta formulas allows. Rules of error control and step length: Shampine & Reichelt, The MATLAB
+ODE Suite, SIAM J. Sci. Comput. 18 (1997).
 
 The head supplies RULES: the exponent of the step length rules, 1 / (order of the error estimate +
 1); the err/RelTol below which the rule 1.25 (err/RelTol)^exponent <= 0.2 lets a step grow five
@@ -16,23 +13,8 @@ the trajectory; h = t_new - t; length what is asked for h; theta = AbsTol/RelTol
 estimate on RelTol's scale. Times in s.
 """
 
-from saltus.kernels.status import RUNNING
-
-# Columns of `options` that are the method's own.
-RTOL, ATOL = range(2)
 # Entries of RULES.
 POWER, TINY, LEAST_SHRINK = range(3)
-
-
-@inner
-def law_mode(i, batch):
-    """The mode that the right-hand side is in."""
-    return FROM_STATE
-
-
-@inner
-def settle_sides(i, t, batch, work):
-    """Sides that the gaps at NODE alone don't tell: none here."""
 
 
 @inner
@@ -88,21 +70,3 @@ def begin_leg(i, t, t_end, batch, work):
     if length * rate > 1.0:
         length = 1.0 / rate
     batch.carry[i, LENGTH] = max(length, 16.0 * ulp(t))
-
-
-@inner
-def longest_step(t_leg, t_end):
-    """A tenth of the leg's span."""
-    return 0.1 * (t_end - t_leg)
-
-
-@inner
-def find_contact(i, t, t_new, t_leg, h, batch, work):
-    """The first contact of a step: (its time, or the step's end; end and length of the step that it
-    lies in; whether there is one; RUNNING).
-    """
-    gaps_at(t_new, NEXT, Q_STAGE, AT_NEXT, work)
-    if any_sign_change(work, AT_NODE, AT_NEXT):
-        t_hit, lands = odezero(t, t_new, t_leg, h, work)
-        return t_hit, t_new, h, lands, RUNNING
-    return t_new, t_new, h, False, RUNNING

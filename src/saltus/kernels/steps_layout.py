@@ -8,11 +8,11 @@ from saltus.kernels.clocks_layout import HELD, NUMBERS
 
 # `work` is one array for everything, so that the compiler sees that its parts don't overlap and
 # keeps them in registers (measured: a few per cent). Where its parts start: vectors of states - the
-# stages, the first of them the rate at the start of the step and the last the rate at its end; the
-# states there, a point between them, the error estimate divided by h, zeros -
-K1, K_END = 0, NSTATES * (STAGES - 1)
-VECTORS, GAPS, DRIVES = STAGES + 5, 7, 2
-NODE, NEXT, POINT, ERROR, REST = (NSTATES * (STAGES + row) for row in range(5))
+# ROWS of the method, the first of them the rate at the start of the step and the last the rate at
+# its end; the states there, a point between them, the error estimate divided by h, zeros -
+K1, K_END = 0, NSTATES * (ROWS - 1)
+VECTORS, GAPS, DRIVES = ROWS + 5, 7, 2
+NODE, NEXT, POINT, ERROR, REST = (NSTATES * (ROWS + row) for row in range(5))
 # gaps - at the ends of the step, the three of the root finder, their rates at a contact and those
 # of a state at rest -
 AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST = (
@@ -21,17 +21,20 @@ AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST = (
 # q at the time of a stage, last at the end of the step, and at any other; c.
 Q_STAGE, Q = (VECTORS * NSTATES + GAPS * NGUARDS + NDRIVE * row for row in range(DRIVES))
 C = VECTORS * NSTATES + GAPS * NGUARDS + DRIVES * NDRIVE
-# What the clocks hold, and their numbers; a number for each stage.
+# What the clocks hold, and their numbers; the NUMBERS_OF_METHOD; MATRICES of states by states.
 H = C + NCONST
 N = H + HELD * NCLOCKS
 S = N + (NUMBERS + 1) * NCLOCKS
-WORK = S + STAGES
+M = S + NUMBERS_OF_METHOD
+WORK = M + MATRICES * NSTATES * NSTATES
 
 
 # Columns of `carry`, what a paused trajectory needs besides its state: time, start of the leg, next
-# step length, and the error estimates of all steps so far, added up for each state.
+# step length, and the error estimates of all steps so far, added up for each state; of a method
+# that looks back (MULTISTEP is 1, not 0) its rows, numbers and matrices.
 TIME, LEG, LENGTH, ERRORS = range(4)
-CARRY = ERRORS + NSTATES
+PAST = ERRORS + NSTATES
+CARRY = PAST + MULTISTEP * (ROWS * NSTATES + NUMBERS_OF_METHOD + MATRICES * NSTATES * NSTATES)
 #: Records that one step may write at most.
 STEP_RECORDS = NGUARDS
 

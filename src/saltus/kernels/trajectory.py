@@ -251,10 +251,27 @@ def take_up(i, t_end, batch, work):
         write_samples_here(i, t, batch, work)
         t_leg = t
     else:
+        exchange_past(i, False, batch, work)
         drive_at(t, Q, work)
         gaps_at(t, NODE, Q, AT_NODE, work)
         rate_at(t, NODE, Q, law_mode(i, batch), K1, work)
     return t, t_leg, t_break
+
+
+@kernel
+def exchange_past(i, store, batch, work):
+    """What a method that looks back knows, to `carry` or from it."""
+    for j in range(MULTISTEP * ROWS * NSTATES):
+        if store:
+            batch.carry[i, PAST + j] = work[K1 + j]
+        else:
+            work[K1 + j] = batch.carry[i, PAST + j]
+    size = NUMBERS_OF_METHOD + MATRICES * NSTATES * NSTATES
+    for j in range(MULTISTEP * size):
+        if store:
+            batch.carry[i, PAST + ROWS * NSTATES + j] = work[S + j]
+        else:
+            work[S + j] = batch.carry[i, PAST + ROWS * NSTATES + j]
 
 
 @kernel
@@ -290,6 +307,7 @@ def put_back(i, t, t_leg, status, batch, work):
     for j in range(NSTATES):
         batch.state[i, j] = work[NODE + j]
     batch.carry[i, TIME], batch.carry[i, LEG] = t, t_leg
+    exchange_past(i, True, batch, work)
     batch.status[i] = status
     if batch.options[i, LOCATE] == 0.0:
         drive_at(t, Q, work)

@@ -13,18 +13,34 @@ from typing import Any
 
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.models.aeroelastic import aeroelastic
+from saltus.models.ball_in_box import ball_in_box
 from saltus.models.bang_bang import bang_bang
+from saltus.models.belt_stribeck import belt_stribeck
+from saltus.models.belt_two_values import belt_two_values
 from saltus.models.bilinear_rig import bilinear_rig
+from saltus.models.bouncing_ball import bouncing_ball
 from saltus.models.chain import chain
+from saltus.models.chattering_pair import chattering_pair
 from saltus.models.delangre import delangre
+from saltus.models.den_hartog import den_hartog
 from saltus.models.double_scroll import double_scroll
+from saltus.models.dropped_oscillator import dropped_oscillator
+from saltus.models.dry_friction import dry_friction
+from saltus.models.falling_ball import falling_ball
 from saltus.models.gear_pair import gear_pair
 from saltus.models.hertz_stop import hertz_stop
+from saltus.models.impact_oscillator import impact_oscillator
 from saltus.models.one_sided_spring import one_sided_spring
+from saltus.models.pulled_pair import pulled_pair
+from saltus.models.relief_valve import relief_valve
+from saltus.models.rocking_block import rocking_block
+from saltus.models.shaken_belt import shaken_belt
 from saltus.models.soft_stop import soft_stop
 from saltus.models.spring_rebound import spring_rebound
 from saltus.models.switched_rotor import switched_rotor
+from saltus.models.thermostat import thermostat
 from saltus.models.thrown_mass import thrown_mass
+from saltus.models.two_blocks import two_blocks
 from saltus.models.two_masses import two_masses
 from saltus.system import System
 
@@ -46,6 +62,22 @@ MODELS: dict[str, Callable[..., System]] = {
         bang_bang,
         switched_rotor,
         double_scroll,
+        impact_oscillator,
+        bouncing_ball,
+        ball_in_box,
+        rocking_block,
+        relief_valve,
+        falling_ball,
+        dropped_oscillator,
+        thermostat,
+        den_hartog,
+        belt_two_values,
+        belt_stribeck,
+        dry_friction,
+        two_blocks,
+        shaken_belt,
+        pulled_pair,
+        chattering_pair,
     )
 }
 
@@ -113,21 +145,37 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "MODELS",
     "aeroelastic",
+    "ball_in_box",
     "bang_bang",
+    "belt_stribeck",
+    "belt_two_values",
     "bilinear_rig",
+    "bouncing_ball",
     "chain",
+    "chattering_pair",
     "delangre",
+    "den_hartog",
     "describe",
     "double_scroll",
+    "dropped_oscillator",
+    "dry_friction",
     "energy",
+    "falling_ball",
     "find",
     "gear_pair",
     "has_energy",
     "hertz_stop",
+    "impact_oscillator",
     "one_sided_spring",
+    "pulled_pair",
+    "relief_valve",
+    "rocking_block",
+    "shaken_belt",
     "soft_stop",
     "spring_rebound",
     "switched_rotor",
+    "thermostat",
     "thrown_mass",
+    "two_blocks",
     "two_masses",
 ]

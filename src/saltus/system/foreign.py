@@ -68,6 +68,10 @@ ADVICE: dict[str, str] = {
         "start, t_end=..., method=sl.ODE45())."),
     **dict.fromkeys(("ode23", "RK23"), "Write sl.simulate(system, start, t_end=..., "
                                        "method=sl.ODE23())."),
+    **dict.fromkeys(("ode113", "LSODA"), "Write sl.simulate(system, start, t_end=..., "
+                                         "method=sl.ODE113())."),
+    **dict.fromkeys(("ode15s", "BDF"), "Write sl.simulate(system, start, t_end=..., "
+                                       "method=sl.ODE15s())."),
     **dict.fromkeys(("rk4", "rungekutta", "runge_kutta"), "Write sl.simulate(system, start, "
                                                           "t_end=..., method=sl.RK4(step))."),
     **dict.fromkeys(("transmission", "transmissibilities"), "Write sl.transmissibility(response, "
