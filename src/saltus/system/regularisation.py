@@ -15,6 +15,7 @@ from typing import Any
 
 from saltus.errors import ParameterError, TraceError, among, nearest, shown
 from saltus.system import checks
+from saltus.system import expression as ex
 from saltus.system.blend import STEPS, Step, blended
 from saltus.system.dimensions import gap_units
 from saltus.system.guards import is_hold
@@ -39,7 +40,8 @@ def regularise(
     A piece that holds where ``gap > 0`` is multiplied by a smoothed step ``H(gap/width)``, the
     other one by ``1 - H``; a weight of joined conditions is the product of theirs. A spring behind
     a gap with ``law="tanh"`` is ``k*d*(1 + tanh(d/width))/2`` of its depth d. Comparisons of time
-    stay as they are: their instants are known.
+    stay as they are: their instants are known. Friction becomes a force of the sliding velocity:
+    it creeps where it stuck, and a static limit above it is left out.
 
     ==============  ============================  ===============================================
     law             H(u)                          largest error of a spring's force / (k*width)
@@ -98,15 +100,27 @@ def regularise(
     if not system.guards:
         raise ParameterError(f"{system.name} has no boundary: there is nothing to regularise.")
     step = _step(law)
+    laws = [guard.law for guard in system.guards]
     system = _without_laws(system)
     named = _names(system, width)
+    static = [
+        number
+        for number, law in enumerate(laws)
+        if law is not None and law.limit is not None and law.limit is not ex.constant(1.0)
+    ]
+    if kept := [system.guards[number].name for number in static if number not in named]:
+        raise ParameterError(
+            f"the friction at {kept[0]!r} has a static limit, which only its own law keeps. Give "
+            f"it a width too."
+        )
     parameters, values, units = _parameters(system, named)
     _check_both_sides(system, parameters)
     called = law if isinstance(law, str) else getattr(law, "__name__", "law").strip("<>")
     field, guards = blended(system, step, parameters)
+    slips = " Friction slips only: its static limit is left out." if static else ""
     description = (
         f"Regularised: {called} over {', '.join(values)} in place of the boundaries "
-        f"{', '.join(system.guards[number].name for number in parameters)}."
+        f"{', '.join(system.guards[number].name for number in parameters)}.{slips}"
     )
     return replace(
         system,

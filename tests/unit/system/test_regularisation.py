@@ -141,32 +141,39 @@ def test_refused_systems():
         sl.regularise(hertz, width=1e-3)
 
 
-def test_contacts_with_laws():
-    """A surface that can be held slips only; where a state jumps nothing is smooth."""
+@sl.system(states="x v", forced_at="frequency")
+def belt(t, x, v, *, speed=0.3, slip=0.5, stick=0.8, gap=1.0, frequency=0.1):
+    push = sl.cos(2 * sl.pi * frequency * t) - sl.where(x > gap, 5 * (x - gap), 0)
+    return v, push - x - sl.friction(v - speed, slip=slip, stick=stick)
+
+
+def test_friction_slips_only():
+    smooth = sl.regularise(belt, width={"speed": 0.1, "gap": 0.01})
+    assert smooth.guards == ()
+    assert smooth.rhs(0.0, [0.2, 0.35])[1] == pytest.approx(0.8 - 0.5 * np.tanh(0.5), rel=1e-12)
+    assert "static limit is left out" in smooth.description
+    with pytest.raises(ParameterError, match="has a static limit"):
+        sl.regularise(belt, width={"gap": 0.1})
+
+
+def test_creep_where_friction_sticks():
+    """At rest on the belt the force that it needs is slip*tanh(creep/width)."""
 
     @sl.system(states="x v")
-    def belt(t, x, v, *, speed=0.3):
-        return v, -x - sl.piecewise((1.0, v > speed), otherwise=-1.0)
+    def dragged(t, x, v, *, speed=0.2, slip=0.5):
+        return v, -0.1 * v - sl.friction(v - speed, slip=slip)
 
-    smooth = sl.regularise(belt, width=0.1)
-    assert smooth.guards == ()
-    assert smooth.rhs(0.0, [0.2, 0.35])[1] == pytest.approx(-0.2 - np.tanh(0.5), rel=1e-14)
+    assert "static" not in sl.regularise(dragged, width=1e-3).description
+    smooth = sl.regularise(dragged, width=1e-3)
+    run = sl.simulate(smooth, (0.0, 0.0), t_end=20.0)
+    creep = run.end_v.item() - 0.2
+    assert 0.5 * np.tanh(creep / 1e-3) == pytest.approx(-0.1 * run.end_v.item(), rel=1e-9)
 
+
+def test_where_a_state_jumps_nothing_is_smooth():
     @sl.system(states="x v")
     def stop(t, x, v, *, gap=1.0):
-        return v, -x, sl.impact(x < gap, v, restitution=0.5)
+        return v, -x, sl.impact(x < gap, v, restitution=0.8)
 
     with pytest.raises(ParameterError, match="the state jumps"):
         sl.regularise(stop, width=0.1)
-
-
-def test_friction_that_stays_keeps_its_limit():
-    @sl.system(states="x v")
-    def block(t, x, v, *, wall=1.0, slip=0.5, stick=0.8):
-        stop = sl.where(x > wall, 50.0 * (x - wall), 0)
-        return v, -x - stop - sl.friction(v, slip=slip, stick=stick)
-
-    smooth = sl.regularise(block, width={"wall": 0.01})
-    friction, hold = smooth.guards
-    assert (friction.name, hold.name) == ("v = 0", "v = 0 held")
-    assert repr(friction.law.limit) == "stick/slip"
