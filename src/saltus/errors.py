@@ -101,6 +101,15 @@ def shown(value: object, limit: int = 80) -> str:
     return text if len(text) <= limit else f"{text[: limit - 4]}...{text[-1]}"
 
 
+def counted(number: int, word: str) -> str:
+    """``1 branch``, ``2 branches``."""
+    if number == 1:
+        return f"1 {word}"
+    if word.endswith("y"):
+        return f"{number} {word[:-1]}ies"
+    return f"{number} {word}{'es' if word.endswith('ch') else 's'}"
+
+
 def among(value: object, words: Iterable[str]) -> bool:
     """Whether a value is text, and one of some words. Lists and arrays, for which ``in`` fails or
     asks each entry, are none of them.

@@ -357,3 +357,8 @@ def _example(unit: str) -> str:
         "Hz": "15 Hz",
         "rad/s": "94.2 rad/s",
     }.get(unit, f"3 {unit}")
+
+
+def titled(heading: str, unit: str) -> str:
+    """A heading with its unit, such as ``x [m]``."""
+    return f"{heading} [{unit}]" if unit not in ("", "1") else heading

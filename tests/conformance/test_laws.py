@@ -115,6 +115,37 @@ def test_three_bodies_share_their_momentum():
     assert u + v + 3 * w == pytest.approx(2.0, rel=1e-15)
 
 
+def test_a_row_of_balls_that_touch_hands_its_momentum_on():
+    @sl.system(states="a b c u v w")
+    def cradle(t, a, b, c, u, v, w):
+        return (
+            u, v, w, 0.0, 0.0, 0.0,
+            sl.impact(a < b, u - v, restitution=1.0, inertia=(1.0, 1.0)),
+            sl.impact(b < c, v - w, restitution=1.0, inertia=(1.0, 1.0)),
+        )  # fmt: skip
+
+    run = sl.simulate(cradle, (-1.0, 0.0, 0.0, 1.0, 0.0, 0.0), t_end=3.0, samples=4)
+    assert times(run, "impact").tolist() == [1.0, 1.0]
+    assert [float(run[f"end_{name}"]) for name in "uvw"] == [0.0, 0.0, 1.0]
+    assert str(run.status.values) == "ok"
+
+
+def test_a_block_that_sticks_is_struck_loose():
+    """Equal masses, e = 0.5: the blow at t = 1 leaves velocities 1/4 and 3/4; the block stops after
+    3/4/0.3 = 2.5 s.
+    """
+
+    @sl.system(states="a b u v")
+    def struck(t, a, b, u, v, *, friction=0.3):
+        blow = sl.impact(a < b, u - v, restitution=0.5, inertia=(1.0, 1.0))
+        return u, v, 0.0, -sl.friction(v, slip=friction), blow
+
+    run = sl.simulate(struck, (-1.0, 0.0, 1.0, 0.0), t_end=3.6, samples=4)
+    assert run["contact_kind"].values.tolist()[:3] == ["impact", "release", "hold"]
+    assert run["contact_time"].values[:3] == pytest.approx([1.0, 1.0, 3.5], abs=1e-14)
+    assert (float(run.end_b), float(run.end_v)) == pytest.approx((0.9375, 0.0), abs=1e-14)
+
+
 def test_a_start_beyond_a_stop_is_invalid():
     with pytest.warns(SaltusWarning, match="beyond a stop"):
         run = sl.simulate(ball, (-1.0, 0.0), t_end=1.0)

@@ -505,18 +505,15 @@ def cache_clear(
     """
     from saltus import cache as entries
     from saltus.cli import screen
+    from saltus.errors import counted
     from saltus.results.files import known
 
     count = entries.clear()
-    screen.say(f"deleted {count} {'entry' if count == 1 else 'entries'} from {entries.folder()}")
+    screen.say(f"deleted {counted(count, 'entry')} from {entries.folder()}")
     if everything:
-        screen.say(f"forgot {_result_files(known.forget())}")
+        screen.say(f"forgot {counted(known.forget(), 'result file')}")
     elif left := known.count():
         screen.say(
-            f"kept the checksums of {_result_files(left)}, which are loaded at once; --all "
-            f"forgets them"
+            f"kept the checksums of {counted(left, 'result file')}, which are loaded at once; "
+            f"--all forgets them"
         )
-
-
-def _result_files(count: int) -> str:
-    return f"{count} result {'file' if count == 1 else 'files'}"

@@ -129,9 +129,16 @@ def never_held(system: System) -> System:
     Raises
     ------
     ParameterError
-        If its state jumps at contacts: the right-hand side alone doesn't say so.
+        If its state jumps at contacts, or a contact is held by more than its force while it moves:
+        the right-hand side alone doesn't say so.
     """
     for guard in system.guards:
+        limit = guard.law.limit if guard.law else None
+        if limit is not None and not (limit.op == "const" and limit.payload == 1.0):
+            raise ParameterError(
+                f"{system.name} has static friction above kinetic friction at {guard.name!r}, "
+                f"which only sl.Taylor() follows. Leave method= out."
+            )
         if guard.law and guard.law.reset:
             raise ParameterError(
                 f"{system.name} has an impact or a jump at {guard.name!r}, which only sl.Taylor() "

@@ -27,7 +27,7 @@ def gaps_function(system: System, clocks: Clocks) -> str:
 
     Whether a contact is held, and the side of a gap that is zero, are taken from out. Behind the
     gaps come, for a guard whose contact can be held, the rate at which its constraint is left
-    without its own force, and what that force changes of it.
+    without its own force, what that force changes of it, and the constraint itself.
     """
     laws = any(guard.law for guard in system.guards)
     code = ScalarCode(
@@ -46,9 +46,13 @@ def gaps_function(system: System, clocks: Clocks) -> str:
     for i, guard in enumerate(system.guards):
         if guard.law and guard.law.kind == "hold":
             held.append(f"out[{i}] = {code.value(guard.gap)}")
-        elif guard.law and guard.law.drive is not None and guard.law.pivot is not None:
-            held.append(f"out[{count + i}] = {code.value(guard.law.drive)}")
-            held.append(f"out[{2 * count + i}] = {code.value(guard.law.pivot)}")
+        elif guard.law:
+            behind = (guard.law.drive, guard.law.pivot, guard.law.constraint)
+            held += [
+                f"out[{(1 + block) * count + i}] = {code.value(value)}"
+                for block, value in enumerate(behind)
+                if value is not None
+            ]
     code.lines += held  # behind all that reads whether contacts are held
     return f"@kernel\ndef gaps(t, y, p, h, out):\n{indented(code.lines)}\n"
 

@@ -15,6 +15,7 @@ from saltus.kernels.status import (
     GRAZE_UNRESOLVED,
     HOLD_LAW,
     IMPACT_LAW,
+    NO_LAW,
     NONFINITE,
     OK,
     PAUSED,
@@ -130,8 +131,9 @@ def end_stretch(lanes, lane, batch, slow):
     ):
         return RUNNING
     final_contacts(lanes, lane, batch, slow)
-    if lanes.memo[lane, RESTS] != 0:
-        return RESTING
+    for g in range(NGUARDS):
+        if (lanes.memo[lane, RESTS] >> g) & 1 and LAW[g] == NO_LAW:
+            return RESTING
     return GRAZE_UNRESOLVED if lanes.run[SHALLOW, lane] > 0.0 else OK
 
 

@@ -115,6 +115,7 @@ def strike(lanes, lane, batch, g, rate, slow):
         for i in range(NSTATES):
             lanes.y[i, lane] = slow.state[i]
         note(lanes, lane, batch, g, IMPACT, int(-lanes.side[g, lane]), velocity, mode, 0.0, slow)
+        loosen(lanes, lane, batch, g, closing, slow)
     if LAW[g] == JUMP_LAW:
         after_jump(lanes, lane, batch, g, slow)
         return
@@ -126,6 +127,28 @@ def strike(lanes, lane, batch, g, rate, slow):
             later = 2.0 * rebound / (pressing * (1.0 - restitution))
         if later <= too_short(lanes, lane, g, restitution):
             hold(lanes, lane, batch, g, later, slow)
+
+
+@kernel
+def loosen(lanes, lane, batch, struck, closing, slow):
+    """Let go of the contacts that are held and that feel the blow of another: their surfaces slide
+    then, their stops are struck or left.
+    """
+    mode = mode_of(lanes, lane)
+    gaps_here(lanes, lane, batch, slow)
+    for g in range(NGUARDS):
+        if g != struck and PARTNER[g] >= 0 and LAW[g] != HOLD_LAW and (mode >> PARTNER[g]) & 1:
+            left = slow.gaps[3 * NGUARDS + g]
+            if abs(left) > FELT * closing:
+                lanes.side[PARTNER[g], lane] = -1.0
+                if LAW[g] == SURFACE_LAW:
+                    lanes.side[g, lane] = 1.0 if left > 0.0 else -1.0
+                    lanes.fresh[g, lane] = 0.0
+                else:
+                    lanes.side[g, lane], lanes.fresh[g, lane] = LAW_SIDE[g], 1.0
+                watch(lanes, lane)
+                note(lanes, lane, batch, PARTNER[g], RELEASE, -1, 0.0, mode, 0.0, slow)
+                mode = mode_of(lanes, lane)
 
 
 @inner

@@ -100,6 +100,9 @@ WATCHED = NGUARDS + NSINGULAR
 #: Part of a friction force by which the force needed exceeds it where slip begins, below which that
 #: is rounding.
 SLOW_START = 1.0e-9
+#: Part of the closing velocity of an impact by which the constraint of another contact changes, if
+#: it changes at all.
+FELT = 1.0e-9
 #: Part of the time scale of the acceleration that may be left of a chatter when it is completed.
 CHATTER = 1.0e-8
 #: Times within this many ulp are one event (EVENTS.md, rule 6).
@@ -189,7 +192,7 @@ def workspace():
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)),
         bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(2), gaps=np.zeros(3 * guards), state=np.zeros(NSTATES),
+        out=np.zeros(2), gaps=np.zeros(4 * guards), state=np.zeros(NSTATES),
         touches=np.zeros((MOST_TOUCHES, 2)),
         held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
     )  # fmt: skip

@@ -301,3 +301,17 @@ def say(ax: Axes, text: str, *datasets: xr.Dataset) -> None:
             fontsize=7,
             color="#A00000",
         )
+
+
+def count_at_top(ax: Axes, unit: float, ticks: int) -> Any:
+    """A second axis at the top that counts so many units of the axis below."""
+
+    def count(below: Any) -> Any:
+        return np.asarray(below, dtype=float) / unit
+
+    def place(above: Any) -> Any:
+        return np.asarray(above, dtype=float) * unit
+
+    top = ax.secondary_xaxis("top", functions=(count, place))
+    top.xaxis.set_major_locator(MaxNLocator(nbins=ticks, steps=[1, 2, 5, 10], integer=True))
+    return top

@@ -8,7 +8,6 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
 from saltus.errors import ParameterError, among, shown
@@ -154,23 +153,8 @@ def _panel(
     ax.set_xlabel(x.label("time"))
     ax.set_ylabel(y.label(state))
     if time == "both" and "period" in ds:
-        _period_axis(ax, period * x.factor)
-
-
-def _period_axis(ax: Axes, period: float) -> None:
-    """A second axis at the top that counts forcing periods; ``period`` in units of
-    the axis below.
-    """
-
-    def count(time: Any) -> Any:
-        return np.asarray(time, dtype=float) / period
-
-    def place(periods: Any) -> Any:
-        return np.asarray(periods, dtype=float) * period
-
-    top = ax.secondary_xaxis("top", functions=(count, place))
-    top.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10], integer=True))
-    top.xaxis.set_major_formatter("{x:g} T")
+        top = draw.count_at_top(ax, period * x.factor, ticks=8)
+        top.xaxis.set_major_formatter("{x:g} T")
 
 
 def _note_contacts(ax: Axes, table: xr.Dataset, owners: Mapping[str, str], x: Scale) -> None:

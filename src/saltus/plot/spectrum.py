@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
 
 from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
@@ -145,12 +144,5 @@ def _mark_orders(ax: Axes, singles: Sequence[xr.Dataset], top: float) -> None:
         for order in range(1, int(top / frequency) + 1):
             ax.axvline(order * frequency, color=QUIET, lw=0.4, ls=(0, (1, 3)), zorder=1)
 
-    def orders(x: Any) -> Any:
-        return np.asarray(x, dtype=float) / frequency
-
-    def frequencies(x: Any) -> Any:
-        return np.asarray(x, dtype=float) * frequency
-
-    above = ax.secondary_xaxis("top", functions=(orders, frequencies))
-    above.xaxis.set_major_locator(MaxNLocator(nbins=10, steps=[1, 2, 5, 10], integer=True))
+    above = draw.count_at_top(ax, frequency, ticks=10)
     above.set_xlabel("order")

@@ -11,6 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
+from saltus.errors import counted
 from saltus.flow.threads import usable_processors
 from saltus.replication.verdict import (
     FAILS,
@@ -103,11 +104,6 @@ def _version() -> str:
 def _sentence(text: str) -> str:
     """With a full stop, if nothing else ends it."""
     return text if text.endswith(("?", "!", ".")) else f"{text}."
-
-
-def _many(count: int, what: str) -> str:
-    """``1 core``, ``2 cores``."""
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def _text(value: str) -> str:
@@ -251,10 +247,10 @@ def _made(result: Replication) -> str:
         else "Grids and sweeps are those of the study files."
     )
     return (
-        f"<p>{_many(new, 'computation')} in this run, {kept} from an earlier one with the same "
+        f"<p>{counted(new, 'computation')} in this run, {kept} from an earlier one with the same "
         f"settings and code. "
-        f"This run took {result.seconds:.0f} s, with {_many(result.threads, 'thread')} on "
-        f"{_many(usable_processors(), 'usable core')} ({_text(platform.machine())}, "
+        f"This run took {result.seconds:.0f} s, with {counted(result.threads, 'thread')} on "
+        f"{counted(usable_processors(), 'usable core')} ({_text(platform.machine())}, "
         f"{_text(platform.system())}). All computations, "
         f"the earlier ones too, took {result.seconds_in_all:.0f} s. {size}</p>"
         f'<p class="quiet">{_text(packages)}</p>'

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from saltus.errors import ParameterError, SaltusError
+from saltus.errors import ParameterError, SaltusError, counted
 from saltus.flow.threads import usable_processors
 from saltus.replication.job import SECONDS, Job
 from saltus.replication.papers import Claim, Numbers, Paper, Picture, folder_of
@@ -283,10 +283,7 @@ def _finish(result: Replication, figure: str) -> str:
         finding = _attempt(result, f"claim {claim.id}", claim, claim.judge)
         result.findings.append((claim, finding or undecided(result.failures[f"claim {claim.id}"])))
     state = "done" if len(result.failures) == before else "not complete"
-    return (
-        f"figure {figure} {state}: {paper.figures[figure]}; {len(claims)} "
-        f"{'claim' if len(claims) == 1 else 'claims'}"
-    )
+    return f"figure {figure} {state}: {paper.figures[figure]}; {counted(len(claims), 'claim')}"
 
 
 def _attempt(

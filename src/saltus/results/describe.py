@@ -7,9 +7,11 @@ import json
 import numpy as np
 import xarray as xr
 
+from saltus.errors import counted
 from saltus.results.dataset.reader import reader
 from saltus.results.dataset.schema import STROBOSCOPE, TABLES, TRAJECTORY, check, kind_of
 from saltus.results.summary import summary
+from saltus.results.wording import tally
 from saltus.units import from_si
 
 
@@ -74,8 +76,7 @@ def _options(ds: xr.Dataset) -> str:
 
 
 def _extent(ds: xr.Dataset) -> str:
-    trajectories = ds.sizes.get("trajectory", 1)
-    parts = [f"{trajectories} {'trajectory' if trajectories == 1 else 'trajectories'}"]
+    parts = [counted(ds.sizes.get("trajectory", 1), "trajectory")]
     if "time" in ds and ds["time"].size:
         parts.append(
             f"{ds['time'].shape[-1]} samples from {float(ds['time'].min()):g} to "
@@ -90,5 +91,4 @@ def _tally(words: np.ndarray) -> str:
     """``3 ok, 1 graze_unresolved``; a single word stays itself."""
     if words.ndim == 0:
         return str(words)
-    found, counts = np.unique(words.astype(str), return_counts=True)
-    return ", ".join(f"{count} {word}" for word, count in zip(found, counts, strict=True))
+    return ", ".join(f"{count} {word}" for word, count in tally(words).items())

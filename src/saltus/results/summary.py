@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from saltus.errors import counted
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.schema import (
     AGREEMENT,
@@ -21,6 +22,7 @@ from saltus.results.dataset.schema import (
     states_of,
 )
 from saltus.results.summary_motions import WRITERS
+from saltus.results.wording import kind_texts, tally, unit_of
 
 #: Attractors that get a line of their own; the others are counted.
 _LINES = 12
@@ -40,7 +42,7 @@ def summary(ds: xr.Dataset) -> list[str]:
     if kind_of(ds) == RESPONSES:
         return [
             f"extent   {_span(ds, parameters_of(ds), 'values')}, "
-            f"{_count(ds.sizes['start'], 'start')} at each",
+            f"{counted(ds.sizes['start'], 'start')} at each",
             *_responses(ds),
         ]
     if kind_of(ds) == AGREEMENT:
@@ -89,7 +91,7 @@ def _span(ds: xr.Dataset, names: tuple[str, ...], what: str) -> str:
     """How many there are along each coordinate, and from where to where they reach."""
     parts = []
     for name in names:
-        values, unit = ds[name].values, ds[name].attrs.get("units", "")
+        values, unit = ds[name].values, unit_of(ds[name])
         parts.append(
             f"{name} from {values.min():g} to {values.max():g} {unit}".rstrip()
             if values.size
@@ -108,7 +110,7 @@ def _starts(ds: xr.Dataset) -> str:
 
 def _attractors(ds: xr.Dataset) -> list[str]:
     count = ds.sizes["attractor"]
-    unit = ds["attractor_peak"].attrs.get("units", "")
+    unit = unit_of(ds["attractor_peak"])
     words = []
     for i in range(count):
         one = ds.isel(attractor=i)
@@ -121,7 +123,7 @@ def _attractors(ds: xr.Dataset) -> list[str]:
         if kind == Kind.NOISY_PERIODIC.word:
             size += f", scatter {float(one['attractor_scatter']):.2g} {unit}".rstrip()
         words.append(f"{name}, {size}")
-    lines = [f"found    {_count(count, 'attractor')}"]
+    lines = [f"found    {counted(count, 'attractor')}"]
     for i, text in enumerate(words[:_LINES]):
         one = ds.isel(attractor=i)
         through = _through(one) if words.count(text) > 1 else ""
@@ -131,7 +133,12 @@ def _attractors(ds: xr.Dataset) -> list[str]:
             else ""
         )
         lines.append(f"  {i}: {text}{through}{share}")
-    return lines + ([f"  and {count - _LINES} more"] if count > _LINES else [])
+    return lines + _more(count)
+
+
+def _more(count: int) -> list[str]:
+    """A line on those that have none of their own."""
+    return [f"  and {count - _LINES} more"] if count > _LINES else []
 
 
 def _through(one: xr.Dataset) -> str:
@@ -140,7 +147,7 @@ def _through(one: xr.Dataset) -> str:
     """
     names = [name for name in states_of(one) if f"attractor_{name}" in one]
     points = {name: float(np.ravel(one[f"attractor_{name}"].values)[0]) for name in names}
-    units = {name: one[f"attractor_{name}"].attrs.get("units", "") for name in names}
+    units = {name: unit_of(one[f"attractor_{name}"]) for name in names}
     place = ", ".join(
         f"{name} = {value:.4g} {units[name]}".rstrip()
         for name, value in points.items()
@@ -163,15 +170,10 @@ def _unsettled(basin: xr.DataArray) -> str:
 
 def _responses(ds: xr.Dataset) -> list[str]:
     """What was found: branches, kinds of motion, events; and what became of the starts."""
-    kinds = [
-        kind_text(kind, n)
-        for kind, n in zip(
-            ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True
-        )
-    ]
-    found = f"found    {_count(len(kinds), 'response')}"
+    kinds = kind_texts(ds, "response_")
+    found = f"found    {counted(len(kinds), 'response')}"
     if len(parameters_of(ds)) == 1:
-        found += f" on {_count(np.unique(ds['response_branch'].values).size, 'branch')}"
+        found += f" on {counted(np.unique(ds['response_branch'].values).size, 'branch')}"
     lines = [f"{found}: {_tally(kinds)}" if kinds else found]
     if ds.sizes.get("event"):
         lines.append(f"events   {_tally(ds['event_kind'].values.tolist())}")
@@ -180,31 +182,17 @@ def _responses(ds: xr.Dataset) -> list[str]:
 
 def _tally(words: list[str]) -> str:
     """``212 T, 31 3T``, the most frequent first."""
-    found = sorted(set(words), key=lambda word: (-words.count(word), word))
+    found = sorted(tally(words).items(), key=lambda one: -one[1])
     more = f" and {len(found) - _LINES} other kinds" if len(found) > _LINES else ""
-    return (
-        ", ".join(f"{words.count(word)} {word}" for word in found[:_LINES]).replace("_", " ") + more
-    )
-
-
-def _count(number: int, word: str) -> str:
-    """``1 branch``, ``2 branches``."""
-    return (
-        f"{number} {word}"
-        if number == 1
-        else (f"{number} {word}{'es' if word.endswith('ch') else 's'}")
-    )
+    return ", ".join(f"{n} {word}" for word, n in found[:_LINES]).replace("_", " ") + more
 
 
 def _exponents(ds: xr.Dataset) -> list[str]:
     """A line on each trajectory: the kind of motion, and its exponents with the half-width of the
     95 % interval of the largest.
     """
-    count, unit = ds.sizes["trajectory"], ds["lyapunov_exponent"].attrs.get("units", "")
-    lines = [
-        f"measured {ds.attrs.get('algorithm', 'unknown')}, {count} "
-        f"{'trajectory' if count == 1 else 'trajectories'}"
-    ]
+    count, unit = ds.sizes["trajectory"], unit_of(ds["lyapunov_exponent"])
+    lines = [f"measured {ds.attrs.get('algorithm', 'unknown')}, {counted(count, 'trajectory')}"]
     for i in range(min(count, _LINES)):
         one = ds.isel(trajectory=i)
         values = ", ".join(f"{value:.6g}" for value in one["lyapunov_exponent"].values)
@@ -212,7 +200,7 @@ def _exponents(ds: xr.Dataset) -> list[str]:
         graze = ", near a graze" if "near_graze" in one and int(one["near_graze"]) else ""
         kind = kind_text(str(one["kind"].item()), int(one["response_period"]))
         lines.append(f"  {i}: {kind}, {values} {unit}, the first +- {width:.1e}{graze}")
-    return lines + ([f"  and {count - _LINES} more"] if count > _LINES else [])
+    return lines + _more(count)
 
 
 def _agreement(ds: xr.Dataset) -> list[str]:

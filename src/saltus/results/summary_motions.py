@@ -12,6 +12,7 @@ import xarray as xr
 from saltus.results.dataset.schema import (
     ENERGY,
     IMPACTS,
+    MODES,
     SECTION,
     SETTLED,
     SPECTRUM,
@@ -19,6 +20,7 @@ from saltus.results.dataset.schema import (
     period_text,
     states_of,
 )
+from saltus.results.wording import unit_of
 
 #: Largest lines of a spectrum that are listed.
 _LINES = 5
@@ -40,10 +42,7 @@ def _spectrum(ds: xr.Dataset) -> list[str]:
         f"extent   {len(frequency)} lines up to {frequency[-1]:g} Hz, window {one['window'].item()}"
     ]
     for name in states_of(ds):
-        amplitude, unit = (
-            one[f"{name}_amplitude"].values,
-            one[f"{name}_amplitude"].attrs.get("units", ""),
-        )
+        amplitude, unit = one[f"{name}_amplitude"].values, unit_of(one[f"{name}_amplitude"])
         largest = np.argsort(amplitude)[::-1][:_LINES]
         lines.append(
             f"  {name}: "
@@ -63,7 +62,7 @@ def _impacts(ds: xr.Dataset) -> list[str]:
             float(one[key].mean())
             for key in ("contacts_per_second", "speed_mean", "share_in_contact")
         )
-        unit = one["speed_mean"].attrs.get("units", "")
+        unit = unit_of(one["speed_mean"])
         lines.append(
             f"  {name}: {rate:.4g} a second, at {speed:.4g} {unit}".rstrip() + f" on average, "
             f"in contact {share:.2%} of the time"
@@ -102,6 +101,15 @@ def _widths(ds: xr.Dataset) -> list[str]:
     ]
 
 
+def _modes(ds: xr.Dataset) -> list[str]:
+    frequency, share = ds["frequency"].values, ds["flexibility_share"].values
+    lines = [f"found    {len(frequency)} modes of {ds.sizes['degree']} degrees of freedom"]
+    lines += [f"extent   {frequency[0]:.4g} to {frequency[-1]:.4g} Hz"]
+    for place, one in zip(ds["place"].values.tolist(), share.tolist(), strict=True):
+        lines.append(f"  {place}: {one:.2%} of the static flexibility")
+    return lines
+
+
 #: For each kind, what writes its lines.
 WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SECTION: _section,
@@ -110,4 +118,5 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     ENERGY: _energy,
     SETTLED: _settled,
     WIDTHS: _widths,
+    MODES: _modes,
 }

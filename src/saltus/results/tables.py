@@ -10,6 +10,8 @@ import numpy as np
 import xarray as xr
 
 from saltus.results.dataset.schema import parameters_of, response_name, sample_dim, states_of
+from saltus.results.wording import unit_of
+from saltus.units import titled
 
 Table = dict[str, np.ndarray]
 
@@ -79,7 +81,7 @@ def _outputs(ds: xr.Dataset) -> Table:
         for name in (str(name) for name in ds.data_vars if ds[name].dims == ("response", "output")):
             unit = "rad" if name == "output_phase" else ds["output_units"].values[i]
             header = f"{output} {name.removeprefix('output_').replace('_', ' ')}"
-            table[f"{header} [{unit}]" if unit not in ("", "1") else header] = ds[name].values[:, i]
+            table[titled(header, unit)] = ds[name].values[:, i]
     return table
 
 
@@ -112,8 +114,7 @@ def guards(ds: xr.Dataset) -> list[str]:
 
 
 def _header(ds: xr.Dataset, name: str) -> str:
-    unit = ds[name].attrs.get("units", "")
-    return f"{name} [{unit}]" if unit not in ("", "1") else name
+    return titled(name, unit_of(ds[name]))
 
 
 def _spread(variable: xr.Variable, shape: xr.Variable) -> np.ndarray:

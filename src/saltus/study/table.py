@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from saltus.fence import csv_cell
-from saltus.units import from_si
+from saltus.units import from_si, titled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,9 +187,9 @@ def table(
     )
 
 
-def titled(heading: str, unit: str) -> str:
-    """A heading with its unit."""
-    return f"{heading} [{unit}]" if unit not in ("", "1") else heading
+def left_out(count: int, what: str, shown: int = ROWS) -> list[str]:
+    """A note on the rows that the screen doesn't show."""
+    return [f"{count - shown} more {what} are in the file."] if count > shown else []
 
 
 def _cell(value: Any) -> str:

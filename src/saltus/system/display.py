@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from saltus.errors import counted
 from saltus.system.expression import ELEMENTARY, Condition, Expr, state, varies
 from saltus.system.guards import Law, is_hold
 from saltus.system.reduction import free_field
@@ -84,8 +85,8 @@ def _jumps(system: System, writer: Writer) -> Iterator[tuple[str, str, Expr]]:
 def system_text(system: System) -> str:
     """The block that ``repr`` shows: equations, guards, parameters."""
     head = (
-        f"System {system.name}: {_counted(len(system.states), 'state')}, "
-        f"{_counted(_boundaries(system), 'guard')}{_forcing(system)}"
+        f"System {system.name}: {counted(len(system.states), 'state')}, "
+        f"{counted(_boundaries(system), 'guard')}{_forcing(system)}"
     )
     states = [
         f"{name} [{system.units[name]}]" if system.units[name] else name for name in system.states
@@ -184,10 +185,6 @@ def _labelled(label: str, lines: list[str]) -> list[str]:
 def _aligned(rows: list[tuple[str, str]]) -> list[str]:
     width = max(len(name) for name, _ in rows)
     return [f"{name:<{width}}  {text}" for name, text in rows]
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 # -- formulas --------------------------------------------------------------------------------------

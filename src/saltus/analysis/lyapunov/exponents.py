@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.qr import AT_REST, GOOD, SEGMENT
 from saltus.analysis.lyapunov.segments import TangentFlow
 from saltus.analysis.lyapunov.spectrum import Spectrum, spectrum
@@ -39,38 +40,13 @@ FORCED = (
 )
 
 
-class Exponents:
-    """The exponents of k trajectories, computed by :meth:`run`; what isn't computed yet is NaN.
-
-    Parameters
-    ----------
-    map_ : Stroboscope
-        The flow, with a row for each trajectory.
-    start : float64[k, D]
-        Starts.
-    periods, transient : int
-        Blocks that count, and blocks before them.
-    every : float or None
-        Time of a block, for a system without forcing [s].
-    """
+class Exponents(Algorithm):
+    """By the variational equations."""
 
     algorithm = "variational equations with saltation, QR method"
 
-    def __init__(
-        self,
-        map_: Stroboscope,
-        start: np.ndarray,
-        periods: int,
-        transient: int,
-        every: float | None,
-    ):
-        self.map, self._start, self._periods, self._transient, self._every = (
-            map_,
-            start,
-            periods,
-            transient,
-            every,
-        )
+    def __init__(self, map_: Stroboscope, start: np.ndarray, periods: int, *blocks: Any):
+        super().__init__(map_, start, periods, *blocks)
         self._ends = running_ends(periods)
         k, size, m = *start.shape, len(self._ends)
         nan = np.full

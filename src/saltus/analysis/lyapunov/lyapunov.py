@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.dataset_parts import provenance, shared_values, subject
+from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.exponents import Exponents
 from saltus.analysis.lyapunov.wolf_on_flow import NeighbourExponents
 from saltus.analysis.outcome_messages import warn
@@ -147,9 +148,8 @@ def lyapunov(
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))
     block = None if every is None else to_si(every, "s", "every")
     map_ = Stroboscope(system, flow, rows, block, threads)
-    work = (Exponents if method == "variational" else NeighbourExponents)(
-        map_, group.start, periods, transient, block
-    )
+    algorithm: type[Algorithm] = Exponents if method == "variational" else NeighbourExponents
+    work = algorithm(map_, group.start, periods, transient, block)
 
     def dataset() -> xr.Dataset:
         return _dataset(system, flow, group, work, unit)
@@ -182,7 +182,7 @@ def _check_words(method: Any, unit: Any, system: System) -> None:
 
 
 def _dataset(
-    system: System, flow: Method, group: Ensemble, work: Exponents | NeighbourExponents, unit: str
+    system: System, flow: Method, group: Ensemble, work: Algorithm, unit: str
 ) -> xr.Dataset:
     """Everything under its name and in its unit."""
     per_period, logarithm = UNITS[unit]

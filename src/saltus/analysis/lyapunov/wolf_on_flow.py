@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.qr import GOOD
 from saltus.analysis.recorded.wolf import NOTHING, Growing, default_search, measure, replaced
 from saltus.analysis.statistics import CONFIDENCE, RUNNING
@@ -23,32 +24,13 @@ SAMPLES = 32
 GROUP = 16_000_000
 
 
-class NeighbourExponents:
-    """As :class:`saltus.analysis.lyapunov.exponents.Exponents`, by the method of Wolf et al.
-
-    Parameters
-    ----------
-    map_, start, periods, transient, every
-        As there.
-    """
+class NeighbourExponents(Algorithm):
+    """By the method of Wolf et al."""
 
     algorithm = "Wolf et al. (1985), fixed evolution time"
 
-    def __init__(
-        self,
-        map_: Stroboscope,
-        start: np.ndarray,
-        periods: int,
-        transient: int,
-        every: float | None,
-    ):
-        self.map, self._start, self._periods, self._transient, self._every = (
-            map_,
-            start,
-            periods,
-            transient,
-            every,
-        )
+    def __init__(self, map_: Stroboscope, start: np.ndarray, *blocks: Any):
+        super().__init__(map_, start, *blocks)
         self._found = [NOTHING] * len(start)
         self._status = np.full(len(start), st.NOT_COMPUTED)
 

@@ -13,6 +13,8 @@ import xarray as xr
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
+from saltus.results import Subject, build, made_by
+from saltus.results.dataset.schema import MODES
 from saltus.system.structures import matrices
 from saltus.system.structures.parts import Contact, direction, parts
 from saltus.system.structures.reduction import flexibility, modes_of
@@ -79,25 +81,12 @@ def structure_modes(
     with np.errstate(invalid="ignore"):  # of what a rigid body moves, or nothing does
         share = np.where(np.isfinite(total), 1 - residual / total, np.nan)
 
-    def values(dims: Any, array: np.ndarray, unit: str, name: str) -> xr.Variable:
-        return xr.Variable(dims, array, {"units": unit, "long_name": name})
-
-    return xr.Dataset(
-        {
-            "frequency": values("mode", kept.angular / (2 * np.pi), "Hz", "natural frequency"),
-            "shape": values(
-                ("degree", "mode"), kept.shapes, "kg^-0.5", "mode shape of unit modal mass"
-            ),
-            "flexibility": values("place", total, "m/N", "static flexibility"),
-            "residual_flexibility": values(
-                "place", residual, "m/N", "static flexibility of the modes left out"
-            ),
-            "flexibility_share": values(
-                "place", share, "1", "share of the static flexibility that the modes carry"
-            ),
-        },
-        {"mode": np.arange(1, count + 1), "degree": degrees, "place": places},
-    )
+    values = {
+        "frequency": kept.angular / (2 * np.pi), "shape": kept.shapes, "flexibility": total,
+        "residual_flexibility": residual, "flexibility_share": share,
+        "mode": np.arange(1, count + 1), "degree": degrees, "place": places,
+    }  # fmt: skip
+    return build(MODES, Subject((), attrs=made_by()), values)
 
 
 def _directions(at: Any, usual: list[str], degrees: list[str]) -> tuple[list[str], np.ndarray]:

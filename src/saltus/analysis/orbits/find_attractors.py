@@ -74,32 +74,15 @@ def find_attractors(
     owner: list[Orbit | SampledAttractor | None] = [None] * len(start)
     settled = np.full(len(start), -1, np.int64)
     travel, going = map_.launch(start, most), np.arange(len(start))
+    noisy = Kind.NOISY_PERIODIC.word
     turns = isinstance(map_, Stroboscope) and autonomous(map_.system)
     while len(going) and travel.age < most:
         points = travel.advance(ROUND)
         here = np.flatnonzero(~_captured(found, points, going, travel.age - ROUND, owner, settled))
-        here = here[
-            ~_keeping(
-                found,
-                Kind.NOISY_PERIODIC.word,
-                points[here],
-                going[here],
-                travel.age,
-                owner,
-                settled,
-            )
-        ]
+        here = here[~_keeping(found, noisy, points[here], going[here], travel.age, owner, settled)]
         while len(here) and _add_orbits(map_, points[here], scale, found, most):
             here = here[
-                ~_keeping(
-                    found,
-                    Kind.NOISY_PERIODIC.word,
-                    points[here],
-                    going[here],
-                    travel.age,
-                    owner,
-                    settled,
-                )
+                ~_keeping(found, noisy, points[here], going[here], travel.age, owner, settled)
             ]
             here = here[
                 ~_captured(found, points[here], going[here], travel.age - ROUND, owner, settled)

@@ -28,6 +28,7 @@ from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.methods import METHODS_VARIABLES, WIDTHS_VARIABLES
 from saltus.results.dataset.responses import RESPONSES_VARIABLES
 from saltus.results.dataset.result import Result
+from saltus.results.dataset.structures import MODES_VARIABLES
 from saltus.results.dataset.trajectories import STROBOSCOPE_VARIABLES, TRAJECTORY_VARIABLES
 
 #: Version of the tables below, kept in every result as ``schema_version``.
@@ -35,7 +36,7 @@ VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS, EXPONENTS = "methods", "exponents"
-SETTLED, WIDTHS = "settled", "widths"
+SETTLED, WIDTHS, MODES = "settled", "widths", "modes"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
@@ -48,6 +49,7 @@ MAKERS = {
     ENERGY: "sl.energy_balance",
     EXPONENTS: "sl.lyapunov or sl.wolf",
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
+    MODES: "sl.structure_modes",
 }  # fmt: skip
 
 #: The table of each kind of result.
@@ -66,6 +68,7 @@ TABLES = {
     EXPONENTS: EXPONENTS_VARIABLES,
     SETTLED: motions.SETTLED_VARIABLES,
     WIDTHS: WIDTHS_VARIABLES,
+    MODES: MODES_VARIABLES,
 }
 
 
@@ -255,6 +258,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         ENERGY: ("energy", "residual", "status"),
         EXPONENTS: ("lyapunov_exponent", "running_exponent"),
         SETTLED: ("response_period", "mismatch"),
+        MODES: ("shape", "flexibility"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 

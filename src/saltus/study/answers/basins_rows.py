@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from saltus.results.dataset.kinds import WITHOUT, Kind, sentences
-from saltus.results.dataset.schema import axes_of, kind_text
+from saltus.results.dataset.schema import axes_of
 from saltus.results.summary import own_errors
+from saltus.results.wording import kind_texts, unit_of
 from saltus.study.table import Column, TextTable, number, quantity, table, with_error, words
 
 if TYPE_CHECKING:
@@ -25,11 +26,8 @@ def attractor_table(title: str, ds: xr.Dataset) -> TextTable:
         for name in map(str, ds.data_vars)
         if name.startswith("attractor_")
     }
-    units = {name: one.attrs.get("units", "") for name, one in found.items()}
-    kinds = [
-        kind_text(str(kind), int(n))
-        for kind, n in zip(found["type"].values, found["period"].values, strict=True)
-    ]
+    units = {name: unit_of(one) for name, one in found.items()}
+    kinds = kind_texts(ds, "attractor_")
     sizes = (
         np.hypot(found["multiplier_real"].values[:, 0], found["multiplier_imag"].values[:, 0])
         if kinds
@@ -101,16 +99,10 @@ def agreement_table(ds: xr.Dataset) -> TextTable:
     """
     match = {
         name: ds[f"match_{name}"].values.tolist()
-        for name in ("a", "b", "type", "period", "fraction_a", "fraction_b", "orbit_distance")
+        for name in ("a", "b", "fraction_a", "fraction_b", "orbit_distance")
     }
     columns = [
-        words(
-            "type",
-            [
-                kind_text(str(kind), int(n))
-                for kind, n in zip(match["type"], match["period"], strict=True)
-            ],
-        )
+        words("type", kind_texts(ds, "match_")),
     ]
     columns += [number(side, [n if n >= 0 else None for n in match[side]]) for side in "ab"]
     columns += [_share(f"share in {side}", match[f"fraction_{side}"], match[side]) for side in "ab"]

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from saltus.results.dataset.schema import kind_text
-from saltus.study.table import ROWS, TextTable, interval, number, table, varied, words
+from saltus.results.wording import unit_of
+from saltus.study.table import TextTable, interval, left_out, number, table, varied, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,7 +23,7 @@ def exponent_table(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each trajectory: kind of motion, exponents, interval of the largest, their sum,
     mean divergence.
     """
-    unit = ds["lyapunov_exponent"].attrs.get("units", "")
+    unit = unit_of(ds["lyapunov_exponent"])
     count, shown = ds.sizes["trajectory"], min(ds.sizes["exponent"], COLUMNS)
     periods = ds["response_period"].values.tolist() if "response_period" in ds else [0] * count
     kinds = [
@@ -43,15 +44,11 @@ def exponent_table(title: str, ds: xr.Dataset) -> TextTable:
         columns += [number(label, ds[name].values, ".6g", unit) for label, name in _SUMS.items()]
     near = ds["near_graze"].values if "near_graze" in ds else np.zeros(count, dtype=np.int64)
     columns.append(words("", ["near a graze" if one else "" for one in near], "near a graze"))
-    return table(title, columns, _notes(ds, min(count, ROWS)))
+    return table(title, columns, _notes(ds))
 
 
-def _notes(ds: xr.Dataset, shown: int) -> tuple[str, ...]:
-    notes = (
-        [f"{ds.sizes['trajectory'] - shown} more motions are in the file."]
-        if ds.sizes["trajectory"] > shown
-        else []
-    )
+def _notes(ds: xr.Dataset) -> tuple[str, ...]:
+    notes = left_out(ds.sizes["trajectory"], "motions")
     if "near_graze" in ds and np.any(ds["near_graze"].values == 1):
         notes.append(
             "Near a graze finite deviations don't grow as infinitesimal ones do: the "

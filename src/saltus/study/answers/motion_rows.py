@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.results.dataset.schema import states_of
+from saltus.results.wording import ended_early, unit_of
 from saltus.study.table import (
     ROWS,
     Column,
     TextTable,
+    left_out,
     number,
     quantity,
     table,
@@ -34,7 +36,7 @@ def section_table(title: str, ds: xr.Dataset) -> TextTable:
     columns.append(number("time", ds["crossing_time"].values, ".10g", "s"))
     if "crossing_phase" in ds and np.isfinite(ds["crossing_phase"].values).any():
         columns.append(number("phase of the forcing", ds["crossing_phase"].values, ".8f"))
-    columns += [quantity(name, ds[name].values, _unit(ds[name]), 8) for name in states_of(ds)]
+    columns += [quantity(name, ds[name].values, unit_of(ds[name]), 8) for name in states_of(ds)]
     columns.append(
         Column(
             "direction",
@@ -49,7 +51,7 @@ def section_table(title: str, ds: xr.Dataset) -> TextTable:
         f"{', '.join(f'{count} {name}' for name, count in totals.items())}."
     ]
     return table(
-        title, columns, [*notes, *_left_out(ds.sizes["crossing"], "crossings"), *_failed(ds)]
+        title, columns, [*notes, *left_out(ds.sizes["crossing"], "crossings"), *_failed(ds)]
     )
 
 
@@ -68,7 +70,7 @@ def spectrum_table(title: str, ds: xr.Dataset) -> TextTable:
     for name in states_of(ds):
         amplitude, phase = ds[f"{name}_amplitude"], ds[f"{name}_phase"]
         columns.append(
-            quantity(f"amplitude of {name}", _flat(amplitude, like, dims), _unit(amplitude), 6)
+            quantity(f"amplitude of {name}", _flat(amplitude, like, dims), unit_of(amplitude), 6)
         )
         columns.append(number(f"phase of {name}", _flat(phase, like, dims), ".4f", "rad"))
     size = _flat(like, like, dims)
@@ -115,7 +117,7 @@ def impact_table(title: str, ds: xr.Dataset) -> TextTable:
     def flat(name: str) -> np.ndarray:
         return _flat(ds[name], like, dims)
 
-    speed = _unit(ds["speed_mean"])
+    speed = unit_of(ds["speed_mean"])
     columns = _of_trajectory(ds, flat("trajectory")) if "trajectory" in like.dims else []
     columns += [words("guard", flat("guard").astype(str)), words("contacts", flat("contacts"))]
     rates = [
@@ -145,7 +147,7 @@ def impact_table(title: str, ds: xr.Dataset) -> TextTable:
     )
     notes = ["± is the standard error by the means of blocks."]
     return table(
-        title, columns, [*notes, *_left_out(like.size, "guards and trajectories"), *_failed(ds)]
+        title, columns, [*notes, *left_out(like.size, "guards and trajectories"), *_failed(ds)]
     )
 
 
@@ -174,7 +176,7 @@ def energy_table(title: str, ds: xr.Dataset) -> TextTable:
         f"residual = supplied - dissipated - change of the stored energy; at most {worst:.1e} "
         f"of the largest of them."
     ]
-    return table(title, columns, [*notes, *_left_out(like.size, "intervals"), *_failed(ds)])
+    return table(title, columns, [*notes, *left_out(like.size, "intervals"), *_failed(ds)])
 
 
 #: By the name of the table in the study file.
@@ -189,10 +191,6 @@ def _of_trajectory(ds: xr.Dataset, rows: np.ndarray) -> list[Column]:
     return [words("trajectory", rows), *varied(ds, rows)]
 
 
-def _unit(values: xr.DataArray) -> str:
-    return str(values.attrs.get("units", ""))
-
-
 def _dims(values: xr.DataArray) -> Sequence[Any]:
     """Dims in the order of the rows: trajectory by trajectory."""
     return sorted(values.dims, key=lambda dim: dim != "trajectory")
@@ -203,15 +201,6 @@ def _flat(values: xr.DataArray, like: xr.DataArray, dims: Sequence[Any]) -> np.n
     return np.asarray(values.broadcast_like(like).transpose(*dims).values).ravel()
 
 
-def _left_out(count: int, what: str) -> list[str]:
-    return [f"{count - ROWS} more {what} are in the file."] if count > ROWS else []
-
-
 def _failed(ds: xr.Dataset) -> list[str]:
     """A note on trajectories that ended early."""
-    words, counts = np.unique(np.atleast_1d(ds["status"].values).astype(str), return_counts=True)
-    return [
-        f"{count} of the motions: {word}."
-        for word, count in zip(words, counts, strict=True)
-        if word != "ok"
-    ]
+    return [f"{count} of the motions: {word}." for word, count in ended_early(ds).items()]

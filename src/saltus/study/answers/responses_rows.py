@@ -14,11 +14,11 @@ import numpy as np
 from saltus.results.dataset.kinds import sentences
 from saltus.results.dataset.schema import (
     event_name,
-    kind_text,
     parameters_of,
     response_name,
     states_of,
 )
+from saltus.results.wording import kind_texts, unit_of
 from saltus.study.table import ROWS, Column, TextTable, interval, number, quantity, table, words
 from saltus.units import from_si
 
@@ -49,7 +49,7 @@ def _branches(title: str, ds: xr.Dataset) -> TextTable:
     first, along = states_of(ds)[0], axis.replace("_", " ")
     values, (unit, size, gap) = (
         response_name(axis),
-        (ds[name].attrs.get("units", "") for name in (axis, "response_rms", "response_margin")),
+        (unit_of(ds[name]) for name in (axis, "response_rms", "response_margin")),
     )
 
     def ends(name: str, pick: Callable[[np.ndarray], Any]) -> list[float]:
@@ -94,10 +94,7 @@ def _most(values: np.ndarray) -> float:
 
 def _types(ds: xr.Dataset) -> str:
     """``T``, or ``T, 2T`` where a branch changes its kind."""
-    pairs = zip(
-        ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True
-    )
-    return ", ".join(dict.fromkeys(kind_text(kind, n) for kind, n in pairs))
+    return ", ".join(dict.fromkeys(kind_texts(ds, "response_")))
 
 
 def _notes(ds: xr.Dataset, more: int) -> tuple[str, ...]:
@@ -114,7 +111,7 @@ def _notes(ds: xr.Dataset, more: int) -> tuple[str, ...]:
 def _events(title: str, ds: xr.Dataset) -> TextTable:
     """A row for what happens to a branch between two values."""
     (axis,) = parameters_of(ds)
-    unit = ds[axis].attrs.get("units", "")
+    unit = unit_of(ds[axis])
     columns = (axis.replace("_", " "), "branch", "what happens")
     found = list(
         zip(
@@ -142,10 +139,7 @@ def _events(title: str, ds: xr.Dataset) -> TextTable:
 def _kinds(title: str, ds: xr.Dataset) -> TextTable:
     """A row for each kind of motion: on how much of the map it is, and where."""
     of = ds["response_of"].values
-    pairs = zip(
-        ds["response_type"].values.tolist(), ds["response_period"].values.tolist(), strict=True
-    )
-    names = np.array([kind_text(kind, n) for kind, n in pairs], dtype=np.str_)
+    names = np.array(kind_texts(ds, "response_"), dtype=np.str_)
     cells = np.append(names, "")[np.where(of < 0, len(names), of)]
     kinds = sorted(set(names.tolist()), key=lambda kind: (len(kind), kind))
     columns = [
@@ -157,7 +151,7 @@ def _kinds(title: str, ds: xr.Dataset) -> TextTable:
         ),
     ]
     for dim, axis in enumerate(parameters_of(ds)):
-        values, unit = ds[axis].values, ds[axis].attrs.get("units", "")
+        values, unit = ds[axis].values, unit_of(ds[axis])
         where = [values[np.nonzero((cells == kind).any(axis=-1))[dim]] for kind in kinds]
         low, high = ([of(found) for found in where] for of in (_least, _most))
         columns.append(

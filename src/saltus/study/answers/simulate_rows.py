@@ -10,7 +10,8 @@ from saltus.analysis.motion.settled import settled
 from saltus.errors import ParameterError
 from saltus.kernels.status import STATUS
 from saltus.results.dataset.schema import end_name, period_text, states_of
-from saltus.study.table import ROWS, TextTable, quantity, table, varied, words
+from saltus.results.wording import ended_early, unit_of
+from saltus.study.table import TextTable, left_out, quantity, table, varied, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,13 +48,13 @@ def run_table(title: str, run: xr.Dataset) -> TextTable:
         quantity(
             f"{name} at the end",
             batch[end_name(name)].values,
-            batch[name].attrs.get("units", ""),
+            unit_of(batch[name]),
             5,
         )
         for name in states_of(run)
     ]
     columns += [words("response", responses)] * bool(responses)
-    return table(title, columns, _notes(batch, min(total, ROWS)))
+    return table(title, columns, _notes(batch))
 
 
 def response_texts(run: xr.Dataset) -> list[str]:
@@ -68,16 +69,10 @@ def response_texts(run: xr.Dataset) -> list[str]:
     return [period_text(int(n), none) for n in np.atleast_1d(found["response_period"].values)]
 
 
-def _notes(batch: xr.Dataset, shown: int) -> tuple[str, ...]:
-    notes = []
-    total = batch.sizes["trajectory"]
-    if shown < total:
-        notes.append(f"{total - shown} more trajectories are in the file.")
-    status, counts = np.unique(batch["status"].values.astype(str), return_counts=True)
-    sentences = dict(STATUS.values())
-    notes += [
+def _notes(batch: xr.Dataset) -> tuple[str, ...]:
+    total, sentences = batch.sizes["trajectory"], dict(STATUS.values())
+    early = [
         f"{count} of {total} {word}: {sentences.get(word, '')}."
-        for word, count in zip(status, counts, strict=True)
-        if word != "ok"
+        for word, count in ended_early(batch).items()
     ]
-    return tuple(notes)
+    return (*left_out(total, "trajectories"), *early)

@@ -75,35 +75,20 @@ def compute(
         if len(missing) >= LARGE:
             say(f"{job.title}: {estimate(job.plan, found, resources_)}")
         begin, count = time.perf_counter(), [0]
+
+        def tell(last: bool = False) -> None:
+            done, seconds = int(store.done().sum()), time.perf_counter() - begin
+            report(Report(job.title, done, job.plan.chunks, seconds, count[0], last=last))
+
         if missing:
 
             def keep(index: int, part: Settling) -> None:
                 store.commit(index, settling_arrays(part, job.plan.system.states))
                 count[0] += 1
 
-            def show(_share: float) -> None:
-                report(
-                    Report(
-                        job.title,
-                        int(store.done().sum()),
-                        job.plan.chunks,
-                        time.perf_counter() - begin,
-                        count[0],
-                    )
-                )
-
             with _runner(resources_) as run:
-                run(job.plan, found, missing, keep, show)
-        report(
-            Report(
-                job.title,
-                int(store.done().sum()),
-                job.plan.chunks,
-                time.perf_counter() - begin,
-                count[0],
-                last=True,
-            )
-        )
+                run(job.plan, found, missing, keep, lambda _: tell())
+        tell(last=True)
     return not store.missing()
 
 
