@@ -96,7 +96,7 @@ def test_far_below_the_stop_the_response_is_linear(answered):
 
 
 def test_the_beam_is_that_of_the_textbook(tmp_path):
-    """Its frequencies are (beta L)^2 sqrt(EI/(rho A L^4)), its flexibility at the tip L^3/(3 EI)."""
+    """Its frequencies are (beta L)^2 sqrt(EI/(rho A L^4)), its flexibility is L^3/(3 EI)."""
     beam = runpy.run_path(str(BEAM / "beam.py"))
     length, width, thickness = beam["LENGTH"], beam["WIDTH"], beam["THICKNESS"]
     rigidity = beam["YOUNG"] * width * thickness**3 / 12
