@@ -197,7 +197,7 @@ def prepared(cache: Path) -> list[tuple[str, float, float]]:
 def is_shared(path: Path) -> bool:
     """Whether an entry of the cache serves all equations."""
     head = path.read_bytes()[:400]
-    return b'"title": "taylor_' in head or b'"title": "ode45, generic' in head
+    return b'"title": "taylor_' in head or b'"title": "pair, generic' in head
 
 
 def table(repeats: int, folder: Path | None) -> None:
