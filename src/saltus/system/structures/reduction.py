@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from saltus.errors import ParameterError
-from saltus.system.structures.matrices import check_positive, dense, is_sparse, len_of
+from saltus.system.structures.matrices import check_positive, dense, len_of
 
 #: Largest structure whose modes are all computed, as dense matrices.
 MOST_DENSE = 1500
@@ -124,7 +124,7 @@ def flexibility(
 def modal_damping(damping: Any, modes: Modes, count: int) -> np.ndarray:
     """A damping matrix in the coordinates of the kept modes, float64[k, k]."""
     shapes = modes.shapes[:, :count]
-    product = damping @ shapes if is_sparse(damping) else dense(damping) @ shapes
-    full = shapes.T @ product
-    tiny = np.abs(full) <= 1e-14 * np.abs(full).max(initial=0.0)
-    return np.where(tiny, 0.0, full)
+    full = shapes.T @ (damping @ shapes)
+    # what is left off the diagonal of proportional damping is rounding, and costs a product each
+    rounding = np.abs(shapes).T @ (abs(damping) @ np.abs(shapes)) * (8 * len(shapes) * 2.0**-52)
+    return np.where(np.abs(full) <= rounding, 0.0, full)

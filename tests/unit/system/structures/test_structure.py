@@ -116,6 +116,16 @@ def test_too_many_degrees_of_freedom_are_reduced():
     assert "left out" in made.description
 
 
+def test_proportional_damping_is_diagonal_among_modes():
+    random = np.random.default_rng(1).normal(size=(20, 20))
+    mass, stiffness = np.eye(20) + random @ random.T / 20, 30 * np.eye(20) + random.T @ random
+    push = np.eye(40)[21]  # the second mode moves
+    made = sl.structure(mass, stiffness, 0.1 * mass + 0.01 * stiffness, modes=20)
+    assert np.flatnonzero(made.rhs(0.0, push)).tolist() == [1, 21]
+    made = sl.structure(mass, stiffness, np.diag(np.arange(20.0)), modes=20)
+    assert np.count_nonzero(made.rhs(0.0, push)) == 21
+
+
 def test_a_contact_that_no_mode_moves():
     free = 50.0 * np.array([[1, -1], [-1, 1]])
     between = sl.Contact("x2", 1e3, 0.1, to="x1")
