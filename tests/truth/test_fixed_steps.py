@@ -53,6 +53,10 @@ def run(system, method, start=STARTS, t_end=END, **more):
     )
 
 
+def run_of(system, method):
+    return sl.simulate(system, [1.0], t_end=5.0, samples=1, method=method)
+
+
 def order(system, events):
     exact, steps = ends(run(system, sl.Taylor())), 0.05 / 2.0 ** np.arange(6)
     errors = [
@@ -164,6 +168,22 @@ def test_multipliers_come_to_the_exact_ones_with_order_4():
     exact = tangent(sl.Taylor())
     errors = [np.abs(tangent(sl.RK4(h, "bisect")) - exact).max() for h in (0.02, 0.01)]
     assert 3.4 < np.log2(errors[0] / errors[1]) < 4.6
+
+
+@pytest.mark.parametrize("events", LOCATED)
+def test_a_motion_that_sticks_is_named(events):
+    """v' = 0.5 cos t - sign v from v = 1: v = 1 + 0.5 sin t - t until it is zero; there both sides
+    push onto v = 0.
+    """
+
+    @sl.system(states="v")
+    def rub(t, v, *, friction=1.0):
+        return 0.5 * sl.cos(t) - sl.piecewise((friction, v > 0), otherwise=-friction)
+
+    with pytest.warns(SaltusWarning, match="sliding"):
+        found = run_of(rub, sl.RK4(0.01, events))
+    assert found.status.item() == "sliding"
+    assert 0.0 < 1 + 0.5 * np.sin(found.end_time.item()) - found.end_time.item() < 0.02
 
 
 # -- options ---------------------------------------------------------------------------------------

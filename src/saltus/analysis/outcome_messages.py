@@ -18,8 +18,8 @@ from saltus.units import from_si
 
 #: Statuses after which a trajectory's end is missing, each with advice.
 _ADVICE = {
-    st.SLIDING: "Sliding and sticking aren't followed yet. Make the force continuous there: "
-    "friction as mu*N*sl.tanh(v/eps), eps small.",
+    st.SLIDING: "sl.Taylor() follows friction that sticks. If it ended this one, make the force "
+    "continuous there: friction as mu*N*sl.tanh(v/eps), eps small.",
     st.BUDGET_STEPS: "Raise max_steps of the method, say Taylor(max_steps=10**10); if steps shrink "
     "towards one place, the equations are "
     "singular there.",

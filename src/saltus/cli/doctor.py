@@ -60,7 +60,7 @@ def machine() -> TextTable:
 
 
 def checks() -> list[Check]:
-    """Run the self-check: contacts and states against closed forms, by both methods."""
+    """Run the self-check: contacts and states against closed forms, by Taylor and by ODE45."""
     from saltus.flow import ODE45, Taylor
 
     return [

@@ -13,6 +13,7 @@ from saltus.codegen.series import Linear, SeriesBuilder, is_constant
 from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
+from saltus.system.guards import Guard
 from saltus.system.singular import set_aside
 from saltus.system.system import System
 from saltus.system.tangent import first_column
@@ -117,6 +118,18 @@ def _state_boundary(form: Linear) -> tuple[str, float, Expr] | None:
     return str(series.payload), sign, ex.neg(form.offset) if sign > 0 else form.offset
 
 
+def _gap_form(builder: SeriesBuilder, guard: Guard, gap: Expr) -> Linear:
+    """The series of a gap. While the contact is held its gap stays zero, and a difference of states
+    and times would leave rounding in its place, whose series allows no step: there it is zero.
+    """
+    form = builder.form(gap)
+    if guard.law is None or guard.law.partner < 0 or guard.law.kind == "hold":
+        return form
+    if _state_boundary(form) is not None:
+        return form
+    return builder.form(ex.select(ex.Bit(guard.law.partner), 0.0, gap))
+
+
 def taylor_head(system: System, order: int, lanes: int) -> Head:
     """Everything that kernels/taylor_*.py expect to stand above it."""
     clocks = Clocks(system)
@@ -129,9 +142,8 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
     for i, row in enumerate(written):
         for k in range(order + 1):
             code.write(row * (order + 1) + k, code.state(i, k), of_column=row in column)
-    guards, rows = _write_guards(
-        system, code, [builder.form(gap) for gap in aside.gaps], constants, order
-    )
+    gaps = [_gap_form(builder, *each) for each in zip(system.guards, aside.gaps, strict=True)]
+    guards, rows = _write_guards(system, code, gaps, constants, order)
     gap_row, scale_row, calm_row = rows, rows + len(system.guards), rows + 2 * len(system.guards)
     for j in range(len(aside.guards)):
         for i, entry in enumerate(aside.without(j, moved)):

@@ -23,11 +23,11 @@ from saltus.flow.counts import whole as whole_number
 from saltus.flow.methods import Method
 from saltus.flow.pace import marks, resume
 from saltus.flow.room import Contacts
+from saltus.flow.stops import on_allowed_sides
 from saltus.flow.threads import may_wait, on_threads, usable_processors
 from saltus.interrupt import Interrupted, Stop
 from saltus.kernels import status as st
 from saltus.kernels.batch import Batch
-from saltus.system.evaluate import evaluate, sides
 from saltus.system.system import System
 
 #: Trajectories in a chunk: enough to keep lanes full, few enough to balance threads and to show
@@ -272,11 +272,14 @@ def allocate(
     n, m, states = len(request.start), len(request.schedule.count), len(system.states)
     sampled = n - request.checks
     finite = np.isfinite(request.start).all(axis=1) & np.isfinite(request.parameters).all(axis=1)
-    finite &= ~beyond_a_stop(system, request)
+    start, beyond = on_allowed_sides(
+        system, request.start, request.parameters, request.origin, request.period
+    )
+    finite &= ~beyond
     whole = {
         "period": request.period,
         "origin": np.full(n, float(request.origin)),
-        "state": np.array(request.start, float, order="C"),
+        "state": start,
         "count": np.zeros(n, np.int64),
         "phase": np.zeros(n),
         "mode": np.full(n, -1, np.int64),
@@ -298,24 +301,6 @@ def allocate(
         whole["sample_mode"], ContactTable.empty(0, states),
     )  # fmt: skip
     return outcome, whole
-
-
-def beyond_a_stop(system: System, request: Request) -> np.ndarray:
-    """Which starts lie where an impact allows no motion, bool[n]."""
-    beyond = np.zeros(len(request.start), bool)
-    stops = [(g, one.law.side) for g, one in enumerate(system.guards) if one.law and one.law.reset]
-    if not stops:
-        return beyond
-    values = dict(zip(system.values, request.parameters.T, strict=True))
-    states = dict(zip(system.states, request.start.T, strict=True))
-    bits = sides(system, request.origin, list(states.values()), values)
-    for g, side in stops:
-        if system.guards[g].law.kind == "impact":  # type: ignore[union-attr]
-            (gap,) = evaluate(
-                [system.guards[g].gap], t=request.origin, states=states, values=values, bits=bits
-            )
-            beyond |= gap * side < 0.0
-    return beyond
 
 
 #: Order of the arguments of every `propagate`.

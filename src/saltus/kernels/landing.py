@@ -8,7 +8,8 @@ INVERSE   the cubic t(g) with the values and rates of g at both ends of the step
 BISECT    the length of the step is halved and halved again, to the side on which the boundary lies
 
 The first two can't reach a boundary where dg/dt changes sign in the step: status TURNED. Where
-several gaps have crossed, the step lands on the first.
+several gaps have crossed, the step lands on the first. Where the law beyond pushes back onto the
+boundary, status SLIDING.
 
 Symbols
 -------
@@ -18,7 +19,7 @@ hit a time from the start of the step [s], NaN if the boundary can't be reached.
 
 import math
 
-from saltus.kernels.status import REJECTED, RUNNING, TURNED
+from saltus.kernels.status import REJECTED, RUNNING, SLIDING, TURNED
 
 # Rules, the column LOCATE of `options`; 0 locates nothing.
 HENON, INVERSE, BISECT = range(1, 4)
@@ -47,6 +48,8 @@ def find_contact(i, t, t_new, t_leg, h, batch, work):
     if first != last:
         hit = reach(i, first, t, h, batch, work)
     closing(first, crossed, t + hit, batch.mode[i], work)
+    if comes_back(first, t + hit, batch.mode[i], work):
+        return t_new, t_new, h, False, SLIDING
     return t + hit, t + hit, hit, True, RUNNING
 
 
@@ -75,6 +78,14 @@ def closing(first, crossed, t_hit, mode, work):
         closes = g == first or (crossed & there) >> g & 1
         direction = -1.0 if mode >> g & 1 else 1.0
         work[LEFT + g], work[RIGHT + g] = (-direction, direction) if closes else (0.0, 0.0)
+
+
+@kernel
+def comes_back(g, t_hit, mode, work):
+    """Whether the law beyond boundary g pushes back onto it. Needs q at t_hit in Q."""
+    rate_at(t_hit, NEXT, Q, mode ^ (1 << g), POINT, work)
+    gap_rates_at(t_hit, NEXT, POINT, Q, TRY, work)
+    return work[TRY + g] * (-1.0 if mode >> g & 1 else 1.0) < 0.0
 
 
 @kernel

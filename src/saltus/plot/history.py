@@ -26,6 +26,7 @@ from saltus.results.dataset.schema import (
 #: Marker, face and name of each kind of contact. Hollow means undecided.
 _MARKERS: dict[str, dict[str, Any]] = {
     "crossing": {"marker": "o", "mfc": OKABE_ITO["black"], "label": "contact"},
+    "impact": {"marker": "o", "mfc": OKABE_ITO["black"], "label": "impact"},
     "graze": {"marker": "D", "mfc": OKABE_ITO["orange"], "label": "graze"},
     "graze_unresolved": {"marker": "o", "mfc": "white", "label": "graze, unresolved"},
 }
@@ -186,7 +187,7 @@ def _mark_contacts(ax: Axes, table: xr.Dataset, state: str, x: Scale, y: Scale) 
     for kind, marker in _MARKERS.items():
         rows = np.flatnonzero(kinds == kind)
         if rows.size:
-            grow = 1.0 if kind == "crossing" else 1.5
+            grow = 1.5 if kind.startswith("graze") else 1.0
             at = (
                 table["contact_time"].values[rows] * x.factor,
                 table[contact_name(state)].values[rows] * y.factor,

@@ -14,6 +14,8 @@ from saltus.plot.style import CYCLE, OKABE_ITO
 _ABOVE = (OKABE_ITO["vermillion"], OKABE_ITO["orange"])
 _BELOW = (OKABE_ITO["blue"], OKABE_ITO["sky blue"])
 _FREE = OKABE_ITO["green"]
+#: How the guards end that say whether a contact is held.
+_HELD = (" at rest", " held")
 
 
 @dataclass(frozen=True)
@@ -105,8 +107,11 @@ def find(ds: xr.Dataset, shown: Sequence[str]) -> Regions:
     shown : sequence of str
         States on the axes, the most important first. Their own guards decide; if they have none,
         those of the only state that has any; else every guard does, a colour for each combination
-        of sides that occurs.
+        of sides that occurs. Where contacts can be held, at rest or stuck, that is what is told
+        apart.
     """
+    if held := [i for i, name in enumerate(ds["guard"].values) if str(name).endswith(_HELD)]:
+        return _by_holding(ds, shown, held)
     owners = ds["guard_state"].values.tolist()
     bounded = [state for state in shown if state in owners] or (
         owners[:1] if len(set(owners)) == 1 and owners[0] else []
@@ -114,6 +119,26 @@ def find(ds: xr.Dataset, shown: Sequence[str]) -> Regions:
     if not owners or not bounded:
         return _by_mode(ds)
     return along(ds, bounded[0])
+
+
+def _by_holding(ds: xr.Dataset, shown: Sequence[str], held: Sequence[int]) -> Regions:
+    """A colour for every set of contacts that are held together; the boundaries of the first state
+    that has any.
+    """
+    owners = ds["guard_state"].values.tolist()
+    lines = next((along(ds, state).boundaries for state in shown if state in owners), ())
+    codes = np.unique(_modes(ds) & _mask(held))
+    colors = [_FREE, *_ABOVE, *_BELOW]
+    names = [str(name).replace("_", " ") for name in ds["guard"].values]
+    regions = [
+        Region(
+            colors[min(place, len(colors) - 1)] if code else _FREE,
+            ", ".join(names[bit] for bit in held if (int(code) >> bit) & 1) or "free",
+            contact=bool(code),
+        )
+        for place, code in enumerate(codes, start=int(codes[0] != 0))
+    ]
+    return Regions(tuple(regions), lines, None, tuple(held), codes)
 
 
 def along(ds: xr.Dataset, state: str) -> Regions:
@@ -168,12 +193,7 @@ def _contact_label(boundary: Boundary) -> str:
 def _by_mode(ds: xr.Dataset) -> Regions:
     """A colour for every combination of sides that occurs, named after the sides."""
     names = ds["guard"].values.tolist()
-    modes = (
-        np.concatenate([np.ravel(ds["mode"].values), ds["contact_mode_after"].values])
-        if "mode" in ds
-        else np.zeros(1, dtype=np.int64)
-    )
-    codes = np.unique(modes)
+    codes = np.unique(_modes(ds))
     regions = []
     for color, label in zip(
         _mode_colors(codes.tolist()), _mode_labels(codes.tolist(), names), strict=True
@@ -183,6 +203,13 @@ def _by_mode(ds: xr.Dataset) -> Regions:
         regions = [Region(CYCLE[0], "", contact=False)]
         codes = np.zeros(1, dtype=np.int64)
     return Regions(tuple(regions), (), None, tuple(range(len(names))), codes)
+
+
+def _modes(ds: xr.Dataset) -> np.ndarray:
+    """The modes of the samples and behind the contacts."""
+    if "mode" not in ds:
+        return np.zeros(1, dtype=np.int64)
+    return np.concatenate([np.ravel(ds["mode"].values), ds["contact_mode_after"].values])
 
 
 def _freeplay(codes: Sequence[int]) -> tuple[int, int, int] | None:

@@ -12,6 +12,7 @@ import pytest
 import impact_orbits
 import saltus as sl
 from saltus.analysis.orbits.orbits import find_orbits
+from saltus.errors import SaltusWarning
 from saltus.flow.maps import Stroboscope
 from saltus.models import (
     ball_in_box,
@@ -267,6 +268,41 @@ def test_chatter_on_the_table():
     rest = kinds.index("hold")
     assert times[rest] == pytest.approx(known("B20c"), rel=1e-13)
     assert times[rest + 1] - times[rest] == pytest.approx(known("B20d"), rel=1e-13)
+
+
+def test_rest_on_a_moving_table_goes_on_as_if_it_stood():
+    """The gap that rest keeps at zero is a difference of a state and a function of time: rounding
+    in it mustn't rule the step, wherever rest begins.
+    """
+    for start in np.random.default_rng(1).uniform(-1.0, 0.9, 60):
+        state = (1.2 * math.sin(start), 1.2 * math.cos(start))
+        run = sl.simulate(bouncing_ball(), state, t_start=start, t_end=2.0, samples=40)
+        assert run.status.item() == "ok"
+        release = run.contact_time.values[run.contact_kind.values == "release"]
+        assert release == pytest.approx([math.asin(1 / 1.2)], rel=1e-13)
+        rests = run.time.values < release[0]
+        table = 1.2 * np.sin(run.time.values[rests])
+        np.testing.assert_allclose(run.x.values[rests], table, atol=1e-14)
+
+
+def test_the_end_of_a_run_at_rest_is_a_start():
+    """Rounding has put it on the wrong side of the table here and there."""
+    drops = sl.simulate(bouncing_ball(), {"x": np.linspace(1.5, 4.0, 40), "v": 0.0}, periods=5)
+    assert (drops.status == "ok").all()
+    again = sl.simulate(bouncing_ball(), {"x": drops.end_x, "v": drops.end_v}, periods=1)
+    assert (again.status == "ok").all()
+    np.testing.assert_allclose(again.end_x.values, 0.0, atol=1e-13)
+    np.testing.assert_allclose(again.end_v.values, 1.2, rtol=1e-13)
+    with pytest.warns(SaltusWarning, match="beyond a stop"):
+        below = sl.simulate(bouncing_ball(), {"x": [-1e-9, -1.0], "v": 1.2}, periods=1)
+    assert (below.status == "invalid").all()
+
+
+def test_chatter_on_the_table_is_an_attractor_that_forgets():
+    found = sl.attractors(bouncing_ball(), (2.0, 0.0))
+    assert found.attractor_period.values.tolist() == [1]
+    multipliers = found.attractor_multiplier_real.values + found.attractor_multiplier_imag.values
+    np.testing.assert_array_equal(multipliers, 0.0)
 
 
 # -- a ball in a box -------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
+import saltus as sl
 from saltus.errors import ParameterError
 from saltus.plot import OKABE_ITO, history, phase, style
 
@@ -255,3 +256,25 @@ def test_figures_of_its_own_have_the_style_and_leave_no_trace(run):
     assert plt.rcParams == before
     with style():
         assert plt.rcParams["axes.spines.right"] is False
+
+
+def test_where_a_contact_is_held_the_line_says_so():
+    """At rest on a stop, and stuck: a colour of their own, a marker for each impact."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def stop(t, x, v, *, gap=0.2, w=0.3):
+        push = sl.cos(w * t) - 0.1 * v - x
+        return v, push, sl.impact(x < gap, v, restitution=0.6)
+
+    @sl.system(states="x v")
+    def belt(t, x, v, *, speed=0.2):
+        return v, -x - sl.friction(v - speed, slip=0.5, stick=1.0)
+
+    for run, words in (
+        (sl.simulate(stop, (0.2, 0.0), periods=1, samples=50), {"gap at rest", "free", "impact"}),
+        (sl.simulate(belt, (0.0, 0.0), t_end=10.0, samples=50), {"speed held", "free"}),
+    ):
+        axes = sl.plot.history(run)
+        axes = np.ravel(axes)[0]
+        legend = axes.get_legend() or axes.figure.legends[0]
+        assert words <= {text.get_text() for text in legend.get_texts()}

@@ -1,0 +1,65 @@
+"""Starts that lie at a stop, or beyond it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from saltus.system.evaluate import evaluate, sides
+from saltus.system.system import System
+
+EPS = 2.0**-52
+#: A start this many roundings beyond a stop lies on it.
+ROUNDINGS = 64.0
+
+
+def on_allowed_sides(
+    system: System, start: np.ndarray, parameters: np.ndarray, origin: float, period: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The starts, those that rounding has put beyond a stop back on the side that it allows; and
+    which starts lie where an impact allows no motion.
+
+    The end of a run at rest on a moving stop is a start of the next: it lies on the stop but for
+    the rounding of its place, and of the way that it goes in a period.
+
+    Parameters
+    ----------
+    system : System
+        The equations.
+    start : float64[n, D]
+        States.
+    parameters : float64[n or 1, P]
+        Values.
+    origin : float
+        Time of the starts [s].
+    period : float64[n]
+        Forcing period, or the span of a run without forcing [s].
+
+    Returns
+    -------
+    (float64[n, D], bool[n])
+    """
+    start = np.array(start, float, order="C")
+    beyond = np.zeros(len(start), bool)
+    values = dict(zip(system.values, parameters.T, strict=True))
+
+    def columns(expressions: object) -> np.ndarray:
+        """Expressions at the starts, float64[n, ...]."""
+        states = dict(zip(system.states, start.T, strict=True))
+        bits = sides(system, origin, list(start.T), values)
+        found = evaluate(expressions, t=origin, states=states, values=values, bits=bits)  # type: ignore[arg-type]
+        return np.stack(np.broadcast_arrays(*found, beyond)[:-1], axis=1).astype(float)
+
+    for g, guard in enumerate(system.guards):
+        if guard.law is None or guard.law.kind != "impact":
+            continue
+        inside = columns([guard.gap])[:, 0] * guard.law.side
+        if not (inside < 0.0).any():
+            continue
+        normal = columns(system.guard_gradients[g]) * guard.law.side
+        way = np.abs(columns(system.field)) * period[:, None]
+        size = (np.abs(normal) * (np.abs(start) + way)).sum(axis=1)
+        here = (inside < 0.0) & (inside >= -ROUNDINGS * EPS * size)
+        back = (EPS * size - inside) / (normal**2).sum(axis=1)
+        start[here] += (back[:, None] * normal)[here]
+        beyond |= (inside < 0.0) & ~here
+    return start, beyond
