@@ -13,7 +13,7 @@ import numpy as np
 from saltus.errors import TraceError, among, nearest, shown
 from saltus.system.clocks import mod
 from saltus.system.compositions import where
-from saltus.system.expression import Expr, Operand
+from saltus.system.expression import Expr, Operand, as_expr
 from saltus.system.functions import sin
 from saltus.system.tables import Table, curve, look_up
 from saltus.units import coherent_unit, to_si
@@ -130,6 +130,10 @@ def pulse(
     """
     if not among(shape, SHAPES):
         raise TraceError(f"sl.pulse: shape={shown(shape)}. {nearest(shape, SHAPES)}")
+    for given in (t, duration, start):
+        as_expr(given)  # refuses anything but a number or a traced value
+    if not isinstance(duration, Expr) and duration <= 0:
+        raise TraceError(f"sl.pulse: duration = {duration:g} must be positive.")
     within = t - start if every is None else mod(t - start, every)
     if shape == "rectangle":
         height: Any = 1.0
@@ -227,6 +231,9 @@ def recorded(
     >>> road.duration, round(road(0.015), 6)
     (0.03, 0.00225)
     """
+    for what, word in (("unit", unit), ("time_unit", time_unit)):
+        if not isinstance(word, str):
+            raise TraceError(f"sl.recorded: {what}={shown(word)}. A unit is text, such as 'mm'.")
     own = coherent_unit(f"1 {unit}", "values") if unit else ""
     points = _times(times, to_si(f"1 {time_unit}", "s", "times"))
     heights = _times(values, to_si(f"1 {unit}", own, "values") if unit else 1.0)

@@ -95,7 +95,7 @@ def regularisation_widths(
     """
     if not among(law, STEPS):
         raise ParameterError(f"regularisation_widths: law={shown(law)}. {nearest(law, STEPS)}")
-    method = check_method(method or ODE45(rtol=1e-4, atol=1e-7))
+    method = check_method(ODE45(rtol=1e-4, atol=1e-7) if method is None else method)
     zero = dict.fromkeys(system.states, 0.0)
     group = ensemble(system, zero if start is None else start, None)
     if len(group.start) != 1:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, shown
+from saltus.errors import ParameterError, among, shown
 from saltus.system.functions import pi
 from saltus.system.guards import number_of
 from saltus.system.structures import matrices
@@ -102,7 +102,7 @@ def structure(
     >>> pair.states, list(pair.values), pair.guards[0].name
     (('x1', 'x2', 'v1', 'v2'), ['stop_gap', 'stop_stiffness', 'force', 'frequency'], 'stop')
     """
-    if unit not in UNITS:
+    if not among(unit, UNITS):
         raise ParameterError(f"unit must be 'm', 'rad' or '', not {shown(unit)}.")
     reduced = modes is not None or damping_ratio is not None
     mass = matrices.checked(mass, "mass", symmetric=True)
@@ -146,10 +146,14 @@ def degree_names(names: Any, size: int) -> list[str]:
     """Names of the degrees of freedom. Raises ParameterError if others are given than there are."""
     if names is None:
         return [f"x{i}" for i in range(1, size + 1)]
-    found = names.replace(",", " ").split() if isinstance(names, str) else list(names)
-    if len(found) != size or not all(isinstance(one, str) for one in found):
+    found = names.replace(",", " ").split() if isinstance(names, str) else names
+    if (
+        not isinstance(found, list | tuple)
+        or len(found) != size
+        or not all(isinstance(one, str) for one in found)
+    ):
         raise ParameterError(f"names must name {size} degrees of freedom, not {shown(names)}.")
-    return found
+    return list(found)
 
 
 def rate_name(name: str) -> str:
@@ -192,7 +196,7 @@ def _ratio(ratio: Any, modes: Modes, count: int) -> np.ndarray:
     """The damping matrix of modes with given damping ratios."""
     try:
         ratios = np.broadcast_to(np.asarray(ratio, float), count)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(
             f"damping_ratio must be one number or {count} of them, not {shown(ratio)}."
         ) from None

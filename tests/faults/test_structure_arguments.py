@@ -1,0 +1,53 @@
+"""Odd arguments of structures, smooth stand-ins and inputs are refused in words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import saltus as sl
+from saltus.errors import SaltusError
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+ODD = [
+    None, True, 0, -1, 2.5, float("nan"), float("inf"), "", "abc", "1 m", "1 s", b"x", [], [1],
+    [[1, 2], [3]], {}, {"a": 1}, object(), lambda u: u, np.zeros(3), np.eye(2),
+    np.eye(2, dtype=object), np.array(["a"]), 10**400, range(3), (1, 2), sl,
+    np.datetime64("2020"),
+]  # fmt: skip
+RIG = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+MATRICES = {"mass": np.eye(2), "stiffness": np.eye(2)}
+CONTACT = {"at": "x1", "stiffness": 1.0, "gap": 1.0}
+FORCE = {"at": "x1", "amplitude": 1.0}
+STRUCTURE = {**MATRICES, "contacts": [CONTACT], "forces": [FORCE], "frequency": 1.0}
+#: What is called, its usual arguments, and those that are made odd.
+CALLS = {
+    "structure": (sl.structure, STRUCTURE, "mass stiffness damping contacts forces frequency "
+        "damping_ratio modes names unit name source"),
+    "contact": (lambda **part: sl.structure(**{**STRUCTURE, "contacts": [part]}), CONTACT,
+        "at stiffness gap to side damping name"),
+    "force": (lambda **part: sl.structure(**{**STRUCTURE, "forces": [part]}), FORCE,
+        "at amplitude phase harmonic name"),
+    "structure_modes": (sl.structure_modes, MATRICES, "mass stiffness modes at names"),
+    "regularise": (sl.regularise, {"system": RIG, "width": 1e-6}, "system law width"),
+    "recorded": (sl.recorded, {"times": [0.0, 1.0], "values": [1.0, 2.0]},
+        "times values unit time_unit kind outside name"),
+    "square": (sl.square, {"phase": 1.0}, "phase duty"),
+    "sawtooth": (sl.sawtooth, {"phase": 1.0}, "phase width"),
+    "pulse": (sl.pulse, {"t": 1.0, "duration": 1.0}, "t duration start every shape"),
+    "regularisation_widths": (sl.regularisation_widths,
+        {"system": RIG, "transient": 1, "points": 1, "widths": [1e-6]},
+        "law method start widths transient points threads"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_odd_arguments_are_refused_in_words(name):
+    function, usual, arguments = CALLS[name]
+    for argument in arguments.split():
+        for odd in ODD:
+            try:
+                function(**{**usual, argument: odd})
+            except SaltusError as error:
+                assert str(error)  # noqa: PT017
