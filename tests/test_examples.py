@@ -5,6 +5,7 @@ of one study.
 from __future__ import annotations
 
 import re
+import runpy
 import shutil
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import saltus as sl
 from saltus.analysis.basins import pipeline
 from saltus.cli.commands import app
 
+BEAM = Path(__file__).parents[1] / "examples" / "beam"
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_masses"
 
 pytestmark = pytest.mark.slow
@@ -91,3 +93,21 @@ def test_far_below_the_stop_the_response_is_linear(answered):
     )
     amplitude = abs(np.linalg.solve(dynamic, [2.0, 0.0])[0])
     assert ds["peak"].sel(frequency=14).values == pytest.approx([amplitude] * 3, rel=1e-6)
+
+
+def test_the_beam_is_that_of_the_textbook(tmp_path):
+    """Its frequencies are (beta L)^2 sqrt(EI/(rho A L^4)), its flexibility is L^3/(3 EI)."""
+    beam = runpy.run_path(str(BEAM / "beam.py"))
+    length, width, thickness = beam["LENGTH"], beam["WIDTH"], beam["THICKNESS"]
+    rigidity = beam["YOUNG"] * width * thickness**3 / 12
+    line = beam["DENSITY"] * width * thickness
+    table = sl.structure_modes(*beam["matrices"](), 3, at=beam["TIP"], names=beam["NAMES"])
+    roots = np.array([1.875104068711961, 4.694091132974175, 7.854757438237613])
+    truth = roots**2 * np.sqrt(rigidity / (line * length**4)) / (2 * np.pi)
+    assert np.abs(table.frequency.values / truth - 1).max() < 2e-5  # order 4 in the elements
+    assert table.flexibility.item() == pytest.approx(length**3 / (3 * rigidity), rel=1e-7)
+    text = (BEAM / "study.toml").read_text(encoding="utf-8")
+    (tmp_path / "study.toml").write_text(text.replace("count = 21", "count = 2"), encoding="utf-8")
+    saltus("run", tmp_path / "study.toml", "--system", f"{BEAM / 'beam.py'}:beam",
+           "--out", tmp_path / "out")  # fmt: skip
+    assert sl.load(tmp_path / "out" / "run.nc").sizes["contact"] == 6 * 12  # of those that are kept
