@@ -234,6 +234,20 @@ def test_the_chattering_pair():
     assert run.end_y.item() == pytest.approx(run.end_x.item(), rel=1e-15)
 
 
+@sl.system(states="x")
+def chattering(t, x, *, level=0.5):
+    """OpenModelica, issue 9711: the rate is 1 below the level, -1 above it."""
+    return sl.piecewise((-1.0, x > level), otherwise=1.0)
+
+
+def test_a_state_that_both_sides_push_back_stays():
+    """M12."""
+    run = sl.simulate(chattering, [0.0], t_end=1.0)
+    assert run.contact_kind.values.tolist() == ["hold"]
+    assert run.contact_time.values == pytest.approx([0.5], rel=1e-15)
+    assert run.end_x.item() == 0.5
+
+
 # -- sliding in the plane --------------------------------------------------------------------------
 @sl.system(states="x y")
 def invisible(t, x, y, *, across=1.0):
