@@ -139,6 +139,8 @@ class Elimination:
             if one is left_out:
                 continue
             across = dot(one.normal, directions[one.hold])
+            if _is_nothing(across):
+                continue  # with those before it held its force changes nothing: it can't be
             later = [other for other in self._contacts[number + 1 :] if other is not left_out]
             later += [left_out] if left_out else []
             own = directions[one.hold]
@@ -201,6 +203,10 @@ class Elimination:
             order += ready
             waiting = [one for one in waiting if one not in ready]
         return order
+
+
+def _is_nothing(node: Expr) -> bool:
+    return node.op == "const" and node.payload == 0
 
 
 def _held(one: Held, value: Expr, otherwise: Expr) -> Expr:

@@ -17,6 +17,7 @@ from saltus.codegen.taylor_head import taylor_head
 from saltus.kernels import lanes as lane_operations
 from saltus.kernels import trigonometry
 from saltus.system import System
+from saltus.system.guards import is_hold
 from saltus.system.tangent import tangent_system
 
 pytestmark = pytest.mark.nojit
@@ -94,9 +95,10 @@ def lane_jets(system: System, states, times, values, order=ORDER, period=1.0):
         clock[TAU, lane], clock[BASE, lane] = times[lane] - count * period, count * period
         head["constants"](values[lane], constants, lane)
         head["turns"](values[lane], 0.0, period, count, lane, clock)
-        gaps = np.zeros(max(head["NGUARDS"], 1))
+        gaps = -np.ones(4 * max(guards, 1))  # no contact is held
         head["gaps"](times[lane], states[:, lane], values[lane], np.zeros(0), gaps)
         side[:guards, lane] = np.where(gaps < 0, -1.0, 1.0)[:guards]
+        side[[i for i in range(guards) if is_hold(system.guards[i])], lane] = -1.0
     with np.errstate(all="ignore"):  # pieces that are undefined on the other side
         head["jets"](np.array(states, float), side, constants, clock, work)
     return head, work

@@ -165,10 +165,16 @@ def test_stick_and_slip_with_falling_friction():
     np.testing.assert_allclose(slip[1:3] + stick[1:3], known("L01c"), rtol=1e-13)
 
 
-@pytest.mark.parametrize("system", [belt_two_values(), belt_stribeck()], ids=["two", "stribeck"])
-def test_stick_and_slip_is_a_limit_cycle_that_forgets(system):
-    found = sl.attractors(system, (0.0, 0.0), every=1.0)
+@pytest.mark.parametrize(
+    ("model", "period"), [(belt_two_values, 8.902605407814523), (belt_stribeck, known("L01c"))]
+)
+def test_stick_and_slip_is_a_limit_cycle_that_forgets(model, period):
+    """Wherever it slips, all of a deviation across the flow is gone after one stick."""
+    found = sl.attractors(model(), (0.0, 0.0), every=1.0)
     assert found.attractor_type.values.tolist() == ["limit_cycle"]
+    assert found.attractor_cycle.values == pytest.approx([period], rel=1e-12)
+    multipliers = np.sort(found.attractor_multiplier_real.values[0])
+    np.testing.assert_allclose(multipliers, [0.0, 1.0], atol=1e-12)
 
 
 def test_the_belt_that_changes_its_speed():
@@ -226,6 +232,20 @@ def test_the_chattering_pair():
     meet = 1.5 - 2 / 7
     assert run.end_x.item() == pytest.approx(meet - 3 / 8.5 * (1 - 1 / 7), rel=1e-14)
     assert run.end_y.item() == pytest.approx(run.end_x.item(), rel=1e-15)
+
+
+@sl.system(states="x")
+def chattering(t, x, *, level=0.5):
+    """OpenModelica, issue 9711: the rate is 1 below the level, -1 above it."""
+    return sl.piecewise((-1.0, x > level), otherwise=1.0)
+
+
+def test_a_state_that_both_sides_push_back_stays():
+    """M12."""
+    run = sl.simulate(chattering, [0.0], t_end=1.0)
+    assert run.contact_kind.values.tolist() == ["hold"]
+    assert run.contact_time.values == pytest.approx([0.5], rel=1e-15)
+    assert run.end_x.item() == 0.5
 
 
 # -- sliding in the plane --------------------------------------------------------------------------

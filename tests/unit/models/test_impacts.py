@@ -27,7 +27,7 @@ from saltus.models import (
 from saltus.system.evaluate import evaluate
 
 ROWS = {}
-for name in ("laws_impact", "laws_ball", "laws_friction"):
+for name in ("laws_impact", "laws_ball", "laws_friction", "laws_more"):
     with (Path(__file__).parents[2] / "reference" / f"{name}.csv").open() as file:
         ROWS |= {row["id"]: row["value"] for row in csv.DictReader(file)}
 RECIPES = {"stiffness": 1.0, "damping": 0.1, "gap": 1.0, "restitution": 0.8}
@@ -206,6 +206,35 @@ def test_the_rocking_block():
     assert run.contact_time.values[-1] == pytest.approx(known("K03"), rel=1e-13)
 
 
+# -- no loss ---------------------------------------------------------------------------------------
+@sl.system(states="x v")
+def between(t, x, v, *, gap=1.0):
+    """A free oscillator between two stops."""
+    upper, lower = (
+        sl.impact(x < gap, v, restitution=1.0),
+        sl.impact(x > -gap, -v, restitution=1.0),
+    )
+    return v, -x, upper, lower
+
+
+def test_backbones_of_rigid_stops():
+    """M20: a stop at half the amplitude. M24: stops on both sides, below the amplitude 1.1."""
+    free = impact_oscillator(damping=0.0, force=0.0, restitution=1.0)
+    times = sl.simulate(free, (-2.0, 0.0), t_end=20.0).contact_time.values
+    assert 2 * math.pi / (times[1] - times[0]) == pytest.approx(known("M20"), rel=1e-14)
+    times = sl.simulate(between, (0.0, 1.1), t_end=20.0).contact_time.values
+    assert 2 * math.pi / (times[2] - times[0]) == pytest.approx(known("M24"), rel=1e-14)
+
+
+def test_impacts_without_loss_keep_the_energy():
+    """Over some 2000 impacts, to what that many roundings may add up to at worst."""
+    run = sl.simulate(between, (0.0, 1.1), t_end=4600.0, samples=2)
+    impacts = int(run.events)
+    assert impacts > 2000
+    energy = run.end_x.item() ** 2 + run.end_v.item() ** 2
+    assert abs(energy / 1.21 - 1) < 4 * impacts * 2.0**-52
+
+
 # -- a ball on a table -----------------------------------------------------------------------------
 def test_the_bounce_is_born():
     """B01a: below this amplitude the two orbits with an impact a period are gone."""
@@ -303,6 +332,8 @@ def test_chatter_on_the_table_is_an_attractor_that_forgets():
     assert found.attractor_period.values.tolist() == [1]
     multipliers = found.attractor_multiplier_real.values + found.attractor_multiplier_imag.values
     np.testing.assert_array_equal(multipliers, 0.0)
+    exponents = sl.lyapunov(impact_oscillator("chatter"), (0.0, 0.0), periods=64)
+    np.testing.assert_array_equal(exponents.lyapunov_exponent.values, -np.inf)
 
 
 # -- a ball in a box -------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ points, not a proof. Khalil, Nonlinear Systems (2002), chapter 4.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from saltus.analysis.orbits.newton import newton
 from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.flow.maps import Stroboscope
 from saltus.system.evaluate import evaluate
-from saltus.system.expression import depends_on
+from saltus.system.expression import Expr, depends_on
 from saltus.system.system import System
 
 #: Longest step of Newton's method, in units of the scale: the field of a motion that has escaped
@@ -28,6 +28,8 @@ from saltus.system.system import System
 FARTHEST_STEP = 1e6
 #: Share of the norm of the Jacobian that a real part must lie below zero: more than rounding.
 MARGINAL = 1e-10
+#: A constraint that is zero to so small a share of its terms is held.
+HELD = 2.0**-46
 #: Shells inside the largest one at which the field is looked at.
 SHELLS = 0.5 ** np.arange(0.0, 12.0)
 
@@ -98,14 +100,46 @@ def jacobian_of(system: System, states: np.ndarray, values: Mapping[str, np.ndar
     ).reshape(len(states), size, size)
 
 
+def _modes(
+    system: System, states: np.ndarray, values: Mapping[str, np.ndarray]
+) -> list[np.ndarray]:
+    """Sides of the guards at states float64[k, D], and which contacts are held there: those whose
+    constraint is zero but for rounding, and whose force is within its limit.
+    """
+    named = dict(zip(system.states, states.T, strict=True))
+    bits = [np.zeros(len(states), bool)] * len(system.guards)
+
+    def at(*entries: Expr) -> np.ndarray:
+        found = evaluate(entries, states=named, values=values, bits=bits)
+        return np.stack([np.broadcast_to(one, len(states)) for one in found])
+
+    def vanishes(entry: Expr, gradient: Iterable[Expr]) -> np.ndarray:
+        value, *slopes = at(entry, *gradient)
+        size = sum(np.abs(slope * y) for slope, y in zip(slopes, states.T, strict=True))
+        return np.abs(value) <= HELD * size
+
+    for number, guard in enumerate(system.guards):
+        if guard.law is None or guard.law.kind != "hold":
+            bits[number] = at(guard.gap)[0] > 0
+    for number, guard in enumerate(system.guards):
+        if guard.law is None or guard.law.kind != "hold":
+            continue
+        owner = guard.law.partner
+        law = system.guards[owner].law
+        assert law is not None
+        assert law.constraint is not None
+        held = vanishes(law.constraint, law.normal)
+        if law.kind == "impact":
+            held &= vanishes(system.guards[owner].gap, system.guard_gradients[owner])
+        bits[number] = held & (at(guard.gap)[0] > 0)
+    return bits
+
+
 def _evaluated(
     system: System, entries: tuple, states: np.ndarray, values: Mapping[str, np.ndarray]
 ) -> np.ndarray:
     named = dict(zip(system.states, states.T, strict=True))
-    bits: list[np.ndarray] = []
-    for guard in system.guards:
-        (gap,) = evaluate([guard.gap], states=named, values=values, bits=bits)
-        bits.append(np.broadcast_to(gap, len(states)) > 0)
+    bits = _modes(system, states, values)
     with np.errstate(all="ignore"):
         columns = evaluate(entries, states=named, values=values, bits=bits)
     return np.stack(
