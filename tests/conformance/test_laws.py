@@ -94,6 +94,22 @@ def test_a_ball_that_rests_is_thrown_by_its_table():
     assert takes_off[1] - rests[0] == pytest.approx(3.13468988997746, rel=1e-13)
 
 
+@pytest.mark.parametrize("amplitude", [0.7, 1.7, 2.6, 4.0, 5.5])
+def test_a_ball_without_rebound_is_followed_whether_its_table_presses_or_not(amplitude):
+    """e = 0, gravity 1: where the table falls away faster than the ball it leaves at once."""
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def bounced(t, x, v, *, amplitude=1.2, w=1.0):
+        rate = amplitude * w * sl.cos(w * t)
+        return v, -1.0, sl.impact(x > amplitude * sl.sin(w * t), rate - v, restitution=0.0)
+
+    start = {"x": np.linspace(6.0, 9.0, 12), "v": np.zeros(12)}
+    run = sl.simulate(bounced.with_values(amplitude=amplitude), start, periods=20, samples=32)
+    assert (run["status"].values == "ok").all()
+    table = amplitude * np.sin(run["time"].values)
+    assert (run["x"].values - table).min() > -1e-12
+
+
 def test_three_bodies_share_their_momentum():
     """An elastic row: the first body's velocity goes to the last; energy and momentum stay."""
 

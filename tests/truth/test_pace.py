@@ -115,4 +115,4 @@ def test_a_tank_whose_law_ends_before_the_root_rests_empty():
 
     run = sl.simulate(mended, [0.7], t_end=10, samples=4, progress=False)
     assert run.end_h.item() == pytest.approx(1e-9)
-    assert run.status.item() == "resting"
+    assert run.status.item() == "ok"

@@ -1,3 +1,3 @@
-"""Numba templates and their pure helpers: numbers in, numbers out, nothing allocated in a loop,
+"""Templates of kernels and their pure helpers: numbers in, numbers out, nothing allocated in a loop,
 nothing raised.
 """

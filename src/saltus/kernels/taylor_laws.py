@@ -127,6 +127,8 @@ def strike(lanes, lane, batch, g, rate, slow):
             later = 2.0 * rebound / (pressing * (1.0 - restitution))
         if later <= too_short(lanes, lane, g, restitution):
             hold(lanes, lane, batch, g, later, slow)
+    elif rebound <= 0.0:
+        lanes.fresh[g, lane] = 2.0  # it leaves at once: gap and rate are known to be zero
 
 
 @kernel
