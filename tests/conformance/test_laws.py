@@ -286,3 +286,58 @@ def test_a_stick_phase_makes_a_multiplier_zero():
 
     orbit = sl.attractors(hartog, (0.0, 0.0))
     assert abs(float(orbit["attractor_multiplier_real"].values.ravel()[-1])) < 1e-12
+
+
+def test_multipliers_where_an_impact_carries_the_motion_over_another_boundary():
+    """The impact turns the velocity round, and with it the friction: the derivative of the return
+    map, against differences of it.
+    """
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def rubbed(t, x, v, *, slip=0.1, w=1.3):
+        push = sl.cos(w * t) - x - 0.1 * v - sl.friction(v, slip=slip)
+        return v, push, sl.impact(x < 0.3, v, restitution=0.7)
+
+    for slip in (0.0, 0.1):
+        system = rubbed.with_values(slip=slip)
+        orbit = sl.attractors(system, (0.1, 0.1), periods=1500)
+        place = np.array([orbit[f"attractor_{name}"].values.ravel()[0] for name in "xv"])
+        starts = place + 1e-6 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        end = sl.simulate(system, {"x": starts[:, 0], "v": starts[:, 1]}, periods=1, samples=1)
+        ends = np.stack([end["end_x"].values, end["end_v"].values])
+        slopes = (ends[:, ::2] - ends[:, 1::2]) / 2e-6
+        real, imaginary = (
+            orbit[f"attractor_multiplier_{part}"].values.ravel() for part in ("real", "imag")
+        )
+        assert real.sum() == pytest.approx(np.trace(slopes), abs=1e-7)
+        assert np.prod(real + 1j * imaginary).real == pytest.approx(np.linalg.det(slopes), abs=1e-7)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("gap", [0.4, 0.5, -0.2])
+def test_a_block_with_friction_leaves_its_stop_where_the_pull_exceeds_the_friction(
+    restitution, gap
+):
+    """At rest on a stop, friction helps to press: released where force cos wt - gap = -slip."""
+
+    @sl.system(states="x v")
+    def rubbed(t, x, v, *, slip=0.3, gap=0.4, restitution=0.5):
+        push = 1.2 * sl.cos(0.5 * t) - x - sl.friction(v, slip=slip)
+        return v, push, sl.impact(x < gap, v, restitution=restitution)
+
+    system = rubbed.with_values(gap=gap, restitution=restitution)
+    run = sl.simulate(system, (gap, 0.0), t_end=30.0, samples=20)
+    leaves = math.acos((gap - 0.3) / 1.2) / 0.5
+    assert times(run, "release")[0] == pytest.approx(leaves, rel=1e-14)
+    assert str(run.status.values) == "ok"
+    assert run["x"].values.max() <= gap
+    after = sl.simulate(system, (gap, 0.0), t_end=leaves + 0.2)
+    force = [(math.cos(0.5 * t) * 1.2 - gap + 0.3) for t in (leaves + 0.1,)]
+    assert force[0] < 0.0
+    assert float(after.end_v) < 0.0
+
+
+def test_a_section_at_an_impact_is_that_of_impacts():
+    run = sl.poincare(stop, (-0.5, 0.0), "gap", periods=5)
+    hits = times(sl.simulate(stop, (-0.5, 0.0), periods=5), "impact")
+    assert run["crossing_time"].values.tolist() == hits.tolist()

@@ -63,7 +63,7 @@ BATCH = (
 _CLOCKS = {"numbers_of_clocks": (ARRAY, ARRAY)}
 _JUMP = {"jump": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE)}
 _LAWS = {
-    "reset": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, ARRAY),
+    "reset": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE, ARRAY),
     "settle": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE),
 }
 

@@ -71,10 +71,11 @@ def jump_function(system: System, clocks: Clocks) -> str:
 
 
 def reset_function(system: System, clocks: Clocks) -> str:
-    """``reset(t, y, p, h, mode, g, out)``: put the state after the jump of guard g's law into y,
-    and S times the tangent; out[0] is the law's restitution, out[1] the closing velocity before.
+    """``reset(t, y, p, h, before, after, g, out)``: put the state after the jump of guard g's law
+    into y, and S times the tangent, between two modes (bits); out[0] is the law's restitution,
+    out[1] the closing velocity before.
     """
-    head = "@kernel\ndef reset(t, y, p, h, mode, g, out):\n"
+    head = "@kernel\ndef reset(t, y, p, h, before, after, g, out):\n"
     base = system.tangent_of or system
     laws = [(g, one.gap, one.law) for g, one in enumerate(base.guards) if one.law and one.law.reset]
     if not laws:
@@ -96,7 +97,7 @@ def reset_function(system: System, clocks: Clocks) -> str:
         lines += [f"drift_{i} = 0.0" for i in range(size)]
         lines += [f"n_{i} = 0.0" for i in range(size + 1)]
     for g, gap, law in laws:
-        code = ScalarCode(leaf, side=_bit_in_mode, prefix=f"law{g}_", switch=clocks.side)
+        code = ScalarCode(leaf, side=_bit_in("before"), prefix=f"law{g}_", switch=clocks.side)
         wanted = {f"new_{i}": entry for i, entry in enumerate(law.reset)}
         if law.restitution is not None and law.constraint is not None:
             wanted |= {"restitution": law.restitution, "closing_before": law.constraint}
@@ -132,7 +133,7 @@ def _reset_of_tangent(
         ("before", known),
         ("after", lambda node: names[node.payload] if node.op == "state" else known(node)),
     ):
-        code = ScalarCode(leaf, side=_bit_in_mode, prefix=f"{word}_", switch=clocks.side)
+        code = ScalarCode(leaf, side=_bit_in(word), prefix=f"{word}_", switch=clocks.side)
         for i, value in enumerate(code.values(base.field)):
             code.lines.append(f"rate_{word}_{i} = {value}")
         lines += code.lines
@@ -183,7 +184,7 @@ def settle_function(system: System, clocks: Clocks) -> str:
         lines += [f"w_{i} = 0.0" for i in range(size)] + [f"d_{i} = 0.0" for i in range(size)]
         lines += [f"n_{i} = 0.0" for i in range(size)] + ["across = 1.0", "square = 1.0"]
     for g, gap, law in laws:
-        code = ScalarCode(leaf, side=_bit_in_mode, prefix=f"law{g}_", switch=clocks.side)
+        code = ScalarCode(leaf, side=_bit_in("mode"), prefix=f"law{g}_", switch=clocks.side)
         wanted = {f"new_{i}": entry for i, entry in enumerate(law.settled)}
         if system.tangent_of:
             wanted |= {f"w_{i}": entry for i, entry in enumerate(law.normal)}
@@ -220,9 +221,9 @@ def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
     return total
 
 
-def _bit_in_mode(guard: int) -> str:
-    """Code for the side of a guard in the mode that a function is given."""
-    return f"((mode >> {guard}) & 1) == 1"
+def _bit_in(word: str) -> Callable[[int], str]:
+    """Code for the side of a guard in a mode that a function is given."""
+    return lambda guard: f"(({word} >> {guard}) & 1) == 1"
 
 
 def _bit_of(word: str, aside: SetAside) -> Callable[[int], str]:

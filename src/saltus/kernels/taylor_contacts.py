@@ -24,6 +24,7 @@ from saltus.kernels.status import (
     GRAZE,
     GRAZE_SHALLOW,
     GRAZES,
+    IMPACT_LAW,
     REC_DIRECTION,
     REC_GUARD,
     REC_KIND,
@@ -539,6 +540,11 @@ def land_all(lanes, lane, batch, hits, slow):
     """
     who, d = lanes.memo[lane, WHO], lanes.found[DELTA, lane]
     arrived = note_arrival(lanes, lane)
+    if LAWS:  # stops before surfaces: friction holds nothing where a stop does
+        for g in range(NGUARDS):
+            stops = (hits >> g) & 1 and LAW[g] == IMPACT_LAW
+            if stops and meet(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow):
+                hits &= ~(1 << g)
     for g in range(NGUARDS):
         if (hits >> g) & 1:
             # Newton's slope is right to some 1e-9

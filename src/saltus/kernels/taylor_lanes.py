@@ -192,10 +192,10 @@ def attend(lanes, lane, batch, slow):
     hits = crossing_guards(lanes, lane)
     if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
         write_samples(lanes, lane, batch, start, slow)
-    status = land_all(lanes, lane, batch, hits, slow) if hits != 0 else RUNNING
     for g in range(NGUARDS):
         if (lanes.memo[lane, RESTS] >> g) & 1:
             lanes.fresh[g, lane] = 1.0
+    status = land_all(lanes, lane, batch, hits, slow) if hits != 0 else RUNNING
     if NCLOCKS > 0 and lanes.clock[TAU, lane] >= lanes.run[WATCH, lane]:
         pass_break(lanes, lane, batch, slow)
     if status == RUNNING and lanes.clock[TAU, lane] >= lanes.run[END, lane]:

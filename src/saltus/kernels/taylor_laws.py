@@ -10,11 +10,13 @@ it isn't. docs/decisions/0040.
 import math
 
 from saltus.kernels.status import (
+    CROSSING,
     HOLD,
     HOLD_LAW,
     IMPACT,
     IMPACT_LAW,
     JUMP_LAW,
+    NO_LAW,
     RELEASE,
     SURFACE_LAW,
 )
@@ -106,20 +108,30 @@ def strike(lanes, lane, batch, g, rate, slow):
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     show_clocks(lanes, lane, slow)
-    now = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
-    reset(now, slow.state, batch.param[who * batch.stride], slow.held, mode, g, slow.out)
+    now, parameters = time_of_law(lanes, lane, batch), batch.param[who * batch.stride]
+    reset(now, slow.state, parameters, slow.held, mode, mode, g, slow.out)
     restitution, closing = slow.out[0], slow.out[1]
     if closing > 0.0:
+        for i in range(NSTATES):
+            lanes.probe_y[i, lane], lanes.y[i, lane] = lanes.y[i, lane], slow.state[i]
+        behind = mode_behind(lanes, lane, batch, g, slow)
+        if TANGENT and behind != mode:
+            for i in range(NSTATES):
+                slow.state[i] = lanes.probe_y[i, lane]
+            reset(now, slow.state, parameters, slow.held, mode, behind, g, slow.out)
+            for i in range(NSTATES):
+                lanes.y[i, lane] = slow.state[i]
+        for i in range(NSTATES):
+            slow.state[i] = lanes.y[i, lane]
         velocity = rate * lanes.side[g, lane]
         lanes.run[SLOWEST, lane] = min(lanes.run[SLOWEST, lane], abs(rate))
-        for i in range(NSTATES):
-            lanes.y[i, lane] = slow.state[i]
         note(lanes, lane, batch, g, IMPACT, int(-lanes.side[g, lane]), velocity, mode, 0.0, slow)
+        turn_over(lanes, lane, batch, behind, slow)
         loosen(lanes, lane, batch, g, closing, slow)
     if LAW[g] == JUMP_LAW:
         after_jump(lanes, lane, batch, g, slow)
         return
-    gaps_here(lanes, lane, batch, slow)
+    face(lanes, lane, batch, g, slow)
     pressing, rebound = slow.gaps[NGUARDS + g], restitution * max(closing, 0.0)
     if pressing > 0.0:
         later = 0.0
@@ -129,6 +141,47 @@ def strike(lanes, lane, batch, g, rate, slow):
             hold(lanes, lane, batch, g, later, slow)
     elif rebound <= 0.0:
         lanes.fresh[g, lane] = 2.0  # it leaves at once: gap and rate are known to be zero
+
+
+@kernel
+def mode_behind(lanes, lane, batch, struck, slow):
+    """The mode where a jump has put the state: it may have carried it over other boundaries."""
+    gaps_here(lanes, lane, batch, slow)
+    mode = mode_of(lanes, lane)
+    for g in range(NGUARDS):
+        plain = LAW[g] == NO_LAW or LAW[g] == SURFACE_LAW
+        watched = lanes.side[WATCHED + g, lane] > 0.5
+        if g != struck and plain and watched and slow.gaps[g] * lanes.side[g, lane] < 0.0:
+            mode ^= 1 << g
+    return mode
+
+
+@kernel
+def turn_over(lanes, lane, batch, mode, slow):
+    """Change the sides of the guards over whose boundaries a jump has carried the state."""
+    for g in range(NGUARDS):
+        before = mode_of(lanes, lane)
+        if ((mode ^ before) >> g) & 1:
+            lanes.side[g, lane], lanes.fresh[g, lane] = -lanes.side[g, lane], 0.0
+            side = int(lanes.side[g, lane])
+            note(lanes, lane, batch, g, CROSSING, side, 0.0, before, 0.0, slow)
+
+
+@kernel
+def face(lanes, lane, batch, g, slow):
+    """Where the state stands on surfaces and on a stop, let the surfaces face the way in which it
+    would leave the stop: their force then presses onto it. The gaps stand in slow.gaps after it.
+    """
+    gaps_here(lanes, lane, batch, slow)
+    for m in range(NGUARDS):
+        free = LAW[m] == SURFACE_LAW and lanes.side[WATCHED + m, lane] > 0.5
+        if free and slow.gaps[m] == 0.0:
+            pressing = slow.gaps[NGUARDS + g]
+            lanes.side[m, lane], lanes.fresh[m, lane] = -lanes.side[m, lane], 1.0
+            gaps_here(lanes, lane, batch, slow)
+            if slow.gaps[NGUARDS + g] <= pressing:
+                lanes.side[m, lane] = -lanes.side[m, lane]
+                gaps_here(lanes, lane, batch, slow)
 
 
 @kernel
@@ -197,6 +250,8 @@ def caught(lanes, lane, batch, g, slow):
         return False  # it jumped over the surface
     snap(lanes, lane, g)
     gaps_here(lanes, lane, batch, slow)
+    if slow.gaps[NGUARDS + g] == 0.0 and slow.gaps[2 * NGUARDS + g] == 0.0:
+        return True  # another contact holds what this one could
     if slow.gaps[2 * NGUARDS + g] < 0.0 and slow.gaps[PARTNER[g]] > 0.0:
         hold(lanes, lane, batch, g, 0.0, slow)
         return True
@@ -220,6 +275,8 @@ def hold(lanes, lane, batch, g, later, slow):
     settle(now, slow.state, batch.param[who * batch.stride], slow.held, before, g)
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
+    if LAW[g] == IMPACT_LAW:
+        face(lanes, lane, batch, g, slow)
     note(lanes, lane, batch, h, HOLD, 1, 0.0, before, later, slow)
 
 
@@ -240,6 +297,10 @@ def release(lanes, lane, batch, h, slow):
     else:
         lanes.side[g, lane] = LAW_SIDE[g]
         lanes.fresh[g, lane] = 3.0 if fades else 2.0
+        for m in range(NGUARDS):
+            free = LAW[m] == SURFACE_LAW and lanes.side[WATCHED + m, lane] > 0.5
+            if free and slow.gaps[m] == 0.0:
+                lanes.fresh[m, lane] = 2.0 if fades else 1.0
     watch(lanes, lane)
     if TANGENT and fades:
         saltate(lanes, lane, batch, h, before, slow)

@@ -17,6 +17,7 @@ from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
+from saltus.kernels import status as st
 from saltus.results.dataset import schema
 from saltus.system.guards import equation_of
 from saltus.system.quantity import (
@@ -204,7 +205,8 @@ def _dataset(
 ) -> xr.Dataset:
     """The crossings that were asked for, under their names."""
     table = outcome.contacts
-    who, guard, time, flips = table.trajectory, table.guard, table.time, table.changes_side
+    who, guard, time = table.trajectory, table.guard, table.time
+    flips = table.changes_side | (table.kind == st.IMPACT)
     late = time > seen.begin[who]
     ours = late & (guard == crossed.guard)
     wanted = ours & flips & ((direction == 0) | (table.direction == direction))
