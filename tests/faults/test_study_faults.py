@@ -178,6 +178,7 @@ def server(tmp_path_factory):
     yield one
     one.process.stdin.close()
     one.process.wait(20)
+    one.process.stdout.close()  # else whatever collects garbage later is told of it
 
 
 def arguments(server, folder, *more):
