@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import gc
 import math
+import warnings
 from pathlib import Path
 
 import pytest
@@ -83,3 +84,14 @@ def never_steady():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "STEADY_AFTER", math.inf)
         yield
+
+
+@pytest.fixture
+def ctrl_c_may_leave_files_open():
+    """What a Ctrl-C that comes while a file is opened leaves to the collector is collected here,
+    where it isn't another test's fault.
+    """
+    yield
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        gc.collect()

@@ -225,6 +225,7 @@ def test_a_request_ends_it(verb):
     assert file_hash(numbers(ask(verb))) == file_hash(numbers(given(verb)))
 
 
+@pytest.mark.usefixtures("ctrl_c_may_leave_files_open")
 @long
 def test_ctrl_c_ends_it_as_an_interruption_that_others_know_too(verb):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
