@@ -4,6 +4,7 @@ bifurcations.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -169,21 +170,9 @@ def branches(
             )  # fmt: skip
             trace(plan, begins, done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:
-            raise Interrupted(
-                lambda: _dataset(system, name, limits, done, wanted, method)
-            ) from None
-        return _dataset(system, name, limits, done, wanted, method)
-
-
-def _dataset(
-    system: System,
-    name: str,
-    limits: tuple[float, float],
-    found: list[Branch],
-    outputs: Outputs,
-    method: Method,
-) -> xr.Dataset:
-    return table_of(system, name, limits, found, outputs, method)
+            partial = functools.partial(table_of, system, name, limits, done, wanted, method)
+            raise Interrupted(partial) from None
+        return table_of(system, name, limits, done, wanted, method)
 
 
 def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
