@@ -145,17 +145,15 @@ def draw_branches(
 def _lines(
     mine: np.ndarray, of: np.ndarray, wanted: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pieces of curve through neighbours on one branch, at least the first of which is wanted, NaN
-    between them.
-    """
-    a, b = mine[:-1], mine[1:]
-    joined = (b == a + 1) & (of[a] == of[b]) & wanted[a]
-    a, b = a[joined], b[joined]
-    nothing = np.full(len(a), np.nan)
-    return (
-        np.stack([x[a], x[b], nothing], axis=1).ravel(),
-        np.stack([y[a], y[b], nothing], axis=1).ravel(),
-    )
+    """Curves through neighbours on one branch of which the first is wanted, NaN between them."""
+    first = mine[:-1]
+    joined = (np.diff(mine) == 1) & (of[first] == of[first + 1]) & wanted[first]
+    keep = np.zeros(len(x) + 1, bool)
+    keep[first[joined]] = keep[first[joined] + 1] = True
+    breaks = np.setdiff1d(np.flatnonzero(keep[:-1]), first[joined])  # last point of each piece
+    index = np.flatnonzero(keep[:-1])
+    after = np.searchsorted(index, breaks) + 1
+    return np.insert(x[index], after, np.nan), np.insert(y[index], after, np.nan)
 
 
 def draw_marks(ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale) -> None:

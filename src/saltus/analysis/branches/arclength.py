@@ -23,7 +23,7 @@ TURN = 0.97
 #: Steps are doubled where so few evaluations sufficed and the tangent turned by less.
 EASY, STRAIGHT = 3, 0.995
 #: First, longest and shortest step, in units of the scale.
-FIRST, LONGEST, SHORTEST = 0.02, 0.25, 1e-7
+FIRST, LONGEST, SHORTEST = 0.02, 0.12, 1e-7
 #: Farthest that the corrector moves from the predicted point, in steps.
 ASTRAY = 0.6
 #: Points after which a curve may be found to be closed, and the cosine of the angle at which it

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.branches.resolution import resolve
 from saltus.analysis.branches.special_points import outside
 from saltus.analysis.branches.tracing import Branch
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.orbits.orbit_measures import Measures, measure
-from saltus.analysis.outputs import Outputs
+from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.results import build
@@ -34,6 +36,7 @@ def table_of(
 ) -> xr.Dataset:
     """The Dataset of branches over a parameter."""
     size = len(system.states)
+    resolve(branches, functools.partial(_peaks, system, name, method))
     counts = [len(branch.z) for branch in branches]
     points = [(branch, z) for branch in branches for z in branch.z]
     numbers = _numbers(system, name, points, outputs, method)
@@ -100,6 +103,12 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
         "branch_end": [branch.ends[1] for branch in branches],
         "branch_unexplained": np.array([len(b.unexplained) for b in branches], np.int64),
     }
+
+
+def _peaks(system: System, name: str, method: Method, branch: Branch, z: np.ndarray) -> np.ndarray:
+    """Largest magnitude of the first state of orbits float64[r, z] of a branch."""
+    numbers = _numbers(system, name, [(branch, one) for one in z], outputs_of(system, None), method)
+    return numbers.peak[:, 0]
 
 
 def _numbers(

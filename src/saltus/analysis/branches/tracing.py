@@ -26,6 +26,8 @@ SAME = 1e-6
 PASSES = 0.3
 #: How far a branch turns, sideways over ahead, from its last point to where it ends.
 TURNS = 0.3
+#: Shortest interval that is halved, in units of the scale.
+LEAST = 1e-9
 #: How often an interval is halved in which changes of stability don't add up.
 HALVINGS = 6
 
@@ -285,7 +287,7 @@ def _find_events(branch: Branch) -> None:
     for left in reversed(range(HALVINGS)):
         branch.events = _located(branch)
         branch.unexplained = _unexplained(branch)
-        if not left or not branch.unexplained or not _refined(branch, branch.unexplained):
+        if not left or not branch.unexplained or not len(refine(branch, branch.unexplained)):
             break
 
 
@@ -339,28 +341,41 @@ def _unexplained(branch: Branch) -> list[int]:
     return result
 
 
-def _refined(branch: Branch, places: Sequence[int]) -> bool:
-    """Put a point in the midst of some intervals; whether there are new ones."""
-    after = np.array(places)
+def refine(branch: Branch, places: Sequence[int]) -> np.ndarray:
+    """Put a point in the midst of some intervals, by the points before them; the numbers of the new
+    points, int64[r].
+    """
+    after = np.array(places, np.int64)
     step = (branch.z[after + 1] - branch.z[after]) / branch.scale
     length = np.einsum("ki,ki->k", step, branch.tangent[after])
     rows = np.full(len(after), branch.row)
     guess = branch.z[after] + 0.5 * length[:, None] * branch.tangent[after] * branch.scale
     point = correct(branch.orbits, guess, branch.tangent[after], rows, np.abs(length))
-    good = np.flatnonzero(point.found & (np.abs(length) > 1e-9))
+    good = np.flatnonzero(point.found & (np.abs(length) > LEAST))
     if not len(good):
-        return False
+        return good
     derivative = point.derivative[good]
     tangent = tangents(derivative, branch.tangent[after[good]])
     own = branch.orbits.multipliers(point.z[good], derivative, rows[good])
-    places_ = after[good] + 1
-    branch.z = np.insert(branch.z, places_, point.z[good], axis=0)
-    branch.tangent = np.insert(branch.tangent, places_, tangent, axis=0)
-    branch.derivative = np.insert(branch.derivative, places_, derivative, axis=0)
-    branch.multipliers = np.insert(branch.multipliers, places_, own, axis=0)
     middle = 0.5 * (branch.length[after[good]] + branch.length[after[good] + 1])
-    branch.length = np.insert(branch.length, places_, middle)
-    return True
+    new = {"z": point.z[good], "tangent": tangent, "derivative": derivative}
+    for name, values in {**new, "multipliers": own, "length": middle}.items():
+        setattr(branch, name, np.insert(getattr(branch, name), after[good] + 1, values, axis=0))
+    placed = after[good] + 1 + np.arange(len(good))
+    branch.events = [replace(event, after=_moved(branch, event, placed)) for event in branch.events]
+    return placed
+
+
+def _moved(branch: Branch, event: SpecialPoint, placed: np.ndarray) -> int:
+    """The point that comes before an event, once new points have been put in."""
+    place = event.after
+    for new in placed:
+        if new <= place:
+            place += 1
+        elif new == place + 1:
+            step = (event.z - branch.z[new]) / branch.scale
+            place += int(step @ branch.tangent[new] >= 0)
+    return place
 
 
 # -- identity --------------------------------------------------------------------------------------
