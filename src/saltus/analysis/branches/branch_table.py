@@ -53,7 +53,7 @@ def table_of(
         "point_branch": np.repeat(np.arange(len(branches)), counts),
         "point_<parameter>": {name: np.array([z[-1] for _, z in points])},
         "point_arclength": np.concatenate([b.length for b in branches] or [np.zeros(0)]),
-        "point_stable": np.abs(multipliers).max(axis=1, initial=0.0) < 1.0 - MARGINAL,
+        "point_stable": np.nanmax(np.abs(multipliers), axis=1, initial=0.0) < 1.0 - MARGINAL,
         "point_unstable_multipliers": outside(multipliers).sum(axis=1),
         "point_period": np.array([float(branch.orbits.period(z)) for branch, z in points]),
         "point_peak": numbers.peak[:, 0] if len(points) else np.zeros(0),
