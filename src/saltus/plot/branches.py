@@ -124,7 +124,7 @@ def draw_branches(
     forced = bool((ds["branch_periods"].values > 0).all())
     place = ds[point_name(ds.attrs["parameter"])].values * across.factor
     periods, of = ds["branch_periods"].values, ds["point_branch"].values
-    stable, height = ds["point_stable"].values, values * up.factor
+    stable, height = ds["point_stable"].values > 0, values * up.factor
     named: dict[str, Any] = {}
     for code in np.unique(motion_colors.codes(["periodic"] * len(periods), periods)):
         color = tuple(motion_colors.color(int(code)).tolist())

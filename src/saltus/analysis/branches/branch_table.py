@@ -47,7 +47,7 @@ def table_of(
     multipliers = _stacked([branch.multipliers for branch in branches], size)
     event_multipliers = _stacked([event.multipliers[None] for _, event in events], size)
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
-    orbits = [branch.orbits.points(z) for branch, z in points]
+    states = padded([branch.orbits.points(z) for branch, z in [*points, *at_events]], size)
     values: dict[str, Any] = {
         "point": np.arange(len(points)),
         "point_branch": np.repeat(np.arange(len(branches)), counts),
@@ -63,7 +63,7 @@ def table_of(
         "point_margin": numbers.margin,
         "point_multiplier_real": multipliers.real,
         "point_multiplier_imag": multipliers.imag,
-        "point_<state>": padded(orbits, size),
+        "point_<state>": states[: len(points)],
         "output": list(outputs.names),
         "output_units": list(outputs.units),
         **{f"point_output_{key}": column for key, column in numbers.by_name().items()},
@@ -77,7 +77,7 @@ def table_of(
         "event_rms": event_numbers.rms[:, 0] if len(events) else np.zeros(0),
         "event_multiplier_real": event_multipliers.real,
         "event_multiplier_imag": event_multipliers.imag,
-        "event_<state>": padded([branch.orbits.points(z) for branch, z in at_events], size),
+        "event_<state>": states[len(points) :],
     }
     fixed = {key: value for key, value in system.values.items() if key != name}
     attrs = provenance(system, method, fixed, (name,)) | {
