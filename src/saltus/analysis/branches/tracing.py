@@ -378,9 +378,15 @@ def _moved(branch: Branch, event: SpecialPoint, placed: np.ndarray) -> int:
 
 
 # -- identity --------------------------------------------------------------------------------------
+def branch_of(z: np.ndarray, n: int, branches: Sequence[Branch]) -> int:
+    """The branch on which an orbit of n periods lies, -1 if it is none of these."""
+    there = (i for i, branch in enumerate(branches) if branch.orbits.n == n and _lies_on(z, branch))
+    return next(there, -1)
+
+
 def _known(z: np.ndarray, n: int, branches: Sequence[Branch]) -> bool:
     """Whether an orbit of n periods lies on a branch that has been followed."""
-    return any(branch.orbits.n == n and _lies_on(z, branch) for branch in branches)
+    return branch_of(z, n, branches) >= 0
 
 
 def _lies_on(z: np.ndarray, branch: Branch) -> bool:

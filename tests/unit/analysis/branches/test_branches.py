@@ -187,3 +187,25 @@ def test_what_cannot_be_followed_is_refused():
         sl.branches(rig_a, {"frequency": (10.0, 20.0)}, method=sl.ODE45(1e-4, 1e-7))
     with pytest.raises(ParameterError, match="switch="):
         sl.branches(rig_a, {"frequency": (10.0, 20.0)}, switch="folds")
+
+
+def test_responses_and_the_unstable_orbits_between_them_in_one_dataset():
+    """The S-shaped branch and the isola of case c at 5 Hz, from one call."""
+    system = sl.models.delangre("c", force="4 N", frequency="5 Hz")
+    found = sl.bifurcation_diagram(
+        system, {"contact_stiffness": [14e3, 18e3, 22e3]}, "random 8",
+        box={"x": (-5e-3, 5e-3), "v": (-0.5, 0.5)}, unstable=True, progress=False,
+    )  # fmt: skip
+    for number in ("G09", "G15"):
+        value = float(RIG[number]["value"])
+        at = found.event_contact_stiffness.values
+        assert at[np.argmin(np.abs(at - value))] == pytest.approx(value, rel=2e-12)
+    of = found.response_branch.values
+    assert (of >= 0).all()
+    for i, branch in enumerate(of):
+        mine = found.point_contact_stiffness.values[found.point_branch.values == branch]
+        assert mine.min() <= found.response_contact_stiffness.values[i] <= mine.max()
+    with pytest.raises(ParameterError, match="this grid has two"):
+        sl.bifurcation_diagram(
+            system, {"contact_stiffness": [1e4], "force": [4.0]}, unstable=True, progress=False
+        )
