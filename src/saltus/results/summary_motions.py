@@ -9,14 +9,17 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
+from saltus.errors import counted
 from saltus.results.dataset.schema import (
     ENERGY,
+    EQUILIBRIA,
     IMPACTS,
     MODES,
     SECTION,
     SETTLED,
     SPECTRUM,
     WIDTHS,
+    equilibrium_name,
     period_text,
     states_of,
 )
@@ -110,6 +113,25 @@ def _modes(ds: xr.Dataset) -> list[str]:
     return lines
 
 
+def _equilibria(ds: xr.Dataset) -> list[str]:
+    lines = [f"found    {counted(ds.sizes['equilibrium'], 'equilibrium')}"]
+    for i in range(ds.sizes["equilibrium"]):
+        one = ds.isel(equilibrium=i)
+        states = [one[equilibrium_name(name)] for name in states_of(ds)]
+        at = ", ".join(
+            f"{name} = {float(value):.4g} {unit_of(value)}".rstrip()
+            for name, value in zip(states_of(ds), states, strict=True)
+        )
+        kind = one["equilibrium_type"].item().replace("_", "-")
+        stable = "stable" if one["equilibrium_stable"] else "unstable"
+        word = kind if kind in ("center", "degenerate", "undecided") else f"{stable} {kind}"
+        contacts = one["equilibrium_contacts"].item()
+        on = "held at" if one["equilibrium_place"].item() == "pseudo" else "on the boundary"
+        where = f", {on} {contacts}" if contacts else ""
+        lines.append(f"  {i}: {word} at {at}{where}")
+    return lines
+
+
 #: For each kind, what writes its lines.
 WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SECTION: _section,
@@ -119,4 +141,5 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SETTLED: _settled,
     WIDTHS: _widths,
     MODES: _modes,
+    EQUILIBRIA: _equilibria,
 }
