@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from saltus.analysis.motion.structure_modes import structure_modes
     from saltus.analysis.motion.transmissibility import transmissibility
     from saltus.analysis.recorded.wolf import wolf
+    from saltus.analysis.responses.all_branches import branches
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
@@ -104,6 +105,7 @@ _HOMES = {
     "spectrum": "saltus.analysis.motion.spectrum",
     "stroboscope": "saltus.analysis.motion.stroboscope",
     "structure_modes": "saltus.analysis.motion.structure_modes",
+    "branches": "saltus.analysis.responses.all_branches",
     "transmissibility": "saltus.analysis.motion.transmissibility",
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
@@ -148,6 +150,7 @@ __all__ = [
     "basin_fractions",
     "basins",
     "bifurcation_diagram",
+    "branches",
     "clip",
     "compare",
     "compare_methods",
