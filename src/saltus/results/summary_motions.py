@@ -13,12 +13,14 @@ from saltus.errors import counted
 from saltus.results.dataset.schema import (
     BRANCHES,
     ENERGY,
+    EQUILIBRIA,
     IMPACTS,
     MODES,
     SECTION,
     SETTLED,
     SPECTRUM,
     WIDTHS,
+    equilibrium_name,
     event_name,
     period_text,
     point_name,
@@ -122,6 +124,25 @@ def _modes(ds: xr.Dataset) -> list[str]:
     return lines
 
 
+def _equilibria(ds: xr.Dataset) -> list[str]:
+    lines = [f"found    {counted(ds.sizes['equilibrium'], 'equilibrium')}"]
+    for i in range(ds.sizes["equilibrium"]):
+        one = ds.isel(equilibrium=i)
+        states = [one[equilibrium_name(name)] for name in states_of(ds)]
+        at = ", ".join(
+            f"{name} = {float(value):.4g} {unit_of(value)}".rstrip()
+            for name, value in zip(states_of(ds), states, strict=True)
+        )
+        kind = one["equilibrium_type"].item().replace("_", "-")
+        stable = "stable" if one["equilibrium_stable"] else "unstable"
+        word = kind if kind in ("center", "degenerate", "undecided") else f"{stable} {kind}"
+        contacts = one["equilibrium_contacts"].item()
+        on = "held at" if one["equilibrium_place"].item() == "pseudo" else "on the boundary"
+        where = f", {on} {contacts}" if contacts else ""
+        lines.append(f"  {i}: {word} at {at}{where}")
+    return lines
+
+
 def _branches(ds: xr.Dataset) -> list[str]:
     name = ds.attrs["parameter"]
     unit = unit_of(ds[point_name(name)])
@@ -154,5 +175,6 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SETTLED: _settled,
     WIDTHS: _widths,
     MODES: _modes,
+    EQUILIBRIA: _equilibria,
     BRANCHES: _branches,
 }
