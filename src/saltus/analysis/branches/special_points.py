@@ -115,7 +115,10 @@ def locate(
     kind : int64[e]
         Which test.
     """
+    if not len(rows):
+        return []
     column = z.shape[1] - 1
+    orbits, rows = orbits.near(z, rows), np.arange(len(rows))
     known: dict[int, SpecialPoint] = {}
 
     def at(step: np.ndarray, event: np.ndarray) -> np.ndarray:
@@ -138,8 +141,6 @@ def locate(
                 )
         return values.reshape(step.shape)
 
-    if not len(rows):
-        return []
     root = elementwise.find_root(
         at, (np.zeros(len(rows)), length), args=(np.arange(len(rows), dtype=float),),
         tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0}, maxiter=60,
