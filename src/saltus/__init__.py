@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.attractors import attractors, basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
+    from saltus.analysis.basins.periodic_orbits import periodic_orbits
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
     from saltus.analysis.methods.regularisation_widths import regularisation_widths
@@ -95,6 +96,7 @@ _HOMES = {
     "frequency_response": "saltus.analysis.responses.frequency_response",
     "impact_statistics": "saltus.analysis.motion.impacts",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
+    "periodic_orbits": "saltus.analysis.basins.periodic_orbits",
     "poincare": "saltus.analysis.motion.poincare",
     "regularisation_widths": "saltus.analysis.methods.regularisation_widths",
     "settled": "saltus.analysis.motion.settled",
@@ -170,6 +172,7 @@ __all__ = [
     "min",
     "mod",
     "models",
+    "periodic_orbits",
     "pi",
     "piecewise",
     "plot",

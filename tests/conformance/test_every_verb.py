@@ -83,6 +83,7 @@ CALLS = {
     ),
     "impact_statistics": started(periods=30),
     "lyapunov": started(periods=64, transient=20),
+    "periodic_orbits": started(periods=1),
     "poincare": started(surface="x turns", periods=5),
     "regularisation_widths": started(points=2, transient=20, widths=[1e-4, 1e-5]),
     "settled": of_result("simulate"),

@@ -112,7 +112,7 @@ def attractors(
         every=None if every is None else to_si(every, "s", "every"),
         threads=threads,
     )
-    scale = _spread(map_, group.start)
+    scale = spread(map_, group.start)
     with reporting(progress) as show:
         found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
     starts = {
@@ -206,7 +206,7 @@ def basin_fractions(
     start = fill(
         system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed
     )
-    scale = _spread(map_, start[:SPREAD_STARTS])
+    scale = spread(map_, start[:SPREAD_STARTS])
     with reporting(progress) as show:
         scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
         found = find_attractors(map_, scouts, scale, periods)[0]
@@ -278,7 +278,7 @@ def _draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[s
     }
 
 
-def _spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
+def spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
     """Range of each state over the starts, their first iterates and the time between two of them; 1
     for a state that never moves.
     """

@@ -26,6 +26,7 @@ from saltus.results.dataset.attractors import (
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.methods import METHODS_VARIABLES, WIDTHS_VARIABLES
+from saltus.results.dataset.orbits import ORBIT_VARIABLES
 from saltus.results.dataset.responses import RESPONSES_VARIABLES
 from saltus.results.dataset.result import Result
 from saltus.results.dataset.structures import MODES_VARIABLES
@@ -37,6 +38,7 @@ TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS, EXPONENTS = "methods", "exponents"
 SETTLED, WIDTHS, MODES = "settled", "widths", "modes"
+ORBITS = "orbits"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
@@ -50,6 +52,7 @@ MAKERS = {
     EXPONENTS: "sl.lyapunov or sl.wolf",
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
     MODES: "sl.structure_modes",
+    ORBITS: "sl.periodic_orbits",
 }  # fmt: skip
 
 #: The table of each kind of result.
@@ -69,6 +72,7 @@ TABLES = {
     SETTLED: motions.SETTLED_VARIABLES,
     WIDTHS: WIDTHS_VARIABLES,
     MODES: MODES_VARIABLES,
+    ORBITS: ORBIT_VARIABLES,
 }
 
 
@@ -87,6 +91,14 @@ def attractor_name(state: str) -> str:
     """
     name = f"attractor_{state}"
     return f"attractor_state_{state}" if name in ATTRACTOR_VARIABLES else name
+
+
+def orbit_name(state: str) -> str:
+    """Name of the variable that holds the points of periodic orbits: ``orbit_x``;
+    ``orbit_state_type`` where the name is taken.
+    """
+    name = f"orbit_{state}"
+    return f"orbit_state_{state}" if name in ORBIT_VARIABLES else name
 
 
 def response_name(name: str) -> str:
@@ -259,6 +271,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         EXPONENTS: ("lyapunov_exponent", "running_exponent"),
         SETTLED: ("response_period", "mismatch"),
         MODES: ("shape", "flexibility"),
+        ORBITS: ("orbit_type", "orbit_stable"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 
