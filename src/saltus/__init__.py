@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.attractors import attractors, basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
+    from saltus.analysis.basins.equilibria import equilibria
     from saltus.analysis.basins.periodic_orbits import periodic_orbits
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from saltus.analysis.motion.structure_modes import structure_modes
     from saltus.analysis.motion.transmissibility import transmissibility
     from saltus.analysis.recorded.wolf import wolf
+    from saltus.analysis.responses.all_branches import branches
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
@@ -93,6 +95,7 @@ _HOMES = {
     "compare": "saltus.analysis.basins.compare",
     "compare_methods": "saltus.analysis.methods.compare_methods",
     "energy_balance": "saltus.analysis.motion.energy",
+    "equilibria": "saltus.analysis.basins.equilibria",
     "frequency_response": "saltus.analysis.responses.frequency_response",
     "impact_statistics": "saltus.analysis.motion.impacts",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
@@ -104,6 +107,7 @@ _HOMES = {
     "spectrum": "saltus.analysis.motion.spectrum",
     "stroboscope": "saltus.analysis.motion.stroboscope",
     "structure_modes": "saltus.analysis.motion.structure_modes",
+    "branches": "saltus.analysis.responses.all_branches",
     "transmissibility": "saltus.analysis.motion.transmissibility",
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
@@ -148,6 +152,7 @@ __all__ = [
     "basin_fractions",
     "basins",
     "bifurcation_diagram",
+    "branches",
     "clip",
     "compare",
     "compare_methods",
@@ -156,6 +161,7 @@ __all__ = [
     "cosh",
     "describe",
     "energy_balance",
+    "equilibria",
     "exp",
     "freeplay",
     "frequency_response",

@@ -26,6 +26,7 @@ BOX = {
     "in units": {"x": ("-1 mm", "1 mm", 4), "v": ("-20 mm/s", "20 mm/s", 4)},
 }
 FREQUENCY = {"in SI": [17.0], "in units": ["17 Hz"]}
+BRANCH = {"in SI": (16.9, 17.1), "in units": ("16.9 Hz", "17.1 Hz")}
 
 
 def spring_force(x, mass, natural_frequency):
@@ -62,6 +63,10 @@ CALLS = {
         RIG,
         {"vary": {"frequency": FREQUENCY[how]}, "start": START[how]},
     ),
+    "branches": lambda how: (
+        RIG,
+        {"vary": {"frequency": BRANCH[how]}, "start": START[how], "at": 1, "longest": 1},
+    ),
     "compare": lambda how: (given("basins", how), {"map_b": given("basins", "in SI")}),
     "compare_methods": lambda how: (
         RIG,
@@ -73,6 +78,10 @@ CALLS = {
         },
     ),
     "energy_balance": started(periods=3, **sl.models.energy("delangre")),
+    "equilibria": lambda how: (
+        sl.models.double_scroll(),
+        {"start": {"x": {"in SI": 1.0, "in units": "1"}[how], "y": 0, "z": 0}},
+    ),
     "frequency_response": lambda how: (
         RIG,
         {
@@ -155,9 +164,11 @@ def test_a_result_says_where_it_comes_from(verb):
     assert attrs["versions"] == to_json(versions())
     if verb in ("wolf", "structure_modes"):  # a series and matrices are no system
         return
-    assert attrs["system"] == RIG.name
-    assert set(json.loads(attrs["parameters"])) <= set(RIG.values)
-    assert {"x", "v"} <= set(json.loads(attrs["units"]))
+    subject = CALLS[verb]("in SI")[0]
+    system = subject if isinstance(subject, sl.System) else RIG
+    assert attrs["system"] == system.name
+    assert set(json.loads(attrs["parameters"])) <= set(system.values)
+    assert set(system.states) <= set(json.loads(attrs["units"]))
     for name in (
         ("method_options_a", "method_options_b") if verb == "compare" else ("method_options",)
     ):

@@ -11,7 +11,9 @@ import xarray as xr
 
 from saltus.errors import counted
 from saltus.results.dataset.schema import (
+    BRANCHES,
     ENERGY,
+    EQUILIBRIA,
     IMPACTS,
     MODES,
     ORBITS,
@@ -19,8 +21,11 @@ from saltus.results.dataset.schema import (
     SETTLED,
     SPECTRUM,
     WIDTHS,
+    equilibrium_name,
+    event_name,
     kind_text,
     period_text,
+    point_name,
     states_of,
 )
 from saltus.results.wording import unit_of
@@ -115,6 +120,48 @@ def _modes(ds: xr.Dataset) -> list[str]:
     return lines
 
 
+def _equilibria(ds: xr.Dataset) -> list[str]:
+    lines = [f"found    {counted(ds.sizes['equilibrium'], 'equilibrium')}"]
+    for i in range(ds.sizes["equilibrium"]):
+        one = ds.isel(equilibrium=i)
+        states = [one[equilibrium_name(name)] for name in states_of(ds)]
+        at = ", ".join(
+            f"{name} = {float(value):.4g} {unit_of(value)}".rstrip()
+            for name, value in zip(states_of(ds), states, strict=True)
+        )
+        kind = one["equilibrium_type"].item().replace("_", "-")
+        stable = "stable" if one["equilibrium_stable"] else "unstable"
+        word = kind if kind in ("center", "degenerate", "undecided") else f"{stable} {kind}"
+        contacts = one["equilibrium_contacts"].item()
+        on = "held at" if one["equilibrium_place"].item() == "pseudo" else "on the boundary"
+        where = f", {on} {contacts}" if contacts else ""
+        lines.append(f"  {i}: {word} at {at}{where}")
+    return lines
+
+
+def _branches(ds: xr.Dataset) -> list[str]:
+    name = ds.attrs["parameter"]
+    unit = unit_of(ds[point_name(name)])
+    closed, stable = ds["branch_closed"].values, ds["point_stable"].values
+    lines = [
+        f"found    {counted(ds.sizes['branch'], 'branch')}, {int(closed.sum())} of "
+        f"them closed, {ds.sizes['point']} orbits, {stable.mean():.0%} of them stable",
+    ]
+    at, kind, of = (ds[one].values for one in (event_name(name), "event_kind", "event_branch"))
+    for i, periods in enumerate(ds["branch_periods"].values.tolist()):
+        mine = ds[point_name(name)].values[ds["point_branch"].values == i]
+        text = ", ".join(
+            f"{word.replace('_', ' ')} {value:.10g}"
+            for word, value in zip(kind[of == i], at[of == i], strict=True)
+        )
+        extent = f"{mine.min():.6g} to {mine.max():.6g} {unit}".rstrip()
+        ends = ", closed" if closed[i] else ""
+        lines.append(f"  {i}: {period_text(periods)} from {extent}{ends}{text and '; ' + text}")
+    if ds.attrs["unexplained_changes"]:
+        lines.append(f"unsure   {ds.attrs['unexplained_changes']} changes of stability unexplained")
+    return lines
+
+
 #: For each kind, what writes its lines.
 def _orbits(ds: xr.Dataset) -> list[str]:
     """A line on each orbit, and what the search says of those that it missed."""
@@ -154,4 +201,6 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     WIDTHS: _widths,
     MODES: _modes,
     ORBITS: _orbits,
+    EQUILIBRIA: _equilibria,
+    BRANCHES: _branches,
 }

@@ -23,6 +23,8 @@ from saltus.results.dataset.attractors import (
     ATTRACTORS_VARIABLES,
     BASINS_VARIABLES,
 )
+from saltus.results.dataset.branches import BRANCHES_VARIABLES
+from saltus.results.dataset.equilibria import EQUILIBRIA_VARIABLES
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.methods import METHODS_VARIABLES, WIDTHS_VARIABLES
@@ -37,8 +39,9 @@ VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS, EXPONENTS = "methods", "exponents"
-SETTLED, WIDTHS, MODES = "settled", "widths", "modes"
 ORBITS = "orbits"
+SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
+EQUILIBRIA = "equilibria"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
@@ -51,8 +54,9 @@ MAKERS = {
     ENERGY: "sl.energy_balance",
     EXPONENTS: "sl.lyapunov or sl.wolf",
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
-    MODES: "sl.structure_modes",
     ORBITS: "sl.periodic_orbits",
+    MODES: "sl.structure_modes", BRANCHES: "sl.branches",
+    EQUILIBRIA: "sl.equilibria",
 }  # fmt: skip
 
 #: The table of each kind of result.
@@ -73,6 +77,8 @@ TABLES = {
     WIDTHS: WIDTHS_VARIABLES,
     MODES: MODES_VARIABLES,
     ORBITS: ORBIT_VARIABLES,
+    EQUILIBRIA: EQUILIBRIA_VARIABLES,
+    BRANCHES: BRANCHES_VARIABLES,
 }
 
 
@@ -101,6 +107,14 @@ def orbit_name(state: str) -> str:
     return f"orbit_state_{state}" if name in ORBIT_VARIABLES else name
 
 
+def equilibrium_name(state: str) -> str:
+    """Name of the variable that holds a state at rest: ``equilibrium_x``;
+    ``equilibrium_state_type`` where the name is taken.
+    """
+    name = f"equilibrium_{state}"
+    return f"equilibrium_state_{state}" if name in EQUILIBRIA_VARIABLES else name
+
+
 def response_name(name: str) -> str:
     """Name of the variable that holds a parameter, or the points of a state, of each response:
     ``response_frequency``, ``response_x``.
@@ -113,14 +127,18 @@ def response_name(name: str) -> str:
 
 
 def event_name(parameter: str) -> str:
-    """Name of the variable that holds the parameter at the events: ``event_frequency``;
+    """Name of the variable that holds a parameter or a state at the events: ``event_frequency``;
     ``event_own_kind`` where the name is taken.
     """
-    return (
-        f"event_own_{parameter}"
-        if f"event_{parameter}" in RESPONSES_VARIABLES
-        else f"event_{parameter}"
-    )
+    taken = (*RESPONSES_VARIABLES, *BRANCHES_VARIABLES)
+    return f"event_own_{parameter}" if f"event_{parameter}" in taken else f"event_{parameter}"
+
+
+def point_name(name: str) -> str:
+    """Name of the variable that holds a parameter or a state at the points of branches:
+    ``point_x``; ``point_own_period`` where the name is taken.
+    """
+    return f"point_own_{name}" if f"point_{name}" in BRANCHES_VARIABLES else f"point_{name}"
 
 
 def sample_name(state: str) -> str:
@@ -272,6 +290,8 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         SETTLED: ("response_period", "mismatch"),
         MODES: ("shape", "flexibility"),
         ORBITS: ("orbit_type", "orbit_stable"),
+        EQUILIBRIA: ("equilibrium_type", "equilibrium_place"),
+        BRANCHES: ("point_branch", "point_stable", "branch_periods"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 

@@ -104,3 +104,17 @@ OF_RESPONSES = KINDS | {
     ),
     "periods": whole(2000, most=MOST_PERIODS),
 }
+#: Branches go over a range, without steps.
+OF_BRANCHES = OF_RESPONSES | {
+    "vary": Kind(
+        dict[str, Interval], ({"frequency": ["2 Hz", "30 Hz"]},),
+        "One parameter and its range.", convert="ranges",
+    ),
+    "at": whole(12, most=MOST_COUNT),
+    "longest": whole(8),
+    "points": whole(1000),
+    "switch": Kind(
+        list[Literal["period_doubling", "branch_point"]], (["period_doubling"],),
+        default=["period_doubling", "branch_point"],
+    ),
+}  # fmt: skip

@@ -1,0 +1,359 @@
+"""Pseudo-arclength continuation of curves F(z) = 0, m equations in m + 1 unknowns, many curves side
+by side.
+
+A step goes along the tangent and returns to the curve by Newton's method in the plane across it, so
+that folds are points like all others. Keller, in Applications of Bifurcation Theory (1977);
+Allgower & Georg, Introduction to Numerical Continuation Methods (2003), chapters 2 and 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+#: Iterations of the corrector: more mean that the step was too long.
+MOST_ITERATIONS = 7
+#: A residual so small, in units of the scale, is rounding; one so small that stalls is accepted.
+CLOSED, STALLED = 1e-13, 1e-9
+#: Cosine of the angle between tangents at the ends of a step: less halves the step.
+TURN = 0.97
+#: Steps are doubled where so few evaluations sufficed and the tangent turned by less.
+EASY, STRAIGHT = 3, 0.995
+#: First, longest and shortest step, in units of the scale.
+FIRST, LONGEST, SHORTEST = 0.02, 0.12, 1e-7
+#: Distance from where a curve ends within which its last point lies, in units of the scale.
+ENDING = 0.005
+#: Farthest that the corrector moves from the predicted point, in steps.
+ASTRAY = 0.6
+#: Points after which a curve may be found to be closed, and the cosine of the angle at which it
+#: then meets its start, and passes it.
+LEAST_CLOSED, AGAIN = 8, 0.9
+
+
+class Equations(Protocol):
+    """m equations F(z) = 0 in m + 1 unknowns, for k curves.
+
+    Attributes
+    ----------
+    scale : float64[k, m + 1]
+        Unit of each unknown.
+    """
+
+    scale: np.ndarray
+
+    def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """F float64[r, m] and its derivative float64[r, m, m + 1], both in units of the scale, at
+        float64[r, m + 1] of the curves int64[r]; NaN where there is none.
+        """
+
+    def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
+        """Points float64[r, m + 1] of the curves int64[r] were accepted."""
+
+    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Other unknowns that mean the same points float64[r, m + 1], float64[r, s, m + 1]; the
+        first are these.
+        """
+
+
+@dataclass
+class Curve:
+    """A curve in one direction from its start.
+
+    Attributes
+    ----------
+    z : list of float64[m + 1]
+        Its points, the start first.
+    tangent : list of float64[m + 1]
+        Unit tangents in units of the scale, in the direction of the curve.
+    derivative : list of float64[m, m + 1]
+        Of the equations, in units of the scale.
+    length : list of float
+        Arclength from the start, in units of the scale.
+    end : str
+        ``range``: the end of the range was reached; ``closed``; ``points``: as many as asked for;
+        ``lost``: no step however short; ``stopped``: another curve of
+        the group is closed; or what the caller says.
+    """
+
+    z: list[np.ndarray] = field(default_factory=list)
+    tangent: list[np.ndarray] = field(default_factory=list)
+    derivative: list[np.ndarray] = field(default_factory=list)
+    length: list[float] = field(default_factory=list)
+    end: str = ""
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """Points of curves: float64[k, m + 1], the derivative there, which were found, and in how many
+    evaluations.
+    """
+
+    z: np.ndarray
+    derivative: np.ndarray
+    found: np.ndarray
+    evaluations: np.ndarray
+
+
+def correct(
+    equations: Equations,
+    guess: np.ndarray,
+    normal: np.ndarray,
+    rows: np.ndarray,
+    astray: np.ndarray | float = np.inf,
+) -> Corrected:
+    """Newton's method from guesses float64[k, m + 1] in the planes across float64[k, m + 1].
+
+    Parameters
+    ----------
+    equations : Equations
+        The curves.
+    guess, normal
+        Where to begin, and the normals of the planes in units of the scale.
+    rows : int64[k]
+        Which curves.
+    astray : float or float64[k]
+        Farthest from the guess, in units of the scale.
+    """
+    k, size = guess.shape
+    scale, limit = equations.scale[rows], np.broadcast_to(astray, k)
+    z, derivative = guess.copy(), np.full((k, size - 1, size), np.nan)
+    found, count = np.zeros(k, bool), np.zeros(k, np.int64)
+    before, left = np.full(k, np.inf), np.arange(k)
+    for _ in range(MOST_ITERATIONS):
+        if not len(left):
+            break
+        residual, matrix = equations.evaluate(z[left], rows[left])
+        count[left] += 1
+        error = np.abs(residual).max(axis=1)
+        good = np.isfinite(error) & np.isfinite(matrix).all(axis=(1, 2))
+        done = good & ((error < CLOSED) | ((error < STALLED) & (error > 0.5 * before[left])))
+        derivative[left[done]], found[left[done]] = matrix[done], True
+        before[left] = error
+        going = good & ~done
+        left, residual, matrix = left[going], residual[going], matrix[going]
+        whole = np.concatenate([matrix, normal[left][:, None]], axis=1)
+        right = np.concatenate([residual, np.zeros((len(left), 1))], axis=1)
+        step = -_solve(whole, right)
+        z[left] += step * scale[left]
+        near = np.linalg.norm((z[left] - guess[left]) / scale[left], axis=1) <= limit[left]
+        left = left[np.isfinite(step).all(axis=1) & near]
+    return Corrected(z, derivative, found, count)
+
+
+def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solutions of linear systems, NaN where there is none."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
+    except np.linalg.LinAlgError:
+        result = np.full(right.shape, np.nan)
+        for i, (one, vector) in enumerate(zip(matrix, right, strict=True)):
+            try:
+                result[i] = np.linalg.solve(one, vector)
+            except np.linalg.LinAlgError:
+                continue
+        return result
+
+
+def tangents(derivative: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Unit vectors that span the null spaces of float64[k, m, m + 1], float64[k, m + 1], on the
+    side of others.
+    """
+    null = np.linalg.svd(derivative)[2][:, -1]
+    side = np.sign(np.einsum("ki,ki->k", null, along))
+    return np.asarray(null * np.where(side == 0, 1.0, side)[:, None])
+
+
+def follow(
+    equations: Equations,
+    start: np.ndarray,
+    along: np.ndarray,
+    column: int,
+    limits: tuple[float, float],
+    points: int,
+    first: float | np.ndarray = FIRST,
+    ends: Callable[[Curve], str] | None = None,
+    group: np.ndarray | None = None,
+) -> list[Curve]:
+    """Curves from points float64[k, m + 1] on them, until they leave the range of one unknown, are
+    closed or have ``points`` points.
+
+    Parameters
+    ----------
+    equations : Equations
+        Row i is curve i.
+    start, along : float64[k, m + 1]
+        Points, and on which side of them to go, in units of the scale.
+    column : int
+        The unknown whose range is limited.
+    limits : (float, float)
+        Its range.
+    points : int
+        Most points of a curve.
+    first : float or float64[k]
+        First step, in units of the scale.
+    ends : callable, optional
+        Why a curve ended before its last point, empty where it didn't: the curve then ends within
+        ENDING of there.
+    group : int64[k], optional
+        Curves that are one: where one of them is closed, the others go no farther.
+    """
+    rows = np.arange(len(start))
+    here = correct(equations, start, tangents_at(equations, start, along, rows), rows, 1.0)
+    fronts = _Fronts(equations, column, limits, [Curve() for _ in rows], first)
+    fronts.begin(here, tangents(_finite(here.derivative), along))
+    while len(fronts.going):
+        taken = fronts.step()
+        for i in taken:
+            if len(fronts.curves[i].z) >= points and not fronts.curves[i].end:
+                fronts.curves[i].end = "points"
+        for i in taken:
+            if ends is not None and (why := ends(fronts.curves[i])):
+                fronts.undo(i, why)
+        if group is not None:
+            shut = {group[i] for i in rows if fronts.curves[i].end == "closed"}
+            for i in fronts.going:
+                fronts.curves[i].end = "stopped" if group[i] in shut else ""
+    return fronts.curves
+
+
+class _Fronts:
+    """The ends of curves that grow."""
+
+    def __init__(
+        self,
+        equations: Equations,
+        column: int,
+        limits: tuple[float, float],
+        curves: list[Curve],
+        first: float | np.ndarray,
+    ) -> None:
+        self.equations, self.column, self.limits, self.curves = equations, column, limits, curves
+        self.length = np.broadcast_to(first, len(curves)).astype(float)
+
+    def begin(self, here: Corrected, tangent: np.ndarray) -> None:
+        """The first points."""
+        self.z, self.tangent = here.z.copy(), tangent
+        for i, curve in enumerate(self.curves):
+            if here.found[i]:
+                _add(curve, here.z[i], tangent[i], here.derivative[i], 0.0)
+            else:
+                curve.end = "lost"
+        self.equations.accepted(here.z, np.arange(len(here.z)))
+
+    @property
+    def going(self) -> np.ndarray:
+        """The curves that go on, int64[g]."""
+        return np.array([i for i, curve in enumerate(self.curves) if not curve.end], np.int64)
+
+    def step(self) -> np.ndarray:
+        """Try a step of each; those that have a new point, int64[r]."""
+        going = self.going
+        guess, normal, outside = self._predicted(going)
+        scale, length = self.equations.scale[going], self.length[going]
+        trial = correct(self.equations, guess, normal, going, ASTRAY * length)
+        tangent = tangents(_finite(trial.derivative), self.tangent[going])
+        turn = np.einsum("ki,ki->k", tangent, self.tangent[going])
+        counts = trial.found & ((turn > TURN) | (length < 100 * SHORTEST))
+        easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
+        moved = np.linalg.norm((trial.z - self.z[going]) / scale, axis=1)
+        for j in np.flatnonzero(counts):
+            curve = self.curves[going[j]]
+            _add(curve, trial.z[j], tangent[j], trial.derivative[j], moved[j])
+            curve.end = "range" if outside[j] else ""
+        taken = going[counts]
+        self.z[taken], self.tangent[taken] = trial.z[counts], tangent[counts]
+        self.equations.accepted(self.z[taken], taken)
+        factor = np.where(counts, np.where(easy, 2.0, 1.0), 0.5)
+        self.length[going] = np.minimum(factor * length, LONGEST)
+        for i in going[~counts & (self.length[going] < SHORTEST)]:
+            self.curves[i].end = "lost"
+        self._close(taken)
+        return taken
+
+    def undo(self, i: int, why: str) -> None:
+        """Take the last point of a curve back: it lies beyond the end."""
+        curve = self.curves[i]
+        length = 0.5 * (curve.length[-1] - curve.length[-2])
+        for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
+            kept.pop()
+        self.z[i], self.tangent[i], self.length[i] = curve.z[-1], curve.tangent[-1], length
+        self.equations.accepted(self.z[[i]], np.array([i]))
+        curve.end = why if length < ENDING else ""
+
+    def _predicted(self, going: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points along the tangents, the planes in which they are corrected, and which land on an
+        end of the range.
+        """
+        column, normal = self.column, self.tangent[going].copy()
+        step = self.length[going, None] * self.tangent[going] * self.equations.scale[going]
+        guess = self.z[going] + step
+        bound = np.clip(guess[:, column], *self.limits)
+        outside = bound != guess[:, column]
+        with np.errstate(invalid="ignore"):
+            share = (bound - self.z[going, column]) / step[:, column]
+        guess[outside] = (self.z[going] + share[:, None] * step)[outside]
+        guess[outside, column] = bound[outside]
+        normal[outside] = 0.0
+        normal[outside, column] = 1.0
+        return guess, normal, outside
+
+    def _close(self, taken: np.ndarray) -> None:
+        """Close the curves that are about to pass their start as they left it."""
+        for i in taken[_closed(self.equations, self.curves, taken, self.length)]:
+            curve = self.curves[i]
+            apart = (curve.z[0] - curve.z[-1]) / self.equations.scale[i]
+            _add(curve, curve.z[0], curve.tangent[0], curve.derivative[0], _size(apart))
+            curve.end = "closed"
+
+
+def _size(vector: np.ndarray) -> float:
+    return float(np.linalg.norm(vector))
+
+
+def tangents_at(
+    equations: Equations, start: np.ndarray, along: np.ndarray, rows: np.ndarray
+) -> np.ndarray:
+    """Tangents at points that lie nearly on the curves."""
+    return tangents(_finite(equations.evaluate(start, rows)[1]), along)
+
+
+def _finite(derivative: np.ndarray) -> np.ndarray:
+    """Derivatives with zeros in place of those that aren't known."""
+    return np.where(np.isfinite(derivative).all(axis=(1, 2))[:, None, None], derivative, 0.0)
+
+
+def _add(
+    curve: Curve, z: np.ndarray, tangent: np.ndarray, derivative: np.ndarray, moved: float
+) -> None:
+    curve.z.append(z.copy())
+    curve.tangent.append(tangent.copy())
+    curve.derivative.append(derivative.copy())
+    curve.length.append((curve.length[-1] if curve.length else 0.0) + float(moved))
+
+
+def _closed(
+    equations: Equations, curves: list[Curve], rows: np.ndarray, step: np.ndarray
+) -> np.ndarray:
+    """Which curves are about to pass their start in the direction in which they left, bool[r]."""
+    result = np.zeros(len(rows), bool)
+    for j, i in enumerate(rows):
+        curve = curves[i]
+        if len(curve.z) < LEAST_CLOSED or curve.end:
+            continue
+        scale = equations.scale[i]
+        one = np.array([i])
+        starts = equations.alike(curve.z[0][None], one)[0]
+        ways = equations.alike(curve.tangent[0][None] * scale, one)[0] / scale
+        for same, way in zip(starts, ways, strict=True):
+            there = (same - curve.z[-1]) / scale
+            apart = float(np.linalg.norm(there))
+            if (
+                apart <= 1.05 * step[i]
+                and there @ curve.tangent[-1] >= AGAIN * apart
+                and way @ curve.tangent[-1] >= AGAIN
+            ):
+                result[j] = True
+    return result

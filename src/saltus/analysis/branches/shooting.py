@@ -1,0 +1,254 @@
+"""The equations of periodic orbits: each of their points must be a whole period from the next, with
+the contact sequence left to the flow.
+
+The unknowns are all points of the orbit and the parameters that are followed, so an orbit of n
+periods is n short shots in place of a long one. Derivatives come from the tangent flow of the
+parametric system (system/parametric.py), jumps at contacts included. An orbit of a system without
+forcing has its period among the unknowns and a condition on its phase: across the flow at the last
+accepted point. Ascher, Mattheij & Russell, Numerical Solution of Boundary Value Problems (1995),
+chapter 4.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+
+import numpy as np
+
+from saltus.analysis.orbits.equilibria import field_of
+from saltus.analysis.orbits.newton import leading_first
+from saltus.flow.engine import Schedule
+from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import Method
+from saltus.system.parametric import parametric
+from saltus.system.system import System
+
+#: Samples of a limit cycle in which the nearest to a point is looked for, and steps that locate it.
+SAMPLES, LOCATED = 400, 3
+
+
+class PeriodicOrbits:
+    """Curves of periodic orbits of n periods over one parameter; an arclength ``Equations``.
+
+    Unknowns z: the n points, one after the other; the time from one to the next [s] in a system
+    without forcing; the parameters [SI].
+
+    Parameters
+    ----------
+    system : System
+        Its equations and values; the same for all curves.
+    names : sequence of str
+        The parameters that are followed.
+    n : int
+        Forcing periods of the orbits; parts of equal time in a system without forcing.
+    scale : float64[k, z]
+        Units of the unknowns.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        names: Sequence[str],
+        n: int,
+        scale: np.ndarray,
+        method: Method,
+        threads: int | None = None,
+    ) -> None:
+        self.system, self.names, self.n, self.scale = system, tuple(names), n, scale
+        self.size, self.free = len(system.states), system.forced_at is None
+        self.parametric = parametric(system, self.names)
+        self._turns = system.period({system.forced_at: 1.0}) if system.forced_at else 1.0
+        self.map = Stroboscope(
+            self.parametric.system, method, every=1.0 if self.parametric.timed else None,
+            threads=threads,
+        )  # fmt: skip
+        self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
+
+    @property
+    def width(self) -> int:
+        """Number of unknowns."""
+        return self.n * self.size + len(self.names) + self.free
+
+    # -- unknowns ----------------------------------------------------------------------------------
+    def points(self, z: np.ndarray) -> np.ndarray:
+        """The points of orbits float64[..., z], float64[..., n, D]."""
+        return z[..., : self.n * self.size].reshape(*z.shape[:-1], self.n, self.size)
+
+    def values(self, z: np.ndarray) -> np.ndarray:
+        """The parameters of orbits float64[..., z], float64[..., names]."""
+        return z[..., self.n * self.size + self.free :]
+
+    def period(self, z: np.ndarray) -> np.ndarray:
+        """The period of orbits float64[..., z] [s], all n parts of it, float64[...]."""
+        if self.free:
+            return np.asarray(self.n * z[..., self.n * self.size])
+        where = self.system.forced_at
+        if where in self.names:
+            return np.asarray(self.n * self._turns / self.values(z)[..., self.names.index(where)])
+        return np.full(z.shape[:-1], self.n * self.system.period())
+
+    def _own(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the states of the parametric system beside the points begin with, float64[r, e], and
+        the derivative of each with respect to its unknown.
+        """
+        values, slopes = self.values(z).copy(), np.ones_like(self.values(z))
+        if self.free:
+            return np.concatenate([z[:, [self.n * self.size]], values], axis=1), np.ones(
+                (len(z), 1 + values.shape[1])
+            )
+        order = list(range(len(self.names)))
+        if self.system.forced_at in self.names:
+            j = self.names.index(self.system.forced_at)
+            slopes[:, j] = -self._turns / values[:, j] ** 2
+            values[:, j] = self._turns / values[:, j]
+            order = [j, *(i for i in order if i != j)]
+        self._order = np.array(order)
+        return values[:, order], slopes[:, order]
+
+    # -- equations ---------------------------------------------------------------------------------
+    def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        r, n, size = len(z), self.n, self.size
+        points, (own, slopes) = self.points(z), self._own(z)
+        start = np.concatenate([points, np.repeat(own[:, None], n, axis=1)], axis=2)
+        ends, matrices = self.map.tangent(start.reshape(r * n, -1), 1)
+        ends = ends.reshape(r, n, -1)[:, :, :size]
+        matrices = matrices.reshape(r, n, start.shape[2], start.shape[2])[:, :, :size]
+        residual = ends - np.roll(points, -1, axis=1)
+        derivative = np.zeros((r, n, size, z.shape[1]))
+        for i in range(n):
+            derivative[:, i, :, i * size : (i + 1) * size] = matrices[:, i, :, :size]
+            j = (i + 1) % n * size
+            derivative[:, i, :, j : j + size] -= np.eye(size)
+        by_own = matrices[..., size:] * slopes[:, None, None]
+        columns = n * size + (np.arange(by_own.shape[3]) if self.free else self._order)
+        derivative[..., columns] = by_own
+        unit = self.scale[rows]
+        each = unit[:, : n * size].reshape(r, n, size)
+        residual = (residual / each).reshape(r, -1)
+        derivative = (derivative / each[..., None]).reshape(r, n * size, -1) * unit[:, None]
+        if not self.free:
+            return residual, derivative
+        at, along = self.phase[rows, 0], self.phase[rows, 1]
+        where = ((z[:, :size] - at) / unit[:, :size] * along).sum(axis=1)
+        row = np.zeros((r, 1, z.shape[1]))
+        row[:, 0, :size] = along
+        return np.append(residual, where[:, None], axis=1), np.append(derivative, row, axis=1)
+
+    def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
+        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        if self.free:
+            self.phase[rows, 0] = z[:, : self.size]
+            self.phase[rows, 1] = self._flow(z) / self.scale[rows, : self.size]
+            self.phase[rows, 1] /= np.linalg.norm(self.phase[rows, 1], axis=1)[:, None]
+
+    def near(self, z: np.ndarray, rows: np.ndarray) -> PeriodicOrbits:
+        """The equations whose row i is curve rows[i], int64[r], with the condition on its phase at
+        the orbit float64[r, z].
+        """
+        other = copy.copy(self)
+        other.scale, other.phase = self.scale[rows], self.phase[rows].copy()
+        other.accepted(z, np.arange(len(rows)))
+        return other
+
+    def beside(self, z: np.ndarray, point: np.ndarray, row: int) -> float:
+        """How far a point float64[D] lies from the limit cycle z, in units of the scale."""
+        values = self._own(z[None])[0]
+        start = np.concatenate([z[None, : self.size], values], axis=1)
+        unit = self.scale[row, : self.size]
+        run = self.map.run(start, self.n, Schedule.even(self.n, SAMPLES)).samples[0]
+        apart = np.abs((run[:, : self.size] - point) / unit).max(axis=1)
+        place = float(np.argmin(apart)) / SAMPLES
+        for _ in range(LOCATED):
+            count, share = int(place // 1), place % 1
+            schedule = Schedule(np.array([count]), np.array([share]))
+            state = self.map.run(start, self.n, schedule).samples[0, 0, : self.size]
+            ahead = z.copy()
+            ahead[: self.size] = state
+            rate = self._flow(ahead[None])[0] * z[self.n * self.size]
+            way, along = (point - state) / unit, rate / unit
+            place = (place + float(way @ along) / float(along @ along)) % self.n
+        return float(np.abs(way).max())
+
+    def _flow(self, z: np.ndarray) -> np.ndarray:
+        """Rates at the first points, float64[r, D]."""
+        values = {
+            name: np.full(len(z), value) for name, value in self.system.values.items()
+        } | dict(zip(self.names, self.values(z).T, strict=True))
+        return field_of(self.system, z[:, : self.size], values)
+
+    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        """The same orbits from each of their points on, float64[r, n, z]."""
+        points = self.points(z)
+        shifts = (np.arange(self.n)[:, None] + np.arange(self.n)) % self.n
+        rolled = points[:, shifts].reshape(len(z), self.n, self.n * self.size)
+        rest = np.repeat(z[:, None, self.n * self.size :], self.n, axis=1)
+        return np.concatenate([rolled, rest], axis=2)
+
+    # -- what an orbit is --------------------------------------------------------------------------
+    def segments(self, derivative: np.ndarray, row: int) -> np.ndarray:
+        """The tangent map of each period from a derivative of the equations, float64[n, D, D]."""
+        size, unit = self.size, self.scale[row]
+        result = np.empty((self.n, size, size))
+        for i in range(self.n):
+            rows = slice(i * size, (i + 1) * size)
+            block = derivative[rows, rows] * unit[rows][:, None] / unit[None, rows]
+            result[i] = block + np.eye(size) if self.n == 1 else block
+        return result
+
+    def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Floquet multipliers of orbits float64[r, z], the largest first, without the trivial one
+        of a system without forcing; complex128[r, D] or [r, D - 1].
+        """
+        flows = self._flow(z) if self.free else None
+        result = []
+        for i, row in enumerate(rows):
+            segments = self.segments(derivative[i], row)
+            if flows is not None:
+                whole = np.linalg.multi_dot([*segments[::-1], np.eye(self.size)])
+                segments = _across(whole, flows[i])[None]
+            result.append(multipliers(segments))
+        return np.array(result)
+
+
+def _across(matrix: np.ndarray, flow: np.ndarray) -> np.ndarray:
+    """The tangent map across the flow, float64[D - 1, D - 1]."""
+    frame = np.linalg.qr(np.concatenate([flow[:, None], np.eye(len(flow))], axis=1))[0]
+    rest = frame[:, 1 : len(flow)]
+    return np.asarray(rest.T @ matrix @ rest)
+
+
+def multipliers(segments: np.ndarray) -> np.ndarray:
+    """Floquet multipliers of float64[n, D, D], the largest first, complex128[D].
+
+    Eigenvalues of the cyclic block matrix are their n-th roots: the product isn't multiplied out,
+    so that small ones keep their digits. Kressner, Numerical Methods for General and Structured
+    Eigenvalue Problems (2005), section 3.
+    """
+    n, size = segments.shape[:2]
+    if n == 1:
+        return leading_first(segments)[0]
+    if not np.isfinite(segments).all():
+        return np.full(size, np.nan + 0j)
+    cyclic = np.zeros((n * size, n * size))
+    for i in range(n):
+        j = (i + 1) % n
+        cyclic[j * size : (j + 1) * size, i * size : (i + 1) * size] = segments[i]
+    roots = np.linalg.eigvals(cyclic)
+    powers = roots**n
+    order = np.argsort(-np.abs(powers))
+    return _grouped(powers[order], n)
+
+
+def _grouped(powers: np.ndarray, n: int) -> np.ndarray:
+    """One of each n equal values."""
+    left, result = list(powers), []
+    while left:
+        first = left[0]
+        nearest = sorted(range(len(left)), key=lambda i: abs(left[i] - first))[:n]
+        mean = np.mean([left[i] for i in nearest])
+        result.append(mean if abs(mean.imag) > 1e-9 * abs(mean) else complex(mean.real))
+        left = [value for i, value in enumerate(left) if i not in set(nearest)]
+    values = np.array(result)
+    return values[np.lexsort((-values.imag, -np.round(np.abs(values), 12)))]

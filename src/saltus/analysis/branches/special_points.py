@@ -1,0 +1,215 @@
+"""Bifurcations along a branch: where they are, to the last digits, and whether they explain every
+change of stability.
+
+Each kind is the zero of a function of the orbit alone; a zero between two points of a branch is
+found by a bracketing method in arclength, at orbits that are closed by Newton's method, so it is
+the solution of the defining system and no interpolation. Chandrupatla, Adv. Eng. Softw. 28 (1997)
+145.
+Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import elementwise
+
+from saltus.analysis.branches.arclength import correct, tangents
+from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.orbits.tolerances import SINGULAR
+
+#: Tests in the order in which they are made.
+KINDS = ("fold", "branch_point", "period_doubling", "neimark_sacker")
+#: A pair of multipliers whose imaginary part is smaller than this share of its size is real: two
+#: real ones whose product is one are no bifurcation.
+COMPLEX = 1e-7
+#: Distance of a multiplier from the unit circle within which it isn't counted.
+ON_CIRCLE = 1e-9
+#: Newton's method at branch points: steps, length of the last one, and distance of two derivatives
+#: whose difference is their slope, in units of the scale.
+MOST_STEPS, CONVERGED, ASIDE = 20, 1e-11, 1e-5
+#: Farthest that a branch point lies from where it was seen, in units of the scale.
+FARTHEST = 0.3
+
+
+@dataclass(frozen=True)
+class SpecialPoint:
+    """A bifurcation on a curve.
+
+    Attributes
+    ----------
+    kind : str
+        One of KINDS.
+    after : int
+        The point of the curve that it comes after.
+    z, tangent : float64[m + 1]
+        The orbit and the parameter, and the direction of the curve, in units of the scale.
+    multipliers : complex128[D]
+        There.
+    derivative : float64[m, m + 1]
+        Of the equations there, in units of the scale.
+    """
+
+    kind: str
+    after: int
+    z: np.ndarray
+    tangent: np.ndarray
+    multipliers: np.ndarray
+    derivative: np.ndarray
+
+
+def tests(
+    tangent: np.ndarray, derivative: np.ndarray, multipliers: np.ndarray, column: int
+) -> np.ndarray:
+    """The functions whose zeros are the bifurcations KINDS, float64[4, p], from points of curves.
+
+    Parameters
+    ----------
+    tangent : float64[p, m + 1]
+        Unit tangents along the curve.
+    derivative : float64[p, m, m + 1]
+        Of the equations.
+    multipliers : complex128[p, D]
+        Without a trivial one.
+    column : int
+        The unknown that is the parameter.
+    """
+    whole = np.concatenate([derivative, tangent[:, None]], axis=1)
+    sign, size = np.linalg.slogdet(whole)
+    width = whole.shape[1]
+    ones = np.ones(len(multipliers))
+    pairs = ones.copy()
+    count = multipliers.shape[1]
+    for i in range(count):
+        for j in range(i + 1, count):
+            pairs = pairs * (multipliers[:, i] * multipliers[:, j] - 1.0)
+    return np.stack([
+        tangent[:, column],
+        sign * np.exp(size / width),
+        np.prod(1.0 + multipliers, axis=1).real,
+        pairs.real if count > 1 else ones,
+    ])  # fmt: skip
+
+
+def locate(
+    orbits: PeriodicOrbits,
+    rows: np.ndarray,
+    z: np.ndarray,
+    tangent: np.ndarray,
+    length: np.ndarray,
+    kind: np.ndarray,
+) -> list[SpecialPoint | None]:
+    """The zeros of tests between points and the next ones.
+
+    Parameters
+    ----------
+    orbits : PeriodicOrbits
+        The equations.
+    rows : int64[e]
+        Which of its curves.
+    z, tangent : float64[e, m + 1]
+        The points before.
+    length : float64[e]
+        Distance of the next point along the tangent, in units of the scale.
+    kind : int64[e]
+        Which test.
+    """
+    if not len(rows):
+        return []
+    column = z.shape[1] - 1
+    orbits, rows = orbits.near(z, rows), np.arange(len(rows))
+    known: dict[int, SpecialPoint] = {}
+
+    def at(step: np.ndarray, event: np.ndarray) -> np.ndarray:
+        event = event.astype(np.int64)
+        flat, which = step.ravel(), event.ravel()
+        mine = rows[which]
+        guess = z[which] + flat[:, None] * tangent[which] * orbits.scale[mine]
+        point = correct(orbits, guess, tangent[which], mine)
+        derivative = np.where(point.found[:, None, None], point.derivative, 0.0)
+        direction = tangents(derivative, tangent[which])
+        values = np.full(len(flat), np.nan)
+        good = np.flatnonzero(point.found)
+        if len(good):
+            own = orbits.multipliers(point.z[good], derivative[good], mine[good])
+            tested = tests(direction[good], derivative[good], own, column)
+            values[good] = tested[kind[which[good]], np.arange(len(good))]
+            for place, i in enumerate(good):
+                known[int(which[i])] = SpecialPoint(
+                    KINDS[kind[which[i]]], -1, point.z[i], direction[i], own[place], derivative[i]
+                )
+        return values.reshape(step.shape)
+
+    root = elementwise.find_root(
+        at, (np.zeros(len(rows)), length), args=(np.arange(len(rows), dtype=float),),
+        tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0}, maxiter=60,
+    )  # fmt: skip
+    at(root.x, np.arange(len(rows), dtype=float))
+    result = [known.get(i) if np.isfinite(root.x[i]) else None for i in range(len(rows))]
+    for i in np.flatnonzero(kind == KINDS.index("branch_point")):
+        guess = z[i] + 0.5 * length[i] * tangent[i] * orbits.scale[rows[i]]
+        near = known.get(int(i))
+        result[i] = _branch_point(
+            orbits, int(rows[i]), guess if near is None else near.z, tangent[i]
+        )
+    return result
+
+
+def _branch_point(
+    orbits: PeriodicOrbits, row: int, start: np.ndarray, along: np.ndarray
+) -> SpecialPoint | None:
+    """The point near another at which two branches cross; None if none is found.
+
+    There the derivative J has a left null vector u, and Newton's method on F alone fails; on
+    ``F + b u = 0, J'u = 0, u'u = 1`` it doesn't. Kuznetsov, section 10.5.2.
+    """
+    unit, z, one = orbits.scale[row], start.copy(), np.array([row])
+    size = len(z)
+    _, derivative = orbits.evaluate(z[None], one)
+    if not np.isfinite(derivative).all():
+        return None
+    null, b = np.linalg.svd(derivative[0])[0][:, -1], 0.0
+    for _ in range(MOST_STEPS):
+        ends, matrices = orbits.evaluate(
+            z + np.concatenate([np.zeros((1, size)), ASIDE * np.eye(size), -ASIDE * np.eye(size)])
+            * unit, np.full(2 * size + 1, row),
+        )  # fmt: skip
+        jacobian = matrices[0]
+        bends = np.einsum("jmi,m->ij", matrices[1 : size + 1] - matrices[size + 1 :], null)
+        residual = np.concatenate([ends[0] + b * null, jacobian.T @ null, [null @ null - 1.0]])
+        whole = np.zeros((2 * size, 2 * size))
+        whole[: size - 1, :size], whole[: size - 1, size] = jacobian, null
+        whole[: size - 1, size + 1 :] = b * np.eye(size - 1)
+        whole[size - 1 : -1, :size] = bends / (2 * ASIDE)
+        whole[size - 1 : -1, size + 1 :] = jacobian.T
+        whole[-1, size + 1 :] = 2 * null
+        if not np.isfinite(whole).all() or np.linalg.cond(whole) > SINGULAR:
+            return None
+        step = -np.linalg.solve(whole, residual)
+        z, b, null = z + step[:size] * unit, b + step[size], null + step[size + 1 :]
+        if np.abs(step[:size]).max() < CONVERGED:
+            break
+    else:
+        return None
+    if np.linalg.norm((z - start) / unit) > FARTHEST:
+        return None
+    derivative = orbits.evaluate(z[None], one)[1]
+    spans = np.linalg.svd(derivative[0])[2][-2:]
+    direction = spans.T @ (spans @ along)
+    direction /= np.linalg.norm(direction)
+    own = orbits.multipliers(z[None], derivative, one)[0]
+    return SpecialPoint("branch_point", -1, z, direction, own, derivative[0])
+
+
+def outside(multipliers: np.ndarray) -> np.ndarray:
+    """How many multipliers lie outside the unit circle beyond +1, beyond -1, and in complex pairs,
+    int64[p, 3].
+    """
+    size, real = np.abs(multipliers), np.abs(multipliers.imag) <= COMPLEX * np.abs(multipliers)
+    far = size > 1.0 + ON_CIRCLE
+    return np.stack([
+        (far & real & (multipliers.real > 0)).sum(axis=1),
+        (far & real & (multipliers.real < 0)).sum(axis=1),
+        (far & ~real).sum(axis=1),
+    ], axis=1)  # fmt: skip

@@ -1,0 +1,488 @@
+"""Families of branches: from seeds in both directions, through folds, onto doubled and crossing
+branches, each once.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, follow, tangents
+from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.special_points import SpecialPoint, locate, outside, tests
+
+#: How far a new branch begins from the point where it leaves another, in units of the scale.
+ASIDE = 0.001
+#: Farthest that a seed lies from its orbit, in units of the scale.
+ASTRAY = 0.5
+#: Branches that are followed side by side.
+ABREAST = 8
+#: A fold so near to a branch point is none, in units of the scale: it is located less well there.
+VERTEX = 1e-4
+#: Orbits nearer than this, in units of the scale, are one.
+SAME = 1e-6
+#: An orbit may lie on a branch whose points, joined by lines, pass it by less.
+PASSES = 0.3
+#: Shortest interval that is halved, in units of the scale.
+LEAST = 1e-9
+#: How often an interval is halved in which changes of stability don't add up.
+HALVINGS = 6
+
+
+@dataclass(frozen=True)
+class Seed:
+    """Where a branch begins.
+
+    Attributes
+    ----------
+    points : float64[n, D]
+        An orbit.
+    own : float64[..]
+        The other unknowns: its period [s] if the system isn't forced, and the parameter.
+    scale : float64[D]
+        Ranges of the states.
+    along : float64[z] or None
+        The side on which to leave, in units of the scale; None for both sides of the parameter.
+    parent : (int, int) or None
+        The branch and its event that the new one leaves.
+    """
+
+    points: np.ndarray
+    own: np.ndarray
+    scale: np.ndarray
+    along: np.ndarray | None = None
+    parent: tuple[int, int] | None = None
+
+    @property
+    def z(self) -> np.ndarray:
+        """All unknowns."""
+        return np.concatenate([self.points.ravel(), self.own])
+
+
+@dataclass
+class Branch:
+    """A branch of periodic orbits of n periods.
+
+    Attributes
+    ----------
+    orbits : PeriodicOrbits
+        The equations, of which it is a row.
+    row : int
+        Which.
+    z : float64[p, z]
+        Its points: see :class:`PeriodicOrbits`.
+    tangent, derivative : float64[p, ...]
+        There, in units of the scale.
+    length : float64[p]
+        Arclength from its first point, in units of the scale.
+    multipliers : complex128[p, D]
+        Floquet multipliers, the largest first, without a trivial one.
+    ends : (str, str)
+        Why it ends at its first and at its last point: see :class:`Curve`; ``period_doubling``
+        where it becomes an orbit of half the period.
+    events : list of SpecialPoint
+        In the order of the branch.
+    unexplained : list of int
+        Points after which the number of multipliers outside the unit circle changes by more or less
+        than the events there explain.
+    parent : (int, int) or None
+        The branch and its event that it leaves.
+    """
+
+    orbits: PeriodicOrbits
+    row: int
+    z: np.ndarray
+    tangent: np.ndarray
+    derivative: np.ndarray
+    length: np.ndarray
+    multipliers: np.ndarray
+    ends: tuple[str, str]
+    events: list[SpecialPoint] = field(default_factory=list)
+    unexplained: list[int] = field(default_factory=list)
+    parent: tuple[int, int] | None = None
+
+    @property
+    def closed(self) -> bool:
+        """Whether it returns to where it began."""
+        return self.ends == ("closed", "closed")
+
+    @property
+    def scale(self) -> np.ndarray:
+        """Unit of each unknown."""
+        return np.asarray(self.orbits.scale[self.row])
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is followed, and how far.
+
+    Attributes
+    ----------
+    make : callable
+        The equations of orbits of n periods with a scale float64[k, z].
+    limits : (float, float)
+        Range of the parameter.
+    points : int
+        Most points of a branch in each direction.
+    longest : int
+        Doubled branches are followed to orbits of this number of periods.
+    switch : set of str
+        Kinds of events at which the branches that leave are followed.
+    """
+
+    make: Callable[[int, np.ndarray], PeriodicOrbits]
+    limits: tuple[float, float]
+    points: int
+    longest: int
+    switch: frozenset[str]
+
+
+def trace(
+    plan: Plan,
+    seeds: Sequence[Seed],
+    branches: list[Branch],
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Add all branches that seeds lie on, and those that leave them at their events, to a list.
+
+    Seeds that lie on a branch already followed are not followed again.
+    """
+    waiting, begun = list(seeds), 0
+    while waiting:
+        n = len(waiting[0].points)
+        wave = [seed for seed in waiting if len(seed.points) == n][:ABREAST]
+        waiting = [seed for seed in waiting if all(seed is not other for other in wave)]
+        begun += len(wave)
+        starts = _Starts.of(plan, wave)
+        fresh = [i for i in starts.found if not _known(starts.z[i], starts.n, branches)]
+        fresh = [i for i in fresh if not _ends_there(wave[i], branches)]
+        for i, branch in zip(fresh, _both_ways(plan, starts, fresh), strict=True):
+            if branch is None or _known(starts.z[i], starts.n, branches):
+                continue
+            if _ends_there(wave[i], branches):
+                continue
+            branches.append(branch)
+            _find_events(branch)
+            waiting += _children(plan, branch, len(branches) - 1)
+        if progress is not None:
+            progress(begun / (begun + len(waiting)))
+
+
+# -- following -------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class _Starts:
+    """Seeds of n periods, closed by Newton's method: float64[k, z], their units, and which were."""
+
+    seeds: Sequence[Seed]
+    n: int
+    z: np.ndarray
+    scale: np.ndarray
+    found: list[int]
+
+    @classmethod
+    def of(cls, plan: Plan, seeds: Sequence[Seed]) -> _Starts:
+        """At the parameter of each seed; beside it where a branch leaves another."""
+        n = len(seeds[0].points)
+        z = np.array([seed.z for seed in seeds])
+        scale = np.array([
+            np.concatenate([np.tile(seed.scale, n), np.abs(seed.own)]) for seed in seeds
+        ])  # fmt: skip
+        scale[:, -1] = plan.limits[1] - plan.limits[0]
+        normal = np.zeros_like(z)
+        normal[:, -1] = 1.0
+        for i, seed in enumerate(seeds):
+            if seed.along is not None:
+                z[i] += ASIDE * seed.along * scale[i]
+                normal[i] = seed.along
+        rows, orbits = np.arange(len(z)), plan.make(n, scale)
+        orbits.accepted(z, rows)
+        point = correct(orbits, z, normal, rows, ASTRAY)
+        return cls(seeds, n, point.z, scale, [int(i) for i in np.flatnonzero(point.found)])
+
+
+def _both_ways(plan: Plan, starts: _Starts, which: Sequence[int]) -> list[Branch | None]:
+    """The branches of some seeds of one period; None where there is none."""
+    if not which:
+        return []
+    owner, sides = [], []
+    for i in which:
+        along = starts.seeds[i].along
+        up = np.zeros(starts.z.shape[1])
+        up[-1] = 1.0
+        for side in (up, -up) if along is None else (along,):
+            owner.append(i)
+            sides.append(side)
+    whose, orbits = np.array(owner), plan.make(starts.n, starts.scale[owner])
+    orbits.accepted(starts.z[owner], np.arange(len(owner)))
+    first = np.array([FIRST if starts.seeds[i].along is None else ASIDE for i in owner])
+    curves = follow(
+        orbits, starts.z[owner], np.array(sides), orbits.width - 1, plan.limits, plan.points, first,
+        ends=functools.partial(_halved, orbits), group=whose,
+    )  # fmt: skip
+    result = []
+    for i in which:
+        mine = np.flatnonzero(whose == i)
+        result.append(_joined(orbits, mine, [curves[j] for j in mine], starts.seeds[i]))
+    return result
+
+
+def _halved(orbits: PeriodicOrbits, curve: Curve) -> str:
+    """``period_doubling`` if an orbit of 2m periods has just passed one of m periods."""
+    if orbits.n % 2 or len(curve.z) < 2:
+        return ""
+    half = orbits.n // 2
+    ahead, behind = (orbits.points(z) for z in (curve.z[-1], curve.z[-2]))
+    apart = [(points[:half] - points[half:]).ravel() for points in (ahead, behind)]
+    return "period_doubling" if apart[0] @ apart[1] < 0.0 else ""
+
+
+def _joined(
+    orbits: PeriodicOrbits, rows: np.ndarray, curves: list[Curve], seed: Seed
+) -> Branch | None:
+    """One branch from the curves to both sides."""
+    curves = [curve for curve in curves if curve.z]
+    if not curves:
+        return None
+    for row, curve in zip(rows, curves, strict=False):
+        if curve.end == "closed":
+            return _of(orbits, int(row), curve, ("closed", "closed"), seed)
+    if len(curves) == 1:
+        return _of(orbits, int(rows[0]), curves[0], ("branch", curves[0].end), seed)
+    up, down = curves
+    whole = Curve(
+        down.z[:0:-1] + up.z,
+        [-tangent for tangent in down.tangent[:0:-1]] + up.tangent,
+        down.derivative[:0:-1] + up.derivative,
+        [-length for length in down.length[:0:-1]] + up.length,
+    )
+    return _of(orbits, int(rows[0]), whole, (down.end, up.end), seed)
+
+
+def _of(
+    orbits: PeriodicOrbits, row: int, curve: Curve, ends: tuple[str, str], seed: Seed
+) -> Branch:
+    z, tangent, derivative = (np.array(one) for one in (curve.z, curve.tangent, curve.derivative))
+    length = np.array(curve.length) - curve.length[0]
+    own = orbits.multipliers(z, derivative, np.full(len(z), row))
+    return Branch(orbits, row, z, tangent, derivative, length, own, ends, parent=seed.parent)
+
+
+# -- events ----------------------------------------------------------------------------------------
+def _find_events(branch: Branch) -> None:
+    """Locate what happens along a branch; halve the intervals where stability doesn't add up."""
+    for left in reversed(range(HALVINGS)):
+        branch.events = _located(branch)
+        branch.unexplained = _unexplained(branch)
+        if not left or not branch.unexplained or not len(refine(branch, branch.unexplained)):
+            break
+
+
+def _located(branch: Branch) -> list[SpecialPoint]:
+    values = tests(branch.tangent, branch.derivative, branch.multipliers, branch.z.shape[1] - 1)
+    kinds, after = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
+    step = branch.z[after + 1] - branch.z[after]
+    length = np.einsum("ki,ki->k", step / branch.scale, branch.tangent[after])
+    found = locate(
+        branch.orbits, np.full(len(after), branch.row), branch.z[after], branch.tangent[after],
+        length, kinds,
+    )  # fmt: skip
+    events = [
+        replace(point, after=int(place))
+        for place, point in zip(after, found, strict=True)
+        if point is not None and _is_real(point)
+    ]
+    events = [event for event in events if not _is_vertex(event, events, branch)]
+    order = sorted(range(len(events)), key=lambda i: (events[i].after, _ahead(branch, events[i])))
+    return [events[i] for i in order]
+
+
+def _is_vertex(event: SpecialPoint, events: Sequence[SpecialPoint], branch: Branch) -> bool:
+    """Whether a fold is where a branch point's crossing branch turns back."""
+    return event.kind == "fold" and any(
+        other.kind == "branch_point" and np.abs((other.z - event.z) / branch.scale).max() < VERTEX
+        for other in events
+    )
+
+
+def _is_real(point: SpecialPoint) -> bool:
+    """Whether a zero of the test for tori is a complex pair on the unit circle."""
+    if point.kind != "neimark_sacker":
+        return True
+    on = np.abs(np.abs(point.multipliers) - 1.0) < 1e-6
+    return bool((on & (np.abs(point.multipliers.imag) > 1e-7)).sum() >= 2)
+
+
+def _ahead(branch: Branch, point: SpecialPoint) -> float:
+    step = (point.z - branch.z[point.after]) / branch.scale
+    return float(step @ branch.tangent[point.after])
+
+
+#: How many multipliers cross the unit circle at each kind of event.
+_CROSSING = {"fold": 1, "branch_point": 1, "period_doubling": 1, "neimark_sacker": 2}
+
+
+def _unexplained(branch: Branch) -> list[int]:
+    """Points after which the count of multipliers outside the circle isn't explained by events."""
+    count = outside(branch.multipliers).sum(axis=1)
+    result = []
+    for place, change in enumerate(np.diff(count)):
+        crossings = [_CROSSING[e.kind] for e in branch.events if e.after == place]
+        sums = {
+            sum(sign * one for sign, one in zip(signs, crossings, strict=True))
+            for signs in itertools.product((-1, 1), repeat=len(crossings))
+        }
+        if int(change) not in sums:
+            result.append(place)
+    return result
+
+
+def refine(branch: Branch, places: Sequence[int]) -> np.ndarray:
+    """Put a point in the midst of some intervals, by the points before them; the numbers of the new
+    points, int64[r].
+    """
+    after = np.array(places, np.int64)
+    step = (branch.z[after + 1] - branch.z[after]) / branch.scale
+    length = np.einsum("ki,ki->k", step, branch.tangent[after])
+    orbits = branch.orbits.near(branch.z[after], np.full(len(after), branch.row))
+    rows = np.arange(len(after))
+    guess = branch.z[after] + 0.5 * length[:, None] * branch.tangent[after] * branch.scale
+    point = correct(orbits, guess, branch.tangent[after], rows, np.abs(length))
+    good = np.flatnonzero(point.found & (np.abs(length) > LEAST))
+    if not len(good):
+        return good
+    derivative = point.derivative[good]
+    tangent = tangents(derivative, branch.tangent[after[good]])
+    own = orbits.multipliers(point.z[good], derivative, rows[good])
+    middle = 0.5 * (branch.length[after[good]] + branch.length[after[good] + 1])
+    new = {"z": point.z[good], "tangent": tangent, "derivative": derivative}
+    for name, values in {**new, "multipliers": own, "length": middle}.items():
+        setattr(branch, name, np.insert(getattr(branch, name), after[good] + 1, values, axis=0))
+    placed = after[good] + 1 + np.arange(len(good))
+    branch.events = [replace(event, after=_moved(branch, event, placed)) for event in branch.events]
+    return placed
+
+
+def _moved(branch: Branch, event: SpecialPoint, placed: np.ndarray) -> int:
+    """The point that comes before an event, once new points have been put in."""
+    place = event.after
+    for new in placed:
+        if new <= place:
+            place += 1
+        elif new == place + 1:
+            step = (event.z - branch.z[new]) / branch.scale
+            place += int(step @ branch.tangent[new] >= 0)
+    return place
+
+
+# -- identity --------------------------------------------------------------------------------------
+def branch_of(z: np.ndarray, n: int, branches: Sequence[Branch]) -> int:
+    """The branch on which an orbit of n periods lies, -1 if it is none of these."""
+    there = (i for i, branch in enumerate(branches) if branch.orbits.n == n and _lies_on(z, branch))
+    return next(there, -1)
+
+
+def _known(z: np.ndarray, n: int, branches: Sequence[Branch]) -> bool:
+    """Whether an orbit of n periods lies on a branch that has been followed."""
+    return branch_of(z, n, branches) >= 0
+
+
+def _lies_on(z: np.ndarray, branch: Branch) -> bool:
+    value = branch.z[:, -1]
+    across = np.flatnonzero((value[1:] - z[-1]) * (value[:-1] - z[-1]) <= 0)
+    normal = np.zeros((1, len(z)))
+    normal[0, -1] = 1.0
+    for i in across:
+        width = value[i + 1] - value[i]
+        share = (z[-1] - value[i]) / width if width else 0.0
+        guess = branch.z[i] + share * (branch.z[i + 1] - branch.z[i])
+        guess[-1] = z[-1]
+        if _apart(z, guess, branch) > PASSES:
+            continue
+        orbits = branch.orbits.near(guess[None], np.array([branch.row]))
+        point = correct(orbits, guess[None], normal, np.array([0]), 2 * PASSES)
+        if point.found[0] and _apart(z, point.z[0], branch, exact=True) < SAME:
+            return True
+    return False
+
+
+def _apart(a: np.ndarray, b: np.ndarray, branch: Branch, exact: bool = False) -> float:
+    """How far two orbits lie apart, in units of the scale, from whichever point they begin; for
+    limit cycles only roughly unless ``exact``.
+    """
+    orbits, row = branch.orbits, branch.row
+    size = orbits.n * orbits.size
+    if orbits.free:
+        periods = abs(a[size] - b[size]) / abs(b[size])
+        return max(periods, orbits.beside(b, a[: orbits.size], row) if exact else 0.0)
+    others = orbits.alike(a[None], np.array([row]))[0]
+    return float(np.abs((others - b)[:, :size] / branch.scale[:size]).max(axis=1).min())
+
+
+def _ends_there(seed: Seed, branches: Sequence[Branch]) -> bool:
+    """Whether the branch that leaves a period doubling is one that was seen to end there."""
+    if seed.along is None:
+        return False
+    for branch in branches:
+        if branch.orbits.n != len(seed.points):
+            continue
+        others = branch.orbits.alike(seed.z[None], np.array([branch.row]))[0]
+        for place in (0, -1):
+            apart = np.linalg.norm((others - branch.z[place]) / branch.scale, axis=1)
+            if branch.ends[place] == "period_doubling" and apart.min() < 3 * ENDING:
+                return True
+    return False
+
+
+# -- branches that leave others --------------------------------------------------------------------
+def _children(plan: Plan, branch: Branch, number: int) -> Iterator[Seed]:
+    """Seeds at the events of a branch, and the orbits of half the period at its ends."""
+    size = branch.orbits.size
+    for index, event in enumerate(branch.events):
+        if event.kind not in plan.switch:
+            continue
+        points = branch.orbits.points(event.z)
+        own = event.z[branch.orbits.n * size :]
+        unit = branch.scale[:size]
+        if event.kind == "period_doubling" and 2 * branch.orbits.n <= plan.longest:
+            yield Seed(
+                np.concatenate([points, points]), own, unit,
+                _doubled(branch, event), (number, index),
+            )  # fmt: skip
+        elif event.kind == "branch_point":
+            aside = _crossing(event)
+            for sign in (1.0, -1.0):
+                yield Seed(points, own, unit, sign * aside, (number, index))
+    for place, end in zip((0, -1), branch.ends, strict=True):
+        if end == "period_doubling":
+            z = branch.z[place]
+            half = branch.orbits.n // 2
+            points = branch.orbits.points(z)
+            middle = 0.5 * (points[:half] + points[half:])
+            yield Seed(middle, z[branch.orbits.n * size :], branch.scale[:size])
+
+
+def _doubled(branch: Branch, event: SpecialPoint) -> np.ndarray:
+    """The direction of the branch of twice the period."""
+    segments = branch.orbits.segments(event.derivative, branch.row)
+    product = np.eye(branch.orbits.size)
+    for one in segments:
+        product = one @ product
+    vector = np.linalg.svd(product + np.eye(len(product)))[2][-1]
+    way = [vector]
+    for one in segments[:-1]:
+        way.append(one @ way[-1])
+    way = np.array(way) / branch.scale[: branch.orbits.size]
+    whole = np.concatenate([way.ravel(), -way.ravel(), np.zeros(branch.orbits.free + 1)])
+    return np.asarray(whole / np.linalg.norm(whole))
+
+
+def _crossing(event: SpecialPoint) -> np.ndarray:
+    """The direction of the branch that crosses at a branch point."""
+    null = np.linalg.svd(event.derivative)[2][-2:]
+    rest = null - np.outer(null @ event.tangent, event.tangent)
+    longest = rest[np.argmax(np.linalg.norm(rest, axis=1))]
+    return np.asarray(longest / np.linalg.norm(longest))
