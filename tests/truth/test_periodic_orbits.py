@@ -66,6 +66,17 @@ def test_the_three_period_response_of_the_rig_has_its_saddle(rig):
     assert sorted(three.orbit_stability.values) == ["saddle", "stable focus"]
 
 
+def test_a_branch_goes_on_from_an_unstable_orbit(rig):
+    """From the saddle of the 3T response round the fold where both sides meet (row G02 of
+    tests/reference/branches_rig.csv).
+    """
+    system = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    chosen = (rig.orbit_period.values == 3) & (rig.orbit_stable.values == 0)
+    branch = sl.branches(system, {"frequency": ("15 Hz", "17.2 Hz")}, start=rig.isel(orbit=chosen))
+    assert branch.event_kind.values.tolist() == ["fold"]
+    assert branch.event_frequency.values == pytest.approx([15.70602680244704], abs=1e-9)
+
+
 def test_the_stable_ones_are_the_attractors(rig):
     system = sl.models.delangre("a", force="4 N", frequency="17 Hz")
     start = np.stack([rig.orbit_x.values[:, 0], rig.orbit_v.values[:, 0]], axis=1)

@@ -108,12 +108,12 @@ class OrbitSet:
             if number[row] >= 0:
                 continue
             alike = _equal(units, marks, units[row], np.flatnonzero(number < 0))
-            orbit = _orbit(map_, points[row], self.scale)
-            if orbit is None:
+            one = _orbit(map_, points[row], self.scale)
+            if one is None:
                 number[alike] = -2
                 continue
             number[alike] = len(self.orbits)
-            self.orbits.append(orbit)
+            self.orbits.append(one)
             self.found.append(0)
         return np.where(number < 0, -1, number)
 
