@@ -82,10 +82,18 @@ def _impacts(ds: xr.Dataset) -> list[str]:
 
 def _energy(ds: xr.Dataset) -> list[str]:
     count = ds["residual"].shape[-1]
-    supplied, dissipated = (float(ds[name].mean()) for name in ("supplied", "dissipated"))
+    parts = {
+        "supplied": "supplied",
+        "dissipated": "dissipated",
+        "friction": "taken by friction",
+        "impacts": "taken by impacts",
+    }
+    means = [
+        f"{float(ds[name].mean()):.6g} J {words}" for name, words in parts.items() if name in ds
+    ]
     return [
         f"extent   {count} intervals",
-        f"found    {supplied:.6g} J supplied and {dissipated:.6g} J dissipated in each on average",
+        f"found    {', '.join(means[:-1])} and {means[-1]} in each on average",
         f"balance  off by {float(ds['imbalance'].max()):.1e} of the energy turned over",
     ]
 
