@@ -23,6 +23,7 @@ from saltus.results.dataset.attractors import (
     ATTRACTORS_VARIABLES,
     BASINS_VARIABLES,
 )
+from saltus.results.dataset.bifurcation_curves import CURVE_VARIABLES
 from saltus.results.dataset.branches import BRANCHES_VARIABLES
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
@@ -38,6 +39,7 @@ TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS, EXPONENTS = "methods", "exponents"
 SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
+CURVE = "bifurcation_curve"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
@@ -51,6 +53,7 @@ MAKERS = {
     EXPONENTS: "sl.lyapunov or sl.wolf",
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
     MODES: "sl.structure_modes", BRANCHES: "sl.branches",
+    CURVE: "sl.bifurcation_curve",
 }  # fmt: skip
 
 #: The table of each kind of result.
@@ -71,6 +74,7 @@ TABLES = {
     WIDTHS: WIDTHS_VARIABLES,
     MODES: MODES_VARIABLES,
     BRANCHES: BRANCHES_VARIABLES,
+    CURVE: CURVE_VARIABLES,
 }
 
 
@@ -266,6 +270,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         SETTLED: ("response_period", "mismatch"),
         MODES: ("shape", "flexibility"),
         BRANCHES: ("point_branch", "point_stable", "branch_periods"),
+        CURVE: ("point_arclength", "codim2_kind"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 
