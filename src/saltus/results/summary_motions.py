@@ -145,9 +145,10 @@ def _curve(ds: xr.Dataset) -> list[str]:
         f" {unit_of(ds[point_name(name)])}".rstrip()
         for name in names
     ]
+    what = ds.attrs["bifurcation"].replace("_", " ")
     lines = [
-        f"found    {ds.attrs['bifurcation'].replace('_', ' ')} of {period_text(ds.attrs['periods'])} "
-        f"at {ds.sizes['point']} points, {', '.join(spans)}"
+        f"found    {what} of {period_text(ds.attrs['periods'])} at {ds.sizes['point']} points, "
+        + ", ".join(spans)
     ]
     for i, kind in enumerate(ds["codim2_kind"].values):
         at = ", ".join(f"{name} {float(ds[f'codim2_{name}'][i]):.10g}" for name in names)

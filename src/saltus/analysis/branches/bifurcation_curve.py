@@ -26,7 +26,7 @@ from saltus.flow.progress import reporting
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
-from saltus.results.dataset.schema import event_name
+from saltus.results.dataset.schema import event_name, point_name
 from saltus.system.system import System
 
 
@@ -131,13 +131,16 @@ def bifurcation_curve(
 
 @dataclass(frozen=True)
 class _Start:
-    """The orbit of an event, and the system with its values."""
+    """The orbit of an event, the system with its values, and how far the states of orbits spread
+    along its branch.
+    """
 
     system: System
     kind: str
     orbit: np.ndarray
     period: float
     multiplier: complex
+    spread: np.ndarray
 
 
 def _ranges(system: System, vary: Any) -> tuple[tuple[str, str], list[tuple[float, float]]]:
@@ -185,9 +188,11 @@ def _start(system: System, event: Any) -> _Start:
     pairs = own[np.abs(own.imag) > 0]
     multiplier = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))] if len(pairs) else 1.0 + 0j
     period = float(event["point_period"].values[int(event["event_point"])])
-    return _Start(
-        system.with_values(**values), kind, orbit[np.isfinite(orbit).all(axis=1)], period, multiplier
-    )
+    mine = event["point_branch"].values == int(event["event_branch"])
+    along = [event[point_name(state)].values[mine] for state in system.states]
+    spread = np.array([np.nanmax(one) - np.nanmin(one) for one in along])
+    orbit = orbit[np.isfinite(orbit).all(axis=1)]
+    return _Start(system.with_values(**values), kind, orbit, period, multiplier, spread)
 
 
 def _equations(
@@ -204,7 +209,7 @@ def _equations(
     z = np.array([*start.orbit.ravel(), *period, *values])
     bare = PeriodicOrbits(system, names, n, np.ones((2, len(z))), method, threads)
     numbers = numbers_of(system, [(bare, z)], outputs_of(system, None), method)
-    states = units(numbers.maximum[0], numbers.minimum[0])
+    states = np.fmax(units(numbers.maximum[0], numbers.minimum[0]), start.spread)
     spans = [high - low for low, high in limits]
     scale = np.array([*np.tile(np.where(np.isfinite(states), states, 1.0), n), *period, *spans])
     bare.scale = np.stack([scale, scale])

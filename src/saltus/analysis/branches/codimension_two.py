@@ -1,11 +1,11 @@
-"""Points of codimension two on curves of bifurcations, each the zero of a function along the curve.
+"""Points of codimension two on curves of bifurcations, each the zero of a function along it.
 
-On a curve of folds with null vectors v and w, the tangent in the plane of the parameters p is across
-``w'F_p``: each of its components vanishes where the curve has an extremum in the other parameter,
-and the ratio of the two where the fold is a cusp. Multipliers that are 1 or -1 besides the critical
-one are zeros of symmetric functions of all. A period doubling is degenerate where the cubic
-coefficient of its normal form vanishes. Kuznetsov, Elements of Applied Bifurcation Theory (2004),
-chapter 9.
+On a curve of folds with null vectors v and w, the tangent in the plane of the parameters p is
+across ``w'F_p``: each of its components vanishes where the curve has an extremum in the other
+parameter, and the ratio of the two where the fold is a cusp. Multipliers that are 1 or -1 besides
+the critical one are zeros of symmetric functions of all. A period doubling is degenerate where the
+cubic coefficient of its normal form vanishes. Kuznetsov, Elements of Applied Bifurcation Theory
+(2004), chapter 9.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from saltus.analysis.branches.special_points import zeros
 
 #: Distance of the orbits whose differences are derivatives of third order, in units of the scale.
 WIDE = 2e-3
+#: Share of the largest value of a test below which a change of its sign is rounding.
+ROUNDING = 1e-7
 #: Kinds on the curves of each bifurcation, in the order of the tests.
 KINDS = {
     "fold": ("extremum", "extremum", "cusp", "resonance_1_1", "fold_flip"),
@@ -65,9 +67,10 @@ def tests(
     tangent: np.ndarray,
     derivative: np.ndarray,
     multipliers: np.ndarray,
-    side: np.ndarray | None = None,
+    side: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The functions whose zeros are KINDS, float64[tests, p], and null vectors float64[p, ...].
+    """The functions whose zeros are KINDS, float64[tests, p], and the null vectors v and w
+    float64[p, 2, size].
 
     Parameters
     ----------
@@ -77,8 +80,8 @@ def tests(
         Which curve each point is of.
     z, tangent, derivative, multipliers
         Of the points.
-    side : float64[p or 1, size], optional
-        Null vectors w on whose side those of the points shall be. Default: each on that of the one
+    side : float64[p, 2, size] or None
+        Null vectors on whose side those of the points shall be; None: each on that of the one
         before.
     """
     one, two = orbits.parameters
@@ -87,21 +90,26 @@ def tests(
     double = [np.prod(1.0 - multipliers, axis=1).real, np.prod(1.0 + multipliers, axis=1).real]
     if orbits.torus:
         return np.stack([*along, z[:, -1] + 0.5, z[:, -1], *double]), np.zeros((len(z), 0))
-    v, w = orbits.null_vectors(z, mine)
-    w = _same_side(w, side)
+    both = np.stack(orbits.null_vectors(z, mine), axis=1)
+    both = _same_side(both, side)
+    v, w = both[:, 0], both[:, 1]
     more = _derivative_at(multipliers, float(orbits.multiplier or 0.0))
     if orbits.kind == "period_doubling":
-        return np.stack([*along, more, double[0], _cubic(orbits, rows, z, mine, v, w)]), w
+        return np.stack([*along, more, double[0], _cubic(orbits, rows, z, mine, v, w)]), both
     slopes = [np.einsum("pi,pi->p", w, mine[:, : orbits.size, column]) for column in (one, two)]
     cusp = along[1] * slopes[0] - along[0] * slopes[1]
-    return np.stack([slopes[1], slopes[0], cusp, more, double[1]]), w
+    return np.stack([slopes[1], slopes[0], cusp, more, double[1]]), both
 
 
-def _same_side(w: np.ndarray, side: np.ndarray | None) -> np.ndarray:
+def _same_side(vectors: np.ndarray, side: np.ndarray | None) -> np.ndarray:
+    """Vectors float64[p, 2, size] on the side of others, or each on that of the one before."""
     if side is not None:
-        return w * np.where((w * side).sum(axis=1) < 0, -1.0, 1.0)[:, None]
-    turns = np.where((w[1:] * w[:-1]).sum(axis=1) < 0, -1.0, 1.0)
-    return w * np.cumprod(np.concatenate([[1.0], turns]))[:, None]
+        turns = np.where((vectors * side).sum(axis=2) < 0, -1.0, 1.0)
+    else:
+        turns = np.ones(vectors.shape[:2])
+        turns[1:] = np.where((vectors[1:] * vectors[:-1]).sum(axis=2) < 0, -1.0, 1.0)
+        turns = np.cumprod(turns, axis=0)
+    return np.asarray(vectors * turns[:, :, None])
 
 
 def _derivative_at(multipliers: np.ndarray, mu: float) -> np.ndarray:
@@ -154,8 +162,8 @@ def find(
     """All points of codimension two on a curve float64[p, z], in its order."""
     rows = np.full(len(z), row)
     own = multipliers(orbits, z, derivative, rows)
-    values, sides = tests(orbits, rows, z, tangent, derivative, own)
-    which, after = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
+    values, sides = tests(orbits, rows, z, tangent, derivative, own, None)
+    which, after = np.nonzero(_crosses(values))
     if not len(which):
         return []
     found: dict[int, CodimensionTwo] = {}
@@ -188,6 +196,15 @@ def find(
     found = {i: point for i, point in found.items() if np.isfinite(places[i])}
     order = sorted(found, key=lambda i: (found[i].after, _ahead(z, tangent, orbits, row, found[i])))
     return [_named(orbits, row, found[i]) for i in order]
+
+
+def _crosses(values: np.ndarray) -> np.ndarray:
+    """Between which points tests float64[tests, p] change their sign by more than rounding."""
+    size = np.abs(values)
+    largest = size.max(axis=1, keepdims=True)
+    largest[:2] = largest[:2].max()  # of one vector
+    ends = np.maximum(size[:, 1:], size[:, :-1])
+    return (values[:, 1:] * values[:, :-1] < 0) & (ends > ROUNDING * largest)
 
 
 def _ahead(

@@ -72,6 +72,8 @@ def trace_curve(
         Ranges of the parameters.
     points : int
         Most points in each direction.
+    progress : callable, optional
+        Called with the share of them that was reached.
     """
     singular, rows = SingularOrbits(orbits, kind), np.arange(2)
     both = np.repeat(start[None], 2, axis=0)
@@ -88,9 +90,13 @@ def trace_curve(
     if singular.torus:
         bounds[orbits.width] = COSINES
 
+    reached = 0
+
     def watch(curve: Curve) -> str:
+        nonlocal reached
+        reached = max(reached, len(curve.z))
         if progress is not None:
-            progress(len(curve.z) / (points + 1))
+            progress(min(reached / points, 1.0))
         return ""
 
     curves = follow(
