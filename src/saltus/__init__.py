@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.attractors import attractors, basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
+    from saltus.analysis.basins.equilibria import equilibria
     from saltus.analysis.branches.bifurcation_curve import bifurcation_curve
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
@@ -94,6 +95,7 @@ _HOMES = {
     "compare": "saltus.analysis.basins.compare",
     "compare_methods": "saltus.analysis.methods.compare_methods",
     "energy_balance": "saltus.analysis.motion.energy",
+    "equilibria": "saltus.analysis.basins.equilibria",
     "frequency_response": "saltus.analysis.responses.frequency_response",
     "impact_statistics": "saltus.analysis.motion.impacts",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
@@ -160,6 +162,7 @@ __all__ = [
     "cosh",
     "describe",
     "energy_balance",
+    "equilibria",
     "exp",
     "freeplay",
     "frequency_response",

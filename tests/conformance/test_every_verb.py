@@ -95,6 +95,10 @@ CALLS = {
         },
     ),
     "energy_balance": started(periods=3, **sl.models.energy("delangre")),
+    "equilibria": lambda how: (
+        sl.models.double_scroll(),
+        {"start": {"x": {"in SI": 1.0, "in units": "1"}[how], "y": 0, "z": 0}},
+    ),
     "frequency_response": lambda how: (
         RIG,
         {
@@ -176,9 +180,11 @@ def test_a_result_says_where_it_comes_from(verb):
     assert attrs["versions"] == to_json(versions())
     if verb in ("wolf", "structure_modes"):  # a series and matrices are no system
         return
-    assert attrs["system"] == RIG.name
-    assert set(json.loads(attrs["parameters"])) <= set(RIG.values)
-    assert {"x", "v"} <= set(json.loads(attrs["units"]))
+    subject = CALLS[verb]("in SI")[0]
+    system = subject if isinstance(subject, sl.System) else RIG
+    assert attrs["system"] == system.name
+    assert set(json.loads(attrs["parameters"])) <= set(system.values)
+    assert set(system.states) <= set(json.loads(attrs["units"]))
     for name in (
         ("method_options_a", "method_options_b") if verb == "compare" else ("method_options",)
     ):

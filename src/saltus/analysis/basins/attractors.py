@@ -191,7 +191,7 @@ def basin_fractions(
         whole(seed, "seed", 0),
     )
     fixed = fixed_states(system, at, box)
-    ranges = _ranges(system, box)
+    ranges = box_ranges(system, box)
     check_room(
         memory(samples, len(system.states)),
         f"{samples} random starts",
@@ -204,11 +204,11 @@ def basin_fractions(
         threads=threads,
     )
     start = fill(
-        system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed
+        system, draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed
     )
     scale = _spread(map_, start[:SPREAD_STARTS])
     with reporting(progress) as show:
-        scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
+        scouts = fill(system, draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
         found = find_attractors(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
@@ -250,7 +250,8 @@ def attractors_dataset(
     )
 
 
-def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+def box_ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """The ends of each range of a box [SI]. Raises ParameterError, UnitError."""
     ranges = {}
     for name, given in box.items():
         try:
@@ -270,7 +271,7 @@ def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, fl
     return ranges
 
 
-def _draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[str, np.ndarray]:
+def draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[str, np.ndarray]:
     """Starts of the states that have a range, from numbers in [0, 1), one column for each."""
     return {
         name: low + (high - low) * column

@@ -36,6 +36,30 @@ def table_of(
     method: Method,
 ) -> xr.Dataset:
     """The Dataset of branches over a parameter."""
+    values = values_of(system, name, branches, outputs, method)
+    values |= {"output": list(outputs.names), "output_units": list(outputs.units)}
+    fixed = {key: value for key, value in system.values.items() if key != name}
+    attrs = provenance(system, method, fixed, (name,)) | attributes_of(name, limits, branches)
+    unit = outputs.units[0] if len(set(outputs.units)) == 1 else ""
+    when = "at whole forcing periods" if system.forced_at else "in equal steps of time"
+    about = subject(system, attrs, guards_over(system, system.values, ()))
+    return build(schema.BRANCHES, about, values, words={"<when>": when, "<output>": unit})
+
+
+def attributes_of(
+    name: str, limits: tuple[float, float], branches: Sequence[Branch]
+) -> dict[str, Any]:
+    """What branches over a parameter are about."""
+    return {
+        "parameter": name, "parameter_low": limits[0], "parameter_high": limits[1],
+        "unexplained_changes": sum(len(branch.unexplained) for branch in branches),
+    }  # fmt: skip
+
+
+def values_of(
+    system: System, name: str, branches: Sequence[Branch], outputs: Outputs, method: Method
+) -> dict[str, Any]:
+    """The variables on the dims ``point``, ``branch`` and ``event``."""
     size = len(system.states)
     resolve(branches, functools.partial(_peaks, system, method))
     counts = [len(branch.z) for branch in branches]
@@ -49,7 +73,7 @@ def table_of(
     event_multipliers = stacked([event.multipliers[None] for _, event in events], size)
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
     states = padded([branch.orbits.points(z) for branch, z in [*points, *at_events]], size)
-    values: dict[str, Any] = {
+    return {
         "point": np.arange(len(points)),
         "point_branch": np.repeat(np.arange(len(branches)), counts),
         "point_<parameter>": {name: np.array([z[-1] for _, z in points])},
@@ -65,8 +89,6 @@ def table_of(
         "point_multiplier_real": multipliers.real,
         "point_multiplier_imag": multipliers.imag,
         "point_<state>": states[: len(points)],
-        "output": list(outputs.names),
-        "output_units": list(outputs.units),
         **{f"point_output_{key}": column for key, column in numbers.by_name().items()},
         **_branches(branches),
         "event": np.arange(len(events)),
@@ -80,15 +102,6 @@ def table_of(
         "event_multiplier_imag": event_multipliers.imag,
         "event_<state>": states[len(points) :],
     }
-    fixed = {key: value for key, value in system.values.items() if key != name}
-    attrs = provenance(system, method, fixed, (name,)) | {
-        "parameter": name, "parameter_low": limits[0], "parameter_high": limits[1],
-        "unexplained_changes": sum(len(branch.unexplained) for branch in branches),
-    }  # fmt: skip
-    unit = outputs.units[0] if len(set(outputs.units)) == 1 else ""
-    when = "at whole forcing periods" if system.forced_at else "in equal steps of time"
-    about = subject(system, attrs, guards_over(system, system.values, ()))
-    return build(schema.BRANCHES, about, values, words={"<when>": when, "<output>": unit})
 
 
 def _branches(branches: Sequence[Branch]) -> dict[str, Any]:

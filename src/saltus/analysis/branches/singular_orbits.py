@@ -11,8 +11,6 @@ Applied Bifurcation Theory (2004), section 10.3.
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 
 from saltus.analysis.branches.arclength import solved
@@ -69,12 +67,9 @@ class SingularOrbits:
 
     def at(self, row: int, z: np.ndarray) -> SingularOrbits:
         """The same equations with a row for each point float64[r, z] of a curve."""
-        orbits = copy.copy(self.orbits)
-        orbits.scale = np.repeat(self.orbits.scale[row][None], len(z), axis=0)
-        orbits.phase = np.full((len(z), *orbits.phase.shape[1:]), np.nan)
-        result, rows = SingularOrbits(orbits, self.kind), np.arange(len(z))
-        orbits.accepted(z[:, : orbits.width], rows)
-        result.begin(z, rows)
+        orbits = self.orbits.near(z[:, : self.orbits.width], np.full(len(z), row))
+        result = SingularOrbits(orbits, self.kind)
+        result.begin(z, np.arange(len(z)))
         return result
 
     def null_vectors(self, z: np.ndarray, derivative: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -116,7 +116,10 @@ def locate(
     kind : int64[e]
         Which test.
     """
+    if not len(rows):
+        return []
     column = z.shape[1] - 1
+    orbits, rows = orbits.near(z, rows), np.arange(len(rows))
     known: dict[int, SpecialPoint] = {}
 
     def at(flat: np.ndarray, which: np.ndarray) -> np.ndarray:

@@ -12,11 +12,11 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.branch_table import table_of
-from saltus.analysis.branches.seeds import scaled, seeds_at, seeds_of
+from saltus.analysis.branches.seeds import scaled, seeds_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.tracing import Branch, Plan, Seed, trace
-from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.outputs import outputs_of
+from saltus.analysis.responses.continued import LONGEST_DOUBLED, POINTS, SWITCHES, seeds_of_grid
 from saltus.analysis.responses.grid import grid_of
 from saltus.analysis.responses.responses import find
 from saltus.analysis.starts import check_system, range_of, single
@@ -28,9 +28,6 @@ from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
 from saltus.system.system import System
 
-#: Events at which the branches that leave are followed.
-SWITCHES = ("period_doubling", "branch_point")
-
 
 @verb
 def branches(
@@ -41,8 +38,8 @@ def branches(
     box: Mapping[str, Any] | None = None,
     at: int = 12,
     switch: Sequence[str] = SWITCHES,
-    longest: int = 8,
-    points: int = 1000,
+    longest: int = LONGEST_DOUBLED,
+    points: int = POINTS,
     values: Mapping[str, Any] | None = None,
     outputs: Mapping[str, Any] | None = None,
     every: float | str | None = None,
@@ -103,7 +100,8 @@ def branches(
     Returns
     -------
     Dataset
-        Dims ``point``, ``branch``, ``event``, ``multiplier``, ``phase``, ``output``. On point:
+        Dims ``point``, ``branch``, ``event``, ``multiplier``, ``orbit_point``,
+        ``output``. On point:
         ``point_branch``, ``point_<parameter>``, ``point_stable``, ``point_unstable_multipliers``,
         ``point_period`` [s], ``point_peak`` and ``point_rms`` of the first state,
         ``point_contacts``, ``point_itinerary``, ``point_margin``, multipliers (of a limit cycle
@@ -219,8 +217,4 @@ def _found_at(
     found = find(grid, method, periods, threads, None)
     if not found.complete:
         raise KeyboardInterrupt
-    points = np.full((len(found), LONGEST, len(system.states)), np.nan)
-    for i in range(len(found)):
-        own = found.points(i)[:LONGEST]
-        points[i, : len(own)] = own
-    return list(seeds_at(system, points, found.period, found.time, values[found.place]))
+    return seeds_of_grid(found, grid, method)

@@ -25,6 +25,7 @@ from saltus.results.dataset.attractors import (
 )
 from saltus.results.dataset.bifurcation_curves import CURVE_VARIABLES
 from saltus.results.dataset.branches import BRANCHES_VARIABLES
+from saltus.results.dataset.equilibria import EQUILIBRIA_VARIABLES
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.methods import METHODS_VARIABLES, WIDTHS_VARIABLES
@@ -40,6 +41,7 @@ BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", 
 METHODS, EXPONENTS = "methods", "exponents"
 SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
 CURVE = "bifurcation_curve"
+EQUILIBRIA = "equilibria"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
@@ -54,6 +56,7 @@ MAKERS = {
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
     MODES: "sl.structure_modes", BRANCHES: "sl.branches",
     CURVE: "sl.bifurcation_curve",
+    EQUILIBRIA: "sl.equilibria",
 }  # fmt: skip
 
 #: The table of each kind of result.
@@ -73,6 +76,7 @@ TABLES = {
     SETTLED: motions.SETTLED_VARIABLES,
     WIDTHS: WIDTHS_VARIABLES,
     MODES: MODES_VARIABLES,
+    EQUILIBRIA: EQUILIBRIA_VARIABLES,
     BRANCHES: BRANCHES_VARIABLES,
     CURVE: CURVE_VARIABLES,
 }
@@ -93,6 +97,14 @@ def attractor_name(state: str) -> str:
     """
     name = f"attractor_{state}"
     return f"attractor_state_{state}" if name in ATTRACTOR_VARIABLES else name
+
+
+def equilibrium_name(state: str) -> str:
+    """Name of the variable that holds a state at rest: ``equilibrium_x``;
+    ``equilibrium_state_type`` where the name is taken.
+    """
+    name = f"equilibrium_{state}"
+    return f"equilibrium_state_{state}" if name in EQUILIBRIA_VARIABLES else name
 
 
 def response_name(name: str) -> str:
@@ -269,6 +281,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         EXPONENTS: ("lyapunov_exponent", "running_exponent"),
         SETTLED: ("response_period", "mismatch"),
         MODES: ("shape", "flexibility"),
+        EQUILIBRIA: ("equilibrium_type", "equilibrium_place"),
         BRANCHES: ("point_branch", "point_stable", "branch_periods"),
         CURVE: ("point_arclength", "codim2_kind"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
