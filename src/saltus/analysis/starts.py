@@ -13,7 +13,6 @@ from saltus.analysis.axes import along
 from saltus.errors import ParameterError, SaltusError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import Request, Schedule
-from saltus.flow.maps import NO_PERIOD
 from saltus.system import expression as ex
 from saltus.system.checks import check_values
 from saltus.system.system import System
@@ -158,28 +157,6 @@ def check_system(system: Any) -> None:
     if isinstance(system, Mapping) and "format" in system:
         advice = "Write sl.System.from_dict(...) of what System.to_dict() gave."
     raise ParameterError(f"the system must be a System, not {type(system).__name__}. {advice}")
-
-
-def looks_every(system: System, every: Any) -> float | None:
-    """Time between two samples [s] at a system without forcing; None for a forced one.
-
-    Raises
-    ------
-    ParameterError, UnitError
-        If it is missing, isn't a positive time, or the system is forced.
-    """
-    if system.forced_at is not None:
-        if every is not None:
-            raise ParameterError(
-                f"{system.name} is forced: it is looked at once a forcing period. Leave every= out."
-            )
-        return None
-    if every is None:
-        raise ParameterError(f"{system.name} {NO_PERIOD}")
-    seconds = to_si(every, "s", "every")
-    if not 0 < seconds < math.inf:
-        raise ParameterError(f"every must be a positive time, not {shown(every)}.")
-    return seconds
 
 
 def fill(
