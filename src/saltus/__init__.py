@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.compare import compare
     from saltus.analysis.basins.equilibria import equilibria
     from saltus.analysis.basins.periodic_orbits import periodic_orbits
+    from saltus.analysis.branches.bifurcation_curve import bifurcation_curve
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
     from saltus.analysis.methods.regularisation_widths import regularisation_widths
@@ -107,6 +108,7 @@ _HOMES = {
     "spectrum": "saltus.analysis.motion.spectrum",
     "stroboscope": "saltus.analysis.motion.stroboscope",
     "structure_modes": "saltus.analysis.motion.structure_modes",
+    "bifurcation_curve": "saltus.analysis.branches.bifurcation_curve",
     "branches": "saltus.analysis.responses.all_branches",
     "transmissibility": "saltus.analysis.motion.transmissibility",
     "wolf": "saltus.analysis.recorded.wolf",
@@ -151,6 +153,7 @@ __all__ = [
     "attractors",
     "basin_fractions",
     "basins",
+    "bifurcation_curve",
     "bifurcation_diagram",
     "branches",
     "clip",

@@ -12,6 +12,7 @@ import xarray as xr
 from saltus.errors import counted
 from saltus.results.dataset.schema import (
     BRANCHES,
+    CURVE,
     ENERGY,
     EQUILIBRIA,
     IMPACTS,
@@ -170,6 +171,24 @@ def _branches(ds: xr.Dataset) -> list[str]:
     return lines
 
 
+def _curve(ds: xr.Dataset) -> list[str]:
+    names = ds.attrs["parameter_x"], ds.attrs["parameter_y"]
+    spans = [
+        f"{name} {ds[point_name(name)].values.min():.6g} to {ds[point_name(name)].values.max():.6g}"
+        f" {unit_of(ds[point_name(name)])}".rstrip()
+        for name in names
+    ]
+    what = ds.attrs["bifurcation"].replace("_", " ")
+    lines = [
+        f"found    {what} of {period_text(ds.attrs['periods'])} at {ds.sizes['point']} points, "
+        + ", ".join(spans)
+    ]
+    for i, kind in enumerate(ds["codim2_kind"].values):
+        at = ", ".join(f"{name} {float(ds[f'codim2_{name}'][i]):.10g}" for name in names)
+        lines.append(f"  {kind.replace('_', ' ')} at {at}")
+    return lines
+
+
 #: For each kind, what writes its lines.
 def _orbits(ds: xr.Dataset) -> list[str]:
     """A line on each orbit, and what the search says of those that it missed."""
@@ -211,4 +230,5 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     ORBITS: _orbits,
     EQUILIBRIA: _equilibria,
     BRANCHES: _branches,
+    CURVE: _curve,
 }

@@ -23,6 +23,7 @@ from saltus.results.dataset.attractors import (
     ATTRACTORS_VARIABLES,
     BASINS_VARIABLES,
 )
+from saltus.results.dataset.bifurcation_curves import CURVE_VARIABLES
 from saltus.results.dataset.branches import BRANCHES_VARIABLES
 from saltus.results.dataset.equilibria import EQUILIBRIA_VARIABLES
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
@@ -41,6 +42,7 @@ BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", 
 METHODS, EXPONENTS = "methods", "exponents"
 ORBITS = "orbits"
 SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
+CURVE = "bifurcation_curve"
 EQUILIBRIA = "equilibria"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
@@ -56,6 +58,7 @@ MAKERS = {
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
     ORBITS: "sl.periodic_orbits",
     MODES: "sl.structure_modes", BRANCHES: "sl.branches",
+    CURVE: "sl.bifurcation_curve",
     EQUILIBRIA: "sl.equilibria",
 }  # fmt: skip
 
@@ -79,6 +82,7 @@ TABLES = {
     ORBITS: ORBIT_VARIABLES,
     EQUILIBRIA: EQUILIBRIA_VARIABLES,
     BRANCHES: BRANCHES_VARIABLES,
+    CURVE: CURVE_VARIABLES,
 }
 
 
@@ -292,6 +296,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         ORBITS: ("orbit_type", "orbit_stable"),
         EQUILIBRIA: ("equilibrium_type", "equilibrium_place"),
         BRANCHES: ("point_branch", "point_stable", "branch_periods"),
+        CURVE: ("point_arclength", "codim2_kind"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 
