@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.axes import along
-from saltus.errors import ParameterError, SaltusError, nearest, shown
+from saltus.errors import ParameterError, SaltusError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import Request, Schedule
 from saltus.system import expression as ex
@@ -248,6 +248,25 @@ def single(system: System, name: str, value: Any) -> float:
             f"end of a range or in a list."
         )
     return float(number)
+
+
+def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
+    """The range (low, high) of a parameter [SI]. Raises ParameterError if it has none, or it
+    doesn't ascend.
+    """
+    if not among(name, system.values):
+        raise ParameterError(
+            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
+        )
+    try:
+        low, high = (single(system, name, end) for end in ends)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"the range of {name} must be (low, high), not {shown(ends)}."
+        ) from None
+    if not low < high:
+        raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")
+    return low, high
 
 
 def _columns(system: System, start: Any) -> dict[str, np.ndarray]:
