@@ -105,8 +105,7 @@ def demo(
     from saltus.results import save, usable_folder
 
     usable_folder(out)
-    if plot:
-        study.prepare_drawing()
+    study.prepare_files(plot)
 
     with screen.working() as progress:
         result = study.demo(frequency, case.value, force, periods, progress)
