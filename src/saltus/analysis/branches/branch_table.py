@@ -13,8 +13,9 @@ from saltus.analysis.branches.resolution import resolve
 from saltus.analysis.branches.special_points import outside
 from saltus.analysis.branches.tracing import Branch
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
-from saltus.analysis.orbits.orbit_measures import Measures, measure
-from saltus.analysis.outputs import Outputs, outputs_of
+from saltus.analysis.orbits.orbit_measures import Measures, measure, unknown
+from saltus.analysis.outputs import Outputs
+from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.results import build
@@ -22,6 +23,8 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.system.system import System
 
+#: Samples of a period by which branches are resolved.
+SAMPLES = 64
 #: Multipliers nearer to the unit circle than this don't count as inside: the orbit may not attract.
 MARGINAL = 1e-9
 
@@ -60,7 +63,7 @@ def values_of(
 ) -> dict[str, Any]:
     """The variables on the dims ``point``, ``branch`` and ``event``."""
     size = len(system.states)
-    resolve(branches, functools.partial(_peaks, system, name, method))
+    resolve(branches, functools.partial(_sampled_peaks, system, name, method))
     counts = [len(branch.z) for branch in branches]
     points = [(branch, z) for branch in branches for z in branch.z]
     numbers = _numbers(system, name, points, outputs, method)
@@ -118,10 +121,31 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
     }
 
 
-def _peaks(system: System, name: str, method: Method, branch: Branch, z: np.ndarray) -> np.ndarray:
-    """Largest magnitude of the first state of orbits float64[r, z] of a branch."""
-    numbers = _numbers(system, name, [(branch, one) for one in z], outputs_of(system, None), method)
-    return numbers.peak[:, 0]
+def _sampled_peaks(
+    system: System, name: str, method: Method, branch: Branch, z: np.ndarray
+) -> np.ndarray:
+    """Largest magnitude of the first state of orbits float64[r, z] of a branch, nearly: at samples,
+    to say where more orbits are needed.
+    """
+    n = branch.orbits.n
+    map_ = _map_of(system, name, method, [(branch, one) for one in z])
+    if system.forced_at is None:
+        n = 1
+    starts = branch.orbits.points(z)[:, 0]
+    samples = map_.run(starts, n, Schedule.even(n, SAMPLES)).samples
+    return np.asarray(np.abs(samples[:, :, 0]).max(axis=1))
+
+
+def _map_of(
+    system: System, name: str, method: Method, points: Sequence[tuple[Branch, np.ndarray]]
+) -> Stroboscope:
+    """A map for each orbit: over its forcing period, or its own period."""
+    rows = np.tile(np.array(list(system.values.values())), (len(points), 1))
+    rows[:, list(system.values).index(name)] = [z[-1] for _, z in points]
+    if system.forced_at is not None:
+        return Stroboscope(system, method, rows)
+    times = np.array([float(branch.orbits.period(z)) for branch, z in points])
+    return Stroboscope(system, method, rows, every=times)
 
 
 def _numbers(
@@ -132,17 +156,13 @@ def _numbers(
     method: Method,
 ) -> Measures:
     """The numbers of orbits: extremes, means, contacts and margins."""
-    rows = np.tile(np.array(list(system.values.values())), (max(len(points), 1), 1))
-    rows[: len(points), list(system.values).index(name)] = [z[-1] for _, z in points]
     starts = np.array([branch.orbits.points(z)[0] for branch, z in points])
     starts = starts.reshape(len(points), len(system.states))
-    rows = rows[: len(points)]
+    if not len(points):
+        return unknown(0, starts.shape[1], len(outputs))
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
-    if system.forced_at is not None:
-        return measure(Stroboscope(system, method, rows), starts, periods, outputs=outputs)
-    times = np.array([float(branch.orbits.period(z)) for branch, z in points])
-    map_ = Stroboscope(system, method, rows, every=times)
-    return measure(map_, starts, np.ones(len(points), np.int64), outputs=outputs)
+    periods = periods if system.forced_at is not None else np.ones_like(periods)
+    return measure(_map_of(system, name, method, points), starts, periods, outputs=outputs)
 
 
 def _stacked(parts: Sequence[np.ndarray], size: int) -> np.ndarray:
