@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.resolution import resolve
+from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import outside
 from saltus.analysis.branches.tracing import Branch
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
@@ -63,16 +64,16 @@ def values_of(
 ) -> dict[str, Any]:
     """The variables on the dims ``point``, ``branch`` and ``event``."""
     size = len(system.states)
-    resolve(branches, functools.partial(_sampled_peaks, system, name, method))
+    resolve(branches, functools.partial(_sampled_peaks, system, method))
     counts = [len(branch.z) for branch in branches]
     points = [(branch, z) for branch in branches for z in branch.z]
-    numbers = _numbers(system, name, points, outputs, method)
+    numbers = numbers_of(system, _with_equations(points), outputs, method)
     events = [(number, event) for number, branch in enumerate(branches) for event in branch.events]
     at_events = [(branches[number], event.z) for number, event in events]
-    event_numbers = _numbers(system, name, at_events, outputs, method)
+    event_numbers = numbers_of(system, _with_equations(at_events), outputs, method)
     begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    multipliers = _stacked([branch.multipliers for branch in branches], size)
-    event_multipliers = _stacked([event.multipliers[None] for _, event in events], size)
+    multipliers = stacked([branch.multipliers for branch in branches], size)
+    event_multipliers = stacked([event.multipliers[None] for _, event in events], size)
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
     states = padded([branch.orbits.points(z) for branch, z in [*points, *at_events]], size)
     return {
@@ -121,51 +122,53 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
     }
 
 
-def _sampled_peaks(
-    system: System, name: str, method: Method, branch: Branch, z: np.ndarray
-) -> np.ndarray:
+def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray) -> np.ndarray:
     """Largest magnitude of the first state of orbits float64[r, z] of a branch, nearly: at samples,
     to say where more orbits are needed.
     """
-    n = branch.orbits.n
-    map_ = _map_of(system, name, method, [(branch, one) for one in z])
-    if system.forced_at is None:
-        n = 1
+    n = branch.orbits.n if system.forced_at is not None else 1
+    map_ = _map_of(system, method, [(branch.orbits, one) for one in z])
     starts = branch.orbits.points(z)[:, 0]
     samples = map_.run(starts, n, Schedule.even(n, SAMPLES)).samples
     return np.asarray(np.abs(samples[:, :, 0]).max(axis=1))
 
 
 def _map_of(
-    system: System, name: str, method: Method, points: Sequence[tuple[Branch, np.ndarray]]
+    system: System, method: Method, points: Sequence[tuple[PeriodicOrbits, np.ndarray]]
 ) -> Stroboscope:
     """A map for each orbit: over its forcing period, or its own period."""
     rows = np.tile(np.array(list(system.values.values())), (len(points), 1))
-    rows[:, list(system.values).index(name)] = [z[-1] for _, z in points]
+    for row, (orbits, z) in zip(rows, points, strict=True):
+        row[[list(system.values).index(name) for name in orbits.names]] = orbits.values(z)
     if system.forced_at is not None:
         return Stroboscope(system, method, rows)
-    times = np.array([float(branch.orbits.period(z)) for branch, z in points])
+    times = np.array([float(orbits.period(z)) for orbits, z in points])
     return Stroboscope(system, method, rows, every=times)
 
 
-def _numbers(
-    system: System,
-    name: str,
+def _with_equations(
     points: Sequence[tuple[Branch, np.ndarray]],
+) -> list[tuple[PeriodicOrbits, np.ndarray]]:
+    return [(branch.orbits, z) for branch, z in points]
+
+
+def numbers_of(
+    system: System,
+    points: Sequence[tuple[PeriodicOrbits, np.ndarray]],
     outputs: Outputs,
     method: Method,
 ) -> Measures:
-    """The numbers of orbits: extremes, means, contacts and margins."""
-    starts = np.array([branch.orbits.points(z)[0] for branch, z in points])
+    """The numbers of orbits, each with its unknowns: extremes, means, contacts and margins."""
+    starts = np.array([orbits.points(z)[0] for orbits, z in points])
     starts = starts.reshape(len(points), len(system.states))
     if not len(points):
         return unknown(0, starts.shape[1], len(outputs))
-    periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
+    periods = np.array([orbits.n for orbits, _ in points], np.int64)
     periods = periods if system.forced_at is not None else np.ones_like(periods)
-    return measure(_map_of(system, name, method, points), starts, periods, outputs=outputs)
+    return measure(_map_of(system, method, points), starts, periods, outputs=outputs)
 
 
-def _stacked(parts: Sequence[np.ndarray], size: int) -> np.ndarray:
+def stacked(parts: Sequence[np.ndarray], size: int) -> np.ndarray:
     """Multipliers in one table complex128[.., size], NaN where a trivial one was left out."""
     if not parts:
         return np.zeros((0, size), complex)

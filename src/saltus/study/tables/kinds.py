@@ -91,6 +91,8 @@ KINDS = {
         "a published model it is known.", None),
     "supplied": Kind(Formula, ("force*cos(2*pi*frequency*t)*v",), _POWER.format("flows in"), None),
     "dissipated": Kind(Formula, ("damping*v**2",), _POWER.format("is lost"), None),
+    "friction": Kind(Formula, ("slip*sign(v)*v",), "Power that friction takes [W], a formula, a "
+        "part of its own beside dissipated; 0 by default.", None),
 }  # fmt: skip
 #: Starts of the analyses that follow many, and values that are the same for all of them.
 OF_RESPONSES = KINDS | {
