@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.attractors import attractors, basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
+    from saltus.analysis.branches.branches import branches
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
     from saltus.analysis.methods.regularisation_widths import regularisation_widths
@@ -102,6 +103,7 @@ _HOMES = {
     "spectrum": "saltus.analysis.motion.spectrum",
     "stroboscope": "saltus.analysis.motion.stroboscope",
     "structure_modes": "saltus.analysis.motion.structure_modes",
+    "branches": "saltus.analysis.branches.branches",
     "transmissibility": "saltus.analysis.motion.transmissibility",
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",
@@ -146,6 +148,7 @@ __all__ = [
     "basin_fractions",
     "basins",
     "bifurcation_diagram",
+    "branches",
     "clip",
     "compare",
     "compare_methods",

@@ -4,15 +4,14 @@ tangent flow holds the derivatives with respect to them.
 Where the period varies too - the forcing frequency is followed, or the system has no forcing - the
 time is counted in periods: the rates are multiplied by the period T, which is a state, and
 ``frequency*t`` is the time itself. The map over one period then has no end that moves, and its
-derivative with respect to T no term of its own. Seydel, Practical Bifurcation and Stability Analysis
-(2010), section 7.
+derivative with respect to T no term of its own. Seydel, Practical Bifurcation and Stability
+Analysis (2010), section 7.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from saltus.errors import ParameterError
@@ -56,9 +55,9 @@ def parametric(system: System, names: tuple[str, ...]) -> Parametric:
         If the instants of a switch, a remainder or a table of time would depend on a parameter.
     """
     if system.origin is not system:
-        made = parametric(system.origin, names)
-        values = {name: system.values[name] for name in made.system.values}
-        return replace(made, system=made.system.with_values(**values))
+        known = parametric(system.origin, names)
+        kept = {name: system.values[name] for name in known.system.values}
+        return replace(known, system=known.system.with_values(**kept))
     timed = system.forced_at is None or system.forced_at in names
     new = tuple(name for name in names if name != system.forced_at)
     rewriting = _Rewriting(system, new, timed)
@@ -97,12 +96,12 @@ class _Rewriting:
         self._period = ex.state(_free(PERIOD, system))
         self._memo: dict[Expr, Expr] = {}
         turns = 2 * math.pi if system.units.get(system.forced_at or "") == "rad/s" else 1.0
-        self._leaves: Mapping[Expr, Expr] = {ex.parameter(name): ex.state(name) for name in names}
+        self._leaves: dict[Expr, Expr] = {ex.parameter(name): ex.state(name) for name in names}
         if timed:
-            self._leaves[ex.TIME] = ex.mul(ex.TIME, self._period)  # type: ignore[index]
+            self._leaves[ex.TIME] = ex.mul(ex.TIME, self._period)
             if system.forced_at is not None:
                 self._frequency, self._turns = ex.parameter(system.forced_at), turns
-                self._leaves[self._frequency] = ex.div(turns, self._period)  # type: ignore[index]
+                self._leaves[self._frequency] = ex.div(turns, self._period)
 
     def rate(self, entry: Expr) -> Expr:
         """A rate, per period where the time is counted so."""

@@ -2,12 +2,13 @@
 by side.
 
 A step goes along the tangent and returns to the curve by Newton's method in the plane across it, so
-that folds are points like all others. Keller, in Applications of Bifurcation Theory (1977); Allgower
-& Georg, Introduction to Numerical Continuation Methods (2003), chapters 2 and 6.
+that folds are points like all others. Keller, in Applications of Bifurcation Theory (1977);
+Allgower & Georg, Introduction to Numerical Continuation Methods (2003), chapters 2 and 6.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -170,7 +171,7 @@ def follow(
     limits: tuple[float, float],
     points: int,
     first: float = FIRST,
-    stop: object = None,
+    stop: Callable[[np.ndarray, list[Curve]], np.ndarray] | None = None,
 ) -> list[Curve]:
     """Curves from points float64[k, m + 1] on them, until they leave the range of one unknown, are
     closed or have ``points`` points.
@@ -190,66 +191,106 @@ def follow(
     first : float
         First step, in units of the scale.
     stop : callable, optional
-        Called with the curves that have a new point (their numbers and the curves); returns which
-        go no farther, bool[r].
+        Called with the numbers int64[r] of the curves that have a new point, and these; returns
+        which go no farther, bool[r].
     """
     rows = np.arange(len(start))
     here = correct(equations, start, tangents_at(equations, start, along, rows), rows, 1.0)
-    curves = [Curve() for _ in rows]
-    tangent, step = tangents(_finite(here.derivative), along), np.full(len(rows), first)
-    for i in rows:
-        if here.found[i]:
-            _add(curves[i], here.z[i], tangent[i], here.derivative[i], 0.0)
-        else:
-            curves[i].end = "lost"
-    equations.accepted(here.z, rows)
-    z, going = here.z.copy(), rows[here.found]
-    while len(going):
-        scale = equations.scale[going]
-        guess = z[going] + step[going, None] * tangent[going] * scale
-        outside = (guess[:, column] < limits[0]) | (guess[:, column] > limits[1])
-        normal = tangent[going].copy()
-        bound = np.clip(guess[:, column], *limits)
-        if outside.any():  # land on the end of the range
-            share = (bound - z[going, column]) / (guess[:, column] - z[going, column])
-            guess[outside] = (z[going] + share[:, None] * (guess - z[going]))[outside]
-            normal[outside] = 0.0
-            normal[outside, column] = 1.0
-            guess[outside, column] = bound[outside]
-        trial = correct(equations, guess, normal, going, ASTRAY * step[going])
-        new = tangents(_finite(trial.derivative), tangent[going])
-        turn = np.einsum("ki,ki->k", new, tangent[going])
-        moved = np.linalg.norm((trial.z - z[going]) / scale, axis=1)
-        counts = trial.found & ((turn > TURN) | (step[going] < 100 * SHORTEST))
-        ends = counts & outside
-        easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
-        factor = np.where(counts, np.where(easy, 2.0, 1.0), 0.5)
-        taken = going[counts]
-        for j in np.flatnonzero(counts):
-            i = going[j]
-            _add(curves[i], trial.z[j], new[j], trial.derivative[j], moved[j])
-            if ends[j]:
-                curves[i].end = "range"
-            elif len(curves[i].z) >= points:
-                curves[i].end = "points"
-        z[taken], tangent[taken] = trial.z[counts], new[counts]
-        equations.accepted(z[taken], taken)
-        step[going] = np.minimum(factor * step[going], LONGEST)
-        short = step[going] < SHORTEST
-        for i in going[short & ~counts]:
-            curves[i].end = "lost"
-        closed = _closed(equations, curves, taken, step)
-        for i in taken[closed]:
-            if not curves[i].end:
-                first_point = curves[i]
-                _add(first_point, first_point.z[0], first_point.tangent[0],
-                     first_point.derivative[0], step[i])  # fmt: skip
-                curves[i].end = "closed"
+    fronts = _Fronts(equations, column, limits, [Curve() for _ in rows], first)
+    fronts.begin(here, tangents(_finite(here.derivative), along))
+    while len(fronts.going):
+        taken = fronts.step()
+        for i in taken:
+            if len(fronts.curves[i].z) >= points and not fronts.curves[i].end:
+                fronts.curves[i].end = "points"
         if stop is not None and len(taken):
-            for i in taken[stop(taken, [curves[i] for i in taken])]:  # type: ignore[operator]
-                curves[i].end = curves[i].end or "stopped"
-        going = np.array([i for i in going if not curves[i].end], np.int64)
-    return curves
+            for i in taken[stop(taken, [fronts.curves[i] for i in taken])]:
+                fronts.curves[i].end = fronts.curves[i].end or "stopped"
+    return fronts.curves
+
+
+class _Fronts:
+    """The ends of curves that grow."""
+
+    def __init__(
+        self,
+        equations: Equations,
+        column: int,
+        limits: tuple[float, float],
+        curves: list[Curve],
+        first: float,
+    ) -> None:
+        self.equations, self.column, self.limits, self.curves = equations, column, limits, curves
+        self.length = np.full(len(curves), first)
+
+    def begin(self, here: Corrected, tangent: np.ndarray) -> None:
+        """The first points."""
+        self.z, self.tangent = here.z.copy(), tangent
+        for i, curve in enumerate(self.curves):
+            if here.found[i]:
+                _add(curve, here.z[i], tangent[i], here.derivative[i], 0.0)
+            else:
+                curve.end = "lost"
+        self.equations.accepted(here.z, np.arange(len(here.z)))
+
+    @property
+    def going(self) -> np.ndarray:
+        """The curves that go on, int64[g]."""
+        return np.array([i for i, curve in enumerate(self.curves) if not curve.end], np.int64)
+
+    def step(self) -> np.ndarray:
+        """Try a step of each; those that have a new point, int64[r]."""
+        going = self.going
+        guess, normal, outside = self._predicted(going)
+        scale, length = self.equations.scale[going], self.length[going]
+        trial = correct(self.equations, guess, normal, going, ASTRAY * length)
+        tangent = tangents(_finite(trial.derivative), self.tangent[going])
+        turn = np.einsum("ki,ki->k", tangent, self.tangent[going])
+        counts = trial.found & ((turn > TURN) | (length < 100 * SHORTEST))
+        easy = counts & (trial.evaluations <= EASY) & (turn > STRAIGHT)
+        moved = np.linalg.norm((trial.z - self.z[going]) / scale, axis=1)
+        for j in np.flatnonzero(counts):
+            curve = self.curves[going[j]]
+            _add(curve, trial.z[j], tangent[j], trial.derivative[j], moved[j])
+            curve.end = "range" if outside[j] else ""
+        taken = going[counts]
+        self.z[taken], self.tangent[taken] = trial.z[counts], tangent[counts]
+        self.equations.accepted(self.z[taken], taken)
+        factor = np.where(counts, np.where(easy, 2.0, 1.0), 0.5)
+        self.length[going] = np.minimum(factor * length, LONGEST)
+        for i in going[~counts & (self.length[going] < SHORTEST)]:
+            self.curves[i].end = "lost"
+        self._close(taken)
+        return taken
+
+    def _predicted(self, going: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points along the tangents, the planes in which they are corrected, and which land on an
+        end of the range.
+        """
+        column, normal = self.column, self.tangent[going].copy()
+        step = self.length[going, None] * self.tangent[going] * self.equations.scale[going]
+        guess = self.z[going] + step
+        bound = np.clip(guess[:, column], *self.limits)
+        outside = bound != guess[:, column]
+        with np.errstate(invalid="ignore"):
+            share = (bound - self.z[going, column]) / step[:, column]
+        guess[outside] = (self.z[going] + share[:, None] * step)[outside]
+        guess[outside, column] = bound[outside]
+        normal[outside] = 0.0
+        normal[outside, column] = 1.0
+        return guess, normal, outside
+
+    def _close(self, taken: np.ndarray) -> None:
+        """Close the curves that are about to pass their start as they left it."""
+        for i in taken[_closed(self.equations, self.curves, taken, self.length)]:
+            curve = self.curves[i]
+            apart = (curve.z[0] - curve.z[-1]) / self.equations.scale[i]
+            _add(curve, curve.z[0], curve.tangent[0], curve.derivative[0], _size(apart))
+            curve.end = "closed"
+
+
+def _size(vector: np.ndarray) -> float:
+    return float(np.linalg.norm(vector))
 
 
 def tangents_at(
@@ -276,7 +317,7 @@ def _add(
 def _closed(
     equations: Equations, curves: list[Curve], rows: np.ndarray, step: np.ndarray
 ) -> np.ndarray:
-    """Which curves are about to pass their start in the direction in which they left it, bool[r]."""
+    """Which curves are about to pass their start in the direction in which they left, bool[r]."""
     result = np.zeros(len(rows), bool)
     for j, i in enumerate(rows):
         curve = curves[i]

@@ -49,9 +49,7 @@ class Legs:
         self.contacts = sequence.contacts
         self.count = max(len(self.contacts), 1)
         self._modes = [one.after for one in self.contacts] or [sequence.mode]
-        self._jumps = Jumps(
-            orbits.parametric.system, self.contacts, self.size, sequence.mode
-        )
+        self._jumps = Jumps(orbits.parametric.system, self.contacts, self.size, sequence.mode)
         self.unit = float(orbits.map.period[0])  # of the time, in those of the parametric system
         self._maps = {
             mode: Stroboscope(
@@ -262,7 +260,7 @@ class Legs:
         """
         at, result = self.at(z), []
         for i in range(len(z)):
-            segments = self._segments(at, derivative[i] , i, int(rows[i]))
+            segments = self._segments(at, derivative[i], i, int(rows[i]))
             if self.free:
                 segments = across(_product(segments), at.rate[i, 0])[None]
             result.append(multipliers(segments))

@@ -143,9 +143,7 @@ def _ahead_of(
     return float((other - z) / orbits.scale[row] @ tangent)
 
 
-def _at_once(
-    orbits: PeriodicOrbits, row: int, one: _Point, other: _Point
-) -> list[ContactEvent]:
+def _at_once(orbits: PeriodicOrbits, row: int, one: _Point, other: _Point) -> list[ContactEvent]:
     """The grazes, or the corner, that alone tell two sequences apart; none if there are more."""
     assert one.sequence is not None and other.sequence is not None
     scale = orbits.scale[row]
@@ -186,9 +184,7 @@ def _swapped(one: ContactSequence, order: list[int], n: int) -> ContactSequence:
     return ContactSequence(new.contacts, one.phase, new.after, new.velocity, one.mode)
 
 
-def _removals(
-    one: ContactSequence, count: int, n: int
-) -> Iterator[tuple[tuple[int, ...], ...]]:
+def _removals(one: ContactSequence, count: int, n: int) -> Iterator[tuple[tuple[int, ...], ...]]:
     """Sets of contacts, ``count`` places in all, that might be new, the shortest contacts first.
 
     A contact is the two places at which a guard is crossed, there and back, or the one place of an

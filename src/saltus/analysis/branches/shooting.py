@@ -1,5 +1,5 @@
-"""The equations of periodic orbits: each of their points a whole period apart must be the next one's
-start, with the contact sequence left to the flow.
+"""The equations of periodic orbits: each of their points must be a whole period from the next, with
+the contact sequence left to the flow.
 
 The unknowns are all points of the orbit and the parameters that are followed, so an orbit of n
 periods is n short shots in place of a long one. Derivatives come from the tangent flow of the
@@ -26,8 +26,8 @@ from saltus.system.system import System
 class PeriodicOrbits:
     """Curves of periodic orbits of n periods over one parameter; an arclength ``Equations``.
 
-    Unknowns z: the n points, one after the other; the period [s] of a system without forcing; the
-    parameters [SI].
+    Unknowns z: the n points, one after the other; the time from one to the next [s] in a system
+    without forcing; the parameters [SI].
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class PeriodicOrbits:
     names : sequence of str
         The parameters that are followed.
     n : int
-        Forcing periods of the orbits; 1 of a system without forcing.
+        Forcing periods of the orbits; parts of equal time in a system without forcing.
     scale : float64[k, z]
         Units of the unknowns.
     """
@@ -53,7 +53,7 @@ class PeriodicOrbits:
         self.system, self.names, self.n, self.scale = system, tuple(names), n, scale
         self.size, self.free = len(system.states), system.forced_at is None
         self.parametric = parametric(system, self.names)
-        self._turns = system.period({system.forced_at: 1.0}) if not self.free else 1.0
+        self._turns = system.period({system.forced_at: 1.0}) if system.forced_at else 1.0
         self.map = Stroboscope(
             self.parametric.system, method, every=1.0 if self.parametric.timed else None,
             threads=threads,
@@ -75,9 +75,9 @@ class PeriodicOrbits:
         return z[..., self.n * self.size + self.free :]
 
     def period(self, z: np.ndarray) -> np.ndarray:
-        """The period of orbits float64[..., z] [s], all n forcing periods of it, float64[...]."""
+        """The period of orbits float64[..., z] [s], all n parts of it, float64[...]."""
         if self.free:
-            return np.asarray(z[..., self.n * self.size])
+            return np.asarray(self.n * z[..., self.n * self.size])
         where = self.system.forced_at
         if where in self.names:
             return np.asarray(self.n * self._turns / self.values(z)[..., self.names.index(where)])
@@ -99,9 +99,7 @@ class PeriodicOrbits:
     def starts(self, z: np.ndarray) -> np.ndarray:
         """The points as states of the parametric system, float64[r, n, E]."""
         own = self.own(z[:, self.n * self.size :])[0]
-        return np.concatenate(
-            [self.points(z), np.repeat(own[:, None], self.n, axis=1)], axis=2
-        )
+        return np.concatenate([self.points(z), np.repeat(own[:, None], self.n, axis=1)], axis=2)
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -146,7 +144,7 @@ class PeriodicOrbits:
         } | dict(zip(self.names, self.values(z).T, strict=True))
         return field_of(self.system, z[:, : self.size], values)
 
-    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
         """The same orbits from each of their points on, float64[r, n, z]."""
         points = self.points(z)
         shifts = (np.arange(self.n)[:, None] + np.arange(self.n)) % self.n
@@ -174,7 +172,8 @@ class PeriodicOrbits:
         for i, row in enumerate(rows):
             segments = self.segments(derivative[i], row)
             if flows is not None:
-                segments = across(segments[0], flows[i])[None]
+                whole = np.linalg.multi_dot([*segments[::-1], np.eye(self.size)])
+                segments = across(whole, flows[i])[None]
             result.append(multipliers(segments))
         return np.array(result)
 

@@ -2,8 +2,9 @@
 change of stability.
 
 Each kind is the zero of a function of the orbit alone; a zero between two points of a branch is
-found by a bracketing method in arclength, at orbits that are closed by Newton's method, so it is the
-solution of the defining system and no interpolation. Chandrupatla, Adv. Eng. Softw. 28 (1997) 145.
+found by a bracketing method in arclength, at orbits that are closed by Newton's method, so it is
+the solution of the defining system and no interpolation. Chandrupatla, Adv. Eng. Softw. 28 (1997)
+145.
 Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10.
 """
 
@@ -16,6 +17,7 @@ from scipy.optimize import elementwise
 
 from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.orbits.tolerances import SINGULAR
 
 #: Tests in the order in which they are made.
 KINDS = ("fold", "branch_point", "period_doubling", "neimark_sacker")
@@ -24,6 +26,11 @@ KINDS = ("fold", "branch_point", "period_doubling", "neimark_sacker")
 COMPLEX = 1e-7
 #: Distance of a multiplier from the unit circle within which it isn't counted.
 ON_CIRCLE = 1e-9
+#: Newton's method at branch points: steps, length of the last one, and distance of two derivatives
+#: whose difference is their slope, in units of the scale.
+MOST_STEPS, CONVERGED, ASIDE = 20, 1e-11, 1e-5
+#: Farthest that a branch point lies from where it was seen, in units of the scale.
+FARTHEST = 0.3
 
 
 @dataclass(frozen=True)
@@ -138,7 +145,60 @@ def locate(
         tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0}, maxiter=60,
     )  # fmt: skip
     at(root.x, np.arange(len(rows), dtype=float))
-    return [known.get(i) if np.isfinite(root.x[i]) else None for i in range(len(rows))]
+    result = [known.get(i) if np.isfinite(root.x[i]) else None for i in range(len(rows))]
+    for i in np.flatnonzero(kind == KINDS.index("branch_point")):
+        guess = z[i] + 0.5 * length[i] * tangent[i] * orbits.scale[rows[i]]
+        near = known.get(int(i))
+        result[i] = _branch_point(
+            orbits, int(rows[i]), guess if near is None else near.z, tangent[i]
+        )
+    return result
+
+
+def _branch_point(
+    orbits: PeriodicOrbits, row: int, start: np.ndarray, along: np.ndarray
+) -> SpecialPoint | None:
+    """The point near another at which two branches cross; None if none is found.
+
+    There the derivative J has a left null vector u, and Newton's method on F alone fails; on
+    ``F + b u = 0, J'u = 0, u'u = 1`` it doesn't. Kuznetsov, section 10.5.2.
+    """
+    unit, z, one = orbits.scale[row], start.copy(), np.array([row])
+    size = len(z)
+    _, derivative = orbits.evaluate(z[None], one)
+    if not np.isfinite(derivative).all():
+        return None
+    null, b = np.linalg.svd(derivative[0])[0][:, -1], 0.0
+    for _ in range(MOST_STEPS):
+        ends, matrices = orbits.evaluate(
+            z + np.concatenate([np.zeros((1, size)), ASIDE * np.eye(size), -ASIDE * np.eye(size)])
+            * unit, np.full(2 * size + 1, row),
+        )  # fmt: skip
+        jacobian = matrices[0]
+        bends = np.einsum("jmi,m->ij", matrices[1 : size + 1] - matrices[size + 1 :], null)
+        residual = np.concatenate([ends[0] + b * null, jacobian.T @ null, [null @ null - 1.0]])
+        whole = np.zeros((2 * size, 2 * size))
+        whole[: size - 1, :size], whole[: size - 1, size] = jacobian, null
+        whole[: size - 1, size + 1 :] = b * np.eye(size - 1)
+        whole[size - 1 : -1, :size] = bends / (2 * ASIDE)
+        whole[size - 1 : -1, size + 1 :] = jacobian.T
+        whole[-1, size + 1 :] = 2 * null
+        if not np.isfinite(whole).all() or np.linalg.cond(whole) > SINGULAR:
+            return None
+        step = -np.linalg.solve(whole, residual)
+        z, b, null = z + step[:size] * unit, b + step[size], null + step[size + 1 :]
+        if np.abs(step[:size]).max() < CONVERGED:
+            break
+    else:
+        return None
+    if np.linalg.norm((z - start) / unit) > FARTHEST:
+        return None
+    derivative = orbits.evaluate(z[None], one)[1]
+    spans = np.linalg.svd(derivative[0])[2][-2:]
+    direction = spans.T @ (spans @ along)
+    direction /= np.linalg.norm(direction)
+    own = orbits.multipliers(z[None], derivative, one)[0]
+    return SpecialPoint("branch_point", -1, z, direction, own, derivative[0])
 
 
 def outside(multipliers: np.ndarray) -> np.ndarray:

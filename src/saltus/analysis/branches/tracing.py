@@ -10,12 +10,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import Curve, correct, follow, tangents
+from saltus.analysis.branches.arclength import LONGEST, Curve, correct, follow, tangents
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import SpecialPoint, locate, outside, tests
 
 #: How far a new branch begins from the point where it leaves another, in units of the scale.
-ASIDE = 0.02
+ASIDE = 0.004
 #: Farthest that a seed lies from its orbit, in units of the scale.
 ASTRAY = 0.5
 #: Branches that are followed side by side.
@@ -24,6 +24,8 @@ ABREAST = 8
 SAME = 1e-6
 #: An orbit may lie on a branch whose points, joined by lines, pass it by less.
 PASSES = 0.3
+#: How far a branch turns, sideways over ahead, from its last point to where it ends.
+TURNS = 0.3
 #: How often an interval is halved in which changes of stability don't add up.
 HALVINGS = 6
 
@@ -137,28 +139,34 @@ class Plan:
 
 
 def trace(
-    plan: Plan, seeds: Sequence[Seed], progress: Callable[[float], None] | None = None
-) -> list[Branch]:
-    """All branches that seeds lie on, and those that leave them at their events.
+    plan: Plan,
+    seeds: Sequence[Seed],
+    branches: list[Branch],
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Add all branches that seeds lie on, and those that leave them at their events, to a list.
 
     Seeds that lie on a branch already followed are not followed again.
     """
-    waiting, branches, begun = list(seeds), list[Branch](), 0
+    waiting, begun = list(seeds), 0
     while waiting:
-        wave = [seed for seed in waiting if len(seed.points) == len(waiting[0].points)][:ABREAST]
+        n = len(waiting[0].points)
+        wave = [seed for seed in waiting if len(seed.points) == n][:ABREAST]
         waiting = [seed for seed in waiting if all(seed is not other for other in wave)]
         begun += len(wave)
         starts = _Starts.of(plan, wave)
         fresh = [i for i in starts.found if not _known(starts.z[i], starts.n, branches)]
+        fresh = [i for i in fresh if not _ends_there(wave[i], starts.z[i], branches)]
         for i, branch in zip(fresh, _both_ways(plan, starts, fresh), strict=True):
             if branch is None or _known(starts.z[i], starts.n, branches):
+                continue
+            if _ends_there(wave[i], starts.z[i], branches):
                 continue
             branches.append(branch)
             _find_events(branch)
             waiting += _children(plan, branch, len(branches) - 1)
         if progress is not None:
             progress(begun / (begun + len(waiting)))
-    return branches
 
 
 # -- following -------------------------------------------------------------------------------------
@@ -175,7 +183,7 @@ class _Starts:
     @classmethod
     def of(cls, plan: Plan, seeds: Sequence[Seed]) -> _Starts:
         """At the parameter of each seed; beside it where a branch leaves another."""
-        n, size = len(seeds[0].points), len(seeds[0].scale)
+        n = len(seeds[0].points)
         z = np.array([seed.z for seed in seeds])
         scale = np.array([
             np.concatenate([np.tile(seed.scale, n), np.abs(seed.own)]) for seed in seeds
@@ -274,12 +282,11 @@ def _of(
 # -- events ----------------------------------------------------------------------------------------
 def _find_events(branch: Branch) -> None:
     """Locate what happens along a branch; halve the intervals where stability doesn't add up."""
-    for _ in range(HALVINGS):
+    for left in reversed(range(HALVINGS)):
         branch.events = _located(branch)
-        wrong = _unexplained(branch)
-        if not wrong or not _refined(branch, wrong):
+        branch.unexplained = _unexplained(branch)
+        if not left or not branch.unexplained or not _refined(branch, branch.unexplained):
             break
-    branch.unexplained = _unexplained(branch)
 
 
 def _located(branch: Branch) -> list[SpecialPoint]:
@@ -381,6 +388,25 @@ def _lies_on(z: np.ndarray, branch: Branch) -> bool:
         apart = np.abs((others - point.z)[:, :size] / branch.scale[:size]).max(axis=1)
         if point.found[0] and apart.min() < SAME:
             return True
+    return False
+
+
+def _ends_there(seed: Seed, z: np.ndarray, branches: Sequence[Branch]) -> bool:
+    """Whether the branch that leaves a period doubling is one that was seen to end there."""
+    if seed.along is None:
+        return False
+    for branch in branches:
+        if branch.orbits.n != len(seed.points):
+            continue
+        others = branch.orbits.alike(z[None], np.array([branch.row]))[0]
+        for place, sign in ((0, -1.0), (-1, 1.0)):
+            if branch.ends[place] != "period_doubling":
+                continue
+            way = (others - branch.z[place]) / branch.scale
+            ahead = sign * way @ branch.tangent[place]
+            aside = np.linalg.norm(way - np.outer(sign * ahead, branch.tangent[place]), axis=1)
+            if ((ahead > 0) & (ahead < 2 * LONGEST) & (aside < TURNS * ahead)).any():
+                return True
     return False
 
 

@@ -23,6 +23,7 @@ from saltus.results.dataset.attractors import (
     ATTRACTORS_VARIABLES,
     BASINS_VARIABLES,
 )
+from saltus.results.dataset.branches import BRANCHES_VARIABLES
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.methods import METHODS_VARIABLES, WIDTHS_VARIABLES
@@ -36,7 +37,7 @@ VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS, EXPONENTS = "methods", "exponents"
-SETTLED, WIDTHS, MODES = "settled", "widths", "modes"
+SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
@@ -49,7 +50,7 @@ MAKERS = {
     ENERGY: "sl.energy_balance",
     EXPONENTS: "sl.lyapunov or sl.wolf",
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
-    MODES: "sl.structure_modes",
+    MODES: "sl.structure_modes", BRANCHES: "sl.branches",
 }  # fmt: skip
 
 #: The table of each kind of result.
@@ -69,6 +70,7 @@ TABLES = {
     SETTLED: motions.SETTLED_VARIABLES,
     WIDTHS: WIDTHS_VARIABLES,
     MODES: MODES_VARIABLES,
+    BRANCHES: BRANCHES_VARIABLES,
 }
 
 
@@ -101,14 +103,18 @@ def response_name(name: str) -> str:
 
 
 def event_name(parameter: str) -> str:
-    """Name of the variable that holds the parameter at the events: ``event_frequency``;
+    """Name of the variable that holds a parameter or a state at the events: ``event_frequency``;
     ``event_own_kind`` where the name is taken.
     """
-    return (
-        f"event_own_{parameter}"
-        if f"event_{parameter}" in RESPONSES_VARIABLES
-        else f"event_{parameter}"
-    )
+    taken = (*RESPONSES_VARIABLES, *BRANCHES_VARIABLES)
+    return f"event_own_{parameter}" if f"event_{parameter}" in taken else f"event_{parameter}"
+
+
+def point_name(name: str) -> str:
+    """Name of the variable that holds a parameter or a state at the points of branches:
+    ``point_x``; ``point_own_period`` where the name is taken.
+    """
+    return f"point_own_{name}" if f"point_{name}" in BRANCHES_VARIABLES else f"point_{name}"
 
 
 def sample_name(state: str) -> str:

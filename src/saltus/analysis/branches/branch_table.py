@@ -1,0 +1,132 @@
+"""From branches to their Dataset: the numbers of every orbit on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.branches.special_points import outside
+from saltus.analysis.branches.tracing import Branch
+from saltus.analysis.dataset_parts import guards_over, provenance, subject
+from saltus.analysis.orbits.orbit_measures import Measures, measure
+from saltus.analysis.outputs import Outputs
+from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import Method
+from saltus.results import build
+from saltus.results.dataset import schema
+from saltus.results.dataset.attractors import padded
+from saltus.system.system import System
+
+#: Multipliers nearer to the unit circle than this don't count as inside: the orbit may not attract.
+MARGINAL = 1e-9
+
+
+def table_of(
+    system: System,
+    name: str,
+    limits: tuple[float, float],
+    branches: Sequence[Branch],
+    outputs: Outputs,
+    method: Method,
+) -> xr.Dataset:
+    """The Dataset of branches over a parameter."""
+    size = len(system.states)
+    counts = [len(branch.z) for branch in branches]
+    points = [(branch, z) for branch in branches for z in branch.z]
+    numbers = _numbers(system, name, points, outputs, method)
+    events = [(number, event) for number, branch in enumerate(branches) for event in branch.events]
+    at_events = [(branches[number], event.z) for number, event in events]
+    event_numbers = _numbers(system, name, at_events, outputs, method)
+    begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    multipliers = _stacked([branch.multipliers for branch in branches], size)
+    event_multipliers = _stacked([event.multipliers[None] for _, event in events], size)
+    periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
+    orbits = [branch.orbits.points(z) for branch, z in points]
+    values: dict[str, Any] = {
+        "point": np.arange(len(points)),
+        "point_branch": np.repeat(np.arange(len(branches)), counts),
+        "point_<parameter>": {name: np.array([z[-1] for _, z in points])},
+        "point_arclength": np.concatenate([b.length for b in branches] or [np.zeros(0)]),
+        "point_stable": np.abs(multipliers).max(axis=1, initial=0.0) < 1.0 - MARGINAL,
+        "point_unstable_multipliers": outside(multipliers).sum(axis=1),
+        "point_period": np.array([float(branch.orbits.period(z)) for branch, z in points]),
+        "point_peak": numbers.peak[:, 0] if len(points) else np.zeros(0),
+        "point_rms": numbers.rms[:, 0] if len(points) else np.zeros(0),
+        "point_contacts": numbers.contacts * (1 if system.forced_at is None else periods),
+        "point_itinerary": list(numbers.itinerary),
+        "point_margin": numbers.margin,
+        "point_multiplier_real": multipliers.real,
+        "point_multiplier_imag": multipliers.imag,
+        "point_<state>": padded(orbits, size),
+        "output": list(outputs.names),
+        "output_units": list(outputs.units),
+        **{f"point_output_{key}": column for key, column in numbers.by_name().items()},
+        **_branches(branches),
+        "event": np.arange(len(events)),
+        "event_kind": [event.kind for _, event in events],
+        "event_branch": np.array([number for number, _ in events], np.int64),
+        "event_point": np.array([begins[i] + event.after for i, event in events], np.int64),
+        "event_<parameter>": {name: np.array([event.z[-1] for _, event in events], float)},
+        "event_peak": event_numbers.peak[:, 0] if len(events) else np.zeros(0),
+        "event_rms": event_numbers.rms[:, 0] if len(events) else np.zeros(0),
+        "event_multiplier_real": event_multipliers.real,
+        "event_multiplier_imag": event_multipliers.imag,
+        "event_<state>": padded([branch.orbits.points(z) for branch, z in at_events], size),
+    }
+    fixed = {key: value for key, value in system.values.items() if key != name}
+    attrs = provenance(system, method, fixed, (name,)) | {
+        "parameter": name, "parameter_low": limits[0], "parameter_high": limits[1],
+        "unexplained_changes": sum(len(branch.unexplained) for branch in branches),
+    }  # fmt: skip
+    unit = outputs.units[0] if len(set(outputs.units)) == 1 else ""
+    when = "at whole forcing periods" if system.forced_at else "in equal steps of time"
+    about = subject(system, attrs, guards_over(system, system.values, ()))
+    return build(schema.BRANCHES, about, values, words={"<when>": when, "<output>": unit})
+
+
+def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
+    """What is known of each branch."""
+    return {
+        "branch": np.arange(len(branches)),
+        "branch_periods": np.array([branch.orbits.n for branch in branches], np.int64),
+        "branch_closed": np.array([branch.closed for branch in branches], bool),
+        "branch_parent": np.array(
+            [-1 if branch.parent is None else branch.parent[0] for branch in branches], np.int64
+        ),
+        "branch_begin": [branch.ends[0] for branch in branches],
+        "branch_end": [branch.ends[1] for branch in branches],
+        "branch_unexplained": np.array([len(b.unexplained) for b in branches], np.int64),
+    }
+
+
+def _numbers(
+    system: System,
+    name: str,
+    points: Sequence[tuple[Branch, np.ndarray]],
+    outputs: Outputs,
+    method: Method,
+) -> Measures:
+    """The numbers of orbits: extremes, means, contacts and margins."""
+    rows = np.tile(np.array(list(system.values.values())), (max(len(points), 1), 1))
+    rows[: len(points), list(system.values).index(name)] = [z[-1] for _, z in points]
+    starts = np.array([branch.orbits.points(z)[0] for branch, z in points])
+    starts = starts.reshape(len(points), len(system.states))
+    rows = rows[: len(points)]
+    periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
+    if system.forced_at is not None:
+        return measure(Stroboscope(system, method, rows), starts, periods, outputs=outputs)
+    times = np.array([float(branch.orbits.period(z)) for branch, z in points])
+    map_ = Stroboscope(system, method, rows, every=times)
+    return measure(map_, starts, np.ones(len(points), np.int64), outputs=outputs)
+
+
+def _stacked(parts: Sequence[np.ndarray], size: int) -> np.ndarray:
+    """Multipliers in one table complex128[.., size], NaN where a trivial one was left out."""
+    if not parts:
+        return np.zeros((0, size), complex)
+    whole = np.concatenate(parts)
+    missing = np.full((len(whole), size - whole.shape[1]), np.nan + 0j)
+    return np.concatenate([whole, missing], axis=1)

@@ -1,0 +1,222 @@
+"""`branches`: all branches of periodic orbits over a parameter, stable or not, and their
+bifurcations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.branches.branch_table import table_of
+from saltus.analysis.branches.seeds import found_at, scaled, seeds_of
+from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.tracing import Branch, Plan, Seed, trace
+from saltus.analysis.outputs import outputs_of
+from saltus.analysis.starts import check_system, single
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError, nearest, shown
+from saltus.flow.counts import whole
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporting, stage
+from saltus.interrupt import Interrupted
+from saltus.system.system import System
+
+#: Events at which the branches that leave are followed.
+SWITCHES = ("period_doubling", "branch_point")
+
+
+@verb
+def branches(
+    system: System,
+    vary: Mapping[str, Any],
+    start: Any = None,
+    *,
+    box: Mapping[str, Any] | None = None,
+    at: int = 12,
+    switch: Sequence[str] = SWITCHES,
+    longest: int = 8,
+    points: int = 1000,
+    values: Mapping[str, Any] | None = None,
+    outputs: Mapping[str, Any] | None = None,
+    every: float | str | None = None,
+    method: Method | None = None,
+    periods: int = 2000,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """Branches of periodic orbits over a parameter, stable and unstable, with folds, period
+    doublings, branch points and tori.
+
+    Each branch is followed by pseudo-arclength continuation on the exact flow, in both directions
+    and through its folds, until it leaves the range or closes: an isola. Contacts come and go by
+    themselves; no contact sequence is given. Derivatives, also with respect to the parameter, are
+    those of the tangent flow. Bifurcations are located to rounding; where the number of multipliers
+    outside the unit circle changes otherwise, the step is refined, and what stays unexplained is
+    counted in ``branch_unexplained``.
+
+    Parameters
+    ----------
+    system : System
+        Forced, or without forcing: then its limit cycles are followed, with their period.
+    vary : mapping
+        One parameter and its range, such as ``{"frequency": ("2 Hz", "30 Hz")}``.
+    start : Dataset, or starts
+        What :func:`saltus.frequency_response`, :func:`saltus.bifurcation_diagram`,
+        :func:`saltus.attractors` or :func:`saltus.basins` returned: each of its periodic orbits is
+        followed. Or starts as for these: they are run at ``at`` values of the parameter first.
+        Default: at rest.
+    box : mapping, optional
+        Range (low, high) of each state for random starts: ``start="random 20"``.
+    at : int
+        Values of the parameter at which starts are run.
+    switch : sequence of str
+        Events at which the branches that leave are followed too.
+    longest : int
+        Doubled branches are followed up to orbits of this number of forcing periods.
+    points : int
+        Most points of a branch in each direction.
+    values : mapping, optional
+        Other values of parameters.
+    outputs : mapping of str to callable, or to (callable, unit), optional
+        What to read off each orbit besides the states, as for :func:`saltus.frequency_response`.
+    every : float or str, optional
+        For starts of a system without forcing: time between two samples [s].
+    method : Method
+        Default :class:`saltus.Taylor`; another one must be exact.
+    periods : int
+        For starts: forcing periods after which a trajectory hasn't settled.
+    seed : int
+        Of random starts.
+    threads : int, optional
+        Default all processors.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds.
+
+    Returns
+    -------
+    Dataset
+        Dims ``point``, ``branch``, ``event``, ``multiplier``, ``phase``, ``output``. On point:
+        ``point_branch``, ``point_<parameter>``, ``point_stable``, ``point_unstable_multipliers``,
+        ``point_period`` [s], ``point_peak`` and ``point_rms`` of the first state,
+        ``point_contacts``, ``point_itinerary``, ``point_margin``, multipliers (of a limit cycle
+        without the trivial one), the states at whole forcing periods, ``point_arclength``, and
+        ``point_output_maximum`` and so on of each state and output. On branch:
+        ``branch_periods``, ``branch_closed``, ``branch_parent``, ``branch_begin``, ``branch_end``.
+        On event: ``event_kind`` (``fold``, ``period_doubling``, ``branch_point``,
+        ``neimark_sacker``), ``event_<parameter>``, its states and multipliers.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used, or no periodic orbit is found to begin with.
+    Interrupted
+        On Ctrl-C; its ``partial`` is the Dataset of the branches that were finished.
+
+    References
+    ----------
+    Keller, in Applications of Bifurcation Theory (1977) 359-384; Kuznetsov, Elements of Applied
+    Bifurcation Theory (2004), chapter 10; Leine & Nijmeijer, Dynamics and Bifurcations of
+    Non-Smooth Mechanical Systems (2004).
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> start = {"x": "5 mm", "v": 0}
+    >>> found = sl.branches(rig, {"frequency": ("15 Hz", "18 Hz")}, start, at=3)
+    >>> [f"{kind} at {f:.6f} Hz" for kind, f in zip(found.event_kind.values,
+    ...                                              found.event_frequency.values)]
+    ['fold at 17.734087 Hz']
+    """
+    check_system(system)
+    method = check_method(method)
+    if not method.exact:
+        raise ParameterError(
+            f"sl.branches needs a method whose errors are rounding, not {method.name}: Newton's "
+            "method doesn't close its orbits. Leave method= out."
+        )
+    for name, value in (values or {}).items():
+        single(system, name, value)
+    system = system.with_values(**(values or {}))
+    name, limits = _range(system, vary)
+    chosen = frozenset(_kinds(switch))
+    wanted = outputs_of(system, outputs)
+    longest, points = whole(longest, "longest", 1), whole(points, "points", 2)
+    done = list[Branch]()
+    with reporting(progress) as show:
+        try:
+            if isinstance(start, xr.Dataset):
+                begins = seeds_of(system, name, start)
+            else:
+                places = np.linspace(*limits, whole(at, "at", 1) + 2)[1:-1]
+                begins = found_at(
+                    system, name, places, start, box, seed, every, method, periods, threads
+                )
+            begins = scaled(system, name, _inside(begins, limits), method)
+            if not begins:
+                raise ParameterError(
+                    f"no periodic orbit of {system.name} is known between {limits[0]:g} and "
+                    f'{limits[1]:g}: give other starts, more of them (start="random 20" with '
+                    "box=), or longer runs (periods=)."
+                )
+            plan = Plan(
+                lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads),
+                limits, points, longest, chosen,
+            )  # fmt: skip
+            trace(plan, begins, done, stage(show, 0.0, 0.9))
+        except KeyboardInterrupt:
+            raise Interrupted(
+                lambda: _dataset(system, name, limits, done, wanted, method)
+            ) from None
+        return _dataset(system, name, limits, done, wanted, method)
+
+
+def _dataset(
+    system: System,
+    name: str,
+    limits: tuple[float, float],
+    found: list[Branch],
+    outputs: Outputs,
+    method: Method,
+) -> xr.Dataset:
+    return table_of(system, name, limits, found, outputs, method)
+
+
+def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
+    """The parameter and its range [SI]."""
+    example = next(iter(system.values), "name")
+    if not isinstance(vary, Mapping) or len(vary) != 1:
+        raise ParameterError(
+            f"sl.branches follows one parameter: {{{example!r}: (low, high)}}, not {shown(vary)}."
+        )
+    ((name, ends),) = vary.items()
+    if name not in system.values:
+        raise ParameterError(
+            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
+        )
+    try:
+        low, high = (single(system, name, end) for end in ends)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"the range of {name} must be (low, high), not {shown(ends)}."
+        ) from None
+    if not low < high:
+        raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")
+    return name, (low, high)
+
+
+def _kinds(switch: Any) -> Sequence[str]:
+    """Kinds of events, checked."""
+    given = (switch,) if isinstance(switch, str) else tuple(switch)
+    for one in given:
+        if one not in SWITCHES:
+            raise ParameterError(f"switch={shown(one)} isn't known. {nearest(one, SWITCHES)}")
+    return given
+
+
+def _inside(seeds: list[Seed], limits: tuple[float, float]) -> list[Seed]:
+    return [seed for seed in seeds if limits[0] <= seed.own[-1] <= limits[1]]

@@ -1,0 +1,125 @@
+"""Where branches begin: the periodic responses and attractors that were found, or those that starts
+lead to at some values of the parameter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.branches.tracing import Seed
+from saltus.analysis.orbits.orbit_measures import measure
+from saltus.analysis.orbits.tolerances import LONGEST, RESTS
+from saltus.analysis.responses.grid import grid_of
+from saltus.analysis.responses.responses import find
+from saltus.errors import ParameterError, shown
+from saltus.flow.maps import Stroboscope
+from saltus.flow.methods import Method
+from saltus.results.dataset import schema
+from saltus.system.system import System
+
+#: Names of what a Dataset knows of its orbits: points, period, limit cycles' time.
+_PREFIX = {schema.RESPONSES: "response", schema.ATTRACTORS: "attractor", schema.BASINS: "attractor"}
+
+
+def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
+    """The periodic orbits of a Dataset as seeds of branches over the parameter ``name``.
+
+    Raises
+    ------
+    ParameterError
+        If the Dataset is of another system or kind, or over another parameter.
+    """
+    kind = schema.kind_of(found)
+    if kind not in _PREFIX:
+        raise ParameterError(
+            "start= takes what sl.frequency_response, sl.bifurcation_diagram, sl.attractors or "
+            f"sl.basins returned, or starts, not {shown(found)[:60]}."
+        )
+    if found.attrs.get("fingerprint") != system.fingerprint():
+        raise ParameterError(
+            f"start= holds orbits of {found.attrs.get('system')}, whose equations are others than "
+            f"those of {system.name}."
+        )
+    prefix = _PREFIX[kind]
+    own = f"{prefix}_{name}" if kind != schema.RESPONSES else schema.response_name(name)
+    values = found[own].values if own in found else np.full(found.sizes[prefix], np.nan)
+    values = np.where(np.isfinite(values), values, system.values[name])
+    label = schema.response_name if prefix == "response" else schema.attractor_name
+    points = np.stack([found[label(state)].values for state in system.states], axis=2)
+    times = found.get(f"{prefix}_cycle")
+    cycles = np.full(len(values), np.nan) if times is None else times.values
+    periods = found[f"{prefix}_period"].values
+    return list(_seeds(system, points, periods, cycles, values))
+
+
+def _seeds(
+    system: System, points: np.ndarray, periods: np.ndarray, times: np.ndarray, values: np.ndarray
+) -> Iterator[Seed]:
+    """Seeds of those that repeat, the shortest first; equilibria are none."""
+    for i in np.argsort(periods, kind="stable"):
+        n = int(periods[i])
+        mine = points[i][np.isfinite(points[i]).all(axis=1)]
+        if n < 1 or not len(mine):
+            continue
+        if system.forced_at is None:
+            if not times[i] > 0:
+                continue
+            yield Seed(mine[:1], np.array([times[i], values[i]]), _ranges(mine))
+        elif len(mine) >= n:
+            yield Seed(mine[:n], values[i : i + 1], np.full(points.shape[2], np.nan))
+
+
+def _ranges(points: np.ndarray) -> np.ndarray:
+    """Range of each state, its size where it rests."""
+    return _units(points.max(axis=0), points.min(axis=0))
+
+
+def _units(high: np.ndarray, low: np.ndarray) -> np.ndarray:
+    ranges, sizes = high - low, np.maximum(np.abs(high), np.abs(low))
+    return np.where(ranges > RESTS * sizes, ranges, np.where(sizes > 0, sizes, 1.0))
+
+
+def scaled(system: System, name: str, seeds: list[Seed], method: Method) -> list[Seed]:
+    """The seeds with the ranges of their states over the whole motion, where they aren't known."""
+    unknown = [i for i, seed in enumerate(seeds) if not np.isfinite(seed.scale).all()]
+    if not unknown:
+        return seeds
+    rows = np.tile(np.array(list(system.values.values())), (len(unknown), 1))
+    rows[:, list(system.values).index(name)] = [seeds[i].own[-1] for i in unknown]
+    starts = np.array([seeds[i].points[0] for i in unknown])
+    periods = np.array([len(seeds[i].points) for i in unknown])
+    numbers = measure(Stroboscope(system, method, rows), starts, periods)
+    result = list(seeds)
+    for place, i in enumerate(unknown):
+        scale = _units(numbers.maximum[place], numbers.minimum[place])
+        result[i] = replace(seeds[i], scale=np.where(np.isfinite(scale), scale, 1.0))
+    return result
+
+
+def found_at(
+    system: System,
+    name: str,
+    values: np.ndarray,
+    start: Any,
+    box: Mapping[str, Any] | None,
+    seed: int,
+    every: Any,
+    method: Method,
+    periods: int,
+    threads: int | None,
+) -> list[Seed]:
+    """Seeds from the attractors that starts lead to at some values of the parameter."""
+    grid = grid_of(system, {name: values}, start, box, None, seed, None, every)
+    found = find(grid, method, periods, threads, None)
+    if not found.complete:
+        raise KeyboardInterrupt
+    points = np.full((len(found), LONGEST, len(system.states)), np.nan)
+    for i in range(len(found)):
+        own = found.points(i)[:LONGEST]
+        points[i, : len(own)] = own
+    return list(_seeds(system, points, found.period, found.time, values[found.place]))
