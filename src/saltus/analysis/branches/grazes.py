@@ -40,6 +40,13 @@ class ContactEvent:
         The orbit's equations, without the contact that grazes.
     z : float64[z]
         The orbit in them.
+    place : int
+        The leg on which it happens.
+    state : float64[D]
+        There.
+    slope : float64[z]
+        Derivative of the gap that grazes with respect to the orbit; of a corner, of the time
+        between the contacts.
     """
 
     kind: str
@@ -47,6 +54,9 @@ class ContactEvent:
     phase: float
     legs: Legs
     z: np.ndarray
+    place: int
+    state: np.ndarray
+    slope: np.ndarray
 
     @property
     def orbit(self) -> np.ndarray:
@@ -98,25 +108,13 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
     gap = _Gap(legs, guard, legs.mode_of(place))
     begins = legs.nodes(z[None])[0][0, place]
     phase = _nearest_turn(legs, z, place, gap, (phase - begins) % legs.n) + begins
-    used, row = legs.count * (size + 1), np.zeros(1, np.int64)
-    scale = np.append(legs.scale[0], 1.0)
+    row, scale = np.zeros(1, np.int64), np.append(legs.scale[0], 1.0)
 
     def equations(u: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        z, when = u[:, :-1], u[:, -1]
-        residual, derivative = legs.evaluate(z, row)
-        first, _, rest = legs.nodes(z)
-        span = np.zeros_like(first)
-        span[:, place] = when - first[:, place]
-        state, by_z, by_time = legs.along(z, legs.at(z), span)
-        own, slopes, order = legs.orbits.own(rest)
-        found = gap.at(when * legs.unit, np.concatenate([state[:, place], own], axis=1))
-        value, normal, by_clock = found[..., 0], found[..., 1:-1], found[..., -1] * legs.unit
-        rows = normal[..., :size] @ by_z[:, place]
-        rows[..., used + order] += normal[..., size:] * slopes[:, None]
-        last = (normal[..., :size] @ by_time[:, place, :, None])[..., 0] + by_clock
+        residual, derivative = legs.evaluate(u[:, :-1], row)
+        _, value, slopes = _touch(legs, place, gap, u)
         whole = np.zeros((1, len(scale), len(scale)))
-        whole[:, :-2, :-1] = derivative
-        whole[:, -2:] = np.concatenate([rows, last[..., None]], axis=2) * scale
+        whole[:, :-2, :-1], whole[:, -2:] = derivative, slopes * scale
         unit = np.abs(whole[:, -2:]).max(axis=2)
         whole[:, -2:] /= unit[..., None]
         return np.concatenate([residual, value / unit], axis=1), whole
@@ -125,7 +123,31 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
     u, found = newton(equations, np.append(z, phase)[None], scale[None])
     if not found[0]:
         return None
-    return ContactEvent("graze", (guard,), float(u[0, -1]) % legs.n, legs, u[0, :-1])
+    state, _, slopes = _touch(legs, place, gap, u)
+    phase = float(u[0, -1]) % legs.n
+    return ContactEvent(
+        "graze", (guard,), phase, legs, u[0, :-1], place, state[0], slopes[0, 0, :-1]
+    )
+
+
+def _touch(
+    legs: Legs, place: int, gap: _Gap, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The state on a leg at a time, the gap there and its rate, and their derivatives with respect
+    to the orbit and the time: float64[k, D], float64[k, 2], float64[k, 2, z + 1].
+    """
+    z, when, size = u[:, :-1], u[:, -1], legs.size
+    first, _, rest = legs.nodes(z)
+    span = np.zeros_like(first)
+    span[:, place] = when - first[:, place]
+    state, by_z, by_time = legs.along(z, legs.at(z), span)
+    own, slopes, order = legs.orbits.own(rest)
+    found = gap.at(when * legs.unit, np.concatenate([state[:, place], own], axis=1))
+    value, normal, by_clock = found[..., 0], found[..., 1:-1], found[..., -1] * legs.unit
+    rows = normal[..., :size] @ by_z[:, place]
+    rows[..., legs.count * (size + 1) + order] += normal[..., size:] * slopes[:, None]
+    last = (normal[..., :size] @ by_time[:, place, :, None])[..., 0] + by_clock
+    return state[:, place], value, np.concatenate([rows, last[..., None]], axis=2)
 
 
 def _nearest_turn(legs: Legs, z: np.ndarray, place: int, gap: _Gap, since: float) -> float:
@@ -175,4 +197,7 @@ def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
         return None
     guards = (legs.contacts[place].guard, legs.contacts[after].guard)
     phase = float(legs.nodes(u)[0][0, place]) % legs.n
-    return ContactEvent("corner", guards, phase, legs, u[0])
+    slope = np.zeros(len(z))
+    slope[after * width], slope[place * width] = 1.0, -1.0
+    state = legs.nodes(u)[1][0, place]
+    return ContactEvent("corner", guards, phase, legs, u[0], place, state, slope)

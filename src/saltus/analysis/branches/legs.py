@@ -18,10 +18,11 @@ from saltus.analysis.branches.contact_sequences import ContactSequence, sequence
 from saltus.analysis.branches.contacts_along import At, Jumps
 from saltus.analysis.branches.shooting import PeriodicOrbits, across, multipliers
 from saltus.flow.maps import Stroboscope
+from saltus.kernels import status as st
 from saltus.system.leg import leg
 
-#: Distance from the free flow's orbit, in units of the scale, within which it is the same orbit.
-SAME = 1e-6
+#: Shorter times are rounding, in periods.
+AT_ONCE = 1e-14
 
 
 class Legs:
@@ -118,6 +119,32 @@ class Legs:
     def mode_of(self, place: int) -> int:
         """The mode of a leg, as bits."""
         return self._modes[place]
+
+    def jumps_at(self, place: int) -> bool:
+        """Whether the state jumps at a contact."""
+        return self.contacts[place].kind == st.IMPACT
+
+    def sequence_at(self, z: np.ndarray) -> ContactSequence:
+        """The contacts of an orbit float64[z]."""
+        phase, _, _ = self.nodes(z[None])
+        after = self.at(z[None]).after[0]
+        speeds = self.speeds(z[None])[0] if self.contacts else np.zeros(1)
+        count = len(self.contacts)
+        return ContactSequence(
+            self.contacts, phase[0, :count], after[:count], speeds[:count], self.sequence.mode
+        )
+
+    @property
+    def free_scale(self) -> np.ndarray:
+        """Units of the unknowns with the contact sequence left to the flow."""
+        unit = self.scale[0]
+        rest = unit[self.count * (self.size + 1) :]
+        return np.append(np.tile(unit[1 : self.size + 1], self.n), rest)
+
+    def tangent(self, z: np.ndarray) -> np.ndarray:
+        """A unit vector along the curve at an orbit float64[z], in units of the scale."""
+        derivative = self.evaluate(z[None], np.zeros(1, np.int64))[1]
+        return np.asarray(np.linalg.svd(derivative[0])[2][-1])
 
     # -- flights -----------------------------------------------------------------------------------
     def fly(
@@ -305,6 +332,7 @@ class Legs:
         points = np.empty((len(z), self.n, self.size))
         for k in range(self.n):
             since = (k - phase) % self.n  # time since each contact
+            since[np.minimum(since, self.n - since) < AT_ONCE] = 0.0
             last = since.argmin(axis=1)
             rows = np.arange(len(z))
             wanted = np.zeros_like(phase)
