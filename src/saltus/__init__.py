@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.attractors import attractors, basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
-    from saltus.analysis.branches.branches import branches
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
     from saltus.analysis.methods.regularisation_widths import regularisation_widths
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from saltus.analysis.motion.structure_modes import structure_modes
     from saltus.analysis.motion.transmissibility import transmissibility
     from saltus.analysis.recorded.wolf import wolf
+    from saltus.analysis.responses.all_branches import branches
     from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
     from saltus.analysis.responses.frequency_response import frequency_response
     from saltus.errors import SaltusError
@@ -103,7 +103,7 @@ _HOMES = {
     "spectrum": "saltus.analysis.motion.spectrum",
     "stroboscope": "saltus.analysis.motion.stroboscope",
     "structure_modes": "saltus.analysis.motion.structure_modes",
-    "branches": "saltus.analysis.branches.branches",
+    "branches": "saltus.analysis.responses.all_branches",
     "transmissibility": "saltus.analysis.motion.transmissibility",
     "wolf": "saltus.analysis.recorded.wolf",
     "SaltusError": "saltus.errors",

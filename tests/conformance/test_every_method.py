@@ -120,6 +120,42 @@ def test_contacts_are_where_they_are_within_the_errors_that_are_told(method):
     )
 
 
+#: A ball that falls from a height of 1 onto a stop and rebounds with e = 0.8.
+@sl.system(states="x v")
+def ball(t, x, v, *, restitution=0.8):
+    return v, -2.0, sl.impact(x > 0.0, -v, restitution=restitution)
+
+
+@every
+def test_an_impact_is_where_it_is_within_the_errors_that_are_told(method):
+    """At t = 1 with the speed 2; at rest on the stop from t = 9 on, where only the exact method
+    goes on.
+    """
+    run = sl.simulate(ball, (1.0, 0.0), t_end=2.0, samples=1, method=method, time_errors="local")
+    assert str(run.status.values) == "ok"
+    assert run.contact_kind.values.tolist() == ["impact"]
+    assert run.contact_direction.values.tolist() == [-1]
+    off = abs(run.contact_time.values[0] - 1.0)
+    told = run.contact_time_error.values[0]  # without how errors of v grow into x: another of them
+    assert off <= 2.0 * told + 1e-14
+    if not method.records_contacts:  # met at the next node
+        return
+    assert off < 3.0 * method.noise
+    assert run.contact_velocity.values[0] == pytest.approx(-2.0, rel=method.noise)
+    assert float(run.end_x) == pytest.approx(1.6 - 1.0, abs=3.0 * method.noise)
+    assert float(run.end_v) == pytest.approx(1.6 - 2.0, abs=3.0 * method.noise)
+
+
+@pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
+@every
+def test_impacts_that_accumulate_are_completed_or_named(method):
+    run = sl.simulate(ball, (1.0, 0.0), t_end=12.0, samples=1, method=method, time_errors="local")
+    if method.exact:
+        assert (str(run.status.values), float(run.end_x)) == ("ok", 0.0)
+    else:
+        assert str(run.status.values) in ("budget_events", "turned")
+
+
 # -- one trajectory and many -----------------------------------------------------------------------
 RIG = sl.models.delangre("b", force="4 N", frequency="7 Hz")
 START = np.random.default_rng(5).uniform((-1e-3, -0.1), (1e-3, 0.1), (6, 2))
@@ -249,6 +285,26 @@ def test_all_are_compared_side_by_side():
     assert (table["method_agreement"] == 1.0).all()
     assert (table["step_error"].isel(method=slice(1, None)) > 0.0).all()
     assert (table["steps_per_period"] > 0.0).all()
+    stopped = sl.compare_methods(
+        sl.models.impact_oscillator(),
+        sl.frequency_response,
+        [sl.ODE45(1e-6, 1e-9), sl.RK4(5e-3), sl.RK4(5e-3, "ignore")],
+        frequency=("1 rad/s", "1.1 rad/s", 2),
+    )
+    exact, ode45, located, late = stopped["step_error"].values.max(axis=1)
+    assert (stopped["method_agreement"] == 1.0).all()
+    assert exact == 0.0
+    assert max(ode45, located) < 1e-6
+    assert late > 1e-4  # h = 5e-3, and the impact is up to a step late
+    rests = sl.compare_methods(
+        sl.models.bouncing_ball(),
+        sl.bifurcation_diagram,
+        [sl.ODE45(1e-6, 1e-9)],
+        vary={"amplitude": (1.1, 1.2, 2)},
+        start=(2.0, 0.0),
+    )
+    assert (rests["type"].values[1] == "failed").all()
+    assert np.isnan(rests["step_error"].values[1]).all()
     maps = sl.compare_methods(
         RIG,
         sl.basins,

@@ -26,6 +26,7 @@ BOX = {
     "in units": {"x": ("-1 mm", "1 mm", 4), "v": ("-20 mm/s", "20 mm/s", 4)},
 }
 FREQUENCY = {"in SI": [17.0], "in units": ["17 Hz"]}
+BRANCH = {"in SI": (16.9, 17.1), "in units": ("16.9 Hz", "17.1 Hz")}
 
 
 def spring_force(x, mass, natural_frequency):
@@ -61,6 +62,10 @@ CALLS = {
     "bifurcation_diagram": lambda how: (
         RIG,
         {"vary": {"frequency": FREQUENCY[how]}, "start": START[how]},
+    ),
+    "branches": lambda how: (
+        RIG,
+        {"vary": {"frequency": BRANCH[how]}, "start": START[how], "at": 1, "longest": 1},
     ),
     "compare": lambda how: (given("basins", how), {"map_b": given("basins", "in SI")}),
     "compare_methods": lambda how: (

@@ -23,8 +23,9 @@ _ADVICE = {
     st.BUDGET_STEPS: "Raise max_steps of the method, say Taylor(max_steps=10**10); if steps shrink "
     "towards one place, the equations are "
     "singular there.",
-    st.BUDGET_EVENTS: "Contacts accumulate; give the contact a finite stiffness or damping, or "
-    "raise max_events of the method.",
+    st.BUDGET_EVENTS: "Contacts accumulate; sl.Taylor() follows impacts to rest and friction that "
+    "sticks. Else give the contact a finite stiffness or damping, or raise max_events of the "
+    "method.",
     st.NONFINITE: "The motion left the range of numbers, or met a pole or a root of something "
     "negative: check the equations at that state.",
     st.TURNED: 'Take sl.RK4(..., events="bisect"), a shorter step, or sl.Taylor().',

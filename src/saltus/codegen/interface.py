@@ -62,10 +62,8 @@ BATCH = (
 
 _CLOCKS = {"numbers_of_clocks": (ARRAY, ARRAY)}
 _JUMP = {"jump": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE)}
-_LAWS = {
-    "reset": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE, ARRAY),
-    "settle": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE),
-}
+_RESET = {"reset": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE, ARRAY)}
+_SETTLE = {"settle": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE)}
 
 #: What the layouts' ``workspace()`` return.
 _TAYLOR_WORK = (_F2,) * 14 + (_I2,) + (_F1, _F2, _F2, _F1, _F1, _F1, _F1, _F2, _F1, _F1)
@@ -102,7 +100,8 @@ TAYLOR = Interface(
             "rates": (ARRAY,) * 5,
             **_CLOCKS,
             **_JUMP,
-            **_LAWS,
+            **_RESET,
+            **_SETTLE,
         }
     ),
     truths=("turns",),
@@ -117,6 +116,7 @@ _OF_RATES = MappingProxyType(
         "gap_rates": (REAL,) + (ARRAY,) * 6,
         **_CLOCKS,
         **_JUMP,
+        **_RESET,
     }
 )
 _TABLEAU = ("STAGE_TIME", "WEIGHT", "ERROR_WEIGHT", "DENSE_WEIGHT")
@@ -150,9 +150,10 @@ def _one_by_one(
             "MULTISTEP",
             *sizes,
         ),
-        flags=("TANGENT", "GAPS_IN_TIME"),
+        flags=("TANGENT", "GAPS_IN_TIME", "LAWS"),
         tables=MappingProxyType(
-            {"CLOCK_KIND": WHOLE, "CLOCK_TABLE": WHOLE} | dict.fromkeys(tables, REAL)
+            {"CLOCK_KIND": WHOLE, "CLOCK_TABLE": WHOLE, "LAW": WHOLE, "LAW_SIDE": REAL}
+            | dict.fromkeys(tables, REAL)
         ),
         functions=MappingProxyType(dict(functions)),
         truths=(),

@@ -13,9 +13,9 @@ from dataclasses import replace
 
 from saltus.codegen.clocks import Clocks
 from saltus.codegen.head import Constant, Head
-from saltus.codegen.saltation import jump_function
+from saltus.codegen.saltation import jump_function, reset_function
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
-from saltus.codegen.taylor_head import bits_of, evaluation_order
+from saltus.codegen.taylor_head import bits_of, evaluation_order, tables, tables_of_laws
 from saltus.errors import ParameterError
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
@@ -129,8 +129,8 @@ def never_held(system: System) -> System:
     Raises
     ------
     ParameterError
-        If its state jumps at contacts, or a contact is held by more than its force while it moves:
-        the right-hand side alone doesn't say so.
+        If a contact is held by more than its force while it moves: the right-hand side alone
+        doesn't say so.
     """
     for guard in system.guards:
         limit = guard.law.limit if guard.law else None
@@ -138,11 +138,6 @@ def never_held(system: System) -> System:
             raise ParameterError(
                 f"{system.name} has static friction above kinetic friction at {guard.name!r}, "
                 f"which only sl.Taylor() follows. Leave method= out."
-            )
-        if guard.law and guard.law.reset:
-            raise ParameterError(
-                f"{system.name} has an impact or a jump at {guard.name!r}, which only sl.Taylor() "
-                f"follows. Leave method= out."
             )
     guards, field = list(system.guards), system.field
     for number, guard in enumerate(system.guards):
@@ -157,6 +152,7 @@ def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool =
     them; ``numbers`` are those of the method (codegen/tableaux.py).
     """
     system = never_held(system)
+    laws = tables_of_laws(system)
     stages = _Stages(system)
     gaps = [guard.gap for guard in system.guards]
     field = _outputs(_with_sides(system, stages, system.field, of_mode=True), system.field)
@@ -177,6 +173,8 @@ def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool =
         NDRIVE=len(stages.drives.nodes),
         TANGENT=system.tangent_of is not None,
         GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
+        LAWS=any(guard.law and guard.law.reset for guard in system.guards),
+        **tables(LAW=laws["LAW"], LAW_SIDE=laws["LAW_SIDE"]),
         **stages.clocks.constants(), **numbers,
     )  # fmt: skip
     functions = [
@@ -186,6 +184,7 @@ def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool =
         f"@kernel\ndef field(t, y, c, q, h, mode, out):\n{field}\n",
         f"@kernel\ndef gaps(t, y, c, q, h, out):\n{gap_values}\n",
         jump_function(system, stages.clocks),
+        reset_function(system, stages.clocks),
         f"@kernel\ndef gap_rates(t, y, dy, c, q, h, out):\n{gap_rates}\n",
     ]
     if jacobian:

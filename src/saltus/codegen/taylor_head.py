@@ -167,12 +167,12 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         NSERIES=len(series),
         PROBED=probed, TANGENT=system.tangent_of is not None,
         LAWS=any(guard.law for guard in system.guards),
-        **_tables(
+        **tables(
             STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row,
             GUARD_SERIES=[series.index(row) for row in guards.row],
             GUARD_SIGN=guards.sign, SNAP_STATE=guards.snap_state, SNAP_CONST=guards.snap_const,
             SINGULAR_GUARD=list(aside.guards),
-            **_laws(system),
+            **tables_of_laws(system),
         ),
         **clocks.constants(),
     )  # fmt: skip
@@ -190,7 +190,7 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
     return Head(constants_of_head, "\n".join(functions))
 
 
-def _laws(system: System) -> dict[str, list]:
+def tables_of_laws(system: System) -> dict[str, list]:
     """Tables of the laws of contact, for each guard: its kind, the guard that says whether it is
     held (of that one: whose contact), its side.
     """
@@ -245,9 +245,9 @@ def _jets_functions(code: JetCode, columns: int, handed_row: int, terms: int) ->
     return "".join(texts) + f"@inner\ndef jets(y, side, c, clock, work):\n{indented(lines)}\n"
 
 
-def _tables(**tables: list) -> dict[str, Constant]:
+def tables(**rows: list) -> dict[str, Constant]:
     """Tables as they stand in a head: never empty."""
-    return {name: tuple(rows) or (0,) for name, rows in tables.items()}
+    return {name: tuple(entries) or (0,) for name, entries in rows.items()}
 
 
 def _write_guards(

@@ -32,12 +32,14 @@ class RK4(Method):
         shorter.
     events : {"ignore", "henon", "inverse", "bisect"}
         ``"ignore"``: the right-hand side picks its side from the state at every stage; the order
-        falls to 2 where a force bends, to 1 where it jumps. The others keep the side of a contact
+        falls to 2 where a force bends, to 1 where it jumps. An impact or a jump of the state then
+        happens at the first node past its boundary: order 1. The others keep the side of a contact
         until a step lands on its boundary, then start afresh, and keep the order. ``"henon"``: one
         step back from the start of the step that crossed, with the gap in place of time.
         ``"inverse"``: time as a cubic of the gap through both ends of that step, twice.
         ``"bisect"``: the step is halved until it ends just beyond the boundary. Where a gap turns
-        about within the step that crossed, the first two end with status ``turned``.
+        about within the step that crossed, the first two end with status ``turned``; at an impact,
+        also where its rate more than doubles in the step.
     tolerance : float
         How closely ``"bisect"`` brackets a contact, as a share of a step [-].
     max_steps, max_events : int, optional

@@ -22,7 +22,8 @@ _PARAMETERS = """
     events : {"locate", "ignore"}
         ``"locate"``: integration stops at each contact and starts afresh, as with MATLAB's Events
         option. ``"ignore"``: contacts are stepped over and the right-hand side picks its side from
-        the state, as without it.
+        the state, as without it; impacts and jumps of the state happen at the end of the step that
+        has passed their boundary.
     max_steps, max_events : int, optional
         Budgets of one trajectory. Default: 10 000 steps per period and a million more; 10 million
         contacts.

@@ -148,11 +148,7 @@ def step(i, t, t_stop, t_leg, t_end, batch, work):
     NaN, or no step is short enough.
     """
     rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]
-    shortest = 16.0 * ulp(t)
-    h = min(longest_step(t_leg, t_end), max(shortest, batch.carry[i, LENGTH]))
-    last = 1.1 * h >= t_stop - t
-    if last:
-        h = t_stop - t
+    h, shortest, last = length_asked(i, t, t_stop, t_leg, t_end, batch)
     k, ns, rejections = int(work[S + ORDER_NOW]), int(work[S + SAME]), 0
     while True:
         if h != work[S + LAST_H] or rejections > 0:

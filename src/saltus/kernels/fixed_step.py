@@ -14,6 +14,8 @@ t, t_new ends of a step; t_stop the next end or break of time; h = t_new - t. Ti
 STEP, CLOSENESS = range(2)
 #: A step ends at t_stop if it falls short of it by a millionth of its length at most.
 REACHES = 1.000001
+#: Flights of fewer of bisection's last brackets are those of its errors.
+BRACKETS = 64.0
 #: Share of a step that tells to which side a motion leaves a boundary on which it stands still.
 START_OF_STEP = 0.001
 
@@ -22,6 +24,12 @@ START_OF_STEP = 0.001
 def law_mode(i, batch):
     """The mode that the right-hand side is in."""
     return batch.mode[i] if batch.options[i, LOCATE] != 0.0 else FROM_STATE
+
+
+@inner
+def at_once(i, t, batch):
+    """The time [s] within which two contacts can't be told apart."""
+    return max(128.0 * ulp(t), BRACKETS * batch.options[i, CLOSENESS] * batch.options[i, STEP])
 
 
 @kernel
@@ -37,6 +45,7 @@ def settle_sides(i, t, batch, work):
         goes = work[RATE + g] if work[RATE + g] != 0.0 else work[AT_NEXT + g]
         if work[AT_NODE + g] == 0.0 and goes > 0.0:
             batch.mode[i] |= 1 << g
+    batch.mode[i] = allowed(batch.mode[i])
     rate_at(t, NODE, Q, law_mode(i, batch), K1, work)
 
 

@@ -29,18 +29,53 @@ def settle_sides(i, t, batch, work):
 
 
 @inner
+def at_once(i, t, batch):
+    """The time [s] within which odezero can't tell two contacts apart."""
+    return RESOLUTION * ulp(t)
+
+
+@inner
 def longest_step(t_leg, t_end):
     """A tenth of the leg's span."""
     return 0.1 * (t_end - t_leg)
 
 
 @inner
+def length_asked(i, t, t_stop, t_leg, t_end, batch):
+    """What a step begins with: (its length, the shortest that it may become, whether it ends at
+    t_stop).
+    """
+    shortest = 16.0 * ulp(t)
+    length = max(shortest, min(longest_step(t_leg, t_end), batch.carry[i, LENGTH]))
+    last = 1.1 * length >= t_stop - t
+    return t_stop - t if last else length, shortest, last
+
+
+@inner
 def find_contact(i, t, t_new, t_leg, h, batch, work):
     """The first contact of a step: (its time, or the step's end; end and length of the step that it
-    lies in; whether there is one; RUNNING).
+    lies in; whether there is one; RUNNING). A state that rebounds does so just before the boundary.
     """
     gaps_at(t_new, NEXT, Q_STAGE, AT_NEXT, work)
     if any_sign_change(work, AT_NODE, AT_NEXT):
-        t_hit, lands = odezero(t, t_new, t_leg, h, work)
-        return t_hit, t_new, h, lands, RUNNING
+        t_before, t_hit, lands = odezero(t, t_new, t_leg, h, work)
+        if LAWS and rebounds(i, t_hit, t, h, batch, work):
+            return t_before, t_new, h, True, RUNNING
+        return t_hit, t_new, h, lands or (LAWS and any_strikes(work)), RUNNING
     return t_new, t_new, h, False, RUNNING
+
+
+@kernel
+def rebounds(i, t_hit, t, h, batch, work):
+    """Whether the state leaves a boundary that it has reached to the side from which it came: at a
+    stop, or where a jump turns it about.
+    """
+    for g in range(NGUARDS):
+        if strikes(work, g):
+            dense(t_hit, t, h, work)
+            drive_at(t_hit, Q, work)
+            work[LATE] = 0.0
+            behind = leap(i, g, t_hit, POINT, batch, work)
+            if LAW[g] == IMPACT_LAW or (waits(g, behind) and lies_on(g, t_hit, work)):
+                return True
+    return False

@@ -260,7 +260,7 @@ def step(i, t, t_stop, t_leg, t_end, batch, work):
     """
     rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]
     shortest = 16.0 * ulp(t)
-    length = min(longest_step(t_leg, t_end), max(shortest, batch.carry[i, LENGTH]))
+    length = max(shortest, min(longest_step(t_leg, t_end), batch.carry[i, LENGTH]))
     if length == shortest and work[S + SHORTEST_YET] != 0.0:
         length = work[S + LAST_LENGTH]
     work[S + SHORTEST_YET] = 1.0 if length == shortest else 0.0

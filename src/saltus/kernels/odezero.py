@@ -17,26 +17,43 @@ gaps matter, so halved values do no harm.
 
 # Ends of the bracket that moved last.
 NEITHER, MOVED_LEFT, MOVED_RIGHT = range(3)
-SMALLEST_NORMAL = 2.2250738585072014e-308
+#: Width of the last bracket [ulp of the time].
+RESOLUTION = 128.0
 
 
 @kernel
 def odezero(t, t_new, t_leg, h, work):
-    """The end of the step up to which no contact happens: (time of the first contact, whether it
-    ends the leg), times in s.
+    """The first contact of a step: (a time just before it, its time, whether it ends the leg),
+    times in s.
 
     Needs the gaps at t and t_new at AT_NODE and AT_NEXT. Afterwards LEFT and RIGHT bracket the
     contact: the gaps that differ in sign there are those that close. A contact at the very start of
     a leg (t_leg) doesn't end it: it is the one that began it.
     """
-    tol = min(128.0 * max(ulp(t), ulp(t_new)), abs(t_new - t))
-    t_left, t_right, t_try = t, t_new, t_new
     for g in range(NGUARDS):
-        work[LEFT + g], work[RIGHT + g], work[TRY + g] = (
-            work[AT_NODE + g],
-            work[AT_NEXT + g],
-            work[AT_NEXT + g],
-        )
+        work[LEFT + g] = work[AT_NODE + g]
+    t_left, t_right = narrow(t, t, t_new, h, work)
+    if LAWS:
+        while t_left == t_leg and t_right < t_new and not any_strikes(work):
+            # MATLAB looks no further: the state would fall through a stop
+            for g in range(NGUARDS):
+                work[LEFT + g] = work[RIGHT + g]
+            if not any_sign_change(work, LEFT, AT_NEXT):
+                break
+            t_leg = t_right
+            t_left, t_right = narrow(t, t_right, t_new, h, work)
+    return t_left, t_right, t_left != t_leg
+
+
+@inner
+def narrow(t, t_left, t_new, h, work):
+    """The bracket of the first contact between t_left, whose gaps stand in LEFT, and the end of the
+    step.
+    """
+    tol = min(RESOLUTION * max(ulp(t), ulp(t_new)), abs(t_new - t))
+    t_right, t_try = t_new, t_new
+    for g in range(NGUARDS):
+        work[RIGHT + g], work[TRY + g] = work[AT_NEXT + g], work[AT_NEXT + g]
     moved = NEITHER
     while t_right - t_left > tol:
         place = propose(t, t_left, t_right, t_try, tol, work)
@@ -53,7 +70,16 @@ def odezero(t, t_new, t_leg, h, work):
             if moved == MOVED_LEFT:
                 halve(work, RIGHT)
             moved = MOVED_LEFT
-    return t_right, t_left != t_leg
+    return t_left, t_right
+
+
+@inner
+def any_strikes(work):
+    """Whether the state jumps at one of the gaps that close."""
+    found = False
+    for g in range(NGUARDS):
+        found |= strikes(work, g)
+    return found
 
 
 @inner
@@ -104,7 +130,7 @@ def give_up(work, row):
 def halve(work, row):
     """The Illinois rule, where it doesn't lose the sign."""
     for g in range(NGUARDS):
-        if abs(0.5 * work[row + g]) >= SMALLEST_NORMAL:
+        if abs(0.5 * work[row + g]) >= SMALLEST:
             work[row + g] *= 0.5
 
 

@@ -10,9 +10,11 @@ contacts are the bits of `mode`, or those of the state at FROM_STATE.
 
 from saltus.kernels.lanes import spacing
 from saltus.kernels.parts import part
+from saltus.kernels.status import IMPACT_LAW, JUMP_LAW
 
 #: As a mode: the right-hand side picks its sides from the state that it is given.
 FROM_STATE = -1
+SMALLEST = 2.2250738585072014e-308
 
 
 @inner
@@ -31,9 +33,13 @@ def rate_at(time, state, q, mode, out, work):
 
 @inner
 def gaps_at(time, state, q, out, work):
-    """All gaps, to `out`."""
+    """All gaps, to `out`. A state that lies on a stop hasn't passed it."""
     c, h = part(work, C, NCONST), part(work, H, HELD * NCLOCKS)
     gaps(time, part(work, state, NSTATES), c, part(work, q, NDRIVE), h, part(work, out, NGUARDS))
+    if LAWS:
+        for g in range(NGUARDS):
+            if LAW[g] == IMPACT_LAW and work[out + g] == 0.0:
+                work[out + g] = LAW_SIDE[g] * SMALLEST
 
 
 @inner
@@ -52,6 +58,34 @@ def sides(at, work):
         if work[at + g] > 0.0:
             bits |= 1 << g
     return bits
+
+
+@inner
+def allowed(bits):
+    """Mode bits with those of stops on the side that these allow, whatever rounding says."""
+    if LAWS:
+        for g in range(NGUARDS):
+            if LAW[g] == IMPACT_LAW:
+                bits = bits | 1 << g if LAW_SIDE[g] > 0.0 else bits & ~(1 << g)
+    return bits
+
+
+@inner
+def leaps(g):
+    """Whether the state jumps at the boundary of a guard."""
+    return LAW[g] == IMPACT_LAW or LAW[g] == JUMP_LAW
+
+
+@inner
+def waits(g, mode):
+    """Whether it does when the gap closes from the side that it has in a mode."""
+    return leaps(g) and (mode >> g & 1 == 1) == (LAW_SIDE[g] > 0.0)
+
+
+@inner
+def strikes(work, g):
+    """Whether the gap closes, from LEFT to RIGHT, and the state jumps."""
+    return leaps(g) and changes_sign(work, LEFT, RIGHT, g) and work[LEFT + g] * LAW_SIDE[g] > 0.0
 
 
 # -- signs -----------------------------------------------------------------------------------------

@@ -23,11 +23,7 @@ def step(i, t, t_stop, t_leg, t_end, batch, work):
     NaN, or no step is short enough.
     """
     rtol, theta = batch.options[i, RTOL], batch.options[i, ATOL] / batch.options[i, RTOL]
-    shortest = 16.0 * ulp(t)
-    length = min(longest_step(t_leg, t_end), max(shortest, batch.carry[i, LENGTH]))
-    last = 1.1 * length >= t_stop - t
-    if last:
-        length = t_stop - t
+    length, shortest, last = length_asked(i, t, t_stop, t_leg, t_end, batch)
     rejections = 0
     while True:
         t_new = t_stop if last else t + length

@@ -9,34 +9,38 @@ from saltus.kernels.clocks_layout import HELD, NUMBERS
 # `work` is one array for everything, so that the compiler sees that its parts don't overlap and
 # keeps them in registers (measured: a few per cent). Where its parts start: vectors of states - the
 # ROWS of the method, the first of them the rate at the start of the step and the last the rate at
-# its end; the states there, a point between them, the error estimate divided by h, zeros -
+# its end; the states there, a point between them, the error estimate divided by h, zeros, a rate
+# behind a jump of the state -
 K1, K_END = 0, NSTATES * (ROWS - 1)
-VECTORS, GAPS, DRIVES = ROWS + 5, 7, 2
-NODE, NEXT, POINT, ERROR, REST = (NSTATES * (ROWS + row) for row in range(5))
+VECTORS, GAPS, DRIVES = ROWS + 6, 9, 2
+NODE, NEXT, POINT, ERROR, REST, BEHIND = (NSTATES * (ROWS + row) for row in range(6))
 # gaps - at the ends of the step, the three of the root finder, their rates at a contact and those
-# of a state at rest -
-AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST = (
+# of a state at rest, before a jump of the state, their rates behind it -
+AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST, BEFORE, RATE_BEHIND = (
     VECTORS * NSTATES + NGUARDS * row for row in range(GAPS)
 )
 # q at the time of a stage, last at the end of the step, and at any other; c.
 Q_STAGE, Q = (VECTORS * NSTATES + GAPS * NGUARDS + NDRIVE * row for row in range(DRIVES))
 C = VECTORS * NSTATES + GAPS * NGUARDS + DRIVES * NDRIVE
-# What the clocks hold, and their numbers; the NUMBERS_OF_METHOD; MATRICES of states by states.
+# What the clocks hold, and their numbers; the NUMBERS_OF_METHOD; MATRICES of states by states; what
+# a law of contact says of its impact; the time [s] by which it was landed on beside its boundary.
 H = C + NCONST
 N = H + HELD * NCLOCKS
 S = N + (NUMBERS + 1) * NCLOCKS
 M = S + NUMBERS_OF_METHOD
-WORK = M + MATRICES * NSTATES * NSTATES
+TOLD = M + MATRICES * NSTATES * NSTATES
+LATE = TOLD + 2
+WORK = LATE + 1
 
 
 # Columns of `carry`, what a paused trajectory needs besides its state: time, start of the leg, next
-# step length, and the error estimates of all steps so far, added up for each state; of a method
-# that looks back (MULTISTEP is 1, not 0) its rows, numbers and matrices.
-TIME, LEG, LENGTH, ERRORS = range(4)
+# step length, contacts met in one instant, the error estimates of all steps so far, added up for
+# each state; of a method that looks back (MULTISTEP is 1, not 0) its rows, numbers and matrices.
+TIME, LEG, LENGTH, AT_ONCE, ERRORS = range(5)
 PAST = ERRORS + NSTATES
 CARRY = PAST + MULTISTEP * (ROWS * NSTATES + NUMBERS_OF_METHOD + MATRICES * NSTATES * NSTATES)
-#: Records that one step may write at most.
-STEP_RECORDS = NGUARDS
+#: Records that one step may write at most: an impact may carry the state over every other boundary.
+STEP_RECORDS = NGUARDS * (NGUARDS if LAWS else 1)
 
 
 def workspace():

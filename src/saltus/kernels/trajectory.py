@@ -7,7 +7,8 @@ One step reads: step -> find the contact -> write samples -> land or go on. A me
 - ``step``, from NODE to NEXT, with the rate there at K_END and q at Q_STAGE;
 - ``dense``, the state inside the step, to POINT;
 - ``find_contact``, whose LEFT and RIGHT differ in sign where a gap closes;
-- ``law_mode`` and ``settle_sides``: the sides that its right-hand side sees.
+- ``law_mode`` and ``settle_sides``: the sides that its right-hand side sees;
+- ``at_once``: the time [s] within which it can't tell two contacts apart.
 
 Symbols
 -------
@@ -25,6 +26,9 @@ from saltus.kernels.status import (
     CROSSING,
     EVENTS,
     FINISHED,
+    IMPACT,
+    IMPACT_LAW,
+    JUMP_LAW,
     NONFINITE,
     OK,
     PAUSED,
@@ -48,6 +52,10 @@ from saltus.kernels.status import (
 
 # Columns of `options` that all methods have.
 LOCATE, MAX_STEPS, MAX_EVENTS = range(2, 5)
+#: Contacts in one instant after which they count as accumulating: flights have become too short to
+#: tell.
+MOST_AT_ONCE = 20
+ROUNDING = 2.220446049250313e-16
 
 
 # -- sides -----------------------------------------------------------------------------------------
@@ -56,7 +64,7 @@ def check_sides(i, batch, work):
     """After a step without contact: the sides are those of the gaps. A gap that has changed sides
     unseen is counted.
     """
-    now = sides(AT_NEXT, work)
+    now = allowed(sides(AT_NEXT, work))
     if now != batch.mode[i]:
         for g in range(NGUARDS):
             if (now ^ batch.mode[i]) >> g & 1 and work[AT_NODE + g] != 0.0:
@@ -86,7 +94,7 @@ def write_sample(i, time, state, batch, work):
         batch.samples[i, m, j] = work[state + j]
     drive_at(time, Q, work)
     gaps_at(time, state, Q, TRY, work)
-    batch.sample_mode[i, m] = sides(TRY, work)
+    batch.sample_mode[i, m] = allowed(sides(TRY, work))
     batch.cursor[i] = m + 1
 
 
@@ -129,10 +137,16 @@ def land(i, t, t_hit, t_new, h, batch, work):
     rate_at(t_hit, NEXT, Q, law_mode(i, batch), K1, work)
     gap_rates_at(t_hit, NEXT, K1, Q, RATE, work)
     gap_errors(i, t_hit, batch, work)
+    if LAWS and batch.options[i, LOCATE] == 0.0:
+        for g in range(NGUARDS):
+            work[TRY + g] += abs(h * work[RATE + g])
     record_contacts(i, t_hit, batch, work)
-    if TANGENT or law_mode(i, batch) != FROM_STATE:
+    if LAWS:
+        strike_all(i, t_hit, batch, work)
+    if TANGENT or LAWS or law_mode(i, batch) != FROM_STATE:
         rate_at(t_hit, NEXT, Q, law_mode(i, batch), K1, work)
     gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
+    face(i, AT_NEXT, batch, work)
 
 
 @kernel
@@ -153,23 +167,27 @@ def gap_errors(i, t_hit, batch, work):
 
 @inner
 def record_contacts(i, t_hit, batch, work):
-    """Count and record every gap that closes at t_hit; sets the mode."""
+    """Count and record every gap that closes at t_hit and lets the state be; sets the mode."""
     before, after = batch.mode[i], batch.mode[i]
     for g in range(NGUARDS):
-        if changes_sign(work, LEFT, RIGHT, g):
+        if crosses(work, g):
             rises = work[RIGHT + g] > work[LEFT + g]
             before = before & ~(1 << g) if rises else before | (1 << g)
             after = after | (1 << g) if rises else after & ~(1 << g)
     for g in range(NGUARDS):
-        if changes_sign(work, LEFT, RIGHT, g):
-            batch.counters[i, EVENTS] += 1
-            batch.minima[i, CONTACT_SPEED] = min(
-                batch.minima[i, CONTACT_SPEED], abs(work[RATE + g])
-            )
-            record(i, g, t_hit, before, after, batch, work)
+        if crosses(work, g):
+            direction = 1 if work[RIGHT + g] > work[LEFT + g] else -1
+            slowest(i, work[RATE + g], batch)
+            note(i, g, t_hit, CROSSING, direction, work[RATE + g], before, after, batch, work)
     batch.mode[i] = after
     if TANGENT:
         saltate(i, t_hit, before, after, batch, work)
+
+
+@inner
+def crosses(work, g):
+    """Whether the gap closes at a contact that lets the state be."""
+    return changes_sign(work, LEFT, RIGHT, g) and not (LAWS and strikes(work, g))
 
 
 @inner
@@ -179,7 +197,7 @@ def saltate(i, t_hit, before, after, batch, work):
     """
     mode = before
     for g in range(NGUARDS):
-        if changes_sign(work, LEFT, RIGHT, g):
+        if crosses(work, g):
             flipped = (mode & ~(1 << g)) | (after & (1 << g))
             h = part(work, H, HELD * NCLOCKS)
             jump(
@@ -188,8 +206,21 @@ def saltate(i, t_hit, before, after, batch, work):
             mode = flipped
 
 
+@inner
+def slowest(i, velocity, batch):
+    """Keep the smallest speed of a contact."""
+    batch.minima[i, CONTACT_SPEED] = min(batch.minima[i, CONTACT_SPEED], abs(velocity))
+
+
+@inner
+def note(i, g, t_hit, kind, direction, velocity, before, after, batch, work):
+    """Count and record one contact."""
+    batch.counters[i, EVENTS] += 1
+    record(i, g, t_hit, kind, direction, velocity, before, after, batch, work)
+
+
 @kernel
-def record(i, g, t_hit, before, after, batch, work):
+def record(i, g, t_hit, kind, direction, velocity, before, after, batch, work):
     """Write one contact, if there is a table and it lies in a period that is kept."""
     period, elapsed = batch.period[i], t_hit - batch.origin[i]
     count = math.floor(elapsed / period)
@@ -198,20 +229,190 @@ def record(i, g, t_hit, before, after, batch, work):
     r = batch.rec_used[0]
     batch.rec_used[0] = r + 1
     row, values = batch.rec_i[r], batch.rec_f[r]
-    row[REC_TRAJECTORY], row[REC_PERIOD], row[REC_GUARD], row[REC_KIND] = i, count, g, CROSSING
-    row[REC_DIRECTION] = 1 if work[RIGHT + g] > work[LEFT + g] else -1
+    row[REC_TRAJECTORY], row[REC_PERIOD], row[REC_GUARD], row[REC_KIND] = i, count, g, kind
+    row[REC_DIRECTION] = direction
     row[REC_MODE_BEFORE], row[REC_MODE_AFTER], row[REC_STEPS] = (
         before,
         after,
         batch.counters[i, STEPS],
     )
-    values[REC_PHASE], values[REC_VELOCITY] = elapsed - count * period, work[RATE + g]
-    values[REC_TIME_ERROR] = (
-        work[TRY + g] / abs(work[RATE + g]) if work[RATE + g] != 0.0 else math.inf
-    )
+    values[REC_PHASE], values[REC_VELOCITY] = elapsed - count * period, velocity
+    values[REC_TIME_ERROR] = work[TRY + g] / abs(velocity) if velocity != 0.0 else math.inf
     for j in range(NSTATES):
         values[RECORD_FLOATS + j] = work[NEXT + j]
     values[RECORD_FLOATS + NSTATES] = t_hit
+
+
+# -- contacts at which the state jumps -------------------------------------------------------------
+@kernel
+def strike_all(i, t_hit, batch, work):
+    """The jumps of the state in NEXT: of the gaps that close at t_hit, and of those beyond whose
+    boundaries another one has carried it. Needs q at t_hit in Q.
+    """
+    struck = 0
+    for _ in range(NGUARDS):
+        for g in range(NGUARDS):
+            if not struck >> g & 1 and (
+                strikes(work, g) or (struck != 0 and carried_past(i, g, t_hit, batch, work))
+            ):
+                struck |= 1 << g
+                strike(i, g, t_hit, True, batch, work)
+
+
+@inner
+def carried_past(i, g, time, batch, work):
+    """Whether the jump before has carried the state over a boundary where it jumps again."""
+    beyond = work[AT_NEXT + g] * LAW_SIDE[g] < -told_from_zero(g, time, work)
+    return waits(g, batch.mode[i]) and beyond and not changes_sign(work, LEFT, RIGHT, g)
+
+
+@kernel
+def strike(i, g, t_hit, told, batch, work):
+    """The state in NEXT jumps by the law of guard g, if it closes: an impact, `told` to the table
+    or not. The gaps behind stand in AT_NEXT.
+    """
+    before = batch.mode[i]
+    after = leap(i, g, t_hit, NEXT, batch, work)
+    work[LATE] = abs(work[BEFORE + g] / work[RATE + g]) if work[RATE + g] != 0.0 else 0.0
+    if not work[TOLD + 1] > 0.0:
+        gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
+        return
+    if TANGENT and after != before:
+        reset_at(i, g, t_hit, NEXT, before, after, batch, work)
+    else:
+        for j in range(NSTATES):
+            work[NEXT + j] = work[POINT + j]
+    batch.mode[i] = after
+    if told:
+        direction = -1 if LAW_SIDE[g] > 0.0 else 1
+        slowest(i, work[RATE + g], batch)
+        note(i, g, t_hit, IMPACT, direction, work[RATE + g], before, before, batch, work)
+        for m in range(NGUARDS):
+            if m != g and (before ^ after) >> m & 1:
+                side = 1 if after >> m & 1 else -1
+                note(i, m, t_hit, CROSSING, side, 0.0, before, before ^ 1 << m, batch, work)
+
+
+@inner
+def reset_at(i, g, time, state, before, after, batch, work):
+    """The law of guard g, to a state; restitution and closing velocity to TOLD."""
+    p, h = batch.param[i * batch.stride], part(work, H, HELD * NCLOCKS)
+    reset(time, part(work, state, NSTATES), p, h, before, after, g, part(work, TOLD, 2))
+
+
+@kernel
+def leap(i, g, time, state, batch, work):
+    """The state after the jump of guard g, to POINT, its gaps, to AT_NEXT, their rates, to
+    RATE_BEHIND; returns the mode there. Needs q in Q.
+    """
+    mode = batch.mode[i]
+    for j in range(NSTATES):
+        work[POINT + j] = work[state + j]
+    gaps_at(time, POINT, Q, BEFORE, work)
+    reset_at(i, g, time, POINT, mode, mode, batch, work)
+    gaps_at(time, POINT, Q, AT_NEXT, work)
+    for m in range(NGUARDS):
+        side, other = (1.0 if mode >> m & 1 else -1.0), m != g and not waits(m, mode)
+        if other and not changes_sign(work, LEFT, RIGHT, m) and work[AT_NEXT + m] * side < 0.0:
+            mode ^= 1 << m
+    rate_at(time, POINT, Q, mode, BEHIND, work)
+    gap_rates_at(time, POINT, BEHIND, Q, RATE_BEHIND, work)
+    if LAW[g] == JUMP_LAW and not stays(g, time, work):
+        mode ^= 1 << g
+    return mode
+
+
+@inner
+def stays(g, time, work):
+    """Whether the state in POINT, after the jump of guard g, is on the side of its boundary that it
+    came from. On the boundary itself the rate of the gap decides.
+    """
+    decides = work[RATE_BEHIND + g] if lies_on(g, time, work) else work[AT_NEXT + g]
+    return decides * LAW_SIDE[g] > 0.0
+
+
+@inner
+def lies_on(g, time, work):
+    """Whether a jump leaves the state on its own boundary."""
+    return abs(work[AT_NEXT + g]) <= 2.0 * abs(work[BEFORE + g]) + told_from_zero(g, time, work)
+
+
+@inner
+def told_from_zero(g, time, work):
+    """How large a gap is after a jump at least if it isn't zero: what its rounding and that of the
+    time make, and landing a little beside the boundary.
+    """
+    change, late = work[AT_NEXT + g] - work[BEFORE + g], 128.0 * ulp(time) + 2.0 * work[LATE]
+    return late * abs(work[RATE_BEHIND + g]) + 8.0 * ROUNDING * abs(change)
+
+
+@inner
+def face(i, at, batch, work):
+    """Give the gaps of laws the sign of the mode, where the right-hand side doesn't follow it: the
+    state may have landed an ulp beyond a boundary that it leaves.
+    """
+    if LAWS and batch.options[i, LOCATE] != 0.0 and law_mode(i, batch) == FROM_STATE:
+        for g in range(NGUARDS):
+            side = 1.0 if batch.mode[i] >> g & 1 else -1.0
+            if leaps(g) and not work[at + g] * side > 0.0:
+                work[at + g] = side * SMALLEST
+
+
+@kernel
+def strike_at_start(i, t, t_end, batch, work):
+    """Impacts of a state that starts on a stop: initial conditions, which no table tells."""
+    struck = False
+    for g in range(NGUARDS):
+        work[LEFT + g], work[RIGHT + g] = 0.0, 0.0
+    for g in range(NGUARDS):
+        if LAW[g] == IMPACT_LAW and abs(work[AT_NODE + g]) <= SMALLEST:
+            for j in range(NSTATES):
+                work[NEXT + j] = work[NODE + j]
+            strike(i, g, t, False, batch, work)
+            for j in range(NSTATES):
+                work[NODE + j] = work[NEXT + j]
+            struck = True
+    if struck:
+        start_leg(i, t, t_end, True, batch, work)
+
+
+@kernel
+def goes_past(i, t, batch, work):
+    """Whether a step whose contacts are not located ends where the state jumps: beyond a stop and
+    closing, or where the condition of a jump has become true. LEFT and RIGHT differ in sign there.
+    """
+    gaps_at(t, NEXT, Q_STAGE, AT_NEXT, work)
+    mode, found, again = allowed(sides(AT_NEXT, work)), False, False
+    for g in range(NGUARDS):
+        was, now = work[AT_NODE + g] * LAW_SIDE[g], work[AT_NEXT + g] * LAW_SIDE[g]
+        past = LAW[g] == JUMP_LAW and now < 0.0 and was > 0.0
+        if past:
+            mode ^= 1 << g
+        if LAW[g] == IMPACT_LAW and now < 0.0:
+            for j in range(NSTATES):
+                work[POINT + j] = work[NEXT + j]
+            reset_at(i, g, t, POINT, mode, mode, batch, work)
+            past = work[TOLD + 1] > 0.0
+            again |= past and was < 0.0
+        work[LEFT + g] = LAW_SIDE[g] if past else 0.0
+        work[RIGHT + g] = -work[LEFT + g]
+        found |= past
+    batch.mode[i] = mode
+    if found:
+        batch.carry[i, AT_ONCE] = batch.carry[i, AT_ONCE] + 1.0 if again else 0.0
+    return found
+
+
+@inner
+def count_at_once(i, t_hit, t_leg, batch, work):
+    """Count the landings from which the state jumps, no time after the one before."""
+    if t_hit - t_leg > at_once(i, t_hit, batch):
+        batch.carry[i, AT_ONCE] = 0.0
+        return
+    for g in range(NGUARDS):
+        if strikes(work, g):
+            batch.carry[i, AT_ONCE] += 1.0
+            return
 
 
 # -- one trajectory --------------------------------------------------------------------------------
@@ -248,12 +449,15 @@ def take_up(i, t_end, batch, work):
     t_break = follow_clocks(i, t, False, batch, work)
     if begins:
         start_leg(i, t, t_end, True, batch, work)
+        if LAWS:
+            strike_at_start(i, t, t_end, batch, work)
         write_samples_here(i, t, batch, work)
         t_leg = t
     else:
         exchange_past(i, False, batch, work)
         drive_at(t, Q, work)
         gaps_at(t, NODE, Q, AT_NODE, work)
+        face(i, AT_NODE, batch, work)
         rate_at(t, NODE, Q, law_mode(i, batch), K1, work)
     return t, t_leg, t_break
 
@@ -294,10 +498,11 @@ def start_leg(i, t, t_end, look, batch, work):
     drive_at(t, Q, work)
     gaps_at(t, NODE, Q, AT_NODE, work)
     if look:
-        batch.mode[i] = sides(AT_NODE, work)
+        batch.mode[i] = allowed(sides(AT_NODE, work))
     rate_at(t, NODE, Q, law_mode(i, batch), K1, work)
     if look:
         settle_sides(i, t, batch, work)
+    face(i, AT_NODE, batch, work)
     begin_leg(i, t, t_end, batch, work)
 
 
@@ -312,7 +517,7 @@ def put_back(i, t, t_leg, status, batch, work):
     if batch.options[i, LOCATE] == 0.0:
         drive_at(t, Q, work)
         gaps_at(t, NODE, Q, AT_NODE, work)
-        batch.mode[i] = sides(AT_NODE, work)
+        batch.mode[i] = allowed(sides(AT_NODE, work))
     batch.phase[i] = t - (batch.origin[i] + batch.count[i] * batch.period[i])
     if status == OK:
         write_samples_here(i, t + 4.0 * ulp(t), batch, work)
@@ -326,13 +531,15 @@ def status_at(i, t, t_end, batch):
         return OK
     if batch.counters[i, EVENTS] > batch.options[i, MAX_EVENTS]:
         return BUDGET_EVENTS
+    if LAWS and batch.carry[i, AT_ONCE] > MOST_AT_ONCE:
+        return BUDGET_EVENTS
     return BUDGET_STEPS if batch.counters[i, STEPS] >= batch.options[i, MAX_STEPS] else RUNNING
 
 
 @inner
 def has_room(batch):
     """Whether the contacts of one more step fit in the table."""
-    return batch.rec_i.shape[0] == 0 or batch.rec_used[0] + NGUARDS <= batch.rec_i.shape[0]
+    return batch.rec_i.shape[0] == 0 or batch.rec_used[0] + STEP_RECORDS <= batch.rec_i.shape[0]
 
 
 @kernel
@@ -356,10 +563,14 @@ def advance(i, budget, batch, work):
             t_hit, t_new, h, lands, status = find_contact(i, t, t_new, t_leg, h, batch, work)
             if status != RUNNING:
                 break
+        elif LAWS:
+            lands = goes_past(i, t_new, batch, work)
         batch.counters[i, STEPS] += 1
         for j in range(NSTATES):
             batch.carry[i, ERRORS + j] += abs(h * work[ERROR + j])
         if lands:
+            if LAWS and locate:
+                count_at_once(i, t_hit, t_leg, batch, work)
             land(i, t, t_hit, t_new, h, batch, work)
             go_on(K1, work)
             begin_leg(i, t_hit, t_end, batch, work)

@@ -19,6 +19,7 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "energy": ("energy",),
     "methods": ("methods",),
     "exponents": ("exponents",),
+    "branches": ("branches",),
 }
 
 

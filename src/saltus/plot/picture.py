@@ -31,6 +31,7 @@ _PICTURES = {
     schema.TRAJECTORY: "plot.history or plot.phase",
     schema.STROBOSCOPE: "plot.phase",
     schema.RESPONSES: "plot.frequency_response, plot.bifurcation_diagram or plot.type_map",
+    schema.BRANCHES: "plot.branches",
 }
 _NAME: ContextVar[str] = ContextVar("name", default="the picture")
 

@@ -9,7 +9,9 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
+from saltus.errors import counted
 from saltus.results.dataset.schema import (
+    BRANCHES,
     ENERGY,
     IMPACTS,
     MODES,
@@ -17,7 +19,9 @@ from saltus.results.dataset.schema import (
     SETTLED,
     SPECTRUM,
     WIDTHS,
+    event_name,
     period_text,
+    point_name,
     states_of,
 )
 from saltus.results.wording import unit_of
@@ -110,6 +114,29 @@ def _modes(ds: xr.Dataset) -> list[str]:
     return lines
 
 
+def _branches(ds: xr.Dataset) -> list[str]:
+    name = ds.attrs["parameter"]
+    unit = unit_of(ds[point_name(name)])
+    closed, stable = ds["branch_closed"].values, ds["point_stable"].values
+    lines = [
+        f"found    {counted(ds.sizes['branch'], 'branch')}, {int(closed.sum())} of "
+        f"them closed, {ds.sizes['point']} orbits, {stable.mean():.0%} of them stable",
+    ]
+    at, kind, of = (ds[one].values for one in (event_name(name), "event_kind", "event_branch"))
+    for i, periods in enumerate(ds["branch_periods"].values.tolist()):
+        mine = ds[point_name(name)].values[ds["point_branch"].values == i]
+        text = ", ".join(
+            f"{word.replace('_', ' ')} {value:.10g}"
+            for word, value in zip(kind[of == i], at[of == i], strict=True)
+        )
+        extent = f"{mine.min():.6g} to {mine.max():.6g} {unit}".rstrip()
+        ends = ", closed" if closed[i] else ""
+        lines.append(f"  {i}: {period_text(periods)} from {extent}{ends}{text and '; ' + text}")
+    if ds.attrs["unexplained_changes"]:
+        lines.append(f"unsure   {ds.attrs['unexplained_changes']} changes of stability unexplained")
+    return lines
+
+
 #: For each kind, what writes its lines.
 WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SECTION: _section,
@@ -119,4 +146,5 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SETTLED: _settled,
     WIDTHS: _widths,
     MODES: _modes,
+    BRANCHES: _branches,
 }

@@ -80,11 +80,15 @@ def jump(t, y, p, h, before, after, g):
 def gap_rates(t, y, dy, c, q, h, out):
     out[0], out[1] = dy[0], dy[0] - c[4]
 """
-# Neither has a clock: nothing is decided by time alone.
-NO_CLOCKS = dict(NCLOCKS=0, CLOCK_KIND=(0,), CLOCK_TABLE=(0,))
-NUMBERS_OF_NO_CLOCKS = """
+# Neither has a clock, by which something is decided by time alone, nor a jump of the state.
+PLAIN = dict(NCLOCKS=0, CLOCK_KIND=(0,), CLOCK_TABLE=(0,), LAWS=False, LAW=(0,), LAW_SIDE=(0.0,))
+OF_PLAIN = """
 @kernel
 def numbers_of_clocks(p, n):
+    pass
+
+@kernel
+def reset(t, y, p, h, before, after, g, out):
     pass
 """
 B4 = {
@@ -104,7 +108,7 @@ def build(sizes, functions):
     return Kernels(
         PAIR,
         "pair",
-        Head(sizes | NO_CLOCKS | DORMAND_PRINCE, functions + NUMBERS_OF_NO_CLOCKS),
+        Head(sizes | PLAIN | DORMAND_PRINCE, functions + OF_PLAIN),
         "a test",
         "a test",
     )

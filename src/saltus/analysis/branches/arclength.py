@@ -23,7 +23,9 @@ TURN = 0.97
 #: Steps are doubled where so few evaluations sufficed and the tangent turned by less.
 EASY, STRAIGHT = 3, 0.995
 #: First, longest and shortest step, in units of the scale.
-FIRST, LONGEST, SHORTEST = 0.02, 0.25, 1e-7
+FIRST, LONGEST, SHORTEST = 0.02, 0.12, 1e-7
+#: Distance from where a curve ends within which its last point lies, in units of the scale.
+ENDING = 0.005
 #: Farthest that the corrector moves from the predicted point, in steps.
 ASTRAY = 0.6
 #: Points after which a curve may be found to be closed, and the cosine of the angle at which it
@@ -72,7 +74,8 @@ class Curve:
         Arclength from the start, in units of the scale.
     end : str
         ``range``: the end of the range was reached; ``closed``; ``points``: as many as asked for;
-        ``lost``: no step however short; ``stopped``: by the caller.
+        ``lost``: no step however short; ``stopped``: another curve of
+        the group is closed; or what the caller says.
     """
 
     z: list[np.ndarray] = field(default_factory=list)
@@ -170,8 +173,9 @@ def follow(
     column: int,
     limits: tuple[float, float],
     points: int,
-    first: float = FIRST,
-    stop: Callable[[np.ndarray, list[Curve]], np.ndarray] | None = None,
+    first: float | np.ndarray = FIRST,
+    ends: Callable[[Curve], str] | None = None,
+    group: np.ndarray | None = None,
 ) -> list[Curve]:
     """Curves from points float64[k, m + 1] on them, until they leave the range of one unknown, are
     closed or have ``points`` points.
@@ -188,11 +192,13 @@ def follow(
         Its range.
     points : int
         Most points of a curve.
-    first : float
+    first : float or float64[k]
         First step, in units of the scale.
-    stop : callable, optional
-        Called with the numbers int64[r] of the curves that have a new point, and these; returns
-        which go no farther, bool[r].
+    ends : callable, optional
+        Why a curve ended before its last point, empty where it didn't: the curve then ends within
+        ENDING of there.
+    group : int64[k], optional
+        Curves that are one: where one of them is closed, the others go no farther.
     """
     rows = np.arange(len(start))
     here = correct(equations, start, tangents_at(equations, start, along, rows), rows, 1.0)
@@ -203,9 +209,13 @@ def follow(
         for i in taken:
             if len(fronts.curves[i].z) >= points and not fronts.curves[i].end:
                 fronts.curves[i].end = "points"
-        if stop is not None and len(taken):
-            for i in taken[stop(taken, [fronts.curves[i] for i in taken])]:
-                fronts.curves[i].end = fronts.curves[i].end or "stopped"
+        for i in taken:
+            if ends is not None and (why := ends(fronts.curves[i])):
+                fronts.undo(i, why)
+        if group is not None:
+            shut = {group[i] for i in rows if fronts.curves[i].end == "closed"}
+            for i in fronts.going:
+                fronts.curves[i].end = "stopped" if group[i] in shut else ""
     return fronts.curves
 
 
@@ -218,10 +228,10 @@ class _Fronts:
         column: int,
         limits: tuple[float, float],
         curves: list[Curve],
-        first: float,
+        first: float | np.ndarray,
     ) -> None:
         self.equations, self.column, self.limits, self.curves = equations, column, limits, curves
-        self.length = np.full(len(curves), first)
+        self.length = np.broadcast_to(first, len(curves)).astype(float)
 
     def begin(self, here: Corrected, tangent: np.ndarray) -> None:
         """The first points."""
@@ -262,6 +272,16 @@ class _Fronts:
             self.curves[i].end = "lost"
         self._close(taken)
         return taken
+
+    def undo(self, i: int, why: str) -> None:
+        """Take the last point of a curve back: it lies beyond the end."""
+        curve = self.curves[i]
+        length = 0.5 * (curve.length[-1] - curve.length[-2])
+        for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
+            kept.pop()
+        self.z[i], self.tangent[i], self.length[i] = curve.z[-1], curve.tangent[-1], length
+        self.equations.accepted(self.z[[i]], np.array([i]))
+        curve.end = why if length < ENDING else ""
 
     def _predicted(self, going: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points along the tangents, the planes in which they are corrected, and which land on an

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from saltus.analysis.branches.resolution import resolve
 from saltus.analysis.branches.special_points import outside
 from saltus.analysis.branches.tracing import Branch
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.orbits.orbit_measures import Measures, measure
-from saltus.analysis.outputs import Outputs
+from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.results import build
@@ -34,6 +36,7 @@ def table_of(
 ) -> xr.Dataset:
     """The Dataset of branches over a parameter."""
     size = len(system.states)
+    resolve(branches, functools.partial(_peaks, system, name, method))
     counts = [len(branch.z) for branch in branches]
     points = [(branch, z) for branch in branches for z in branch.z]
     numbers = _numbers(system, name, points, outputs, method)
@@ -44,13 +47,13 @@ def table_of(
     multipliers = _stacked([branch.multipliers for branch in branches], size)
     event_multipliers = _stacked([event.multipliers[None] for _, event in events], size)
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
-    orbits = [branch.orbits.points(z) for branch, z in points]
+    states = padded([branch.orbits.points(z) for branch, z in [*points, *at_events]], size)
     values: dict[str, Any] = {
         "point": np.arange(len(points)),
         "point_branch": np.repeat(np.arange(len(branches)), counts),
         "point_<parameter>": {name: np.array([z[-1] for _, z in points])},
         "point_arclength": np.concatenate([b.length for b in branches] or [np.zeros(0)]),
-        "point_stable": np.abs(multipliers).max(axis=1, initial=0.0) < 1.0 - MARGINAL,
+        "point_stable": np.nanmax(np.abs(multipliers), axis=1, initial=0.0) < 1.0 - MARGINAL,
         "point_unstable_multipliers": outside(multipliers).sum(axis=1),
         "point_period": np.array([float(branch.orbits.period(z)) for branch, z in points]),
         "point_peak": numbers.peak[:, 0] if len(points) else np.zeros(0),
@@ -60,7 +63,7 @@ def table_of(
         "point_margin": numbers.margin,
         "point_multiplier_real": multipliers.real,
         "point_multiplier_imag": multipliers.imag,
-        "point_<state>": padded(orbits, size),
+        "point_<state>": states[: len(points)],
         "output": list(outputs.names),
         "output_units": list(outputs.units),
         **{f"point_output_{key}": column for key, column in numbers.by_name().items()},
@@ -74,7 +77,7 @@ def table_of(
         "event_rms": event_numbers.rms[:, 0] if len(events) else np.zeros(0),
         "event_multiplier_real": event_multipliers.real,
         "event_multiplier_imag": event_multipliers.imag,
-        "event_<state>": padded([branch.orbits.points(z) for branch, z in at_events], size),
+        "event_<state>": states[len(points) :],
     }
     fixed = {key: value for key, value in system.values.items() if key != name}
     attrs = provenance(system, method, fixed, (name,)) | {
@@ -100,6 +103,12 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
         "branch_end": [branch.ends[1] for branch in branches],
         "branch_unexplained": np.array([len(b.unexplained) for b in branches], np.int64),
     }
+
+
+def _peaks(system: System, name: str, method: Method, branch: Branch, z: np.ndarray) -> np.ndarray:
+    """Largest magnitude of the first state of orbits float64[r, z] of a branch."""
+    numbers = _numbers(system, name, [(branch, one) for one in z], outputs_of(system, None), method)
+    return numbers.peak[:, 0]
 
 
 def _numbers(

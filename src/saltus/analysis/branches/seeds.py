@@ -1,21 +1,16 @@
-"""Where branches begin: the periodic responses and attractors that were found, or those that starts
-lead to at some values of the parameter.
-"""
+"""Where branches begin: the periodic responses and attractors that were found."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.tracing import Seed
 from saltus.analysis.orbits.orbit_measures import measure
-from saltus.analysis.orbits.tolerances import LONGEST, RESTS
-from saltus.analysis.responses.grid import grid_of
-from saltus.analysis.responses.responses import find
+from saltus.analysis.orbits.tolerances import RESTS
 from saltus.errors import ParameterError, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -54,10 +49,10 @@ def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
     times = found.get(f"{prefix}_cycle")
     cycles = np.full(len(values), np.nan) if times is None else times.values
     periods = found[f"{prefix}_period"].values
-    return list(_seeds(system, points, periods, cycles, values))
+    return list(seeds_at(system, points, periods, cycles, values))
 
 
-def _seeds(
+def seeds_at(
     system: System, points: np.ndarray, periods: np.ndarray, times: np.ndarray, values: np.ndarray
 ) -> Iterator[Seed]:
     """Seeds of those that repeat, the shortest first; equilibria are none."""
@@ -99,27 +94,3 @@ def scaled(system: System, name: str, seeds: list[Seed], method: Method) -> list
         scale = _units(numbers.maximum[place], numbers.minimum[place])
         result[i] = replace(seeds[i], scale=np.where(np.isfinite(scale), scale, 1.0))
     return result
-
-
-def found_at(
-    system: System,
-    name: str,
-    values: np.ndarray,
-    start: Any,
-    box: Mapping[str, Any] | None,
-    seed: int,
-    every: Any,
-    method: Method,
-    periods: int,
-    threads: int | None,
-) -> list[Seed]:
-    """Seeds from the attractors that starts lead to at some values of the parameter."""
-    grid = grid_of(system, {name: values}, start, box, None, seed, None, every)
-    found = find(grid, method, periods, threads, None)
-    if not found.complete:
-        raise KeyboardInterrupt
-    points = np.full((len(found), LONGEST, len(system.states)), np.nan)
-    for i in range(len(found)):
-        own = found.points(i)[:LONGEST]
-        points[i, : len(own)] = own
-    return list(_seeds(system, points, found.period, found.time, values[found.place]))

@@ -4,28 +4,31 @@ branches, each once.
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import LONGEST, Curve, correct, follow, tangents
+from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, follow, tangents
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import SpecialPoint, locate, outside, tests
 
 #: How far a new branch begins from the point where it leaves another, in units of the scale.
-ASIDE = 0.004
+ASIDE = 0.001
 #: Farthest that a seed lies from its orbit, in units of the scale.
 ASTRAY = 0.5
 #: Branches that are followed side by side.
 ABREAST = 8
+#: A fold so near to a branch point is none, in units of the scale: it is located less well there.
+VERTEX = 1e-4
 #: Orbits nearer than this, in units of the scale, are one.
 SAME = 1e-6
 #: An orbit may lie on a branch whose points, joined by lines, pass it by less.
 PASSES = 0.3
-#: How far a branch turns, sideways over ahead, from its last point to where it ends.
-TURNS = 0.3
+#: Shortest interval that is halved, in units of the scale.
+LEAST = 1e-9
 #: How often an interval is halved in which changes of stability don't add up.
 HALVINGS = 6
 
@@ -156,11 +159,11 @@ def trace(
         begun += len(wave)
         starts = _Starts.of(plan, wave)
         fresh = [i for i in starts.found if not _known(starts.z[i], starts.n, branches)]
-        fresh = [i for i in fresh if not _ends_there(wave[i], starts.z[i], branches)]
+        fresh = [i for i in fresh if not _ends_there(wave[i], branches)]
         for i, branch in zip(fresh, _both_ways(plan, starts, fresh), strict=True):
             if branch is None or _known(starts.z[i], starts.n, branches):
                 continue
-            if _ends_there(wave[i], starts.z[i], branches):
+            if _ends_there(wave[i], branches):
                 continue
             branches.append(branch)
             _find_events(branch)
@@ -215,21 +218,10 @@ def _both_ways(plan: Plan, starts: _Starts, which: Sequence[int]) -> list[Branch
             sides.append(side)
     whose, orbits = np.array(owner), plan.make(starts.n, starts.scale[owner])
     orbits.accepted(starts.z[owner], np.arange(len(owner)))
-    shut: set[int] = set()
-
-    def stop(rows: np.ndarray, curves: list[Curve]) -> np.ndarray:
-        for row, curve in zip(rows, curves, strict=True):
-            if not curve.end and _halves_meet(orbits, curve):
-                for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
-                    kept.pop()
-                curve.end = "period_doubling"
-            if curve.end == "closed":
-                shut.add(int(whose[row]))
-        return np.isin(whose[rows], list(shut))
-
+    first = np.array([FIRST if starts.seeds[i].along is None else ASIDE for i in owner])
     curves = follow(
-        orbits, starts.z[owner], np.array(sides), orbits.width - 1, plan.limits, plan.points,
-        stop=stop,
+        orbits, starts.z[owner], np.array(sides), orbits.width - 1, plan.limits, plan.points, first,
+        ends=functools.partial(_halved, orbits), group=whose,
     )  # fmt: skip
     result = []
     for i in which:
@@ -238,14 +230,14 @@ def _both_ways(plan: Plan, starts: _Starts, which: Sequence[int]) -> list[Branch
     return result
 
 
-def _halves_meet(orbits: PeriodicOrbits, curve: Curve) -> bool:
-    """Whether an orbit of 2m periods has just passed one of m periods."""
+def _halved(orbits: PeriodicOrbits, curve: Curve) -> str:
+    """``period_doubling`` if an orbit of 2m periods has just passed one of m periods."""
     if orbits.n % 2 or len(curve.z) < 2:
-        return False
+        return ""
     half = orbits.n // 2
     ahead, behind = (orbits.points(z) for z in (curve.z[-1], curve.z[-2]))
     apart = [(points[:half] - points[half:]).ravel() for points in (ahead, behind)]
-    return bool(apart[0] @ apart[1] < 0.0)
+    return "period_doubling" if apart[0] @ apart[1] < 0.0 else ""
 
 
 def _joined(
@@ -285,7 +277,7 @@ def _find_events(branch: Branch) -> None:
     for left in reversed(range(HALVINGS)):
         branch.events = _located(branch)
         branch.unexplained = _unexplained(branch)
-        if not left or not branch.unexplained or not _refined(branch, branch.unexplained):
+        if not left or not branch.unexplained or not len(refine(branch, branch.unexplained)):
             break
 
 
@@ -303,8 +295,17 @@ def _located(branch: Branch) -> list[SpecialPoint]:
         for place, point in zip(after, found, strict=True)
         if point is not None and _is_real(point)
     ]
+    events = [event for event in events if not _is_vertex(event, events, branch)]
     order = sorted(range(len(events)), key=lambda i: (events[i].after, _ahead(branch, events[i])))
     return [events[i] for i in order]
+
+
+def _is_vertex(event: SpecialPoint, events: Sequence[SpecialPoint], branch: Branch) -> bool:
+    """Whether a fold is where a branch point's crossing branch turns back."""
+    return event.kind == "fold" and any(
+        other.kind == "branch_point" and np.abs((other.z - event.z) / branch.scale).max() < VERTEX
+        for other in events
+    )
 
 
 def _is_real(point: SpecialPoint) -> bool:
@@ -339,28 +340,41 @@ def _unexplained(branch: Branch) -> list[int]:
     return result
 
 
-def _refined(branch: Branch, places: Sequence[int]) -> bool:
-    """Put a point in the midst of some intervals; whether there are new ones."""
-    after = np.array(places)
+def refine(branch: Branch, places: Sequence[int]) -> np.ndarray:
+    """Put a point in the midst of some intervals, by the points before them; the numbers of the new
+    points, int64[r].
+    """
+    after = np.array(places, np.int64)
     step = (branch.z[after + 1] - branch.z[after]) / branch.scale
     length = np.einsum("ki,ki->k", step, branch.tangent[after])
     rows = np.full(len(after), branch.row)
     guess = branch.z[after] + 0.5 * length[:, None] * branch.tangent[after] * branch.scale
     point = correct(branch.orbits, guess, branch.tangent[after], rows, np.abs(length))
-    good = np.flatnonzero(point.found & (np.abs(length) > 1e-9))
+    good = np.flatnonzero(point.found & (np.abs(length) > LEAST))
     if not len(good):
-        return False
+        return good
     derivative = point.derivative[good]
     tangent = tangents(derivative, branch.tangent[after[good]])
     own = branch.orbits.multipliers(point.z[good], derivative, rows[good])
-    places_ = after[good] + 1
-    branch.z = np.insert(branch.z, places_, point.z[good], axis=0)
-    branch.tangent = np.insert(branch.tangent, places_, tangent, axis=0)
-    branch.derivative = np.insert(branch.derivative, places_, derivative, axis=0)
-    branch.multipliers = np.insert(branch.multipliers, places_, own, axis=0)
     middle = 0.5 * (branch.length[after[good]] + branch.length[after[good] + 1])
-    branch.length = np.insert(branch.length, places_, middle)
-    return True
+    new = {"z": point.z[good], "tangent": tangent, "derivative": derivative}
+    for name, values in {**new, "multipliers": own, "length": middle}.items():
+        setattr(branch, name, np.insert(getattr(branch, name), after[good] + 1, values, axis=0))
+    placed = after[good] + 1 + np.arange(len(good))
+    branch.events = [replace(event, after=_moved(branch, event, placed)) for event in branch.events]
+    return placed
+
+
+def _moved(branch: Branch, event: SpecialPoint, placed: np.ndarray) -> int:
+    """The point that comes before an event, once new points have been put in."""
+    place = event.after
+    for new in placed:
+        if new <= place:
+            place += 1
+        elif new == place + 1:
+            step = (event.z - branch.z[new]) / branch.scale
+            place += int(step @ branch.tangent[new] >= 0)
+    return place
 
 
 # -- identity --------------------------------------------------------------------------------------
@@ -391,21 +405,17 @@ def _lies_on(z: np.ndarray, branch: Branch) -> bool:
     return False
 
 
-def _ends_there(seed: Seed, z: np.ndarray, branches: Sequence[Branch]) -> bool:
+def _ends_there(seed: Seed, branches: Sequence[Branch]) -> bool:
     """Whether the branch that leaves a period doubling is one that was seen to end there."""
     if seed.along is None:
         return False
     for branch in branches:
         if branch.orbits.n != len(seed.points):
             continue
-        others = branch.orbits.alike(z[None], np.array([branch.row]))[0]
-        for place, sign in ((0, -1.0), (-1, 1.0)):
-            if branch.ends[place] != "period_doubling":
-                continue
-            way = (others - branch.z[place]) / branch.scale
-            ahead = sign * way @ branch.tangent[place]
-            aside = np.linalg.norm(way - np.outer(sign * ahead, branch.tangent[place]), axis=1)
-            if ((ahead > 0) & (ahead < 2 * LONGEST) & (aside < TURNS * ahead)).any():
+        others = branch.orbits.alike(seed.z[None], np.array([branch.row]))[0]
+        for place in (0, -1):
+            apart = np.linalg.norm((others - branch.z[place]) / branch.scale, axis=1)
+            if branch.ends[place] == "period_doubling" and apart.min() < 3 * ENDING:
                 return True
     return False
 

@@ -94,7 +94,8 @@ def compare_methods(
         ``known`` (whether the reference has this response at that value, from any start),
         ``orbit_distance`` (units of the response's size); over the parameters: ``step_error`` and
         ``step_error_rms``, the error of one forcing period started on the reference's own responses
-        (units of the motion's range), and ``steps_per_period``. For basins, over both states:
+        (units of the motion's range; NaN where the method doesn't get through it), and
+        ``steps_per_period``. For basins, over both states:
         ``basin`` in the numbers of the reference, and ``agrees``.
 
     Raises

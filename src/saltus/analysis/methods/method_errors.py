@@ -110,7 +110,8 @@ def one_period_errors(
     -------
     dict of float64[places...]
         ``step_error``, ``step_error_rms``: largest and root mean square over the states of the
-        responses and their points, in units of the range of each state in the motion;
+        responses and their points, in units of the range of each state in the motion, NaN where
+        the method doesn't get through the period;
         ``steps_per_period``: steps tried.
     """
     axes = parameters_of(exact)
@@ -133,15 +134,19 @@ def one_period_errors(
     scale = motion_range(right, start)
     outcome = wrong.run(start, 1)
     apart = np.abs((outcome.state - right.run(start, 1).state) / scale)
+    lost = ~np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED))
     steps = outcome.counters[:, st.STEPS] + outcome.counters[:, st.REJECTED]
     size = int(np.prod(places))
     count = np.maximum(np.bincount(flat, minlength=size), 1)
     largest = np.full(size, np.nan)
     np.fmax.at(largest, flat, apart.max(axis=1))
+    gone = np.bincount(flat, lost, size) > 0
     empty = np.bincount(flat, minlength=size) == 0
     fields = {
-        "step_error": largest,
-        "step_error_rms": np.sqrt(np.bincount(flat, np.mean(apart**2, axis=1), size) / count),
+        "step_error": np.where(gone, np.nan, largest),
+        "step_error_rms": np.where(
+            gone, np.nan, np.sqrt(np.bincount(flat, np.mean(apart**2, axis=1), size) / count)
+        ),
         "steps_per_period": np.bincount(flat, steps, size) / count,
     }
     return {

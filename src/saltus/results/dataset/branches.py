@@ -30,7 +30,7 @@ BRANCHES_VARIABLES = {
     "point_arclength": Variable(
         _POINT, "1", "length of the branch from its first point, in ranges of its unknowns"
     ),
-    "point_stable": Variable(_POINT, "1", "whether the orbit attracts", "bool"),
+    "point_stable": Variable(_POINT, "1", "whether the orbit attracts", "i1"),
     "point_unstable_multipliers": Variable(
         _POINT, "1", "Floquet multipliers outside the unit circle", "i4"
     ),
@@ -72,7 +72,7 @@ BRANCHES_VARIABLES = {
     "branch_periods": Variable(
         _BRANCH, "1", "period of its orbits in forcing periods; 1 without forcing", "i8"
     ),
-    "branch_closed": Variable(_BRANCH, "1", "whether it returns to where it began", "bool"),
+    "branch_closed": Variable(_BRANCH, "1", "whether it returns to where it began", "i1"),
     "branch_parent": Variable(
         _BRANCH, "1", "branch that it leaves at its first point, -1 if none", "i8"
     ),

@@ -265,6 +265,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         EXPONENTS: ("lyapunov_exponent", "running_exponent"),
         SETTLED: ("response_period", "mismatch"),
         MODES: ("shape", "flexibility"),
+        BRANCHES: ("point_branch", "point_stable", "branch_periods"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 

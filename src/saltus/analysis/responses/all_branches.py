@@ -4,6 +4,7 @@ bifurcations.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -11,10 +12,13 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.branch_table import table_of
-from saltus.analysis.branches.seeds import found_at, scaled, seeds_of
+from saltus.analysis.branches.seeds import scaled, seeds_at, seeds_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.tracing import Branch, Plan, Seed, trace
+from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.outputs import outputs_of
+from saltus.analysis.responses.grid import grid_of
+from saltus.analysis.responses.responses import find
 from saltus.analysis.starts import check_system, single
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest, shown
@@ -153,7 +157,7 @@ def branches(
                 begins = seeds_of(system, name, start)
             else:
                 places = np.linspace(*limits, whole(at, "at", 1) + 2)[1:-1]
-                begins = found_at(
+                begins = _found_at(
                     system, name, places, start, box, seed, every, method, periods, threads
                 )
             begins = scaled(system, name, _inside(begins, limits), method)
@@ -169,21 +173,9 @@ def branches(
             )  # fmt: skip
             trace(plan, begins, done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:
-            raise Interrupted(
-                lambda: _dataset(system, name, limits, done, wanted, method)
-            ) from None
-        return _dataset(system, name, limits, done, wanted, method)
-
-
-def _dataset(
-    system: System,
-    name: str,
-    limits: tuple[float, float],
-    found: list[Branch],
-    outputs: Outputs,
-    method: Method,
-) -> xr.Dataset:
-    return table_of(system, name, limits, found, outputs, method)
+            partial = functools.partial(table_of, system, name, limits, done, wanted, method)
+            raise Interrupted(partial) from None
+        return table_of(system, name, limits, done, wanted, method)
 
 
 def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
@@ -220,3 +212,27 @@ def _kinds(switch: Any) -> Sequence[str]:
 
 def _inside(seeds: list[Seed], limits: tuple[float, float]) -> list[Seed]:
     return [seed for seed in seeds if limits[0] <= seed.own[-1] <= limits[1]]
+
+
+def _found_at(
+    system: System,
+    name: str,
+    values: np.ndarray,
+    start: Any,
+    box: Mapping[str, Any] | None,
+    seed: int,
+    every: Any,
+    method: Method,
+    periods: int,
+    threads: int | None,
+) -> list[Seed]:
+    """Seeds from the attractors that starts lead to at some values of the parameter."""
+    grid = grid_of(system, {name: values}, start, box, None, seed, None, every)
+    found = find(grid, method, periods, threads, None)
+    if not found.complete:
+        raise KeyboardInterrupt
+    points = np.full((len(found), LONGEST, len(system.states)), np.nan)
+    for i in range(len(found)):
+        own = found.points(i)[:LONGEST]
+        points[i, : len(own)] = own
+    return list(seeds_at(system, points, found.period, found.time, values[found.place]))

@@ -1,0 +1,35 @@
+"""How finely branches are resolved: as many orbits as a picture of their size needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from saltus.analysis.branches.tracing import Branch, refine
+
+#: Largest change of the size of the orbit from one point to the next, relative to the larger.
+CHANGE = 0.08
+#: Changes smaller than this share of the largest orbit can't be seen.
+SEEN = 0.005
+#: How often an interval is halved for it.
+ROUNDS = 4
+
+#: Sizes float64[r] of orbits float64[r, z] of a branch.
+Sizes = Callable[[Branch, np.ndarray], np.ndarray]
+
+
+def resolve(branches: Sequence[Branch], sizes: Sizes) -> None:
+    """Put orbits between neighbours whose sizes differ by more than can be drawn as a line."""
+    known = [sizes(branch, branch.z) for branch in branches]
+    largest = max((float(np.nanmax(size, initial=0.0)) for size in known), default=0.0)
+    for number, branch in enumerate(branches):
+        size = known[number]
+        for _ in range(ROUNDS):
+            change = np.abs(np.diff(size))
+            larger = np.maximum(size[1:], size[:-1])
+            wide = np.flatnonzero((change > CHANGE * larger) & (change > SEEN * largest))
+            new = refine(branch, wide.tolist()) if len(wide) else wide
+            if not len(new):
+                break
+            size = np.insert(size, new - np.arange(len(new)), sizes(branch, branch.z[new]))

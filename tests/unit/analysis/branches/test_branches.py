@@ -1,0 +1,189 @@
+"""Branches of periodic orbits against folds, doublings and tori that are known otherwise."""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.integrate import solve_ivp
+
+import saltus as sl
+from saltus.errors import ParameterError
+
+REFERENCE = Path(__file__).parents[3] / "reference"
+
+
+def rows(name):
+    """Rows of a file of tests/reference by their ids."""
+    with (REFERENCE / f"{name}.csv").open() as file:
+        return {row["id"]: row for row in csv.DictReader(file)}
+
+
+RIG = rows("branches_rig")
+
+
+def orbit_of(row):
+    """The first point of a row's orbit: ``x0=... v0=...``."""
+    words = dict(word.split("=") for word in row["check"].partition(";")[0].split()[1:])
+    return {"x": float(words["x0"]), "v": float(words["v0"])}
+
+
+def located(found, kind, near):
+    """The value of the event of a kind that is nearest to a value."""
+    parameter = found.attrs["parameter"]
+    at = found[f"event_{parameter}"].values[found.event_kind.values == kind]
+    return at[np.argmin(np.abs(at - near))]
+
+
+@cache
+def rig(case, frequency, stiffness, low, high, start, at):
+    """Branches of the rig over a parameter."""
+    system = sl.models.delangre(case, force="4 N", frequency=frequency, contact_stiffness=stiffness)
+    name = "frequency" if high < 100 else "contact_stiffness"
+    seeds = sl.bifurcation_diagram(system, {name: [at]}, start=start, progress=False)
+    return sl.branches(system, {name: (low, high)}, seeds, longest=1, progress=False)
+
+
+HIGH = (5e-3, 0.0)
+FOUND = {
+    "G02": ("a", 17.0, 14e3, 15.0, 28.5, (-4e-4, 0.0125), 16.0),
+    "G05": ("b", 15.0, 14e3, 12.0, 18.5, HIGH, 15.0),
+    "G07": ("b", 15.0, 14e3, 12.0, 18.5, HIGH, 15.0),
+    "G09": ("c", 5.0, 2e4, 1.2e4, 3.2e4, (0.0, 0.0), 1.4e4),
+    "G17": ("c", 17.0, 8e3, 7.5e3, 9e3, (0.0, 0.0), 8e3),
+}
+
+
+@pytest.mark.parametrize("number", FOUND)
+def test_folds_and_doublings_of_the_rig(number):
+    found, row = rig(*FOUND[number]), RIG[number]
+    kind, value = row["quantity"].partition(":")[0].replace(" ", "_"), float(row["value"])
+    assert located(found, kind, value) == pytest.approx(value, rel=2e-12)
+    assert found.attrs["unexplained_changes"] == 0
+
+
+def test_an_isola_is_closed():
+    found = rig(*FOUND["G02"])
+    closed = (found.branch_closed.values > 0) & (found.branch_periods.values == 3)
+    assert closed.any()
+    mine = found.point_frequency.values[found.point_branch.values == np.flatnonzero(closed)[0]]
+    assert 27.7 < mine.max() < 27.9
+    assert 15.70 < mine.min() < 15.75
+
+
+def test_the_orbits_between_events_are_as_stable_as_their_multipliers_say():
+    found = rig(*FOUND["G05"])
+    sizes = np.hypot(found.point_multiplier_real, found.point_multiplier_imag).max("multiplier")
+    np.testing.assert_array_equal(found.point_stable.values, sizes.values < 1 - 1e-9)
+    assert 0 < found.point_stable.values.mean() < 1
+    # Liouville: the product of the multipliers is the damping's
+    product = (found.point_multiplier_real + 1j * found.point_multiplier_imag).prod("multiplier")
+    damping = np.exp(-2 * 0.03 * 2 * np.pi * 5 * found.point_period.values)
+    np.testing.assert_allclose(product.values.real, damping, rtol=1e-9)
+
+
+def rig_b(t, y, f):
+    """Rates of the rig, case b at 4 N, written out; frozen on one side of each gap by ``sides``."""
+    x, v = y
+    w, wn = 2 * np.pi * f, 2 * np.pi * 5
+    beyond = min(x, 0.0) + max(x - 0.4e-3, 0.0)
+    restoring = -2 * 0.03 * wn * v - wn**2 * x - 7e8 / 3 * x**3 - 14e3 / 3 * beyond
+    return v, restoring + 4 * (1 - 18 / w**2) * np.cos(w * t) / 3
+
+
+def test_unstable_orbits_close_under_an_independent_solver():
+    """DOP853 from contact to contact."""
+    found = rig(*FOUND["G05"])
+    unstable = np.flatnonzero(found.point_stable.values == 0)
+    gaps = [lambda t, y, f, level=level: y[0] - level for level in (0.0, 0.4e-3)]
+    for gap in gaps:
+        gap.terminal = True
+    for i in unstable[[3, len(unstable) // 2, -3]]:
+        f, period = float(found.point_frequency[i]), float(found.point_period[i])
+        start = np.array([float(found.point_x[i, 0]), float(found.point_v[i, 0])])
+        t, y = 0.0, start
+        while t < period:
+            # a step off the boundary first: an event there would end it at once
+            short = solve_ivp(
+                rig_b, (t, min(t + 1e-6, period)), y, "DOP853", rtol=1e-13, atol=1e-16, args=(f,)
+            )
+            run = solve_ivp(
+                rig_b, (short.t[-1], period), short.y[:, -1], "DOP853", rtol=1e-13, atol=1e-16,
+                args=(f,), events=gaps,
+            )  # fmt: skip
+            t, y = run.t[-1], run.y[:, -1]
+        size = np.hypot(*(found[f"point_multiplier_{part}"][i].values for part in ("real", "imag")))
+        assert np.abs((y - start) / [1e-3, 0.1]).max() < 1e-10 * size.max()
+
+
+def test_soft_stop():
+    known = rows("branches_soft_stop")
+    stop = sl.models.soft_stop()
+    found = sl.branches(stop, {"frequency": (1.38, 2.8)}, (1.5, 0.0), at=3, progress=False)
+    for number in ("S01", "S03"):  # S03 lies 0.03 % below the graze of the response without contact
+        value = float(known[number]["value"])
+        assert located(found, "fold", value) == pytest.approx(value, rel=1e-12)
+
+
+def test_two_masses():
+    known = rows("branches_two_masses")
+    found = sl.branches(
+        sl.models.two_masses(), {"frequency": (0.6, 0.76)}, at=1, switch=(), progress=False
+    )
+    for number in known:
+        kind = known[number]["quantity"].partition(":")[0].lower()
+        kind, value = kind.replace(" ", "_").replace("-", "_"), float(known[number]["value"])
+        assert located(found, kind, value) == pytest.approx(value, abs=2e-12)
+
+
+def test_a_symmetric_orbit_has_branch_points_and_its_twins_are_one_branch():
+    found = sl.branches(
+        sl.models.soft_stop(), {"frequency": (0.33, 0.39)}, at=5, longest=1, progress=False
+    )
+    crossing = found.event_frequency.values[found.event_kind.values == "branch_point"]
+    parent = crossing[found.event_branch.values[found.event_kind.values == "branch_point"] == 0]
+    child = np.setdiff1d(crossing, parent)
+    assert len(parent) == 2
+    for value in child:  # located from the other branch too
+        assert np.abs(parent - value).min() < 1e-9
+    assert (found.branch_parent.values == 0).sum() == 1
+    # the mirror of each orbit is on the branch too: largest and smallest value change places
+    one = found.isel(point=found.point_branch.values == 1).sel(output="x")
+    top, bottom = one.point_output_maximum.values, -one.point_output_minimum.values
+    assert (top > bottom + 1e-6).any()
+    assert (top < bottom - 1e-6).any()
+
+
+def test_a_limit_cycle_is_followed_with_its_period():
+    """Van der Pol's: the multiplier is exp(mu integral(1 - x**2)); the period is known."""
+
+    @sl.system(states="x v")
+    def oscillator(t, x, v, *, mu=1.0):
+        return v, mu * (1 - x**2) * v - x
+
+    found = sl.branches(oscillator, {"mu": (0.5, 2.0)}, (2.0, 0.0), at=1, every=7.0, progress=False)
+    assert found.sizes["event"] == 0
+    at = np.argmin(np.abs(found.point_mu.values - 2.0))
+    # Andersen & Geer, SIAM J. Appl. Math. 42 (1982) 678: T(2) = 7.62987448
+    assert found.point_period.values[at] == pytest.approx(7.62987448, abs=2e-8)
+    assert found.point_stable.values.all()
+
+
+def test_what_cannot_be_followed_is_refused():
+    rig_a = sl.models.delangre("a")
+    for arguments, words in (
+        (({"frequency": (20.0, 10.0)},), "must ascend"),
+        (({"frequenzy": (10.0, 20.0)},), "Did you mean"),
+        (({"frequency": (1.0, 2.0), "force": (1, 2)},), "one parameter"),
+        (({"frequency": (10.0, 20.0)}, xr.Dataset()), "start="),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            sl.branches(rig_a, *arguments)
+    with pytest.raises(ParameterError, match="errors are rounding"):
+        sl.branches(rig_a, {"frequency": (10.0, 20.0)}, method=sl.ODE45(1e-4, 1e-7))
+    with pytest.raises(ParameterError, match="switch="):
+        sl.branches(rig_a, {"frequency": (10.0, 20.0)}, switch="folds")
