@@ -35,10 +35,7 @@ def leg(system: System, mode: int) -> System:
     time = ex.add(start, ex.mul(span, ex.TIME))
     rates = []
     for entry in frozen(system, system.field, mode):
-        if any(
-            node.op in ("select", "mod", "table") and ex.depends_on(node, ("time",))
-            for node in ex.walk(entry)
-        ):
+        if not _smooth_in_time(entry):
             raise ParameterError(
                 f"{system.name} switches at instants, or has a remainder or a table of time. Its "
                 "contacts can't be followed one by one along a branch."
@@ -52,7 +49,24 @@ def leg(system: System, mode: int) -> System:
         field=(*rates, zero, zero),
         guards=(),
         values=system.values,
-        units={**{START: "", SPAN: ""}, **system.units},
+        units={START: "", SPAN: "", **system.units},
+    )
+
+
+def has_legs(system: System) -> bool:
+    """Whether the system has legs: its equations are smooth in time within every mode."""
+    return all(_smooth_in_time(entry) for entry in system.field)
+
+
+def _smooth_in_time(entry: Expr) -> bool:
+    """Whether nothing switches, and no remainder or table is taken, by the time."""
+    return not any(
+        node.op in ("mod", "table") and ex.depends_on(node, ("time",)) for node in ex.walk(entry)
+    ) and not any(
+        ex.depends_on(relation.gap, ("time",))
+        for node in ex.walk(entry)
+        if node.op == "select"
+        for relation in ex.relations_in(node.payload)
     )
 
 

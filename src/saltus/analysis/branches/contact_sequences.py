@@ -62,12 +62,18 @@ class ContactSequence:
     velocity: np.ndarray
     mode: int
 
+    @property
+    def flies(self) -> bool:
+        """Whether no contact is held, so that the orbit is made of legs (legs.py)."""
+        return all(one.kind in (st.CROSSING, st.IMPACT) for one in self.contacts)
+
 
 def sequences(orbits: PeriodicOrbits, z: np.ndarray) -> list[ContactSequence | None]:
     """The contact sequences of orbits float64[p, z], all in one call; None where there is none."""
     p, n = len(z), orbits.n
     outcome = orbits.map.run(orbits.starts(z).reshape(p * n, -1), 1, record=0)
-    good = np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED)).reshape(p, n).all(axis=1)
+    good = np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED))
+    whole = np.asarray(good.reshape(p, n).all(axis=1))
     table = outcome.contacts
     table = table.rows(~np.isin(table.kind, (st.GRAZE, st.GRAZE_SHALLOW)))
     begins = table.begins(p * n)
@@ -88,7 +94,7 @@ def sequences(orbits: PeriodicOrbits, z: np.ndarray) -> list[ContactSequence | N
                 table.velocity[rows],
                 int(modes[i, -1]),
             )
-            if good[i]
+            if whole[i]
             else None
         )
     return result

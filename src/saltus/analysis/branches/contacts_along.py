@@ -69,13 +69,13 @@ class Jumps:
                 gap, law = guard.gap, guard.law
                 if law is not None and law.reset and contact.direction == -law.side:
                     after = law.reset[:size]
-            gap, *after = frozen(system, (gap, *after), before)
+            gap, *left = frozen(system, (gap, *after), before)
             rates = frozen(system, system.field[:size], before)
             self._entries.append(
                 (
-                    gap, *gradient(gap, system.states), time_derivative(gap), *rates, *after,
-                    *(slope for one in after for slope in gradient(one, system.states)),
-                    *map(time_derivative, after),
+                    gap, *gradient(gap, system.states), time_derivative(gap), *rates, *left,
+                    *(slope for one in left for slope in gradient(one, system.states)),
+                    *map(time_derivative, left),
                 )
             )  # fmt: skip
         self._size = size

@@ -1,10 +1,10 @@
-"""Grazes and corners: the orbits of a branch at which a contact appears or vanishes, or two contacts
-come at once and change their order.
+"""Grazes and corners: the orbits of a branch at which a contact appears or vanishes, or two
+contacts come at once and change their order.
 
 A graze is the orbit without the contact that touches the boundary: R = 0, g(y(t)) = 0 and
-g'(y(t)) = 0 in the orbit, the parameter and the time t, with the legs of the orbit (legs.py) in R. All
-of it is smooth, whatever the contact does to a motion that meets it, so Newton's method finds it to
-rounding. At a corner a leg lasts no time.
+g'(y(t)) = 0 in the orbit, the parameter and the time t, with the legs of the orbit (legs.py) in R.
+All of it is smooth, whatever the contact does to a motion that meets it, so Newton's method finds
+it to rounding. At a corner a leg lasts no time.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
     phase : float
         About when, in periods since the orbit's first point.
     """
-    place, size = legs.leg_at(z, phase), legs.size
+    place = legs.leg_at(z, phase)
     gap = _Gap(legs, guard, legs.mode_of(place))
     begins = legs.nodes(z[None])[0][0, place]
     phase = _nearest_turn(legs, z, place, gap, (phase - begins) % legs.n) + begins

@@ -3,13 +3,14 @@ grazes at which one becomes another.
 
 At a graze with a rigid stop two branches meet, of orbits with the impact and of orbits without it.
 They go on from one another in the parameter, *persistence*, or both lie on one side of it, a
-*nonsmooth fold*. di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (2008),
-section 7.
+*nonsmooth fold*. di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems
+(2008), section 7.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from saltus.analysis.branches.contact_sequences import sequences
 from saltus.analysis.branches.leg_ends import End, end_of
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.special_points import SpecialPoint
+from saltus.analysis.branches.tracing import ASIDE, Branch, Plan, Starts, both_ways
 
 #: Contact sequences of one branch in one direction.
 MOST_PIECES = 200
@@ -26,6 +29,8 @@ SIDEWAYS = 0.3
 #: Where before an event the last point of a piece lies, in steps, and the shortest such step in
 #: units of the scale.
 NEXT_TO, LEAST = 1e-3, 1e-7
+#: First step behind an event, in units of the scale.
+AFTER = 1e-4
 _ROW = np.zeros(1, np.int64)
 
 
@@ -39,12 +44,15 @@ class Piece:
         Its equations.
     curve : Curve
         Its points, all of the free flow.
+    after_event : bool
+        Whether its first point is an event.
     end : End or None
         The event behind its last point.
     """
 
     legs: Legs
     curve: Curve
+    after_event: bool = False
     end: End | None = None
 
     @property
@@ -80,15 +88,15 @@ class _Way:
 
     limits: tuple[float, float]
     points: int
+    first: float
     home: tuple[Legs, np.ndarray]
     pieces: list[Piece] = field(default_factory=list)
     end: str = ""
 
     def follow(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> None:
         """Follow the branch from an orbit on, piece by piece."""
-        first = FIRST
         for _ in range(MOST_PIECES):
-            end = self._piece(legs, z, along, first)
+            end = self._piece(legs, z, along)
             if end is None:
                 return
             if end.onto is None:
@@ -97,36 +105,35 @@ class _Way:
             legs, z, along = end.onto, end.start, end.along
         self.end = "points"
 
-    def _piece(self, legs: Legs, z: np.ndarray, along: np.ndarray, first: float) -> End | None:
+    def _piece(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> End | None:
         """One contact sequence, and where it ends if that is at an event."""
         again, virtual = bool(self.pieces), list[np.ndarray]()
 
-        def stop(_: np.ndarray, curves: list[Curve]) -> np.ndarray:
-            curve = curves[0]
+        def ends(curve: Curve) -> str:
             if not legs.admissible(curve.z[-1][None])[0]:
                 virtual.append(curve.z[-1])
-                curve.end = "virtual"
-            elif _halves_meet(legs, curve):
-                curve.end = "period_doubling"
-            elif again and self._returns(legs, curve):
-                curve.end = "closed"
-            else:
-                return np.zeros(1, bool)
-            if curve.end != "closed":
-                for kept in (curve.z, curve.tangent, curve.derivative, curve.length):
-                    kept.pop()
-            return np.ones(1, bool)
+                return "virtual"
+            if again and self._returns(legs, curve):
+                return "closed"
+            return _halved(legs, curve)
 
         left = self.points - sum(len(piece.curve.z) for piece in self.pieces)
         curve = follow(
-            legs, z[None], along[None], legs.width - 1, self.limits, max(left, 2), first, stop
+            legs,
+            z[None],
+            along[None],
+            legs.width - 1,
+            self.limits,
+            max(left, 2),
+            AFTER if again else self.first,
+            ends,
         )[0]
-        piece = Piece(legs, curve)
+        piece = Piece(legs, curve, again)
         self.pieces.append(piece)
-        if not virtual:
+        if curve.end != "virtual":
             self.end = curve.end
             return None
-        piece.end = end_of(legs, curve.z[-1], virtual[0], curve.tangent[-1])
+        piece.end = end_of(legs, curve.z[-1], virtual[-1], curve.tangent[-1])
         piece.close_up()
         if piece.end is None:
             self.end = "lost"
@@ -149,13 +156,13 @@ class _Way:
         return False
 
 
-def _halves_meet(legs: Legs, curve: Curve) -> bool:
-    """Whether an orbit of 2m periods has just passed one of m periods."""
+def _halved(legs: Legs, curve: Curve) -> str:
+    """``period_doubling`` if an orbit of 2m periods has just passed one of m periods."""
     if legs.n % 2 or len(curve.z) < 2:
-        return False
+        return ""
     half, points = legs.n // 2, legs.orbits.points(legs.orbit(np.array(curve.z[-2:])))
     apart = (points[:, :half] - points[:, half:]).reshape(2, -1)
-    return bool(apart[0] @ apart[1] < 0.0)
+    return "period_doubling" if apart[0] @ apart[1] < 0.0 else ""
 
 
 def follow_legs(
@@ -165,6 +172,7 @@ def follow_legs(
     along: np.ndarray,
     limits: tuple[float, float],
     points: int,
+    first: float = FIRST,
 ) -> tuple[list[Piece], str]:
     """A branch of periodic orbits in one direction, contact by contact.
 
@@ -180,6 +188,8 @@ def follow_legs(
         Range of the parameter, the last unknown.
     points : int
         Most points.
+    first : float
+        First step, in units of the scale.
 
     Returns
     -------
@@ -197,6 +207,146 @@ def follow_legs(
     step = 1e-6 * tangent * legs.scale[0]
     moved = np.subtract(*legs.orbit(np.array([start + step, start - step])))
     side = 1.0 if (moved / scale) @ along > 0 else -1.0
-    way = _Way(limits, points, (legs, start))
+    way = _Way(limits, points, first, (legs, start))
     way.follow(legs, start, side * tangent)
     return way.pieces, way.end
+
+
+# -- branches --------------------------------------------------------------------------------------
+@dataclass
+class PieceBranch(Branch):
+    """A piece as a branch in the unknowns of its legs."""
+
+    orbits: Legs  # type: ignore[assignment]
+
+    def _contacts(self) -> list[SpecialPoint]:
+        """None: all of its orbits have the same contacts."""
+        return []
+
+
+@dataclass
+class LegBranch(Branch):
+    """A branch in pieces of one contact sequence each.
+
+    Attributes
+    ----------
+    pieces : list of (PieceBranch, Piece)
+        In the order of the branch; each as a branch of its own equations, and what is behind it in
+        the direction in which it was followed.
+    backwards : int
+        How many of the first pieces were followed against that order.
+    """
+
+    pieces: list[tuple[PieceBranch, Piece]] = field(default_factory=list)
+    backwards: int = 0
+
+    def find_events(self) -> None:
+        """Locate what happens within the pieces; between them are the grazes and corners."""
+        for branch, _ in self.pieces:
+            branch.find_events()
+        self.join()
+
+    def join(self) -> None:
+        """Make one branch of the pieces."""
+        z, lengths, multipliers, events = list[np.ndarray](), [0.0], list[np.ndarray](), []
+        self.unexplained = []
+        for number, (branch, piece) in enumerate(self.pieces):
+            again = int(0 < self.backwards == number)  # the orbit from which both ways begin
+            first = sum(map(len, z)) - again
+            back = number < self.backwards
+            if back and piece.end is not None:
+                events.append(self._between(first - 1, piece, piece.outcome))
+            z.append(branch.orbits.orbit(branch.z[again:]))
+            multipliers.append(branch.multipliers[again:])
+            steps = np.append(0.0, np.diff(branch.length))[again:]
+            lengths += list(lengths[-1] + np.cumsum(steps))
+            events += [self._own(branch, event, first) for event in branch.events]
+            self.unexplained += [first + place for place in branch.unexplained]
+            if not back and piece.end is not None:
+                events.append(self._between(first + len(branch.z) - 1, piece, piece.outcome))
+        self.z, self.multipliers = np.concatenate(z), np.concatenate(multipliers)
+        self.length = np.array(lengths[1:]) - lengths[1]
+        self.events = events
+        self._complete()
+
+    def _own(self, branch: PieceBranch, event: SpecialPoint, first: int) -> SpecialPoint:
+        return replace(event, after=first + event.after, z=branch.orbits.orbit(event.z[None])[0])
+
+    def _between(self, after: int, piece: Piece, outcome: str) -> SpecialPoint:
+        """The event behind a piece."""
+        assert piece.end is not None
+        event = piece.end.event
+        none = np.zeros(0)
+        return SpecialPoint(
+            event.kind, max(after, 0), event.orbit, none, event.legs.multipliers_at(event.z), none,
+            event.guards, event.phase, outcome,
+        )  # fmt: skip
+
+    def _complete(self) -> None:
+        """Tangents and derivatives in the unknowns with the contact sequence left to the flow."""
+        rows = np.full(len(self.z), self.row)
+        self.derivative = self.orbits.evaluate(self.z, rows)[1]
+        known = np.where(np.isfinite(self.derivative), self.derivative, 0.0)
+        ahead = np.gradient(self.z / self.scale, axis=0) if len(self.z) > 1 else self.z * 0.0
+        self.tangent = tangents(known, ahead)
+        for i, event in enumerate(self.events):
+            matrix = self.orbits.evaluate(event.z[None], rows[:1])[1]
+            way = tangents(np.where(np.isfinite(matrix), matrix, 0.0), self.tangent[[event.after]])
+            self.events[i] = replace(event, derivative=matrix[0], tangent=way[0])
+
+
+def leg_branches(plan: Plan, starts: Starts, which: Sequence[int]) -> list[Branch | None]:
+    """The branches of some seeds, see :class:`Plan`: contact by contact where orbits have impacts,
+    as others where contacts are held.
+    """
+    orbits = plan.make(starts.n, starts.scale)
+    known = dict(zip(which, sequences(orbits, starts.z[which]), strict=True)) if which else {}
+    result = []
+    for i in which:
+        sequence = known[i]
+        if sequence is None or not sequence.flies:
+            result += both_ways(plan, starts, [i])
+            continue
+        result.append(_branch(plan, orbits, i, starts))
+    return result
+
+
+def _branch(plan: Plan, orbits: PeriodicOrbits, row: int, starts: Starts) -> Branch | None:
+    """The branch of one seed in both directions, or in the one in which it leaves another."""
+    seed, z, scale = starts.seeds[row], starts.z[row], starts.scale[row]
+    up = np.zeros(len(z))
+    up[-1] = 1.0
+    sides, first = ((up, -up), FIRST) if seed.along is None else ((seed.along,), ASIDE)
+    ways: list[tuple[list[Piece], str]] = []
+    for along in sides:
+        if not ways or ways[0][1] != "closed":
+            ways.append(follow_legs(orbits, z, scale, along, plan.limits, plan.points, first))
+    ends = (ways[-1][1], ways[0][1]) if len(ways) == 2 else ("branch", ways[0][1])
+    if ways[0][1] == "closed":
+        ends = ("closed", "closed")
+    forwards = [_as_branch(piece, False) for piece in ways[0][0] if piece.curve.z]
+    back = [_as_branch(piece, True) for piece in ways[1][0] if piece.curve.z] if ways[1:] else []
+    if not forwards and not back:
+        return None
+    none = np.zeros(0)
+    result = LegBranch(
+        orbits, row, none, none, none, none, none, ends, parent=seed.parent,
+        pieces=[*back[::-1], *forwards], backwards=len(back),
+    )  # fmt: skip
+    result.join()
+    return result
+
+
+def _as_branch(piece: Piece, backwards: bool) -> tuple[PieceBranch, Piece]:
+    """A piece as a branch of its own equations, in the order of the whole.
+
+    The orbit at a graze, from which a piece begins, isn't among its points.
+    """
+    legs, curve = piece.legs, piece.curve
+    columns = [np.array(one) for one in (curve.z, curve.tangent, curve.derivative, curve.length)]
+    skip = 1 if piece.after_event and len(curve.z) > 1 else 0
+    z, tangent, derivative, length = (column[skip:] for column in columns)
+    if backwards:
+        z, tangent, derivative, length = z[::-1], -tangent[::-1], derivative[::-1], -length[::-1]
+    own = legs.multipliers(z, derivative, np.zeros(len(z), np.int64))
+    return PieceBranch(legs, 0, z, tangent, derivative, length, own, ("", "")), piece

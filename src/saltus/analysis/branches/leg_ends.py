@@ -88,8 +88,8 @@ def end_of(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -
 
 def _reason(legs: Legs, z: np.ndarray, beyond: np.ndarray, tangent: np.ndarray) -> End | None:
     """The event that makes an orbit virtual, if it is a single one."""
-    slow = np.flatnonzero(legs.speeds(beyond[None])[0] <= 0) if legs.contacts else []
-    impacts = [i for i in slow if legs.jumps_at(i)]
+    speeds = legs.speeds(beyond[None])[0] if legs.contacts else np.ones(1)
+    impacts = [int(i) for i in np.flatnonzero(speeds <= 0) if legs.jumps_at(int(i))]
     if impacts:
         return _impact_vanishes(legs, z, impacts[0]) if len(impacts) == 1 else None
     shrunk = np.flatnonzero(legs.spans(legs.nodes(beyond[None])[0])[0] <= 0)

@@ -4,13 +4,11 @@ next must end where that one begins, and on its boundary.
 The unknowns are the times of all contacts and the states before them. A leg is a flight in one mode
 without boundaries (system/leg.py), so the equations are smooth where a contact appears or vanishes,
 and beyond: an impact may have no speed, or be met from behind. Orbits there are *virtual*, see
-:meth:`Legs.admissible`. The map over a period has a square root at such a place, or a jump. Dankowicz
-& Schilder, Recipes for Continuation (2013), chapter 9.
+:meth:`Legs.admissible`. The map over a period has a square root at such a place, or a jump.
+Dankowicz & Schilder, Recipes for Continuation (2013), chapter 9.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -266,7 +264,7 @@ class Legs:
             flow = self.at(z).rate[:, 0] / self.scale[rows, 1 : self.size + 1]
             self.phase[rows, 1] = flow / np.linalg.norm(flow, axis=1)[:, None]
 
-    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
         """The same orbits from another period on, float64[r, s, z]."""
         phase, before, rest = self.nodes(z)
         m, n, result = self.count, self.n, [z]
@@ -344,8 +342,9 @@ class Legs:
         """Whether the free flow makes the orbits float64[r, z]: they meet these contacts and no
         others, bool[r].
         """
-        legs_in_order = (self.spans(self.nodes(z)[0]) > 0).all(axis=1)
-        result = legs_in_order & ((self.speeds(z) > 0).all(axis=1) if self.contacts else True)
+        result = np.array((self.spans(self.nodes(z)[0]) > 0).all(axis=1))
+        if self.contacts:
+            result &= (self.speeds(z) > 0).all(axis=1)
         which = np.flatnonzero(result)
         if not len(which):
             return result
@@ -359,7 +358,7 @@ class Legs:
         return result
 
 
-def _product(segments: Sequence[np.ndarray]) -> np.ndarray:
+def _product(segments: np.ndarray) -> np.ndarray:
     """The last times ... times the first."""
     result = np.eye(len(segments[0]))
     for one in segments:

@@ -18,13 +18,15 @@ from saltus.analysis.branches.contact_sequences import (
 from saltus.analysis.branches.grazes import ContactEvent, corner, graze
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.special_points import SpecialPoint
+from saltus.system.leg import has_legs
 
 #: How often an interval is halved in which the change isn't one graze, one corner, or several
 #: grazes at once.
 HALVINGS = 24
 #: Grazes at one interval of a branch that are told apart without halving it, and the shortest
 #: contacts among which they are sought.
-MOST_AT_ONCE, SHORTEST = 4, 8
+MOST_AT_ONCE, SHORTEST = 4, 16
 #: How far outside of its interval an event may lie, in intervals.
 OUTSIDE = 0.02
 #: Grazes nearer than this, in units of the scale, come at once.
@@ -32,51 +34,18 @@ AT_ONCE = 1e-9
 
 
 @dataclass(frozen=True)
-class ContactPoint:
-    """An orbit of a branch at which the contact sequence changes.
-
-    Attributes
-    ----------
-    kind : str
-        ``graze``: a contact appears or vanishes; ``corner``: two contacts come at once.
-    after : int
-        The point of the branch that it comes after.
-    ahead : float
-        How far behind that point, in units of the scale.
-    z : float64[m + 1]
-        The orbit and the parameter, in the unknowns of the branch.
-    multipliers : complex128[D]
-        Of the orbit without the contact that appears.
-    guards : tuple of int
-        The guard that is grazed; the two that are met at once.
-    phase : float
-        When, in periods since the orbit's first point.
-    event : ContactEvent
-        The orbit in its legs.
-    """
-
-    kind: str
-    after: int
-    ahead: float
-    z: np.ndarray
-    multipliers: np.ndarray
-    guards: tuple[int, ...]
-    phase: float
-    event: ContactEvent
-
-
-@dataclass(frozen=True)
 class _Point:
     """A point of a branch and its contacts."""
 
     z: np.ndarray
-    sequence: ContactSequence | None
+    sequence: ContactSequence
 
 
 def contact_points(
     orbits: PeriodicOrbits, row: int, z: np.ndarray, tangent: np.ndarray
-) -> list[ContactPoint]:
-    """All changes of the contact sequence between the points of a branch and the next ones.
+) -> list[SpecialPoint]:
+    """All changes of the contact sequence between the points of a branch and the next ones; none
+    where contacts are held, or equations switch by the time.
 
     Parameters
     ----------
@@ -87,21 +56,34 @@ def contact_points(
     z, tangent : float64[p, z]
         The points, and the tangents there in units of the scale.
     """
-    points = [_Point(*one) for one in zip(z, sequences(orbits, z), strict=True)]
-    result = []
-    for after, (one, other) in enumerate(itertools.pairwise(points)):
-        events = _between(orbits, row, tangent[after], one, other, 0)
-        aheads = [_ahead(orbits, row, tangent[after], one.z, event) for event in events]
-        for place in np.argsort(aheads, kind="stable"):
-            event = events[place]
-            own = event.legs.multipliers_at(event.z)
-            result.append(
-                ContactPoint(
-                    event.kind, after, aheads[place], event.orbit, own, event.guards, event.phase,
-                    event,
-                )
-            )  # fmt: skip
-    return result
+    if not has_legs(orbits.parametric.system):
+        return []
+    points = _points(orbits, z)
+    found = [
+        (after, event)
+        for after, (one, other) in enumerate(itertools.pairwise(points))
+        if one is not None and other is not None
+        for event in _between(orbits, row, tangent[after], one, other, 0)
+    ]
+    if not found:
+        return []
+    places = np.array([event.orbit for _, event in found])
+    derivative = orbits.evaluate(places, np.full(len(found), row))[1]
+    return [
+        SpecialPoint(
+            event.kind, after, place, tangent[after], event.legs.multipliers_at(event.z), matrix,
+            event.guards, event.phase,
+        )
+        for (after, event), place, matrix in zip(found, places, derivative, strict=True)
+    ]  # fmt: skip
+
+
+def _points(orbits: PeriodicOrbits, z: np.ndarray) -> list[_Point | None]:
+    """Orbits with their contacts; None where one of these is held."""
+    return [
+        None if found is None or not found.flies else _Point(one, found)
+        for one, found in zip(z, sequences(orbits, z), strict=True)
+    ]
 
 
 def _between(
@@ -109,7 +91,7 @@ def _between(
 ) -> list[ContactEvent]:
     """The events between two points of a branch."""
     first, second = one.sequence, other.sequence
-    if first is None or second is None or shift(first, second, orbits.n) is not None:
+    if shift(first, second, orbits.n) is not None:
         return []
     length = _ahead_of(orbits, row, tangent, one.z, other.z)
     found = _at_once(orbits, row, one, other)
@@ -123,7 +105,9 @@ def _between(
     middle = correct(orbits, guess[None], tangent[None], np.array([row]), length)
     if not middle.found[0]:
         return []
-    half = _Point(middle.z[0], sequences(orbits, middle.z)[0])
+    half = _points(orbits, middle.z)[0]
+    if half is None:
+        return []
     return [
         *_between(orbits, row, tangent, one, half, depth + 1),
         *_between(orbits, row, tangent, half, other, depth + 1),
@@ -145,13 +129,12 @@ def _ahead_of(
 
 def _at_once(orbits: PeriodicOrbits, row: int, one: _Point, other: _Point) -> list[ContactEvent]:
     """The grazes, or the corner, that alone tell two sequences apart; none if there are more."""
-    assert one.sequence is not None and other.sequence is not None
     scale = orbits.scale[row]
     fewer, more = sorted((one, other), key=lambda point: len(point.sequence.contacts))
     short, long = fewer.sequence, more.sequence
     if len(short.contacts) == len(long.contacts):
         for place, order in _swaps(len(short.contacts)):
-            if shift(_swapped(short, order, orbits.n), long, orbits.n) is not None:
+            if shift(_swapped(short, order), long, orbits.n) is not None:
                 event = corner(*Legs.of(orbits, short, fewer.z, scale), place)
                 return [event] if event is not None else []
         return []
@@ -178,7 +161,7 @@ def _swaps(count: int) -> Iterator[tuple[int, list[int]]]:
         yield place, order
 
 
-def _swapped(one: ContactSequence, order: list[int], n: int) -> ContactSequence:
+def _swapped(one: ContactSequence, order: list[int]) -> ContactSequence:
     """The contacts in another order, at the same times."""
     new = of_places(one, order)
     return ContactSequence(new.contacts, one.phase, new.after, new.velocity, one.mode)
@@ -201,9 +184,9 @@ def _removals(one: ContactSequence, count: int, n: int) -> Iterator[tuple[tuple[
                     lasts = (one.phase[(i + j) % m] - one.phase[i]) % n
                     contacts.append((lasts / n, (i, (i + j) % m)))
                 break
-    single = [one_ for one_ in sorted(contacts)]
+    shortest = sorted(contacts)[:SHORTEST]
     for how_many in range(1, MOST_AT_ONCE + 1):
-        for chosen in itertools.combinations(single[: 2 * SHORTEST], how_many):
+        for chosen in itertools.combinations(shortest, how_many):
             places = [place for _, contact in chosen for place in contact]
             if len(places) == count == len(set(places)):
                 yield tuple(contact for _, contact in chosen)

@@ -12,9 +12,10 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.branch_table import table_of
+from saltus.analysis.branches.leg_branches import leg_branches
 from saltus.analysis.branches.seeds import scaled, seeds_at, seeds_of
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.tracing import Branch, Plan, Seed, trace
+from saltus.analysis.branches.tracing import Branch, Plan, Seed, both_ways, trace
 from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.outputs import outputs_of
 from saltus.analysis.responses.grid import grid_of
@@ -26,6 +27,7 @@ from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
+from saltus.system.leg import has_legs
 from saltus.system.system import System
 
 #: Events at which the branches that leave are followed.
@@ -170,12 +172,18 @@ def branches(
             plan = Plan(
                 lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads),
                 limits, points, longest, chosen,
+                leg_branches if _jumps(system) else both_ways,
             )  # fmt: skip
             trace(plan, begins, done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:
             partial = functools.partial(table_of, system, name, limits, done, wanted, method)
             raise Interrupted(partial) from None
         return table_of(system, name, limits, done, wanted, method)
+
+
+def _jumps(system: System) -> bool:
+    """Whether the state jumps at contacts, between which it flies in legs."""
+    return has_legs(system) and any(guard.law and guard.law.reset for guard in system.guards)
 
 
 def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
