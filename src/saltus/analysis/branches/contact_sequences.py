@@ -137,7 +137,14 @@ def _alike(one: Contact, other: Contact) -> bool:
     return (one.guard, one.direction) == (other.guard, other.direction)
 
 
-def of_places(one: ContactSequence, places: Sequence[int]) -> ContactSequence:
+def without(one: ContactSequence, places: Sequence[int]) -> ContactSequence:
+    """A sequence without some of its contacts; the first of these begins what is left out."""
+    keep = [i for i in range(len(one.contacts)) if i not in places]
+    new = in_order(one, keep)
+    return new if keep or not places else replace(new, mode=one.contacts[places[0]].before)
+
+
+def in_order(one: ContactSequence, places: Sequence[int]) -> ContactSequence:
     """A sequence of some of the contacts, in the order of their places."""
     keep = list(places)
     return replace(

@@ -23,7 +23,7 @@ from saltus.analysis.branches.special_points import SpecialPoint
 from saltus.analysis.branches.tracing import ASIDE, Branch, Plan, Starts, both_ways
 
 #: Contact sequences of one branch in one direction.
-MOST_PIECES = 200
+MOST_PIECES = 40
 #: How far a branch may pass its start sideways, over the step that passes it.
 SIDEWAYS = 0.3
 #: Where before an event the last point of a piece lies, in steps, and the shortest such step in
@@ -304,10 +304,12 @@ def leg_branches(plan: Plan, starts: Starts, which: Sequence[int]) -> list[Branc
     result = []
     for i in which:
         sequence = known[i]
-        if sequence is None or not sequence.flies:
+        if sequence is not None and sequence.flies:
+            result.append(_branch(plan, orbits, i, starts))
+        elif starts.n <= plan.longest:
             result += both_ways(plan, starts, [i])
-            continue
-        result.append(_branch(plan, orbits, i, starts))
+        else:  # a chatter of many periods
+            result.append(None)
     return result
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from saltus.analysis.branches.arclength import correct, tangents
 from saltus.analysis.branches.contact_sequences import (
     Contact,
     ContactSequence,
-    of_places,
     sequences,
     shift,
+    without,
 )
 from saltus.analysis.branches.grazes import ContactEvent, corner, graze
 from saltus.analysis.branches.legs import Legs
@@ -24,6 +24,8 @@ HALVINGS = 40
 OUTSIDE = 0.05
 #: How far beyond an event the free flow is asked for the new contacts, in units of the scale.
 BEYOND = (1e-3, 1e-4, 1e-5, 1e-6)
+#: Contacts of the free flow and of a virtual orbit that are the same differ less, in periods.
+SAME_TIME = 1e-6
 _ROW = np.zeros(1, np.int64)
 
 
@@ -117,10 +119,7 @@ def _impact_vanishes(legs: Legs, z: np.ndarray, place: int) -> End | None:
 def _without(legs: Legs, z: np.ndarray, places: tuple[int, ...]) -> ContactEvent | None:
     """The graze at which some contacts of an orbit vanish."""
     phase = legs.nodes(z[None])[0][0]
-    keep = [i for i in range(len(legs.contacts)) if i not in places]
-    fewer = of_places(legs.sequence_at(z), keep)
-    if not keep:
-        fewer = replace(fewer, mode=legs.contacts[places[0]].before)
+    fewer = without(legs.sequence_at(z), places)
     shorter, near = Legs.of(legs.orbits, fewer, legs.orbit(z[None])[0], legs.free_scale)
     last = phase[places[-1]] + (legs.n if places[-1] < places[0] else 0.0)
     return graze(shorter, near, legs.contacts[places[0]].guard, 0.5 * (phase[places[0]] + last))
@@ -188,11 +187,9 @@ def _first_extra(legs: Legs, z: np.ndarray) -> tuple[Contact, float] | None:
     free = sequences(legs.orbits, legs.orbit(z[None]))[0]
     if free is None:
         return None
-    phase = legs.nodes(z[None])[0][0] % legs.n
-    own = [legs.contacts[i] for i in np.argsort(phase, kind="stable")] if legs.contacts else []
+    phase = np.sort(legs.nodes(z[None])[0][0] % legs.n) if legs.contacts else np.zeros(0)
     for i, contact in enumerate(free.contacts):
-        mine = own[i] if i < len(own) else None
-        if mine is None or (mine.guard, mine.direction) != (contact.guard, contact.direction):
+        if i == len(phase) or free.phase[i] < phase[i] - SAME_TIME:
             return contact, float(free.phase[i])
     return None
 

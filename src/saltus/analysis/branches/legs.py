@@ -19,6 +19,8 @@ from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 from saltus.system.leg import leg
 
+#: Legs that last less are flown by a detour that lasts so long, in periods.
+BRIEF, DETOUR = 1e-3, 1e-2
 #: Shorter times are rounding, in periods.
 AT_ONCE = 1e-14
 
@@ -162,13 +164,32 @@ class Legs:
         matrices = np.empty((*after.shape, start.shape[2]))
         for mode, map_ in self._maps.items():
             mine = [i for i, one in enumerate(self._modes) if one == mode]
-            flat = start[:, mine].reshape(-1, start.shape[2])
-            end, matrix = map_.tangent(flat, 1)
+            end, matrix = self._flown(map_, start[:, mine].reshape(-1, start.shape[2]))
             shape = (len(after), len(mine))
             ends[:, mine] = end[:, : self.size].reshape(*shape, -1)
             matrices[:, mine] = matrix[:, : self.size].reshape(*shape, self.size, -1)
         matrices[..., -2:] *= self.unit
         return ends, matrices
+
+    def _flown(self, map_: Stroboscope, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Ends of legs float64[k, E + 2] and their tangent maps. One that lasts next to no time
+        goes back first and then forth: all of its rates would be next to nothing.
+        """
+        span, away = start[:, -1], DETOUR * self.unit
+        short = np.flatnonzero((np.abs(span) < BRIEF * self.unit) & (span != 0))
+        if not len(short):
+            return map_.tangent(start, 1)
+        first = start.copy()
+        first[short, -1] = -away
+        end, matrix = map_.tangent(first, 1)
+        onwards = end[short]
+        onwards[:, -2:] = start[short, -2:] + np.array([-away, away])
+        there, second = map_.tangent(onwards, 1)
+        back = matrix[short]
+        back[:, :-1, -1] = 0.0  # the time it goes back is the same for all
+        there[:, -2:] = start[short, -2:]
+        end[short], matrix[short] = there, second @ back
+        return end, matrix
 
     def _states(
         self, after: np.ndarray, rest: np.ndarray, phase: np.ndarray, span: np.ndarray

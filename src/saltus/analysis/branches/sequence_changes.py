@@ -11,9 +11,10 @@ import numpy as np
 from saltus.analysis.branches.arclength import correct
 from saltus.analysis.branches.contact_sequences import (
     ContactSequence,
-    of_places,
+    in_order,
     sequences,
     shift,
+    without,
 )
 from saltus.analysis.branches.grazes import ContactEvent, corner, graze
 from saltus.analysis.branches.legs import Legs
@@ -139,8 +140,7 @@ def _at_once(orbits: PeriodicOrbits, row: int, one: _Point, other: _Point) -> li
                 return [event] if event is not None else []
         return []
     for contacts in _removals(long, len(long.contacts) - len(short.contacts), orbits.n):
-        gone = {place for contact in contacts for place in contact}
-        rest = of_places(long, [i for i in range(len(long.contacts)) if i not in gone])
+        rest = without(long, [place for contact in contacts for place in contact])
         if shift(rest, short, orbits.n) is None:
             continue
         legs, z = Legs.of(orbits, short, fewer.z, scale)
@@ -163,7 +163,7 @@ def _swaps(count: int) -> Iterator[tuple[int, list[int]]]:
 
 def _swapped(one: ContactSequence, order: list[int]) -> ContactSequence:
     """The contacts in another order, at the same times."""
-    new = of_places(one, order)
+    new = in_order(one, order)
     return ContactSequence(new.contacts, one.phase, new.after, new.velocity, one.mode)
 
 
