@@ -5,24 +5,17 @@ uses.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-import numpy as np
-
-from saltus.codegen.module import Flow, steps_module
-from saltus.errors import ParameterError, shown
-from saltus.flow.counts import whole
-from saltus.flow.method import Method, check_positive, explain_unknown_options, step_budget
-from saltus.flow.taylor import Taylor
-from saltus.system.system import System
+from saltus.errors import ParameterError
+from saltus.flow.method import check_positive, explain_unknown_options
+from saltus.flow.one_by_one import OneByOne
 from saltus.units import to_si
-
-#: Ways of crossing, in the order of kernels/landing.py.
-EVENTS = ("ignore", "henon", "inverse", "bisect")
 
 
 @explain_unknown_options
 @dataclass(frozen=True)
-class RK4(Method):
+class RK4(OneByOne):
     """The classical Runge-Kutta method in steps of one length, as literature on contacts uses it.
 
     Parameters
@@ -51,6 +44,9 @@ class RK4(Method):
     Kutta, Z. Math. Phys. 46 (1901) 435-453; Henon, Physica D 5 (1982) 412-414.
     """
 
+    #: In the order of kernels/landing.py.
+    EVENTS: ClassVar[tuple[str, ...]] = ("ignore", "henon", "inverse", "bisect")
+
     step: float | str
     events: str = "bisect"
     tolerance: float = 2.0**-40
@@ -62,30 +58,13 @@ class RK4(Method):
             object.__setattr__(self, "step", to_si(self.step, "s", "step"))
         check_positive("step", self.step)
         check_positive("tolerance", self.tolerance)
-        if not isinstance(self.events, str) or self.events not in EVENTS:
-            ways = ", ".join(f'"{way}"' for way in EVENTS)
-            raise ParameterError(f"events must be one of {ways}, not {shown(self.events)}.")
         if self.tolerance >= 1:
             raise ParameterError(f"tolerance is a share of a step, below 1, not {self.tolerance}.")
-        if self.max_steps is not None:
-            whole(self.max_steps, "max_steps")
-        whole(self.max_events, "max_events")
+        self._check_common()
 
-    def kernels(self, system: System) -> Flow:
-        """The compiled method."""
-        return steps_module(system, self.name)
-
-    def numbers(self, periods: float) -> np.ndarray:
-        """Length of a step, tolerance, the way of crossing, step budget, event budget."""
-        return np.array(
-            [
-                float(self.step),
-                self.tolerance,
-                float(EVENTS.index(self.events)),
-                step_budget(self.max_steps, periods),
-                float(self.max_events),
-            ]
-        )
+    def _own_numbers(self) -> tuple[float, float, float]:
+        """Length of a step, tolerance, the way of crossing."""
+        return float(self.step), self.tolerance, float(self.EVENTS.index(self.events))
 
     @property
     def label(self) -> str:
@@ -93,15 +72,6 @@ class RK4(Method):
         return f"{self.name} {self.events} ({float(self.step):g})"
 
     @property
-    def records_contacts(self) -> bool:
-        """Only if they are located."""
-        return self.events != "ignore"
-
-    @property
     def noise(self) -> float:
         """Nothing measures the errors of fixed steps: what they are taken to be."""
         return 1e-3 if self.records_contacts else 0.01
-
-    def companion(self) -> Taylor:
-        """The Taylor flow, which is exact compared with this one."""
-        return Taylor()

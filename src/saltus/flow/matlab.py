@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from saltus.codegen.module import Flow, steps_module
-from saltus.errors import ParameterError, shown
-from saltus.flow.counts import whole
-from saltus.flow.method import Method, check_positive, explain_unknown_options, step_budget
-from saltus.flow.taylor import Taylor
-from saltus.system.system import System
+from saltus.errors import ParameterError
+from saltus.flow.method import check_positive, explain_unknown_options
+from saltus.flow.one_by_one import OneByOne
 
 _PARAMETERS = """
     Parameters
@@ -32,8 +29,10 @@ _M = TypeVar("_M", bound="Matlab")
 
 
 @dataclass(frozen=True)
-class Matlab(Method):
+class Matlab(OneByOne):
     """Options and numbers that MATLAB's solvers have in common."""
+
+    EVENTS: ClassVar[tuple[str, ...]] = ("ignore", "locate")
 
     rtol: float = 1e-3
     atol: float = 1e-6
@@ -49,27 +48,11 @@ class Matlab(Method):
                 f"rtol must be at least {100 * np.finfo(float).eps:.3g}, as in "
                 f"MATLAB, not {self.rtol}."
             )
-        if not isinstance(self.events, str) or self.events not in ("locate", "ignore"):
-            raise ParameterError(f'events must be "locate" or "ignore", not {shown(self.events)}.')
-        if self.max_steps is not None:
-            whole(self.max_steps, "max_steps")
-        whole(self.max_events, "max_events")
+        self._check_common()
 
-    def kernels(self, system: System) -> Flow:
-        """The compiled method."""
-        return steps_module(system, self.name)
-
-    def numbers(self, periods: float) -> np.ndarray:
-        """RelTol, AbsTol, whether contacts are located, step budget, event budget."""
-        return np.array(
-            [
-                self.rtol,
-                self.atol,
-                float(self.events == "locate"),
-                step_budget(self.max_steps, periods),
-                float(self.max_events),
-            ]
-        )
+    def _own_numbers(self) -> tuple[float, float, float]:
+        """RelTol, AbsTol, whether contacts are located."""
+        return self.rtol, self.atol, float(self.EVENTS.index(self.events))
 
     @property
     def label(self) -> str:
@@ -78,11 +61,6 @@ class Matlab(Method):
             f"{self.name.lower()} {'' if self.events == 'locate' else 'not '}located "
             f"({self.rtol:g}, {self.atol:g})"
         )
-
-    @property
-    def records_contacts(self) -> bool:
-        """Only if they are located."""
-        return self.events == "locate"
 
     @property
     def noise(self) -> float:
@@ -100,10 +78,6 @@ class Matlab(Method):
     def noise_of(self, scale: np.ndarray) -> np.ndarray:
         """The same, with the errors that AbsTol allows to small states."""
         return self.noise * np.maximum(1.0, self.atol / (self.rtol * scale)).max(axis=1)
-
-    def companion(self) -> Taylor:
-        """The Taylor flow, which is exact compared with these methods."""
-        return Taylor()
 
 
 def _documented(cls: type[_M]) -> type[_M]:

@@ -12,9 +12,10 @@ from saltus.errors import ParameterError, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import motion_colors, regions
 from saltus.plot import response_points as points
+from saltus.plot.branches import draw_branches, draw_marks
 from saltus.plot.picture import caller, picture
 from saltus.plot.style import QUIET, Scale
-from saltus.results.dataset.schema import response_name, sample_name, states_of
+from saltus.results.dataset.schema import point_name, response_name, sample_name, states_of
 
 #: What the vertical axis shows, by what was sampled.
 _SHOWN = {
@@ -22,6 +23,8 @@ _SHOWN = {
     "stroboscope": "{} at the "
         "Poincaré points",
 }  # fmt: skip
+#: What is drawn of branches where turning points are drawn of responses.
+_EXTREMES = ("maximum", "minimum")
 #: Diameter of the smallest dots [pt]: more than a pixel of a screen.
 _SMALLEST = 0.6
 #: Where the legend begins, in widths of the Axes, if the names of the gaps stand there.
@@ -82,9 +85,13 @@ def bifurcation_diagram(
             named |= (_compare if one.name else _kinds)(
                 panel, one, one.ds[name].values * scale.factor, across
             )
+            if not one.name and "point_branch" in one.ds:
+                named |= _continued(panel, one, state, across, scale, events)
         _frame(panel, datasets, variables, state, scale, across)
         if events:
-            points.draw_events(panel, datasets, across)
+            points.draw_events(
+                panel, [one for one in datasets if "point_branch" not in one.ds], across
+            )
         if legend:
             points.legend(panel, named, _BESIDE_GAPS if panel.texts else 1.02)
     return panel
@@ -131,6 +138,25 @@ def _kinds(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> di
         }
         draw.draw_points(ax, x, y, zorder=2 if aperiodic else 3, **marks)
     return points.kind_handles(one, of)
+
+
+def _continued(
+    ax: Axes, one: points.Shown, state: str, across: Scale, up: Scale, events: bool
+) -> dict[str, Any]:
+    """The branches that the responses lie on: their extremes where turning points are drawn, else
+    their points at whole periods.
+    """
+    ds = one.ds
+    if sample_name(state) in ds and ds.attrs.get("sample") == "turning_points":
+        curves = [ds[f"point_output_{end}"].sel(output=state).values for end in _EXTREMES]
+    else:
+        curves = list(ds[point_name(state)].values.T)
+    named: dict[str, Any] = {}
+    for values in curves:
+        named |= draw_branches(ax, ds, values, across, up)
+        if events:
+            draw_marks(ax, ds, values, across, up)
+    return named
 
 
 def _compare(ax: Axes, one: points.Shown, values: np.ndarray, across: Scale) -> dict[str, Any]:

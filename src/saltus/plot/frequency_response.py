@@ -15,6 +15,7 @@ from saltus.errors import ParameterError, UnitError, among, nearest, shown
 from saltus.plot import axes as draw
 from saltus.plot import motion_colors
 from saltus.plot import response_points as points
+from saltus.plot.branches import draw_branches, draw_marks
 from saltus.plot.picture import picture
 from saltus.plot.style import OKABE_ITO, Scale
 from saltus.results.dataset.schema import states_of
@@ -101,6 +102,8 @@ def frequency_response(
             named |= (_compare if one.name else _kinds)(
                 panel, one, one.ds[variable].values * up.factor, across
             )
+            if not one.name and "point_branch" in one.ds:
+                named |= _continued(panel, one, quantity, output, across, up, events)
         if marks is not None:
             _draw_measured(
                 panel,
@@ -118,7 +121,9 @@ def frequency_response(
             else up.label(_LABELS[quantity].format(named_output))
         )
         if events:
-            points.draw_events(panel, datasets, across)
+            points.draw_events(
+                panel, [one for one in datasets if "point_branch" not in one.ds], across
+            )
         if legend:
             points.legend(panel, named)
     return panel
@@ -168,7 +173,7 @@ def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[st
         np.unique(of).tolist(), key=lambda code: (code != motion_colors.CHAOTIC, code)
     ):
         color, mine = motion_colors.color(code), of == code
-        if motion_colors.repeats(code):
+        if motion_colors.repeats(code) and "point_branch" not in one.ds:
             line = points.branch_lines(one, y, mine)
             ax.plot(
                 line[0] * across.factor,
@@ -191,6 +196,27 @@ def _kinds(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[st
             **marks,
         )
     return points.kind_handles(one, of, markers=True)
+
+
+def _continued(
+    ax: Axes,
+    one: points.Shown,
+    quantity: str,
+    output: str | None,
+    across: Scale,
+    up: Scale,
+    events: bool,
+) -> dict[str, Any]:
+    """The branches that the responses lie on: stable solid, unstable dashed."""
+    if quantity == "transmissibility":
+        raise ParameterError("a transmissibility isn't known on branches: draw it without them.")
+    name = states_of(one.ds)[0] if output is None else output
+    values = one.ds[f"point_output_{quantity}"].sel(output=name).values
+    values = np.rad2deg(values) if quantity == "phase" else values
+    named = draw_branches(ax, one.ds, values, across, up)
+    if events:
+        draw_marks(ax, one.ds, values, across, up)
+    return named
 
 
 def _compare(ax: Axes, one: points.Shown, y: np.ndarray, across: Scale) -> dict[str, Any]:

@@ -40,7 +40,7 @@ def leg(system: System, mode: int) -> System:
                 f"{system.name} switches at instants, or has a remainder or a table of time. Its "
                 "contacts can't be followed one by one along a branch."
             )
-        rates.append(ex.mul(ex.substituted(entry, ex.TIME, time), span))
+        rates.append(ex.mul(ex.substituted(entry, {ex.TIME: time}), span))
     zero = ex.constant(0.0)
     states = (*system.states, START, SPAN)
     return System(

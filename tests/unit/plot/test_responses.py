@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from matplotlib.colors import same_color, to_rgb
 
+import saltus as sl
 from saltus.errors import ParameterError
 from saltus.plot import (
     bifurcation_diagram,
@@ -413,3 +414,26 @@ def test_a_title_stands_above_the_marks_of_events_and_every_mark_is_its_own():
     looks = [marker for _, marker in response_points._EVENTS.values()]
     assert len(set(looks)) == len(looks)
     assert not set(looks) & set(response_points.MARKERS[:1])  # the first of several Datasets
+
+
+def test_unstable_branches_are_drawn_with_the_responses():
+    rig = sl.models.delangre("b", force="4 N")
+    start = {"x": ["0 mm", "5 mm"], "v": 0}
+    for found, draw in (
+        (
+            sl.frequency_response(rig, ["12.5 Hz", "13 Hz"], start, unstable=True, progress=False),
+            sl.plot.frequency_response,
+        ),
+        (
+            sl.bifurcation_diagram(
+                rig, {"frequency": [12.5, 13.0]}, start, unstable=True, progress=False
+            ),
+            sl.plot.bifurcation_diagram,
+        ),
+        (
+            sl.branches(rig, {"frequency": (12.0, 14.0)}, start, at=1, progress=False),
+            sl.plot.branches,
+        ),
+    ):
+        ax = draw(found)
+        assert any((line.get_gid() or "").startswith("stable") for line in ax.lines)

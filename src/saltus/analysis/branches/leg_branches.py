@@ -118,16 +118,9 @@ class _Way:
             return _halved(legs, curve)
 
         left = self.points - sum(len(piece.curve.z) for piece in self.pieces)
-        curve = follow(
-            legs,
-            z[None],
-            along[None],
-            legs.width - 1,
-            self.limits,
-            max(left, 2),
-            AFTER if again else self.first,
-            ends,
-        )[0]
+        step = AFTER if again else self.first
+        limits = {legs.width - 1: self.limits}
+        curve = follow(legs, z[None], along[None], limits, max(left, 2), step, ends=ends)[0]
         piece = Piece(legs, curve, again)
         self.pieces.append(piece)
         if curve.end != "virtual":

@@ -10,6 +10,8 @@ Dankowicz & Schilder, Recipes for Continuation (2013), chapter 9.
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 
 from saltus.analysis.branches.contact_sequences import ContactSequence, sequences, shift
@@ -284,6 +286,15 @@ class Legs:
             self.phase[rows, 0] = self.nodes(z)[1][:, 0]
             flow = self.at(z).rate[:, 0] / self.scale[rows, 1 : self.size + 1]
             self.phase[rows, 1] = flow / np.linalg.norm(flow, axis=1)[:, None]
+
+    def near(self, z: np.ndarray, rows: np.ndarray) -> Legs:
+        """The equations whose row i is curve rows[i], int64[r], with the condition on its phase at
+        the orbit float64[r, z].
+        """
+        other = copy.copy(self)
+        other.scale, other.phase = self.scale[rows], self.phase[rows].copy()
+        other.accepted(z, np.arange(len(rows)))
+        return other
 
     def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
         """The same orbits from another period on, float64[r, s, z]."""

@@ -12,26 +12,21 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.branch_table import table_of
-from saltus.analysis.branches.leg_branches import leg_branches
-from saltus.analysis.branches.seeds import scaled, seeds_at, seeds_of
-from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.tracing import Branch, Plan, Seed, both_ways, trace
-from saltus.analysis.orbits.tolerances import LONGEST
+from saltus.analysis.branches.plans import plan_of
+from saltus.analysis.branches.seeds import scaled, seeds_of
+from saltus.analysis.branches.tracing import Branch, Seed, trace
 from saltus.analysis.outputs import outputs_of
+from saltus.analysis.responses.continued import LONGEST_DOUBLED, POINTS, SWITCHES, seeds_of_grid
 from saltus.analysis.responses.grid import grid_of
 from saltus.analysis.responses.responses import find
-from saltus.analysis.starts import check_system, single
+from saltus.analysis.starts import check_system, range_of, single
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
-from saltus.system.leg import has_legs
 from saltus.system.system import System
-
-#: Events at which the branches that leave are followed.
-SWITCHES = ("period_doubling", "branch_point")
 
 
 @verb
@@ -43,8 +38,8 @@ def branches(
     box: Mapping[str, Any] | None = None,
     at: int = 12,
     switch: Sequence[str] = SWITCHES,
-    longest: int = 8,
-    points: int = 1000,
+    longest: int = LONGEST_DOUBLED,
+    points: int = POINTS,
     values: Mapping[str, Any] | None = None,
     outputs: Mapping[str, Any] | None = None,
     every: float | str | None = None,
@@ -55,14 +50,15 @@ def branches(
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
     """Branches of periodic orbits over a parameter, stable and unstable, with folds, period
-    doublings, branch points and tori.
+    doublings, branch points, tori and grazes.
 
     Each branch is followed by pseudo-arclength continuation on the exact flow, in both directions
     and through its folds, until it leaves the range or closes: an isola. Contacts come and go by
     themselves; no contact sequence is given. Derivatives, also with respect to the parameter, are
     those of the tangent flow. Bifurcations are located to rounding; where the number of multipliers
     outside the unit circle changes otherwise, the step is refined, and what stays unexplained is
-    counted in ``branch_unexplained``.
+    counted in ``branch_unexplained``. Orbits with impacts are followed from contact to contact,
+    through the grazes at which an impact appears or vanishes.
 
     Parameters
     ----------
@@ -105,7 +101,8 @@ def branches(
     Returns
     -------
     Dataset
-        Dims ``point``, ``branch``, ``event``, ``multiplier``, ``phase``, ``output``. On point:
+        Dims ``point``, ``branch``, ``event``, ``multiplier``, ``orbit_point``,
+        ``output``. On point:
         ``point_branch``, ``point_<parameter>``, ``point_stable``, ``point_unstable_multipliers``,
         ``point_period`` [s], ``point_peak`` and ``point_rms`` of the first state,
         ``point_contacts``, ``point_itinerary``, ``point_margin``, multipliers (of a limit cycle
@@ -113,7 +110,11 @@ def branches(
         ``point_output_maximum`` and so on of each state and output. On branch:
         ``branch_periods``, ``branch_closed``, ``branch_parent``, ``branch_begin``, ``branch_end``.
         On event: ``event_kind`` (``fold``, ``period_doubling``, ``branch_point``,
-        ``neimark_sacker``), ``event_<parameter>``, its states and multipliers.
+        ``neimark_sacker``; ``graze``: a contact appears or vanishes; ``corner``: two contacts come
+        at once), ``event_<parameter>``, its states and multipliers, ``event_guard`` and
+        ``event_phase`` of a graze or corner, and of a graze of orbits with impacts
+        ``event_outcome``: ``persistence``, where orbits with the impact go on from those without
+        it, or ``nonsmooth_fold``, where both lie on one side.
 
     Raises
     ------
@@ -169,21 +170,12 @@ def branches(
                     f'{limits[1]:g}: give other starts, more of them (start="random 20" with '
                     "box=), or longer runs (periods=)."
                 )
-            plan = Plan(
-                lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads),
-                limits, points, longest, chosen,
-                leg_branches if _jumps(system) else both_ways,
-            )  # fmt: skip
+            plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
             trace(plan, begins, done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:
             partial = functools.partial(table_of, system, name, limits, done, wanted, method)
             raise Interrupted(partial) from None
         return table_of(system, name, limits, done, wanted, method)
-
-
-def _jumps(system: System) -> bool:
-    """Whether the state jumps at contacts, between which it flies in legs."""
-    return has_legs(system) and any(guard.law and guard.law.reset for guard in system.guards)
 
 
 def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
@@ -194,19 +186,7 @@ def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
             f"sl.branches follows one parameter: {{{example!r}: (low, high)}}, not {shown(vary)}."
         )
     ((name, ends),) = vary.items()
-    if name not in system.values:
-        raise ParameterError(
-            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
-        )
-    try:
-        low, high = (single(system, name, end) for end in ends)
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"the range of {name} must be (low, high), not {shown(ends)}."
-        ) from None
-    if not low < high:
-        raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")
-    return name, (low, high)
+    return name, range_of(system, name, ends)
 
 
 def _kinds(switch: Any) -> Sequence[str]:
@@ -239,8 +219,4 @@ def _found_at(
     found = find(grid, method, periods, threads, None)
     if not found.complete:
         raise KeyboardInterrupt
-    points = np.full((len(found), LONGEST, len(system.states)), np.nan)
-    for i in range(len(found)):
-        own = found.points(i)[:LONGEST]
-        points[i, : len(own)] = own
-    return list(seeds_at(system, points, found.period, found.time, values[found.place]))
+    return seeds_of_grid(found, grid, method)

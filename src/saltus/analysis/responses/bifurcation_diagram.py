@@ -26,6 +26,7 @@ def bifurcation_diagram(
     *,
     sample: str = "turning_points",
     follow: bool = False,
+    unstable: bool = False,
     box: Mapping[str, Any] | None = None,
     values: Mapping[str, Any] | None = None,
     outputs: Mapping[str, Any] | None = None,
@@ -42,7 +43,7 @@ def bifurcation_diagram(
     Parameters
     ----------
     system : System
-        Any system; one without forcing with ``every``.
+        Any system.
     vary : mapping
         One parameter, or two for a map of types: a range, such as ``{"contact_stiffness": ("1e3
         N/m", "1e9 N/m", 2000, "log")}``, or a list or array of values.
@@ -55,9 +56,14 @@ def bifurcation_diagram(
     follow : bool
         Whether each start goes on, from the lowest value upwards, where it stood at the value
         before; otherwise each value starts afresh.
+    unstable : bool
+        Whether to follow the branches that the responses lie on by :func:`saltus.branches`, through
+        their unstable parts and onto doubled and crossing branches. Then ``response_branch`` is one
+        of these (-1 of what never repeats), and the Dataset has their variables, on ``point``,
+        ``branch`` and ``event``, too.
     every : float or str, optional
-        Time between two samples of the motion of a system without forcing [s], about a turn of it.
-        Equilibria, limit cycles, their periods, sizes and stability don't depend on it.
+        Time between two samples of the motion of a system without forcing [s]; default about a
+        turn of it. Equilibria, limit cycles, their periods, sizes and stability don't depend on it.
     box, values, outputs, method, periods, seed, threads, progress
         As for :func:`saltus.frequency_response`.
 
@@ -101,5 +107,12 @@ def bifurcation_diagram(
     grid = grid_of(system, vary, start, box, values, seed, follow, every)
     check_unforced_sample(sample, grid.system)
     return respond(
-        grid, method, periods, threads, progress, sample if len(grid.axes) == 1 else "", outputs
+        grid,
+        method,
+        periods,
+        threads,
+        progress,
+        sample if len(grid.axes) == 1 else "",
+        outputs,
+        unstable,
     )

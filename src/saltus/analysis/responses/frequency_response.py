@@ -26,6 +26,7 @@ def frequency_response(
     *,
     box: Mapping[str, Any] | None = None,
     follow: bool = False,
+    unstable: bool = False,
     values: Mapping[str, Any] | None = None,
     outputs: Mapping[str, Any] | None = None,
     method: Method | None = None,
@@ -57,6 +58,11 @@ def frequency_response(
         Range (low, high) of each state for random starts.
     follow : bool
         Whether given starts are swept upwards too.
+    unstable : bool
+        Whether to follow the branches that the responses lie on by :func:`saltus.branches`, through
+        their unstable parts and onto doubled and crossing branches. Then ``response_branch`` is one
+        of these (-1 of what never repeats), and the Dataset has their variables, on ``point``,
+        ``branch`` and ``event``, too.
     values : mapping, optional
         Other values of parameters.
     outputs : mapping of str to callable, or to (callable, unit), optional
@@ -118,8 +124,8 @@ def frequency_response(
     if system.forced_at is None:
         raise ParameterError(
             f"{system.name} has no forcing, so no frequency to vary. Take sl.bifurcation_diagram "
-            f"over another parameter, with every=; "
+            f"over another parameter; "
             "if a parameter is the frequency of a forcing, declare forced_at= in @sl.system."
         )
     grid = grid_of(system, {system.forced_at: frequency}, start, box, values, seed, follow)
-    return respond(grid, method, periods, threads, progress, outputs=outputs)
+    return respond(grid, method, periods, threads, progress, outputs=outputs, unstable=unstable)

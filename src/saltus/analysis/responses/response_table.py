@@ -4,6 +4,7 @@ share.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -14,13 +15,14 @@ from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.outputs import Outputs, outputs_of
 from saltus.analysis.responses import branches
 from saltus.analysis.responses.bifurcations import Event
+from saltus.analysis.responses.continued import check_continued, continued
 from saltus.analysis.responses.followed import Followed
 from saltus.analysis.responses.grid import Grid
 from saltus.analysis.responses.responses import GridResponses, find, numbers_of, table_of
 from saltus.analysis.responses.samples import sampled
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
-from saltus.flow.progress import reporting
+from saltus.flow.progress import reporting, stage
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
@@ -36,17 +38,26 @@ def respond(
     progress: bool | Callable[[float], None] | None,
     sample: str = "",
     outputs: Mapping[str, Any] | None = None,
+    unstable: bool = False,
 ) -> xr.Dataset:
-    """The Dataset of a grid's responses. Raises Interrupted, with the Dataset of what is known, on
-    Ctrl-C.
+    """The Dataset of a grid's responses, with the branches that they lie on if ``unstable``. Raises
+    Interrupted, with the Dataset of what is known, on Ctrl-C.
     """
     method, periods = check_method(method), whole(periods, "periods")
+    check_continued(unstable, grid, method)
     wanted = outputs_of(grid.system, outputs)
+    part = functools.partial(_dataset, grid, method, periods)
     with reporting(progress) as show:
-        found = find(grid, method, periods, threads, show)
-    if not found.complete:
-        raise Interrupted(lambda: _dataset(grid, method, periods, found, threads, sample, wanted))
-    return _dataset(grid, method, periods, found, threads, sample, wanted)
+        found = find(grid, method, periods, threads, stage(show, 0.0, 0.4) if unstable else show)
+        if not found.complete:
+            raise Interrupted(lambda: part(found, threads, sample, wanted))
+        if not unstable:
+            return part(found, threads, sample, wanted)
+        try:
+            more = continued(found, grid, method, wanted, threads, stage(show, 0.4, 0.95))
+        except KeyboardInterrupt:
+            raise Interrupted(lambda: part(found, threads, sample, wanted)) from None
+        return part(found, threads, sample, wanted, more)
 
 
 def _dataset(
@@ -57,11 +68,14 @@ def _dataset(
     threads: int | None,
     sample: str,
     outputs: Outputs,
+    more: tuple[dict[str, Any], dict[str, Any], np.ndarray] | None = None,
 ) -> xr.Dataset:
     numbers = numbers_of(found, outputs, grid, method, threads)
     table = table_of(found, numbers, grid, method)
     branch, happened = np.full(len(found), -1, np.int64), []
-    if len(grid.axes) == 1 and found.complete:  # after Ctrl-C nothing more is computed
+    if more is not None:
+        branch = more[2]
+    elif len(grid.axes) == 1 and found.complete:  # after Ctrl-C nothing more is computed
         followed = Followed(found, grid, method, threads)
         branch = branches.follow(found, followed, grid.places)
         happened = branches.events(found, table, branch, followed, grid, method.exact)
@@ -88,13 +102,15 @@ def _dataset(
             else {}
         ),
         # netCDF-3 has room for one empty dim only
-        **(_events(happened, grid) if len(table) else {}),
+        **(_events(happened, grid) if len(table) and more is None else {}),
+        **(more[0] if more is not None else {}),
     }
     output = outputs.units[0] if len(set(outputs.units)) == 1 else ""
     words = {"<when>": table.points_when, "<output>": output, "<sampled>": SAMPLES.get(sample, "")}
     attrs = provenance(system, method, fixed, grid.axes) | {
         "periods": periods,
         "random_starts": int(grid.drawn),
+        **(more[1] if more is not None else {}),
     }
     about = subject(
         system,

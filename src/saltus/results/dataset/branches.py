@@ -48,7 +48,7 @@ BRANCHES_VARIABLES = {
     ),
     "point_multiplier_real": Variable(_MULTIPLIER, "1", "Floquet multiplier, real part"),
     "point_multiplier_imag": Variable(_MULTIPLIER, "1", "Floquet multiplier, imaginary part"),
-    "point_<state>": Variable(("point", "phase"), "<state>", "<state> <when>"),
+    "point_<state>": Variable(("point", "orbit_point"), "<state>", "<state> <when>"),
     "output": Variable(
         ("output",), "", "output: a state, or a function of the motion", "str", coord=True
     ),
@@ -105,6 +105,6 @@ BRANCHES_VARIABLES = {
     "event_multiplier_imag": Variable(
         ("event", "multiplier"), "1", "Floquet multiplier, imaginary part"
     ),
-    "event_<state>": Variable(("event", "phase"), "<state>", "<state> <when>"),
+    "event_<state>": Variable(("event", "orbit_point"), "<state>", "<state> <when>"),
     **GUARDS,
 }

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from saltus.results.dataset.attractors import ENDS, AttractorTable, padded
+from saltus.results.dataset.branches import BRANCHES_VARIABLES
 from saltus.results.dataset.kinds import WITHOUT_WORDS, Kind
 from saltus.results.dataset.variable import GUARDS, Variable
 
@@ -102,10 +103,13 @@ RESPONSES_VARIABLES = {
         "phase of the first harmonic A cos(2 pi f t + phase), t the time of the equations",
     ),
     "sample_<state>": Variable(("response", "sample"), "<state>", "<state> <sampled>"),
-    "event": Variable(("event",), "1", "event", "i8", coord=True),
+    **{
+        name: row
+        for name, row in BRANCHES_VARIABLES.items()
+        if name not in ("output", "output_units")
+    },
     "event_kind": Variable(("event",), "", "what happens to the branch between two values", "str"),
     "event_branch": Variable(("event",), "1", "branch to which it happens", "i8"),
-    "event_<parameter>": Variable(("event",), "<parameter>", "<parameter>"),
     **GUARDS,
     "guard_boundary": replace(GUARDS["guard_boundary"], dims=("guard", "...?")),
 }

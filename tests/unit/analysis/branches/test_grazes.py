@@ -11,9 +11,10 @@ import pytest
 
 import saltus as sl
 from saltus.analysis.branches.contact_sequences import sequences, shift
+from saltus.analysis.branches.plans import plan_of
 from saltus.analysis.branches.sequence_changes import contact_points
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.tracing import Plan, Seed, both_ways, trace
+from saltus.analysis.branches.tracing import Seed, trace
 
 REFERENCE = Path(__file__).parents[3] / "reference"
 
@@ -53,10 +54,7 @@ def test_a_fold_just_below_a_graze_is_another_event():
 def test_the_rig_grazes_its_upper_stop():
     rig = sl.models.delangre("c", force="4 N", frequency="5 Hz")
     near = value("branches_rig", "G18")
-    plan = Plan(
-        lambda n, scale: PeriodicOrbits(rig, ("contact_stiffness",), n, scale, sl.Taylor()),
-        (2.25e4, 2.33e4), 200, 1, frozenset(), both_ways,
-    )  # fmt: skip
+    plan = plan_of(rig, "contact_stiffness", (2.25e4, 2.33e4), sl.Taylor(), None, 200, 1, ())
     seed = Seed(
         np.array([[5.37959592e-4, -5.810987347e-3]]), np.array([near]), np.array([1e-3, 0.1])
     )
