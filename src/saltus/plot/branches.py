@@ -34,7 +34,6 @@ MARKS = {
     "branch_point": ("branch point", "X"), "neimark_sacker": ("Neimark-Sacker", "h"),
     "hopf": ("Hopf", "p"), "graze": ("graze", "^"), "corner": ("two contacts at once", "v"),
     "boundary_equilibrium": ("boundary equilibrium", "P"),
-    "graze": ("graze", "v"), "corner": ("two contacts at once", "P"),
 }  # fmt: skip
 #: Quantities that begin at zero.
 _SIZES = ("peak", "rms", "peak_to_peak", "rms_about_mean", "amplitude", "period")
