@@ -43,5 +43,10 @@ def limit_cycles(
 
 
 def cycle_of(map_: Stroboscope, one: SampledAttractor) -> OrbitBatch:
-    """A limit cycle that is known by its places: its first one is where it begins."""
-    return attracting_cycles(map_, one.points[:1], ROUND * float(map_.period[0]), NEAR)[0]
+    """A limit cycle that is known by its places, looked for from one of them at which it moves as
+    fast as it mostly does: away from rest, and from where an impact or a jump cuts it.
+    """
+    steps = np.linalg.norm(np.diff(one.points, axis=0, append=one.points[:1]) / one.scale, axis=1)
+    widest = np.maximum(steps, np.roll(steps, 1))
+    usual = one.points[[np.argsort(widest)[len(widest) // 2]]]
+    return attracting_cycles(map_, usual, ROUND * float(map_.period[0]), NEAR)[0]
