@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import json
 import signal
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ import saltus as sl
 from saltus.results.dataset import schema
 from saltus.results.dataset.result import Result
 from saltus.results.provenance import file_hash, to_json, versions
+from saltus.system.system import System
 
 RIG = sl.models.delangre("a", force="4 N", frequency="17 Hz")
 #: The same start, numbers and names with units; and the same box.
@@ -27,6 +29,17 @@ BOX = {
 }
 FREQUENCY = {"in SI": [17.0], "in units": ["17 Hz"]}
 BRANCH = {"in SI": (16.9, 17.1), "in units": ("16.9 Hz", "17.1 Hz")}
+
+
+FOLD = {"in SI": (16.0, 19.0), "in units": ("16 Hz", "19 Hz")}
+FORCE = {"in SI": (3.9, 4.1), "in units": ("3.9 N", "4.1 N")}
+
+
+@cache
+def the_fold():
+    """The end of the resonance."""
+    start = {"x": 5e-3, "v": 0.0}
+    return sl.branches(RIG, {"frequency": (15.0, 18.0)}, start, at=3, longest=1).sel(event=0)
 
 
 def spring_force(x, mass, natural_frequency):
@@ -63,6 +76,10 @@ CALLS = {
         RIG,
         {"vary": {"frequency": FREQUENCY[how]}, "start": START[how]},
     ),
+    "bifurcation_curve": lambda how: (
+        RIG,
+        {"event": the_fold(), "vary": {"frequency": FOLD[how], "force": FORCE[how]}, "points": 4},
+    ),
     "branches": lambda how: (
         RIG,
         {"vary": {"frequency": BRANCH[how]}, "start": START[how], "at": 1, "longest": 1},
@@ -75,6 +92,13 @@ CALLS = {
             "methods": [sl.ODE45(1e-6, 1e-9)],
             "frequency": FREQUENCY[how],
             "start": START[how],
+        },
+    ),
+    "edge_orbit": lambda how: (
+        RIG,
+        {
+            "a": {"in SI": (0.0, 0.0), "in units": ("0 mm", "0 m/s")}[how],
+            "b": {"in SI": (2.5e-3, 0.56), "in units": ("2.5 mm", "560 mm/s")}[how],
         },
     ),
     "energy_balance": started(periods=3, **sl.models.energy("delangre")),
@@ -92,6 +116,7 @@ CALLS = {
     ),
     "impact_statistics": started(periods=30),
     "lyapunov": started(periods=64, transient=20),
+    "periodic_orbits": started(periods=1),
     "poincare": started(surface="x turns", periods=5),
     "regularisation_widths": started(points=2, transient=20, widths=[1e-4, 1e-5]),
     "settled": of_result("simulate"),
@@ -213,9 +238,13 @@ def with_bad_start(verb, bad):
     subject, arguments = CALLS[verb]("in SI")
     if "start" in arguments:
         return subject, arguments | {"start": (bad, 0.0)}
+    if "a" in arguments:
+        return subject, arguments | {"a": (bad, 0.0)}
     if "x" in arguments:
         return subject, arguments | {"x": (bad, *arguments["x"][1:])}
-    return None if isinstance(subject, xr.Dataset) else (np.full_like(subject, bad), arguments)
+    if isinstance(subject, xr.Dataset | System):
+        return None
+    return np.full_like(subject, bad), arguments
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

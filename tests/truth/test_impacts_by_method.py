@@ -129,6 +129,7 @@ def test_the_table_of_contacts_is_that_of_the_default_method():
         np.testing.assert_array_equal(found["mode"].values, exact["mode"].values)
 
 
+@pytest.mark.nojit
 @every
 def test_a_start_on_the_stop_with_the_velocity_into_it_rebounds(method):
     """As an initial condition: up with 1.5, no event."""
@@ -158,6 +159,7 @@ def test_a_heater_with_hysteresis_switches_at_its_times(method):
     np.testing.assert_allclose(switched, exact, rtol=0, atol=0.05 if rough else 1e-4)
 
 
+@pytest.mark.nojit
 @located
 def test_a_jump_that_leads_on_happens_once(method):
     """From 0 at 1: a count; at 2.5 back by 4, over the boundary of the count, met anew."""
@@ -194,6 +196,26 @@ def test_an_angle_is_wrapped_again_and_again(method):
         )
 
 
+@pytest.mark.nojit
+@pytest.mark.parametrize("method", MATLAB, ids=lambda one: one.label)
+def test_a_stop_in_the_step_that_leaves_another_boundary_is_seen(method):
+    """From x = 0, where the force bends, with the speed 1: the stop at 1e-7 lies in the first step,
+    in which MATLAB's rule would look no further than the start.
+    """
+
+    @sl.system(states="x v")
+    def near(t, x, v):
+        return (
+            v,
+            -sl.piecewise((x, x > 0.0), otherwise=0.0),
+            sl.impact(x < 1e-7, v, restitution=1.0),
+        )
+
+    found = run(near, (0.0, 1.0), method, 0.01, samples=1)
+    assert times(found, "impact") == pytest.approx([1e-7], rel=1e-9)
+    assert float(found.end_x) == pytest.approx(2e-7 - 0.01, rel=1e-9)
+
+
 @located
 def test_a_jump_may_carry_the_state_over_other_boundaries(method):
     """From 2 with x'' = -1: at 1/2 to -5/2, over the boundary of a count and that of a spring, of
@@ -216,6 +238,7 @@ def test_a_jump_may_carry_the_state_over_other_boundaries(method):
     assert float(found.end_x) == pytest.approx(-1.0 + speed * rest - rest**2 / 2, rel=1e-5)
 
 
+@pytest.mark.nojit
 @located
 def test_a_row_of_balls_that_touch_hands_its_momentum_on(method):
     @sl.system(states="a b c u v w")
@@ -254,6 +277,36 @@ def test_impacts_that_accumulate_end_with_a_status(method, restitution):
         assert found["x"].values[np.isfinite(found["x"].values)].min() >= -1e-12
 
 
+@pytest.mark.parametrize("name", ["thompson", "table"])
+@pytest.mark.parametrize(
+    "method",
+    [sl.ODE45(1e-8, 1e-11), sl.ODE113(1e-8, 1e-11), sl.RK4(0.01)],
+    ids=lambda one: one.label,
+)
+def test_just_the_motions_that_come_to_rest_are_named(method, name):
+    """On a stop at zero, and on a table whose place has rounding errors: these must not keep a ball
+    bouncing. All other motions are the exact ones.
+    """
+    system = sl.models.impact_oscillator(case="thompson")
+    start = np.random.default_rng(1).uniform((-0.9, -0.4), (-0.25, 0.25), (80, 2))
+    if name == "table":
+        system = sl.models.bouncing_ball(amplitude=1.5)
+        start = np.random.default_rng(2).uniform((2.0, -1.0), (9.0, 1.0), (80, 2))
+    exact = run(system, start, None, 14.0, samples=1)
+    rests = np.zeros(len(start), bool)
+    rests[exact["contact_trajectory"].values[exact["contact_kind"].values == "hold"]] = True
+    assert rests.sum() > 0
+    with pytest.warns(SaltusWarning, match="sl.Taylor"):
+        found = run(system, start, method, 14.0, samples=1)
+    np.testing.assert_array_equal(found["status"].values == "budget_events", rests)
+    assert (found["status"].values[~rests] == "ok").all()
+    assert found["steps"].values.max() < 5000
+    for end in ("end_x", "end_v"):
+        off = np.abs(found[end].values - exact[end].values)[~rests]
+        assert off.max(initial=0.0) < 1e-4
+
+
+@pytest.mark.nojit
 @every
 def test_a_stop_that_is_pressed_from_the_start_is_named(method):
     with pytest.warns(SaltusWarning, match="sl.Taylor"):

@@ -124,6 +124,11 @@ def hertz(depth: Operand, *, stiffness: Operand, exponent: Operand = 1.5) -> Any
     Expr or float
         Force [N] against the depth: it stands with a minus in the equation of motion.
 
+    Raises
+    ------
+    TraceError
+        If an argument is neither a number nor traced.
+
     References
     ----------
     H. Hertz, Ueber die Beruehrung fester elastischer Koerper, J. reine angew. Math. 92 (1882)
@@ -146,8 +151,10 @@ def hunt_crossley(
     speed: Operand,
     exponent: Operand = 1.5,
 ) -> Any:
-    """The force of a contact with hysteresis after Hunt and Crossley,
-    ``stiffness*depth**exponent*(1 + 3*(1 - restitution)/(2*speed)*velocity)`` where the depth is positive, else 0.
+    """The force of a contact with hysteresis after Hunt and Crossley.
+
+    It is ``stiffness*depth**exponent*(1 + c*velocity)`` where the depth is positive, else 0, with
+    the factor ``c = 3*(1 - restitution)/(2*speed)``.
 
     Its loss is that of ``restitution`` in the limit of small losses; at larger ones the rebound is
     faster (:func:`flores` keeps to it). It vanishes with the depth, so it doesn't jump at contact.
@@ -229,6 +236,11 @@ def lankarani_nikravesh(
     ----------
     H. M. Lankarani, P. E. Nikravesh, A contact force model with hysteresis damping for impact
     analysis of multibody systems, J. Mech. Des. 112 (1990) 369-376.
+
+    Examples
+    --------
+    >>> lankarani_nikravesh(0.25, 1.0, stiffness=8.0, restitution=0.5, speed=1.125)
+    1.5
     """
     bounce = _restitution("lankarani_nikravesh", restitution)
     factor = 0.75 * (1.0 - bounce * bounce) / _number(speed)
@@ -266,6 +278,11 @@ def flores(
     ----------
     P. Flores, M. Machado, M. T. Silva, J. M. Martins, On the continuous contact force models for
     soft materials in multibody dynamics, Multibody Syst. Dyn. 25 (2011) 357-375.
+
+    Examples
+    --------
+    >>> flores(0.25, 1.0, stiffness=8.0, restitution=0.5, speed=3.2)
+    1.5
     """
     bounce = _restitution("flores", restitution)
     factor = 1.6 * (1.0 - bounce) / (bounce * _number(speed))

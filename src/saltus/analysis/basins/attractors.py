@@ -17,6 +17,7 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
+from saltus.analysis.orbits.turns import looks_every
 from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, shown
@@ -72,7 +73,8 @@ def attractors(
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
     every : float or str, optional
-        Time between two samples [s]: needed for a system without forcing.
+        Time between two samples [s] of a system without forcing; default about a turn of its
+        motions.
     threads : int, optional
         Default all processors. Results don't depend on it.
     progress : bool or callable
@@ -109,10 +111,10 @@ def attractors(
     map_ = Stroboscope(
         system,
         check_method(method),
-        every=None if every is None else to_si(every, "s", "every"),
+        every=looks_every(system, every, group.start),
         threads=threads,
     )
-    scale = _spread(map_, group.start)
+    scale = spread(map_, group.start)
     with reporting(progress) as show:
         found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
     starts = {
@@ -122,7 +124,7 @@ def attractors(
     }
     attrs = (
         provenance(system, map_.method, system.values)
-        | {"periods": periods}
+        | looked(periods, map_)
         | stray_attrs(found.astray)
     )
     return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
@@ -197,16 +199,16 @@ def basin_fractions(
         f"{samples} random starts",
         "Draw fewer: samples=10_000 tells shares to 1 %.",
     )
-    map_ = Stroboscope(
-        system,
-        check_method(method),
-        every=None if every is None else to_si(every, "s", "every"),
-        threads=threads,
-    )
     start = fill(
         system, draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed
     )
-    scale = _spread(map_, start[:SPREAD_STARTS])
+    map_ = Stroboscope(
+        system,
+        check_method(method),
+        every=looks_every(system, every, start),
+        threads=threads,
+    )
+    scale = spread(map_, start[:SPREAD_STARTS])
     with reporting(progress) as show:
         scouts = fill(system, draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
         found = find_attractors(map_, scouts, scale, periods)[0]
@@ -221,7 +223,7 @@ def basin_fractions(
         "periods_to_settle": result.periods,
     }
     ds = attractors_dataset(
-        subject(system, provenance(system, map_.method, system.values) | {"periods": periods}),
+        subject(system, provenance(system, map_.method, system.values) | looked(periods, map_)),
         table,
         starts,
     )
@@ -232,6 +234,12 @@ def basin_fractions(
         samples=samples,
         seed=seed,
     )
+
+
+def looked(periods: int, map_: Stroboscope) -> dict[str, Any]:
+    """Settings of a result that say how often motions were looked at, and for how long at most."""
+    every = {} if map_.system.forced_at else {"every": float(map_.period[0])}
+    return {"periods": periods} | every
 
 
 def attractors_dataset(
@@ -279,7 +287,7 @@ def draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[st
     }
 
 
-def _spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
+def spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
     """Range of each state over the starts, their first iterates and the time between two of them; 1
     for a state that never moves.
     """

@@ -18,7 +18,16 @@ from saltus.results.dataset import schema
 from saltus.system.system import System
 
 #: Names of what a Dataset knows of its orbits: points, period, limit cycles' time.
-_PREFIX = {schema.RESPONSES: "response", schema.ATTRACTORS: "attractor", schema.BASINS: "attractor"}
+_PREFIX = {
+    schema.RESPONSES: "response", schema.ATTRACTORS: "attractor", schema.BASINS: "attractor",
+    schema.ORBITS: "orbit",
+}  # fmt: skip
+#: How variables that hold their points are named.
+_POINTS = {
+    "response": schema.response_name,
+    "attractor": schema.attractor_name,
+    "orbit": schema.orbit_name,
+}
 
 
 def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
@@ -32,8 +41,8 @@ def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
     kind = schema.kind_of(found)
     if kind not in _PREFIX:
         raise ParameterError(
-            "start= takes what sl.frequency_response, sl.bifurcation_diagram, sl.attractors or "
-            f"sl.basins returned, or starts, not {shown(found)[:60]}."
+            "start= takes what sl.frequency_response, sl.bifurcation_diagram, sl.attractors, "
+            f"sl.basins or sl.periodic_orbits returned, or starts, not {shown(found)[:60]}."
         )
     if found.attrs.get("fingerprint") != system.fingerprint():
         raise ParameterError(
@@ -44,8 +53,7 @@ def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
     own = f"{prefix}_{name}" if kind != schema.RESPONSES else schema.response_name(name)
     values = found[own].values if own in found else np.full(found.sizes[prefix], np.nan)
     values = np.where(np.isfinite(values), values, system.values[name])
-    label = schema.response_name if prefix == "response" else schema.attractor_name
-    points = np.stack([found[label(state)].values for state in system.states], axis=2)
+    points = np.stack([found[_POINTS[prefix](state)].values for state in system.states], axis=2)
     times = found.get(f"{prefix}_cycle")
     cycles = np.full(len(values), np.nan) if times is None else times.values
     periods = found[f"{prefix}_period"].values
@@ -71,10 +79,11 @@ def seeds_at(
 
 def _ranges(points: np.ndarray) -> np.ndarray:
     """Range of each state, its size where it rests."""
-    return _units(points.max(axis=0), points.min(axis=0))
+    return units(points.max(axis=0), points.min(axis=0))
 
 
-def _units(high: np.ndarray, low: np.ndarray) -> np.ndarray:
+def units(high: np.ndarray, low: np.ndarray) -> np.ndarray:
+    """Units of states between bounds: their range, their size where they rest."""
     ranges, sizes = high - low, np.maximum(np.abs(high), np.abs(low))
     return np.where(ranges > RESTS * sizes, ranges, np.where(sizes > 0, sizes, 1.0))
 
@@ -91,6 +100,6 @@ def scaled(system: System, name: str, seeds: list[Seed], method: Method) -> list
     numbers = measure(Stroboscope(system, method, rows), starts, periods)
     result = list(seeds)
     for place, i in enumerate(unknown):
-        scale = _units(numbers.maximum[place], numbers.minimum[place])
+        scale = units(numbers.maximum[place], numbers.minimum[place])
         result[i] = replace(seeds[i], scale=np.where(np.isfinite(scale), scale, 1.0))
     return result

@@ -220,8 +220,8 @@ def _both_ways(plan: Plan, starts: _Starts, which: Sequence[int]) -> list[Branch
     orbits.accepted(starts.z[owner], np.arange(len(owner)))
     first = np.array([FIRST if starts.seeds[i].along is None else ASIDE for i in owner])
     curves = follow(
-        orbits, starts.z[owner], np.array(sides), orbits.width - 1, plan.limits, plan.points, first,
-        ends=functools.partial(_halved, orbits), group=whose,
+        orbits, starts.z[owner], np.array(sides), {orbits.width - 1: plan.limits}, plan.points,
+        first, ends=functools.partial(_halved, orbits), group=whose,
     )  # fmt: skip
     result = []
     for i in which:

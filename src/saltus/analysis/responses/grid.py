@@ -4,23 +4,23 @@ bifurcation diagrams run over.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from saltus.analysis.axes import along
 from saltus.analysis.orbits.tolerances import LONGEST
-from saltus.analysis.starts import check_system, ensemble, looks_every, single
+from saltus.analysis.orbits.turns import ASKED, looks_every
+from saltus.analysis.random_starts import random_starts
+from saltus.analysis.starts import check_system, ensemble, single
 from saltus.errors import ParameterError, nearest, shown
-from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.room import check_room
 from saltus.system.system import System
-from saltus.units import from_si, to_si
+from saltus.units import from_si
 
 #: Directions of a sweep by what users write.
 SWEEPS = {"sweep_up": "up", "sweep_down": "down"}
@@ -113,7 +113,8 @@ def grid_of(
     follow : bool or None
         Whether each start is followed from value to value, upwards.
     every : float, str or None
-        Time between two samples [s] at a system without forcing.
+        Time between two samples [s] at a system without forcing; None for about a turn of its
+        motions.
 
     Raises
     ------
@@ -121,7 +122,6 @@ def grid_of(
         If a name is unknown, a range is empty, or the grid too large.
     """
     check_system(system)
-    seconds = looks_every(system, every)
     if values is not None:
         if not isinstance(values, Mapping):
             raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
@@ -138,7 +138,7 @@ def grid_of(
         raise ParameterError(
             "a sweep follows one parameter; this grid has two. Leave follow= and sweeps out."
         )
-    grid = Grid(system, points, starts, sweeps, drawn, seconds)
+    grid = Grid(system, points, starts, sweeps, drawn)
     check_room(
         grid.places
         * (len(starts) * (400.0 + RESPONSE * len(system.states)) + 16.0 * len(system.values)),
@@ -148,7 +148,9 @@ def grid_of(
     corners = {name: np.array([column.min(), column.max()]) for name, column in points.items()}
     # ranges and periodicity of the forcing are checked there
     ensemble(system, np.zeros(len(system.states)), corners)
-    return grid
+    some = np.unique(np.linspace(0, grid.places - 1, ASKED).astype(int))
+    begin = starts[np.arange(len(some)) % len(starts)]
+    return replace(grid, every=looks_every(system, every, begin, grid.rows[some]))
 
 
 def axis(system: System, name: str, given: Any) -> np.ndarray:
@@ -185,13 +187,7 @@ def _starts(
     if isinstance(start, str) and start in SWEEPS:
         return np.zeros((1, len(system.states))), (SWEEPS[start],), False
     if isinstance(start, str):
-        word, _, number = start.partition(" ")
-        if word != "random" or not re.fullmatch("0*[1-9][0-9]{0,11}", number.strip()):
-            raise ParameterError(
-                f"start={shown(start)} isn't known. "
-                f"{nearest(start, (*SWEEPS, 'random 20'))} Or give states."
-            )
-        return _random(system, int(number), box, seed), (), True
+        return random_starts(system, start, box, seed, tuple(SWEEPS)), (), True
     if box is not None:
         raise ParameterError('box= is for random starts: start="random 20".')
     return (
@@ -199,33 +195,3 @@ def _starts(
         (),
         False,
     )
-
-
-def _random(system: System, count: int, box: Any, seed: int) -> np.ndarray:
-    """Starts uniform in a box; states without a range start at zero."""
-    if not isinstance(box, Mapping) or not box:
-        example = ", ".join(
-            f'"{name}": ("-1 {system.units[name]}", "1 {system.units[name]}")'
-            for name in system.states[:2]
-        )
-        raise ParameterError(f"random starts need a box to be drawn from: box={{{example}}}.")
-    unit = np.random.default_rng(whole(seed, "seed", 0)).random((count, len(system.states)))
-    starts = np.zeros((count, len(system.states)))
-    for name, ends in box.items():
-        if name not in system.states:
-            raise ParameterError(
-                f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}"
-            )
-        try:
-            low, high = (to_si(end, system.units[name], name) for end in ends)
-        except (TypeError, ValueError):
-            raise ParameterError(
-                f"the range of {name} must be (low, high), not {shown(ends)}."
-            ) from None
-        if not (np.isfinite([low, high]).all() and low < high):
-            raise ParameterError(
-                f"the range of {name} must ascend and be finite, not {shown(ends)}."
-            )
-        column = system.states.index(name)
-        starts[:, column] = low + (high - low) * unit[:, column]
-    return starts
