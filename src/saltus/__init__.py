@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.attractors import attractors, basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
+    from saltus.analysis.basins.edge_orbit import edge_orbit
     from saltus.analysis.basins.equilibria import equilibria
     from saltus.analysis.basins.periodic_orbits import periodic_orbits
     from saltus.analysis.branches.bifurcation_curve import bifurcation_curve
@@ -95,6 +96,7 @@ _HOMES = {
     "bifurcation_diagram": "saltus.analysis.responses.bifurcation_diagram",
     "compare": "saltus.analysis.basins.compare",
     "compare_methods": "saltus.analysis.methods.compare_methods",
+    "edge_orbit": "saltus.analysis.basins.edge_orbit",
     "energy_balance": "saltus.analysis.motion.energy",
     "equilibria": "saltus.analysis.basins.equilibria",
     "frequency_response": "saltus.analysis.responses.frequency_response",
@@ -163,6 +165,7 @@ __all__ = [
     "cos",
     "cosh",
     "describe",
+    "edge_orbit",
     "energy_balance",
     "equilibria",
     "exp",

@@ -114,17 +114,8 @@ def periodic_orbits(
         if isinstance(start, str)
         else _given(system, start, box)
     )
-    method = check_method(method)
-    if not method.exact:
-        raise ParameterError(
-            f"errors of {method.name} keep unstable orbits from closing. Leave method= out: Taylor "
-            f"integrates to rounding."
-        )
-    if system.forced_at is None:
-        raise ParameterError(
-            f"{system.name} has no forcing period. Its attracting limit cycles are found by "
-            f"sl.attractors with every=."
-        )
+    method = exact_method(method)
+    check_forced(system)
     size = len(system.states)
     check_room(len(states) * periods * size * 400.0, f"{len(states)} starts", "Take fewer.")
     map_ = Stroboscope(system, method, threads=threads)
@@ -138,6 +129,26 @@ def periodic_orbits(
         "seed": seed,
     }
     return orbits_dataset(system, attrs, table, searches(found))
+
+
+def exact_method(method: Method | None) -> Method:
+    """The method. Raises ParameterError for one whose errors are more than rounding."""
+    method = check_method(method)
+    if not method.exact:
+        raise ParameterError(
+            f"errors of {method.name} keep unstable orbits from closing. Leave method= out: Taylor "
+            f"integrates to rounding."
+        )
+    return method
+
+
+def check_forced(system: System) -> None:
+    """Raises ParameterError for a system without a forcing period."""
+    if system.forced_at is None:
+        raise ParameterError(
+            f"{system.name} has no forcing period. Its attracting limit cycles are found by "
+            f"sl.attractors, and its equilibria by sl.equilibria."
+        )
 
 
 def _given(system: System, start: Any, box: Any) -> np.ndarray:

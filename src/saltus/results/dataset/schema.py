@@ -56,7 +56,7 @@ MAKERS = {
     ENERGY: "sl.energy_balance",
     EXPONENTS: "sl.lyapunov or sl.wolf",
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
-    ORBITS: "sl.periodic_orbits",
+    ORBITS: "sl.periodic_orbits or sl.edge_orbit",
     MODES: "sl.structure_modes", BRANCHES: "sl.branches",
     CURVE: "sl.bifurcation_curve",
     EQUILIBRIA: "sl.equilibria",
