@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import saltus as sl
 from saltus.errors import ParameterError, SaltusWarning
@@ -379,3 +380,27 @@ def test_a_cycle_of_jumps_has_its_period(start):
     period = 10 * math.log(16 / 14.5) + 10 * math.log(5.5 / 4)
     assert found["attractor_cycle"].values == pytest.approx([period], rel=1e-13)
     assert abs(found["attractor_multiplier_real"].values.ravel()[-1]) < 1e-12
+
+
+def test_a_jump_over_another_jumps_boundary_leaves_the_state_where_it_is():
+    """Both resets happen at one instant; the second doesn't put the state on its own boundary."""
+
+    @sl.system(states="x v n")
+    def carried(t, x, v, n):
+        spring = sl.piecewise((5.0 * x, x < -1.0), otherwise=0.0)
+        return (
+            v, -1.0 - spring, 0.0, sl.jump(x < 0.5, x=x - 3.0), sl.jump(x < 0.0, n=n + 1.0)
+        )  # fmt: skip
+
+    run = sl.simulate(carried, (2.0, 0.0, 0.0), t_end=2.6, samples=1, progress=False)
+    fall = np.sqrt(3.0)  # from 2 to 0.5 at unit gravity; its speed then
+    w = np.sqrt(5.0)
+
+    def swing(t):  # x'' = -1 - 5x from -2.5
+        return -0.2 - 2.3 * np.cos(w * t) - fall / w * np.sin(w * t)
+
+    leaves = brentq(lambda t: swing(t) + 1.0, 0.5, 0.8, xtol=1e-15)
+    speed = 2.3 * w * np.sin(w * leaves) - fall * np.cos(w * leaves)
+    rest = 2.6 - fall - leaves
+    assert run.end_x.item() == pytest.approx(-1.0 + speed * rest - rest**2 / 2, abs=1e-12)
+    assert run.end_n.item() == 1.0

@@ -104,7 +104,12 @@ def strike(lanes, lane, batch, g, rate, slow):
     rest.
     """
     who, mode = lanes.memo[lane, WHO], mode_of(lanes, lane)
-    snap(lanes, lane, g)
+    gap = lanes.work[GAP_ROW + g, lane]
+    carried = lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] < 0.5 and gap != 0.0
+    if LAW[g] == JUMP_LAW and carried:  # by another jump, far beyond the boundary
+        lanes.fresh[g, lane] = 1.0
+    else:
+        snap(lanes, lane, g)
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     show_clocks(lanes, lane, slow)
