@@ -94,6 +94,27 @@ def test_multipliers_come_to_the_exact_ones_with_order_4():
     assert np.abs(tangent(sl.ODE45(1e-9, 1e-12)) - exact).max() < 1e-5
 
 
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    "method", [sl.RK4(0.01), sl.ODE45(1e-10, 1e-13)], ids=lambda one: one.label
+)
+def test_the_tangent_of_a_jump_into_another_law_is_the_slope_of_the_map(method):
+    """Central differences of the ends: the force behind the jump isn't that before it."""
+
+    @sl.system(states="x v")
+    def carried(t, x, v):
+        spring = sl.piecewise((5.0 * x, x < -1.0), otherwise=0.0)
+        return v, -1.0 - spring, sl.jump(x < 0.5, x=x - 3.0, v=0.5 * v)
+
+    start, step = np.array([2.0, 0.1]), 1e-4
+    tangent = Stroboscope(carried, method, every=2.1).tangent(start[None], 1)[1][0]
+    near = start + step * np.concatenate([np.eye(2), -np.eye(2)])
+    found = run(carried, near, method, 2.1, samples=1)
+    ends_near = np.stack([found["end_x"].values, found["end_v"].values], axis=1)
+    slopes = (ends_near[:2] - ends_near[2:]).T / (2 * step)
+    np.testing.assert_allclose(tangent, slopes, rtol=1e-5)
+
+
 # -- closed forms ----------------------------------------------------------------------------------
 @located
 def test_the_flights_of_a_ball_are_those_of_its_closed_form(method):
