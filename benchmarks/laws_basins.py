@@ -23,8 +23,10 @@ FAR = 1e-3
 
 
 @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
-def chatter(t, x, v, *, gap=0.2, restitution=0.6, damping=0.1, w=0.7):
-    """A stop that the motion strikes, chatters on and rests at."""
+def struck(t, x, v, *, gap=0.0, restitution=0.6, damping=0.02, w=0.62):
+    """A stop that is struck three or four times a period; on the way there motions chatter and
+    rest.
+    """
     return v, sl.cos(w * t) - damping * v - x, sl.impact(x < gap, v, restitution=restitution)
 
 
@@ -36,7 +38,7 @@ def stick_slip(t, x, v, *, speed=0.5, slip=0.4, stick=0.6, force=0.6, w=1.2):
     return v, force * sl.cos(w * t) - spring - 0.02 * v - rub
 
 
-AXES = {chatter: {"x": (-3, 0.199), "v": (-3, 3)}, stick_slip: {"x": (-3, 3), "v": (-3, 3)}}
+AXES = {struck: {"x": (-3, -0.001), "v": (-3, 3)}, stick_slip: {"x": (-3, 3), "v": (-3, 3)}}
 
 
 def nearest(found: xr.Dataset, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
