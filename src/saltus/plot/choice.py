@@ -21,6 +21,7 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "exponents": ("exponents",),
     "branches": ("branches",),
     "bifurcation_curve": ("bifurcation_curves",),
+    "backbone": ("backbone",),
 }
 
 

@@ -23,6 +23,7 @@ from saltus.results.dataset.attractors import (
     ATTRACTORS_VARIABLES,
     BASINS_VARIABLES,
 )
+from saltus.results.dataset.backbones import BACKBONE_VARIABLES
 from saltus.results.dataset.bifurcation_curves import CURVE_VARIABLES
 from saltus.results.dataset.branches import BRANCHES_VARIABLES
 from saltus.results.dataset.equilibria import EQUILIBRIA_VARIABLES
@@ -40,7 +41,7 @@ TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS, EXPONENTS = "methods", "exponents"
 SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
-CURVE = "bifurcation_curve"
+CURVE, BACKBONE = "bifurcation_curve", "backbone"
 EQUILIBRIA = "equilibria"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
@@ -55,7 +56,7 @@ MAKERS = {
     EXPONENTS: "sl.lyapunov or sl.wolf",
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
     MODES: "sl.structure_modes", BRANCHES: "sl.branches",
-    CURVE: "sl.bifurcation_curve",
+    CURVE: "sl.bifurcation_curve", BACKBONE: "sl.backbone",
     EQUILIBRIA: "sl.equilibria",
 }  # fmt: skip
 
@@ -79,6 +80,7 @@ TABLES = {
     EQUILIBRIA: EQUILIBRIA_VARIABLES,
     BRANCHES: BRANCHES_VARIABLES,
     CURVE: CURVE_VARIABLES,
+    BACKBONE: BACKBONE_VARIABLES,
 }
 
 
@@ -284,6 +286,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         EQUILIBRIA: ("equilibrium_type", "equilibrium_place"),
         BRANCHES: ("point_branch", "point_stable", "branch_periods"),
         CURVE: ("point_arclength", "codim2_kind"),
+        BACKBONE: ("backbone_frequency", "point_output_peak"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 
