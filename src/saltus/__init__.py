@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.attractors import attractors, basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
+    from saltus.analysis.basins.edge_orbit import edge_orbit
     from saltus.analysis.basins.equilibria import equilibria
+    from saltus.analysis.basins.periodic_orbits import periodic_orbits
     from saltus.analysis.branches.backbone import backbone
     from saltus.analysis.branches.bifurcation_curve import bifurcation_curve
     from saltus.analysis.lyapunov.lyapunov import lyapunov
@@ -58,12 +60,16 @@ if TYPE_CHECKING:
         cos,
         cosh,
         exp,
+        flores,
         freeplay,
         friction,
         heaviside,
+        hertz,
+        hunt_crossley,
         hypot,
         impact,
         jump,
+        lankarani_nikravesh,
         log,
         max,
         min,
@@ -95,11 +101,13 @@ _HOMES = {
     "bifurcation_diagram": "saltus.analysis.responses.bifurcation_diagram",
     "compare": "saltus.analysis.basins.compare",
     "compare_methods": "saltus.analysis.methods.compare_methods",
+    "edge_orbit": "saltus.analysis.basins.edge_orbit",
     "energy_balance": "saltus.analysis.motion.energy",
     "equilibria": "saltus.analysis.basins.equilibria",
     "frequency_response": "saltus.analysis.responses.frequency_response",
     "impact_statistics": "saltus.analysis.motion.impacts",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
+    "periodic_orbits": "saltus.analysis.basins.periodic_orbits",
     "poincare": "saltus.analysis.motion.poincare",
     "regularisation_widths": "saltus.analysis.methods.regularisation_widths",
     "settled": "saltus.analysis.motion.settled",
@@ -119,8 +127,9 @@ _HOMES = {
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"),
         "saltus.results"),
     **dict.fromkeys(
-        ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise",
-            "sin", "sqrt", "system", "tan", "tanh"),
+        ("System", "abs", "atan", "cos", "exp", "flores", "freeplay", "hertz",
+            "hunt_crossley", "lankarani_nikravesh", "log", "max", "min", "pi", "piecewise", "sin",
+            "sqrt", "system", "tan", "tanh"),
         "saltus.system",
     ),
     **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
@@ -164,17 +173,22 @@ __all__ = [
     "cos",
     "cosh",
     "describe",
+    "edge_orbit",
     "energy_balance",
     "equilibria",
     "exp",
+    "flores",
     "freeplay",
     "frequency_response",
     "friction",
     "heaviside",
+    "hertz",
+    "hunt_crossley",
     "hypot",
     "impact",
     "impact_statistics",
     "jump",
+    "lankarani_nikravesh",
     "load",
     "log",
     "lyapunov",
@@ -182,6 +196,7 @@ __all__ = [
     "min",
     "mod",
     "models",
+    "periodic_orbits",
     "pi",
     "piecewise",
     "plot",

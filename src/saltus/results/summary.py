@@ -196,11 +196,15 @@ def _exponents(ds: xr.Dataset) -> list[str]:
     for i in range(min(count, _LINES)):
         one = ds.isel(trajectory=i)
         values = ", ".join(f"{value:.6g}" for value in one["lyapunov_exponent"].values)
-        width = float(one["lyapunov_high"][0] - one["lyapunov_exponent"][0])
+        first = float(one["lyapunov_exponent"][0])
+        width = float(one["lyapunov_high"][0]) - first if np.isfinite(first) else 0.0
         graze = ", near a graze" if "near_graze" in one and int(one["near_graze"]) else ""
         kind = kind_text(str(one["kind"].item()), int(one["response_period"]))
         lines.append(f"  {i}: {kind}, {values} {unit}, the first +- {width:.1e}{graze}")
-    return lines + _more(count)
+    lines += _more(count)
+    if np.isneginf(ds["lyapunov_exponent"].values).any():
+        lines.append("-inf     where a contact sticks or rests, nothing is left of a deviation")
+    return lines
 
 
 def _agreement(ds: xr.Dataset) -> list[str]:
