@@ -16,6 +16,7 @@ from saltus.plot.gallery import gallery
 from saltus.plot.history import history
 from saltus.plot.measures import energy, impacts
 from saltus.plot.methods import methods
+from saltus.plot.orbits import periodic_orbits
 from saltus.plot.phase import phase
 from saltus.plot.section import section
 from saltus.plot.spectrum import spectrum
@@ -25,7 +26,7 @@ from saltus.plot.type_map import type_map
 __all__ = [
     "OKABE_ITO", "agreement", "basins", "bifurcation_curves", "bifurcation_diagram", "branches",
     "energy", "exponents", "frequency_response", "gallery", "history",
-    "impacts", "methods", "phase", "section", "spectrum", "style", "type_map",
+    "impacts", "methods", "periodic_orbits", "phase", "section", "spectrum", "style", "type_map",
 ]  # fmt: skip
 
 
