@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.edge_orbit import edge_orbit
     from saltus.analysis.basins.equilibria import equilibria
     from saltus.analysis.basins.periodic_orbits import periodic_orbits
+    from saltus.analysis.branches.backbone import backbone
     from saltus.analysis.branches.bifurcation_curve import bifurcation_curve
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
@@ -114,6 +115,7 @@ _HOMES = {
     "spectrum": "saltus.analysis.motion.spectrum",
     "stroboscope": "saltus.analysis.motion.stroboscope",
     "structure_modes": "saltus.analysis.motion.structure_modes",
+    "backbone": "saltus.analysis.branches.backbone",
     "bifurcation_curve": "saltus.analysis.branches.bifurcation_curve",
     "branches": "saltus.analysis.responses.all_branches",
     "transmissibility": "saltus.analysis.motion.transmissibility",
@@ -158,6 +160,7 @@ __all__ = [
     "atan",
     "atan2",
     "attractors",
+    "backbone",
     "basin_fractions",
     "basins",
     "bifurcation_curve",

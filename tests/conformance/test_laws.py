@@ -404,3 +404,23 @@ def test_a_jump_over_another_jumps_boundary_leaves_the_state_where_it_is():
     rest = 2.6 - fall - leaves
     assert run.end_x.item() == pytest.approx(-1.0 + speed * rest - rest**2 / 2, abs=1e-12)
     assert run.end_n.item() == 1.0
+
+
+def test_an_impact_with_a_tangential_part_keeps_the_angular_momentum_about_its_point():
+    """A ball of m*gyration*radius**2: u - gyration*radius*spin stays, the slip u + radius*spin
+    becomes -tangential times itself each time, the normal velocity -normal times.
+    """
+
+    @sl.system(states="x y u v spin")
+    def superball(t, x, y, u, v, spin, *, radius=0.02, normal=0.8, tangential=0.6, gyration=0.4):
+        kick = -(1 + tangential) * (u + radius * spin) * gyration / (1 + gyration)
+        after = {"v": -normal * v, "u": u + kick, "spin": spin + kick / (gyration * radius)}
+        return u, v, 0.0, -9.81, 0.0, sl.jump(y < radius, **after)
+
+    run = sl.simulate(superball, (0.0, 1.02, 1.0, 0.0, 30.0), t_end=2.0)
+    fall = math.sqrt(2 / 9.81)
+    count = len(run["contact_time"])
+    assert run["contact_time"].values[:2] == pytest.approx([fall, fall * 2.6], rel=1e-13)
+    u, spin = float(run.end_u), float(run.end_spin)
+    assert u - 0.4 * 0.02 * spin == pytest.approx(1.0 - 0.4 * 0.02 * 30.0, rel=1e-14)
+    assert u + 0.02 * spin == pytest.approx((-0.6) ** count * 1.6, rel=1e-13)

@@ -6,6 +6,7 @@ from typing import Any
 
 from saltus.errors import nearest, shown
 from saltus.plot.agreement import agreement
+from saltus.plot.backbone import backbone
 from saltus.plot.basins import basins
 from saltus.plot.bifurcation import bifurcation_diagram
 from saltus.plot.bifurcation_curves import bifurcation_curves
@@ -24,8 +25,8 @@ from saltus.plot.style import OKABE_ITO, style
 from saltus.plot.type_map import type_map
 
 __all__ = [
-    "OKABE_ITO", "agreement", "basins", "bifurcation_curves", "bifurcation_diagram", "branches",
-    "energy", "exponents", "frequency_response", "gallery", "history",
+    "OKABE_ITO", "agreement", "backbone", "basins", "bifurcation_curves", "bifurcation_diagram",
+    "branches", "energy", "exponents", "frequency_response", "gallery", "history",
     "impacts", "methods", "periodic_orbits", "phase", "section", "spectrum", "style", "type_map",
 ]  # fmt: skip
 

@@ -22,6 +22,7 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "branches": ("branches",),
     "orbits": ("periodic_orbits",),
     "bifurcation_curve": ("bifurcation_curves",),
+    "backbone": ("backbone",),
 }
 
 

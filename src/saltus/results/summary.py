@@ -118,7 +118,8 @@ def _attractors(ds: xr.Dataset) -> list[str]:
         kind = str(one["attractor_type"].item())
         name = f"{kind} {period}T" if kind == "periodic" else kind_text(kind, period)
         if kind == "limit_cycle" and "attractor_cycle" in one:
-            name += f", period {float(one['attractor_cycle']):.4g} s"
+            cycle = float(one["attractor_cycle"])
+            name += f", period {cycle:.4g} s, {1 / cycle:.4g} Hz"
         size = f"peak {float(one['attractor_peak']):.4g} {unit}".rstrip()
         if kind == Kind.NOISY_PERIODIC.word:
             size += f", scatter {float(one['attractor_scatter']):.2g} {unit}".rstrip()
