@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.attractors import attractors, basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
+    from saltus.analysis.basins.equilibria import equilibria
+    from saltus.analysis.branches.bifurcation_curve import bifurcation_curve
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
     from saltus.analysis.methods.regularisation_widths import regularisation_widths
@@ -93,6 +95,7 @@ _HOMES = {
     "compare": "saltus.analysis.basins.compare",
     "compare_methods": "saltus.analysis.methods.compare_methods",
     "energy_balance": "saltus.analysis.motion.energy",
+    "equilibria": "saltus.analysis.basins.equilibria",
     "frequency_response": "saltus.analysis.responses.frequency_response",
     "impact_statistics": "saltus.analysis.motion.impacts",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
@@ -103,6 +106,7 @@ _HOMES = {
     "spectrum": "saltus.analysis.motion.spectrum",
     "stroboscope": "saltus.analysis.motion.stroboscope",
     "structure_modes": "saltus.analysis.motion.structure_modes",
+    "bifurcation_curve": "saltus.analysis.branches.bifurcation_curve",
     "branches": "saltus.analysis.responses.all_branches",
     "transmissibility": "saltus.analysis.motion.transmissibility",
     "wolf": "saltus.analysis.recorded.wolf",
@@ -147,6 +151,7 @@ __all__ = [
     "attractors",
     "basin_fractions",
     "basins",
+    "bifurcation_curve",
     "bifurcation_diagram",
     "branches",
     "clip",
@@ -157,6 +162,7 @@ __all__ = [
     "cosh",
     "describe",
     "energy_balance",
+    "equilibria",
     "exp",
     "freeplay",
     "frequency_response",

@@ -102,11 +102,13 @@ def shown(value: object, limit: int = 80) -> str:
 
 
 def counted(number: int, word: str) -> str:
-    """``1 branch``, ``2 branches``."""
+    """``1 branch``, ``2 branches``, ``3 equilibria``."""
     if number == 1:
         return f"1 {word}"
     if word.endswith("y"):
         return f"{number} {word[:-1]}ies"
+    if word.endswith("ium"):
+        return f"{number} {word[:-2]}a"
     return f"{number} {word}{'es' if word.endswith('ch') else 's'}"
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import json
 import signal
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ import saltus as sl
 from saltus.results.dataset import schema
 from saltus.results.dataset.result import Result
 from saltus.results.provenance import file_hash, to_json, versions
+from saltus.system.system import System
 
 RIG = sl.models.delangre("a", force="4 N", frequency="17 Hz")
 #: The same start, numbers and names with units; and the same box.
@@ -27,6 +29,17 @@ BOX = {
 }
 FREQUENCY = {"in SI": [17.0], "in units": ["17 Hz"]}
 BRANCH = {"in SI": (16.9, 17.1), "in units": ("16.9 Hz", "17.1 Hz")}
+
+
+FOLD = {"in SI": (16.0, 19.0), "in units": ("16 Hz", "19 Hz")}
+FORCE = {"in SI": (3.9, 4.1), "in units": ("3.9 N", "4.1 N")}
+
+
+@cache
+def the_fold():
+    """The end of the resonance."""
+    start = {"x": 5e-3, "v": 0.0}
+    return sl.branches(RIG, {"frequency": (15.0, 18.0)}, start, at=3, longest=1).sel(event=0)
 
 
 def spring_force(x, mass, natural_frequency):
@@ -63,6 +76,10 @@ CALLS = {
         RIG,
         {"vary": {"frequency": FREQUENCY[how]}, "start": START[how]},
     ),
+    "bifurcation_curve": lambda how: (
+        RIG,
+        {"event": the_fold(), "vary": {"frequency": FOLD[how], "force": FORCE[how]}, "points": 4},
+    ),
     "branches": lambda how: (
         RIG,
         {"vary": {"frequency": BRANCH[how]}, "start": START[how], "at": 1, "longest": 1},
@@ -78,6 +95,10 @@ CALLS = {
         },
     ),
     "energy_balance": started(periods=3, **sl.models.energy("delangre")),
+    "equilibria": lambda how: (
+        sl.models.double_scroll(),
+        {"start": {"x": {"in SI": 1.0, "in units": "1"}[how], "y": 0, "z": 0}},
+    ),
     "frequency_response": lambda how: (
         RIG,
         {
@@ -159,9 +180,11 @@ def test_a_result_says_where_it_comes_from(verb):
     assert attrs["versions"] == to_json(versions())
     if verb in ("wolf", "structure_modes"):  # a series and matrices are no system
         return
-    assert attrs["system"] == RIG.name
-    assert set(json.loads(attrs["parameters"])) <= set(RIG.values)
-    assert {"x", "v"} <= set(json.loads(attrs["units"]))
+    subject = CALLS[verb]("in SI")[0]
+    system = subject if isinstance(subject, sl.System) else RIG
+    assert attrs["system"] == system.name
+    assert set(json.loads(attrs["parameters"])) <= set(system.values)
+    assert set(system.states) <= set(json.loads(attrs["units"]))
     for name in (
         ("method_options_a", "method_options_b") if verb == "compare" else ("method_options",)
     ):
@@ -209,7 +232,9 @@ def with_bad_start(verb, bad):
         return subject, arguments | {"start": (bad, 0.0)}
     if "x" in arguments:
         return subject, arguments | {"x": (bad, *arguments["x"][1:])}
-    return None if isinstance(subject, xr.Dataset) else (np.full_like(subject, bad), arguments)
+    if isinstance(subject, xr.Dataset | System):
+        return None
+    return np.full_like(subject, bad), arguments
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

@@ -254,6 +254,35 @@ def test_impacts_that_accumulate_end_with_a_status(method, restitution):
         assert found["x"].values[np.isfinite(found["x"].values)].min() >= -1e-12
 
 
+@pytest.mark.parametrize("name", ["thompson", "table"])
+@pytest.mark.parametrize(
+    "method",
+    [sl.ODE45(1e-8, 1e-11), sl.ODE113(1e-8, 1e-11), sl.RK4(0.01)],
+    ids=lambda one: one.label,
+)
+def test_just_the_motions_that_come_to_rest_are_named(method, name):
+    """On a stop at zero, and on a table whose place has rounding errors: these must not keep a ball
+    bouncing. All other motions are the exact ones.
+    """
+    system = sl.models.impact_oscillator(case="thompson")
+    start = np.random.default_rng(1).uniform((-0.9, -0.4), (-0.25, 0.25), (80, 2))
+    if name == "table":
+        system = sl.models.bouncing_ball(amplitude=1.5)
+        start = np.random.default_rng(2).uniform((2.0, -1.0), (9.0, 1.0), (80, 2))
+    exact = run(system, start, None, 14.0, samples=1)
+    rests = np.zeros(len(start), bool)
+    rests[exact["contact_trajectory"].values[exact["contact_kind"].values == "hold"]] = True
+    assert rests.sum() > 0
+    with pytest.warns(SaltusWarning, match="sl.Taylor"):
+        found = run(system, start, method, 14.0, samples=1)
+    np.testing.assert_array_equal(found["status"].values == "budget_events", rests)
+    assert (found["status"].values[~rests] == "ok").all()
+    assert found["steps"].values.max() < 5000
+    for end in ("end_x", "end_v"):
+        off = np.abs(found[end].values - exact[end].values)[~rests]
+        assert off.max(initial=0.0) < 1e-4
+
+
 @every
 def test_a_stop_that_is_pressed_from_the_start_is_named(method):
     with pytest.warns(SaltusWarning, match="sl.Taylor"):

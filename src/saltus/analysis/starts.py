@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.axes import along
-from saltus.errors import ParameterError, SaltusError, nearest, shown
+from saltus.errors import ParameterError, SaltusError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.engine import Request, Schedule
-from saltus.flow.maps import NO_PERIOD
 from saltus.system import expression as ex
 from saltus.system.checks import check_values
 from saltus.system.system import System
@@ -160,28 +159,6 @@ def check_system(system: Any) -> None:
     raise ParameterError(f"the system must be a System, not {type(system).__name__}. {advice}")
 
 
-def looks_every(system: System, every: Any) -> float | None:
-    """Time between two samples [s] at a system without forcing; None for a forced one.
-
-    Raises
-    ------
-    ParameterError, UnitError
-        If it is missing, isn't a positive time, or the system is forced.
-    """
-    if system.forced_at is not None:
-        if every is not None:
-            raise ParameterError(
-                f"{system.name} is forced: it is looked at once a forcing period. Leave every= out."
-            )
-        return None
-    if every is None:
-        raise ParameterError(f"{system.name} {NO_PERIOD}")
-    seconds = to_si(every, "s", "every")
-    if not 0 < seconds < math.inf:
-        raise ParameterError(f"every must be a positive time, not {shown(every)}.")
-    return seconds
-
-
 def fill(
     system: System, columns: Mapping[str, np.ndarray], fixed: Mapping[str, float]
 ) -> np.ndarray:
@@ -271,6 +248,25 @@ def single(system: System, name: str, value: Any) -> float:
             f"end of a range or in a list."
         )
     return float(number)
+
+
+def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
+    """The range (low, high) of a parameter [SI]. Raises ParameterError if it has none, or it
+    doesn't ascend.
+    """
+    if not among(name, system.values):
+        raise ParameterError(
+            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
+        )
+    try:
+        low, high = (single(system, name, end) for end in ends)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"the range of {name} must be (low, high), not {shown(ends)}."
+        ) from None
+    if not low < high:
+        raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")
+    return low, high
 
 
 def _columns(system: System, start: Any) -> dict[str, np.ndarray]:

@@ -38,6 +38,7 @@ class Kind(StrEnum):
     agreement = "agreement"
     frequency_response = "frequency_response"
     bifurcation_diagram = "bifurcation_diagram"
+    branches = "branches"
     type_map = "type_map"
     section = "section"
     spectrum = "spectrum"

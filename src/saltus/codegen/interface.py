@@ -137,7 +137,7 @@ def _one_by_one(
         entry="propagate",
         arguments=(*BATCH, _F1),
         layout="steps_layout",
-        templates=(*templates, "trajectory"),
+        templates=(*templates, "steps_laws", "trajectory"),
         sizes=(
             "NSTATES",
             "NGUARDS",

@@ -32,6 +32,12 @@ def at_once(i, t, batch):
     return max(128.0 * ulp(t), BRACKETS * batch.options[i, CLOSENESS] * batch.options[i, STEP])
 
 
+@inner
+def least_state(i, batch):
+    """The size that every state has at least: nothing is known of it."""
+    return 0.0
+
+
 @kernel
 def settle_sides(i, t, batch, work):
     """Sides of the gaps that are zero at NODE, by the sign of their rates or, where these are zero

@@ -35,6 +35,12 @@ def at_once(i, t, batch):
 
 
 @inner
+def least_state(i, batch):
+    """The size that every state has at least for the control of errors."""
+    return batch.options[i, ATOL] / batch.options[i, RTOL]
+
+
+@inner
 def longest_step(t_leg, t_end):
     """A tenth of the leg's span."""
     return 0.1 * (t_end - t_leg)

@@ -8,7 +8,8 @@ One step reads: step -> find the contact -> write samples -> land or go on. A me
 - ``dense``, the state inside the step, to POINT;
 - ``find_contact``, whose LEFT and RIGHT differ in sign where a gap closes;
 - ``law_mode`` and ``settle_sides``: the sides that its right-hand side sees;
-- ``at_once``: the time [s] within which it can't tell two contacts apart.
+- ``at_once``, the time [s] within which it can't tell two contacts apart, and ``least_state``, the
+  size below which it takes a state for zero.
 
 Symbols
 -------
@@ -26,9 +27,6 @@ from saltus.kernels.status import (
     CROSSING,
     EVENTS,
     FINISHED,
-    IMPACT,
-    IMPACT_LAW,
-    JUMP_LAW,
     NONFINITE,
     OK,
     PAUSED,
@@ -52,10 +50,6 @@ from saltus.kernels.status import (
 
 # Columns of `options` that all methods have.
 LOCATE, MAX_STEPS, MAX_EVENTS = range(2, 5)
-#: Contacts in one instant after which they count as accumulating: flights have become too short to
-#: tell.
-MOST_AT_ONCE = 20
-ROUNDING = 2.220446049250313e-16
 
 
 # -- sides -----------------------------------------------------------------------------------------
@@ -124,7 +118,7 @@ def write_samples_here(i, until, batch, work):
 
 # -- contacts --------------------------------------------------------------------------------------
 @kernel
-def land(i, t, t_hit, t_new, h, batch, work):
+def land(i, t, t_hit, t_new, t_leg, h, batch, work):
     """Cut the step at a contact: NEXT becomes the state there, K1 its rate, AT_NEXT its gaps; the
     contact is recorded.
     """
@@ -137,9 +131,8 @@ def land(i, t, t_hit, t_new, h, batch, work):
     rate_at(t_hit, NEXT, Q, law_mode(i, batch), K1, work)
     gap_rates_at(t_hit, NEXT, K1, Q, RATE, work)
     gap_errors(i, t_hit, batch, work)
-    if LAWS and batch.options[i, LOCATE] == 0.0:
-        for g in range(NGUARDS):
-            work[TRY + g] += abs(h * work[RATE + g])
+    if LAWS:
+        before_strikes(i, t_hit, t_leg, h, batch, work)
     record_contacts(i, t_hit, batch, work)
     if LAWS:
         strike_all(i, t_hit, batch, work)
@@ -154,15 +147,23 @@ def gap_errors(i, t_hit, batch, work):
     """How far the errors of all steps so far have moved each gap at most, to TRY; how errors grow
     from step to step is left out.
     """
-    gap_rates_at(t_hit, NEXT, REST, Q, RATE_AT_REST, work)
-    for g in range(NGUARDS):
-        work[TRY + g] = 0.0
     for j in range(NSTATES):
-        work[REST + j] = batch.carry[i, ERRORS + j]
-        gap_rates_at(t_hit, NEXT, REST, Q, AT_NEXT, work)
+        work[BEHIND + j] = batch.carry[i, ERRORS + j]
+    gap_changes(t_hit, TRY, work)
+
+
+@kernel
+def gap_changes(time, out, work):
+    """How far changes of the states in NEXT, in BEHIND, move each gap at most, to `out`."""
+    gap_rates_at(time, NEXT, REST, Q, RATE_AT_REST, work)
+    for g in range(NGUARDS):
+        work[out + g] = 0.0
+    for j in range(NSTATES):
+        work[REST + j] = work[BEHIND + j]
+        gap_rates_at(time, NEXT, REST, Q, AT_NEXT, work)
         work[REST + j] = 0.0
         for g in range(NGUARDS):
-            work[TRY + g] += abs(work[AT_NEXT + g] - work[RATE_AT_REST + g])
+            work[out + g] += abs(work[AT_NEXT + g] - work[RATE_AT_REST + g])
 
 
 @inner
@@ -241,178 +242,6 @@ def record(i, g, t_hit, kind, direction, velocity, before, after, batch, work):
     for j in range(NSTATES):
         values[RECORD_FLOATS + j] = work[NEXT + j]
     values[RECORD_FLOATS + NSTATES] = t_hit
-
-
-# -- contacts at which the state jumps -------------------------------------------------------------
-@kernel
-def strike_all(i, t_hit, batch, work):
-    """The jumps of the state in NEXT: of the gaps that close at t_hit, and of those beyond whose
-    boundaries another one has carried it. Needs q at t_hit in Q.
-    """
-    struck = 0
-    for _ in range(NGUARDS):
-        for g in range(NGUARDS):
-            if not struck >> g & 1 and (
-                strikes(work, g) or (struck != 0 and carried_past(i, g, t_hit, batch, work))
-            ):
-                struck |= 1 << g
-                strike(i, g, t_hit, True, batch, work)
-
-
-@inner
-def carried_past(i, g, time, batch, work):
-    """Whether the jump before has carried the state over a boundary where it jumps again."""
-    beyond = work[AT_NEXT + g] * LAW_SIDE[g] < -told_from_zero(g, time, work)
-    return waits(g, batch.mode[i]) and beyond and not changes_sign(work, LEFT, RIGHT, g)
-
-
-@kernel
-def strike(i, g, t_hit, told, batch, work):
-    """The state in NEXT jumps by the law of guard g, if it closes: an impact, `told` to the table
-    or not. The gaps behind stand in AT_NEXT.
-    """
-    before = batch.mode[i]
-    after = leap(i, g, t_hit, NEXT, batch, work)
-    work[LATE] = abs(work[BEFORE + g] / work[RATE + g]) if work[RATE + g] != 0.0 else 0.0
-    if not work[TOLD + 1] > 0.0:
-        gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
-        return
-    if TANGENT and after != before:
-        reset_at(i, g, t_hit, NEXT, before, after, batch, work)
-    else:
-        for j in range(NSTATES):
-            work[NEXT + j] = work[POINT + j]
-    batch.mode[i] = after
-    if told:
-        direction = -1 if LAW_SIDE[g] > 0.0 else 1
-        slowest(i, work[RATE + g], batch)
-        note(i, g, t_hit, IMPACT, direction, work[RATE + g], before, before, batch, work)
-        for m in range(NGUARDS):
-            if m != g and (before ^ after) >> m & 1:
-                side = 1 if after >> m & 1 else -1
-                note(i, m, t_hit, CROSSING, side, 0.0, before, before ^ 1 << m, batch, work)
-
-
-@inner
-def reset_at(i, g, time, state, before, after, batch, work):
-    """The law of guard g, to a state; restitution and closing velocity to TOLD."""
-    p, h = batch.param[i * batch.stride], part(work, H, HELD * NCLOCKS)
-    reset(time, part(work, state, NSTATES), p, h, before, after, g, part(work, TOLD, 2))
-
-
-@kernel
-def leap(i, g, time, state, batch, work):
-    """The state after the jump of guard g, to POINT, its gaps, to AT_NEXT, their rates, to
-    RATE_BEHIND; returns the mode there. Needs q in Q.
-    """
-    mode = batch.mode[i]
-    for j in range(NSTATES):
-        work[POINT + j] = work[state + j]
-    gaps_at(time, POINT, Q, BEFORE, work)
-    reset_at(i, g, time, POINT, mode, mode, batch, work)
-    gaps_at(time, POINT, Q, AT_NEXT, work)
-    for m in range(NGUARDS):
-        side, other = (1.0 if mode >> m & 1 else -1.0), m != g and not waits(m, mode)
-        if other and not changes_sign(work, LEFT, RIGHT, m) and work[AT_NEXT + m] * side < 0.0:
-            mode ^= 1 << m
-    rate_at(time, POINT, Q, mode, BEHIND, work)
-    gap_rates_at(time, POINT, BEHIND, Q, RATE_BEHIND, work)
-    if LAW[g] == JUMP_LAW and not stays(g, time, work):
-        mode ^= 1 << g
-    return mode
-
-
-@inner
-def stays(g, time, work):
-    """Whether the state in POINT, after the jump of guard g, is on the side of its boundary that it
-    came from. On the boundary itself the rate of the gap decides.
-    """
-    decides = work[RATE_BEHIND + g] if lies_on(g, time, work) else work[AT_NEXT + g]
-    return decides * LAW_SIDE[g] > 0.0
-
-
-@inner
-def lies_on(g, time, work):
-    """Whether a jump leaves the state on its own boundary."""
-    return abs(work[AT_NEXT + g]) <= 2.0 * abs(work[BEFORE + g]) + told_from_zero(g, time, work)
-
-
-@inner
-def told_from_zero(g, time, work):
-    """How large a gap is after a jump at least if it isn't zero: what its rounding and that of the
-    time make, and landing a little beside the boundary.
-    """
-    change, late = work[AT_NEXT + g] - work[BEFORE + g], 128.0 * ulp(time) + 2.0 * work[LATE]
-    return late * abs(work[RATE_BEHIND + g]) + 8.0 * ROUNDING * abs(change)
-
-
-@inner
-def face(i, at, batch, work):
-    """Give the gaps of laws the sign of the mode, where the right-hand side doesn't follow it: the
-    state may have landed an ulp beyond a boundary that it leaves.
-    """
-    if LAWS and batch.options[i, LOCATE] != 0.0 and law_mode(i, batch) == FROM_STATE:
-        for g in range(NGUARDS):
-            side = 1.0 if batch.mode[i] >> g & 1 else -1.0
-            if leaps(g) and not work[at + g] * side > 0.0:
-                work[at + g] = side * SMALLEST
-
-
-@kernel
-def strike_at_start(i, t, t_end, batch, work):
-    """Impacts of a state that starts on a stop: initial conditions, which no table tells."""
-    struck = False
-    for g in range(NGUARDS):
-        work[LEFT + g], work[RIGHT + g] = 0.0, 0.0
-    for g in range(NGUARDS):
-        if LAW[g] == IMPACT_LAW and abs(work[AT_NODE + g]) <= SMALLEST:
-            for j in range(NSTATES):
-                work[NEXT + j] = work[NODE + j]
-            strike(i, g, t, False, batch, work)
-            for j in range(NSTATES):
-                work[NODE + j] = work[NEXT + j]
-            struck = True
-    if struck:
-        start_leg(i, t, t_end, True, batch, work)
-
-
-@kernel
-def goes_past(i, t, batch, work):
-    """Whether a step whose contacts are not located ends where the state jumps: beyond a stop and
-    closing, or where the condition of a jump has become true. LEFT and RIGHT differ in sign there.
-    """
-    gaps_at(t, NEXT, Q_STAGE, AT_NEXT, work)
-    mode, found, again = allowed(sides(AT_NEXT, work)), False, False
-    for g in range(NGUARDS):
-        was, now = work[AT_NODE + g] * LAW_SIDE[g], work[AT_NEXT + g] * LAW_SIDE[g]
-        past = LAW[g] == JUMP_LAW and now < 0.0 and was > 0.0
-        if past:
-            mode ^= 1 << g
-        if LAW[g] == IMPACT_LAW and now < 0.0:
-            for j in range(NSTATES):
-                work[POINT + j] = work[NEXT + j]
-            reset_at(i, g, t, POINT, mode, mode, batch, work)
-            past = work[TOLD + 1] > 0.0
-            again |= past and was < 0.0
-        work[LEFT + g] = LAW_SIDE[g] if past else 0.0
-        work[RIGHT + g] = -work[LEFT + g]
-        found |= past
-    batch.mode[i] = mode
-    if found:
-        batch.carry[i, AT_ONCE] = batch.carry[i, AT_ONCE] + 1.0 if again else 0.0
-    return found
-
-
-@inner
-def count_at_once(i, t_hit, t_leg, batch, work):
-    """Count the landings from which the state jumps, no time after the one before."""
-    if t_hit - t_leg > at_once(i, t_hit, batch):
-        batch.carry[i, AT_ONCE] = 0.0
-        return
-    for g in range(NGUARDS):
-        if strikes(work, g):
-            batch.carry[i, AT_ONCE] += 1.0
-            return
 
 
 # -- one trajectory --------------------------------------------------------------------------------
@@ -569,9 +398,7 @@ def advance(i, budget, batch, work):
         for j in range(NSTATES):
             batch.carry[i, ERRORS + j] += abs(h * work[ERROR + j])
         if lands:
-            if LAWS and locate:
-                count_at_once(i, t_hit, t_leg, batch, work)
-            land(i, t, t_hit, t_new, h, batch, work)
+            land(i, t, t_hit, t_new, t_leg, h, batch, work)
             go_on(K1, work)
             begin_leg(i, t_hit, t_end, batch, work)
             t = t_leg = t_hit

@@ -8,6 +8,7 @@ from saltus.errors import nearest, shown
 from saltus.plot.agreement import agreement
 from saltus.plot.basins import basins
 from saltus.plot.bifurcation import bifurcation_diagram
+from saltus.plot.bifurcation_curves import bifurcation_curves
 from saltus.plot.branches import branches
 from saltus.plot.exponents import exponents
 from saltus.plot.frequency_response import frequency_response
@@ -22,8 +23,8 @@ from saltus.plot.style import OKABE_ITO, style
 from saltus.plot.type_map import type_map
 
 __all__ = [
-    "OKABE_ITO", "agreement", "basins", "bifurcation_diagram", "branches", "energy", "exponents",
-    "frequency_response", "gallery", "history",
+    "OKABE_ITO", "agreement", "basins", "bifurcation_curves", "bifurcation_diagram", "branches",
+    "energy", "exponents", "frequency_response", "gallery", "history",
     "impacts", "methods", "phase", "section", "spectrum", "style", "type_map",
 ]  # fmt: skip
 

@@ -20,6 +20,7 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "methods": ("methods",),
     "exponents": ("exponents",),
     "branches": ("branches",),
+    "bifurcation_curve": ("bifurcation_curves",),
 }
 
 

@@ -142,12 +142,15 @@ def energy(
         first = int(ds["trajectory"].values[0])
         ds = ds.sel(trajectory=selection.chosen(ds, first if trajectory is None else trajectory)[0])
     dim = str(ds["residual"].dims[0])
-    curves = {
+    lines = {
         "supplied": (OKABE_ITO["blue"], "-"),
         "dissipated": (OKABE_ITO["vermillion"], "-"),
+        "friction": (OKABE_ITO["orange"], "-"),
+        "impacts": (OKABE_ITO["purple"], "-"),
         "change": (OKABE_ITO["green"], "-"),
         "energy": (OKABE_ITO["black"], (0, (4, 2))),
     }
+    curves = {name: line for name, line in lines.items() if name in ds}
     scale = display_scale(
         "J", max(float(np.abs(ds[name].values).max(initial=0.0)) for name in curves)
     )

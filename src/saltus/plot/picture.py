@@ -32,6 +32,7 @@ _PICTURES = {
     schema.STROBOSCOPE: "plot.phase",
     schema.RESPONSES: "plot.frequency_response, plot.bifurcation_diagram or plot.type_map",
     schema.BRANCHES: "plot.branches",
+    schema.CURVE: "plot.bifurcation_curves",
 }
 _NAME: ContextVar[str] = ContextVar("name", default="the picture")
 

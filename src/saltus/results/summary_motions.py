@@ -12,13 +12,16 @@ import xarray as xr
 from saltus.errors import counted
 from saltus.results.dataset.schema import (
     BRANCHES,
+    CURVE,
     ENERGY,
+    EQUILIBRIA,
     IMPACTS,
     MODES,
     SECTION,
     SETTLED,
     SPECTRUM,
     WIDTHS,
+    equilibrium_name,
     event_name,
     period_text,
     point_name,
@@ -76,10 +79,18 @@ def _impacts(ds: xr.Dataset) -> list[str]:
 
 def _energy(ds: xr.Dataset) -> list[str]:
     count = ds["residual"].shape[-1]
-    supplied, dissipated = (float(ds[name].mean()) for name in ("supplied", "dissipated"))
+    parts = {
+        "supplied": "supplied",
+        "dissipated": "dissipated",
+        "friction": "taken by friction",
+        "impacts": "taken by impacts",
+    }
+    means = [
+        f"{float(ds[name].mean()):.6g} J {words}" for name, words in parts.items() if name in ds
+    ]
     return [
         f"extent   {count} intervals",
-        f"found    {supplied:.6g} J supplied and {dissipated:.6g} J dissipated in each on average",
+        f"found    {', '.join(means[:-1])} and {means[-1]} in each on average",
         f"balance  off by {float(ds['imbalance'].max()):.1e} of the energy turned over",
     ]
 
@@ -114,6 +125,25 @@ def _modes(ds: xr.Dataset) -> list[str]:
     return lines
 
 
+def _equilibria(ds: xr.Dataset) -> list[str]:
+    lines = [f"found    {counted(ds.sizes['equilibrium'], 'equilibrium')}"]
+    for i in range(ds.sizes["equilibrium"]):
+        one = ds.isel(equilibrium=i)
+        states = [one[equilibrium_name(name)] for name in states_of(ds)]
+        at = ", ".join(
+            f"{name} = {float(value):.4g} {unit_of(value)}".rstrip()
+            for name, value in zip(states_of(ds), states, strict=True)
+        )
+        kind = one["equilibrium_type"].item().replace("_", "-")
+        stable = "stable" if one["equilibrium_stable"] else "unstable"
+        word = kind if kind in ("center", "degenerate", "undecided") else f"{stable} {kind}"
+        contacts = one["equilibrium_contacts"].item()
+        on = "held at" if one["equilibrium_place"].item() == "pseudo" else "on the boundary"
+        where = f", {on} {contacts}" if contacts else ""
+        lines.append(f"  {i}: {word} at {at}{where}")
+    return lines
+
+
 def _branches(ds: xr.Dataset) -> list[str]:
     name = ds.attrs["parameter"]
     unit = unit_of(ds[point_name(name)])
@@ -137,6 +167,24 @@ def _branches(ds: xr.Dataset) -> list[str]:
     return lines
 
 
+def _curve(ds: xr.Dataset) -> list[str]:
+    names = ds.attrs["parameter_x"], ds.attrs["parameter_y"]
+    spans = [
+        f"{name} {ds[point_name(name)].values.min():.6g} to {ds[point_name(name)].values.max():.6g}"
+        f" {unit_of(ds[point_name(name)])}".rstrip()
+        for name in names
+    ]
+    what = ds.attrs["bifurcation"].replace("_", " ")
+    lines = [
+        f"found    {what} of {period_text(ds.attrs['periods'])} at {ds.sizes['point']} points, "
+        + ", ".join(spans)
+    ]
+    for i, kind in enumerate(ds["codim2_kind"].values):
+        at = ", ".join(f"{name} {float(ds[f'codim2_{name}'][i]):.10g}" for name in names)
+        lines.append(f"  {kind.replace('_', ' ')} at {at}")
+    return lines
+
+
 #: For each kind, what writes its lines.
 WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SECTION: _section,
@@ -146,5 +194,7 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SETTLED: _settled,
     WIDTHS: _widths,
     MODES: _modes,
+    EQUILIBRIA: _equilibria,
     BRANCHES: _branches,
+    CURVE: _curve,
 }

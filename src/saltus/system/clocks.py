@@ -69,7 +69,7 @@ def affine(node: Expr) -> tuple[Expr, Expr] | None:
 def _at_zero(node: Expr, leaf: Expr) -> Expr | None:
     """The value where a leaf is zero, if there is one."""
     try:
-        return ex.substituted(node, leaf, ex.constant(0.0))
+        return ex.substituted(node, {leaf: ex.constant(0.0)})
     except TraceError:  # a pole
         return None
 
@@ -86,7 +86,7 @@ def switch_of(gap: Expr) -> Level | Wave | Pulse | None:
     if len(inner) != 1:
         return None
     (wave,) = inner
-    line, outer = affine(wave.args[0]), ex.substituted(gap, wave, _SYMBOL)
+    line, outer = affine(wave.args[0]), ex.substituted(gap, {wave: _SYMBOL})
     factor, shift = differentiate(outer, _SYMBOL), _at_zero(outer, _SYMBOL)
     if line is None or shift is None or ex.depends_on(shift, ("time", "state")):
         return None
@@ -144,7 +144,9 @@ def _cases(gap: Expr, whole: Expr, left: list[int]) -> Condition | bool:
         if left[0] < 0 or switch_of(gap) is None:
             raise TraceError(_unsolvable(whole))
         return _RELATIONS.setdefault(gap, Relation(gap))
-    if_so, if_not = (_cases(ex.substituted(gap, piece, value), whole, left) for value in piece.args)
+    if_so, if_not = (
+        _cases(ex.substituted(gap, {piece: value}), whole, left) for value in piece.args
+    )
     return _either(_both(piece.payload, if_so), _both(Not(piece.payload), if_not))
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import threading
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -549,13 +549,13 @@ def rebuild(node: Expr, args: tuple[Expr, ...], payload: Any) -> Expr:
     return _OPERATIONS[node.op](*args)
 
 
-def substituted(root: Expr, old: Expr, new: Expr) -> Expr:
-    """The expression with another node in the place of ``old``; conditions stay as they are."""
+def substituted(root: Expr, new: Mapping[Expr, Expr]) -> Expr:
+    """The expression with other nodes in the places of some; conditions stay as they are."""
     memo: dict[Expr, Expr] = {}
     for node in walk(root):
         memo[node] = (
-            new
-            if node is old
+            new[node]
+            if node in new
             else rebuild(node, tuple(memo[child] for child in node.args), node.payload)
         )
     return memo[root]

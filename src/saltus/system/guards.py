@@ -339,7 +339,7 @@ def _guard(gap: Expr, canonical: Canonical) -> tuple[Guard, bool]:
     name, factor = canonical.level_of(gap)
     if name is None:
         return Guard("", gap), positive
-    state, at_zero = ex.state(name), ex.substituted(gap, ex.state(name), ex.constant(0.0))
+    state, at_zero = ex.state(name), ex.substituted(gap, {ex.state(name): ex.constant(0.0)})
     boundary = ex.div(_negated(at_zero) if factor > 0 else at_zero, abs(factor))
     if ex.varies(boundary):
         return Guard("", gap), positive

@@ -10,12 +10,12 @@ guard, an integral one more state, and both come with the flow's own precision.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from saltus.errors import ParameterError, TraceError, nearest, shown
-from saltus.system.expression import TIME, Expr, as_expr, parameter, state, sub
+from saltus.system.expression import TIME, Expr, add, as_expr, parameter, state, sub, substituted
 from saltus.system.guards import Guard, bits_in, expressions_of, join_guards, surface_guard
 from saltus.system.names import why_no_name
 from saltus.system.singular import lifted
@@ -304,6 +304,42 @@ def with_integrals(
         field=(*system.field, *rates),
         units={**system.units, **{name: new_units.get(name, "") for name in integrands}},
     )
+
+
+def with_losses(system: System, stored: Expr, name: str, unit: str) -> System:
+    """The system with one more state, the last: the sum of what its impacts and jumps have taken of
+    a stored quantity.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    stored : Expr
+        The quantity, as :func:`quantity` returns it; its pieces are those from which the state
+        jumps.
+    name, unit : str
+        Of the new state.
+
+    Returns
+    -------
+    System
+        Where nothing jumps the new state stays as it starts.
+    """
+    extended = with_integrals(system, {name: lambda: 0.0}, {name: unit})
+    sum_, states = state(name), [state(one) for one in system.states]
+
+    def taken(after: Sequence[Expr]) -> tuple[Expr, ...]:
+        left = substituted(stored, dict(zip(states, after[:-1], strict=True)))
+        return (*after[:-1], add(sum_, sub(stored, left)))
+
+    def lossy(guard: Guard) -> Guard:
+        law = guard.law
+        if law is None or law.kind not in ("impact", "jump"):
+            return guard
+        settled = law.settled and taken(law.settled)
+        return replace(guard, law=replace(law, reset=taken(law.reset), settled=settled))
+
+    return replace(extended, guards=tuple(map(lossy, extended.guards)))
 
 
 def _free(name: str, system: System) -> str:

@@ -303,7 +303,7 @@ class _Boundaries:
         if guard.state is None or guard.boundary is None:
             return False
         try:
-            there = ex.substituted(node, ex.state(guard.state), guard.boundary)
+            there = ex.substituted(node, {ex.state(guard.state): guard.boundary})
         except TraceError:  # something in it is no number there
             return False
         return not self._canonical.polynomial(there)

@@ -100,7 +100,7 @@ class OnSurface:
         if self._solved is None:
             return False
         try:
-            there = ex.substituted(expression, *self._solved)
+            there = ex.substituted(expression, dict([self._solved]))
         except TraceError:  # something in it is no number there
             return False
         return not self._canonical.polynomial(there)
@@ -108,7 +108,7 @@ class OnSurface:
 
 def level(gap: Expr, name: str, slope: Expr) -> Expr:
     """The value of a state at which a gap is zero that is linear in it."""
-    rest = ex.substituted(gap, ex.state(name), _ZERO)
+    rest = ex.substituted(gap, {ex.state(name): _ZERO})
     return ratio(ex.neg(rest), slope)
 
 

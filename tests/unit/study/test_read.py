@@ -128,7 +128,7 @@ def test_schema_tells_editors_the_keys():
     assert set(schema["properties"]) == {
         "study", "system", "method", "simulate", "compare", "poincare", "spectrum", "impacts",
         "energy", "lyapunov",
-        "frequency_response", "bifurcation_diagram", "basins",
+        "frequency_response", "bifurcation_diagram", "branches", "basins",
     }  # fmt: skip
     assert schema["$defs"]["Simulate"]["additionalProperties"] is False
     assert schema["$defs"]["SystemTable"]["additionalProperties"] != {}, (

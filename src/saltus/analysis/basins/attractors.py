@@ -17,6 +17,7 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
+from saltus.analysis.orbits.turns import looks_every
 from saltus.analysis.starts import check_system, ensemble, fill, fixed_states
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, shown
@@ -72,7 +73,8 @@ def attractors(
     periods : int
         Forcing periods after which a trajectory that hasn't settled is looked at for chaos.
     every : float or str, optional
-        Time between two samples [s]: needed for a system without forcing.
+        Time between two samples [s] of a system without forcing; default about a turn of its
+        motions.
     threads : int, optional
         Default all processors. Results don't depend on it.
     progress : bool or callable
@@ -109,7 +111,7 @@ def attractors(
     map_ = Stroboscope(
         system,
         check_method(method),
-        every=None if every is None else to_si(every, "s", "every"),
+        every=looks_every(system, every, group.start),
         threads=threads,
     )
     scale = _spread(map_, group.start)
@@ -122,7 +124,7 @@ def attractors(
     }
     attrs = (
         provenance(system, map_.method, system.values)
-        | {"periods": periods}
+        | looked(periods, map_)
         | stray_attrs(found.astray)
     )
     return attractors_dataset(subject(system, attrs), portraits(map_, found), starts)
@@ -191,24 +193,24 @@ def basin_fractions(
         whole(seed, "seed", 0),
     )
     fixed = fixed_states(system, at, box)
-    ranges = _ranges(system, box)
+    ranges = box_ranges(system, box)
     check_room(
         memory(samples, len(system.states)),
         f"{samples} random starts",
         "Draw fewer: samples=10_000 tells shares to 1 %.",
     )
+    start = fill(
+        system, draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed
+    )
     map_ = Stroboscope(
         system,
         check_method(method),
-        every=None if every is None else to_si(every, "s", "every"),
+        every=looks_every(system, every, start),
         threads=threads,
-    )
-    start = fill(
-        system, _draw(ranges, np.random.default_rng(seed).random((samples, len(ranges)))), fixed
     )
     scale = _spread(map_, start[:SPREAD_STARTS])
     with reporting(progress) as show:
-        scouts = fill(system, _draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
+        scouts = fill(system, draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
         found = find_attractors(map_, scouts, scale, periods)[0]
         result = settle_all(map_, start, found, periods, threads, show)
         found = complete(map_, result, found, scale, periods, threads)
@@ -221,7 +223,7 @@ def basin_fractions(
         "periods_to_settle": result.periods,
     }
     ds = attractors_dataset(
-        subject(system, provenance(system, map_.method, system.values) | {"periods": periods}),
+        subject(system, provenance(system, map_.method, system.values) | looked(periods, map_)),
         table,
         starts,
     )
@@ -232,6 +234,12 @@ def basin_fractions(
         samples=samples,
         seed=seed,
     )
+
+
+def looked(periods: int, map_: Stroboscope) -> dict[str, Any]:
+    """Settings of a result that say how often motions were looked at, and for how long at most."""
+    every = {} if map_.system.forced_at else {"every": float(map_.period[0])}
+    return {"periods": periods} | every
 
 
 def attractors_dataset(
@@ -250,7 +258,8 @@ def attractors_dataset(
     )
 
 
-def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+def box_ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """The ends of each range of a box [SI]. Raises ParameterError, UnitError."""
     ranges = {}
     for name, given in box.items():
         try:
@@ -270,7 +279,7 @@ def _ranges(system: System, box: Mapping[str, Any]) -> dict[str, tuple[float, fl
     return ranges
 
 
-def _draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[str, np.ndarray]:
+def draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[str, np.ndarray]:
     """Starts of the states that have a range, from numbers in [0, 1), one column for each."""
     return {
         name: low + (high - low) * column

@@ -54,7 +54,8 @@ def basins(
     periods : int
         Forcing periods that a trajectory is followed at most.
     every : float or str, optional
-        Time between two samples [s]: needed for a system without forcing.
+        Time between two samples [s] of a system without forcing; default about a turn of its
+        motions.
     threads : int, optional
         Default all processors. Results don't depend on it.
     progress : bool or callable

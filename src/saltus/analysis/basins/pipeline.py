@@ -24,6 +24,7 @@ from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
+from saltus.analysis.orbits.turns import ASKED, looks_every
 from saltus.analysis.starts import check_system, fill, fixed_states
 from saltus.errors import ParameterError
 from saltus.flow.counts import whole
@@ -274,10 +275,9 @@ def basin_plan(
         f"{first} x {second} cells",
         "Take a coarser grid, or sl.basin_fractions.",
     )
-    seconds = None if every is None else to_si(every, "s", "every")
-    plan = BasinPlan(system, method, values, fixed, periods, seconds)
-    plan.map()  # every= is checked where it is used
-    return plan
+    plan = BasinPlan(system, method, values, fixed, periods)
+    some = plan.starts(np.linspace(0, plan.cells - 1, ASKED).astype(int))
+    return replace(plan, every=looks_every(system, every, some))
 
 
 def _axis(system: System, name: str, given: Any) -> np.ndarray:

@@ -8,7 +8,7 @@ Allgower & Georg, Introduction to Numerical Continuation Methods (2003), chapter
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -136,19 +136,19 @@ def correct(
         left, residual, matrix = left[going], residual[going], matrix[going]
         whole = np.concatenate([matrix, normal[left][:, None]], axis=1)
         right = np.concatenate([residual, np.zeros((len(left), 1))], axis=1)
-        step = -_solve(whole, right)
+        step = -solved(whole, right)
         z[left] += step * scale[left]
         near = np.linalg.norm((z[left] - guess[left]) / scale[left], axis=1) <= limit[left]
         left = left[np.isfinite(step).all(axis=1) & near]
     return Corrected(z, derivative, found, count)
 
 
-def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solutions of linear systems, NaN where there is none."""
     try:
         return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
     except np.linalg.LinAlgError:
-        result = np.full(right.shape, np.nan)
+        result = np.full(right.shape, np.nan, matrix.dtype)
         for i, (one, vector) in enumerate(zip(matrix, right, strict=True)):
             try:
                 result[i] = np.linalg.solve(one, vector)
@@ -170,14 +170,13 @@ def follow(
     equations: Equations,
     start: np.ndarray,
     along: np.ndarray,
-    column: int,
-    limits: tuple[float, float],
+    bounds: Mapping[int, tuple[float, float]],
     points: int,
     first: float | np.ndarray = FIRST,
     ends: Callable[[Curve], str] | None = None,
     group: np.ndarray | None = None,
 ) -> list[Curve]:
-    """Curves from points float64[k, m + 1] on them, until they leave the range of one unknown, are
+    """Curves from points float64[k, m + 1] on them, until they leave the range of an unknown, are
     closed or have ``points`` points.
 
     Parameters
@@ -186,10 +185,8 @@ def follow(
         Row i is curve i.
     start, along : float64[k, m + 1]
         Points, and on which side of them to go, in units of the scale.
-    column : int
-        The unknown whose range is limited.
-    limits : (float, float)
-        Its range.
+    bounds : mapping of int to (float, float)
+        Ranges of unknowns, by their columns.
     points : int
         Most points of a curve.
     first : float or float64[k]
@@ -202,7 +199,7 @@ def follow(
     """
     rows = np.arange(len(start))
     here = correct(equations, start, tangents_at(equations, start, along, rows), rows, 1.0)
-    fronts = _Fronts(equations, column, limits, [Curve() for _ in rows], first)
+    fronts = _Fronts(equations, bounds, [Curve() for _ in rows], first)
     fronts.begin(here, tangents(_finite(here.derivative), along))
     while len(fronts.going):
         taken = fronts.step()
@@ -225,12 +222,11 @@ class _Fronts:
     def __init__(
         self,
         equations: Equations,
-        column: int,
-        limits: tuple[float, float],
+        bounds: Mapping[int, tuple[float, float]],
         curves: list[Curve],
         first: float | np.ndarray,
     ) -> None:
-        self.equations, self.column, self.limits, self.curves = equations, column, limits, curves
+        self.equations, self.bounds, self.curves = equations, bounds, curves
         self.length = np.broadcast_to(first, len(curves)).astype(float)
 
     def begin(self, here: Corrected, tangent: np.ndarray) -> None:
@@ -287,17 +283,21 @@ class _Fronts:
         """Points along the tangents, the planes in which they are corrected, and which land on an
         end of the range.
         """
-        column, normal = self.column, self.tangent[going].copy()
+        normal = self.tangent[going].copy()
         step = self.length[going, None] * self.tangent[going] * self.equations.scale[going]
-        guess = self.z[going] + step
-        bound = np.clip(guess[:, column], *self.limits)
-        outside = bound != guess[:, column]
-        with np.errstate(invalid="ignore"):
-            share = (bound - self.z[going, column]) / step[:, column]
-        guess[outside] = (self.z[going] + share[:, None] * step)[outside]
-        guess[outside, column] = bound[outside]
+        here, share, at = self.z[going], np.ones(len(going)), np.full(len(going), -1)
+        for column, (low, high) in self.bounds.items():
+            ahead = here[:, column] + step[:, column]
+            bound = np.clip(ahead, low, high)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                reach = (bound - here[:, column]) / step[:, column]
+            nearer = (bound != ahead) & (reach < share)
+            share[nearer], at[nearer] = reach[nearer], column
+        guess, outside = here + share[:, None] * step, at >= 0
         normal[outside] = 0.0
-        normal[outside, column] = 1.0
+        normal[outside, at[outside]] = 1.0
+        for j in np.flatnonzero(outside):
+            guess[j, at[j]] = np.clip(guess[j, at[j]], *self.bounds[int(at[j])])
         return guess, normal, outside
 
     def _close(self, taken: np.ndarray) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.resolution import resolve
+from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import outside
 from saltus.analysis.branches.tracing import Branch
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
@@ -60,16 +61,16 @@ def values_of(
 ) -> dict[str, Any]:
     """The variables on the dims ``point``, ``branch`` and ``event``."""
     size = len(system.states)
-    resolve(branches, functools.partial(_peaks, system, name, method))
+    resolve(branches, functools.partial(_peaks, system, method))
     counts = [len(branch.z) for branch in branches]
     points = [(branch, z) for branch in branches for z in branch.z]
-    numbers = _numbers(system, name, points, outputs, method)
+    numbers = numbers_of(system, _with_equations(points), outputs, method)
     events = [(number, event) for number, branch in enumerate(branches) for event in branch.events]
     at_events = [(branches[number], event.z) for number, event in events]
-    event_numbers = _numbers(system, name, at_events, outputs, method)
+    event_numbers = numbers_of(system, _with_equations(at_events), outputs, method)
     begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    multipliers = _stacked([branch.multipliers for branch in branches], size)
-    event_multipliers = _stacked([event.multipliers[None] for _, event in events], size)
+    multipliers = stacked([branch.multipliers for branch in branches], size)
+    event_multipliers = stacked([event.multipliers[None] for _, event in events], size)
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
     states = padded([branch.orbits.points(z) for branch, z in [*points, *at_events]], size)
     return {
@@ -118,34 +119,39 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
     }
 
 
-def _peaks(system: System, name: str, method: Method, branch: Branch, z: np.ndarray) -> np.ndarray:
+def _peaks(system: System, method: Method, branch: Branch, z: np.ndarray) -> np.ndarray:
     """Largest magnitude of the first state of orbits float64[r, z] of a branch."""
-    numbers = _numbers(system, name, [(branch, one) for one in z], outputs_of(system, None), method)
-    return numbers.peak[:, 0]
+    points = _with_equations([(branch, one) for one in z])
+    return numbers_of(system, points, outputs_of(system, None), method).peak[:, 0]
 
 
-def _numbers(
-    system: System,
-    name: str,
+def _with_equations(
     points: Sequence[tuple[Branch, np.ndarray]],
+) -> list[tuple[PeriodicOrbits, np.ndarray]]:
+    return [(branch.orbits, z) for branch, z in points]
+
+
+def numbers_of(
+    system: System,
+    points: Sequence[tuple[PeriodicOrbits, np.ndarray]],
     outputs: Outputs,
     method: Method,
 ) -> Measures:
-    """The numbers of orbits: extremes, means, contacts and margins."""
-    rows = np.tile(np.array(list(system.values.values())), (max(len(points), 1), 1))
-    rows[: len(points), list(system.values).index(name)] = [z[-1] for _, z in points]
-    starts = np.array([branch.orbits.points(z)[0] for branch, z in points])
+    """The numbers of orbits, each with its unknowns: extremes, means, contacts and margins."""
+    rows = np.tile(np.array(list(system.values.values())), (len(points), 1))
+    for row, (orbits, z) in zip(rows, points, strict=True):
+        row[[list(system.values).index(name) for name in orbits.names]] = orbits.values(z)
+    starts = np.array([orbits.points(z)[0] for orbits, z in points])
     starts = starts.reshape(len(points), len(system.states))
-    rows = rows[: len(points)]
-    periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
+    periods = np.array([orbits.n for orbits, _ in points], np.int64)
     if system.forced_at is not None:
         return measure(Stroboscope(system, method, rows), starts, periods, outputs=outputs)
-    times = np.array([float(branch.orbits.period(z)) for branch, z in points])
+    times = np.array([float(orbits.period(z)) for orbits, z in points])
     map_ = Stroboscope(system, method, rows, every=times)
     return measure(map_, starts, np.ones(len(points), np.int64), outputs=outputs)
 
 
-def _stacked(parts: Sequence[np.ndarray], size: int) -> np.ndarray:
+def stacked(parts: Sequence[np.ndarray], size: int) -> np.ndarray:
     """Multipliers in one table complex128[.., size], NaN where a trivial one was left out."""
     if not parts:
         return np.zeros((0, size), complex)

@@ -71,10 +71,11 @@ def seeds_at(
 
 def _ranges(points: np.ndarray) -> np.ndarray:
     """Range of each state, its size where it rests."""
-    return _units(points.max(axis=0), points.min(axis=0))
+    return units(points.max(axis=0), points.min(axis=0))
 
 
-def _units(high: np.ndarray, low: np.ndarray) -> np.ndarray:
+def units(high: np.ndarray, low: np.ndarray) -> np.ndarray:
+    """Units of states between bounds: their range, their size where they rest."""
     ranges, sizes = high - low, np.maximum(np.abs(high), np.abs(low))
     return np.where(ranges > RESTS * sizes, ranges, np.where(sizes > 0, sizes, 1.0))
 
@@ -91,6 +92,6 @@ def scaled(system: System, name: str, seeds: list[Seed], method: Method) -> list
     numbers = measure(Stroboscope(system, method, rows), starts, periods)
     result = list(seeds)
     for place, i in enumerate(unknown):
-        scale = _units(numbers.maximum[place], numbers.minimum[place])
+        scale = units(numbers.maximum[place], numbers.minimum[place])
         result[i] = replace(seeds[i], scale=np.where(np.isfinite(scale), scale, 1.0))
     return result

@@ -11,16 +11,21 @@ chapter 4.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
 
 from saltus.analysis.orbits.equilibria import field_of
 from saltus.analysis.orbits.newton import leading_first
+from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.system.parametric import parametric
 from saltus.system.system import System
+
+#: Samples of a limit cycle in which the nearest to a point is looked for, and steps that locate it.
+SAMPLES, LOCATED = 400, 3
 
 
 class PeriodicOrbits:
@@ -137,6 +142,34 @@ class PeriodicOrbits:
             self.phase[rows, 0] = z[:, : self.size]
             self.phase[rows, 1] = self._flow(z) / self.scale[rows, : self.size]
             self.phase[rows, 1] /= np.linalg.norm(self.phase[rows, 1], axis=1)[:, None]
+
+    def near(self, z: np.ndarray, rows: np.ndarray) -> PeriodicOrbits:
+        """The equations whose row i is curve rows[i], int64[r], with the condition on its phase at
+        the orbit float64[r, z].
+        """
+        other = copy.copy(self)
+        other.scale, other.phase = self.scale[rows], self.phase[rows].copy()
+        other.accepted(z, np.arange(len(rows)))
+        return other
+
+    def beside(self, z: np.ndarray, point: np.ndarray, row: int) -> float:
+        """How far a point float64[D] lies from the limit cycle z, in units of the scale."""
+        values = self._own(z[None])[0]
+        start = np.concatenate([z[None, : self.size], values], axis=1)
+        unit = self.scale[row, : self.size]
+        run = self.map.run(start, self.n, Schedule.even(self.n, SAMPLES)).samples[0]
+        apart = np.abs((run[:, : self.size] - point) / unit).max(axis=1)
+        place = float(np.argmin(apart)) / SAMPLES
+        for _ in range(LOCATED):
+            count, share = int(place // 1), place % 1
+            schedule = Schedule(np.array([count]), np.array([share]))
+            state = self.map.run(start, self.n, schedule).samples[0, 0, : self.size]
+            ahead = z.copy()
+            ahead[: self.size] = state
+            rate = self._flow(ahead[None])[0] * z[self.n * self.size]
+            way, along = (point - state) / unit, rate / unit
+            place = (place + float(way @ along) / float(along @ along)) % self.n
+        return float(np.abs(way).max())
 
     def _flow(self, z: np.ndarray) -> np.ndarray:
         """Rates at the first points, float64[r, D]."""

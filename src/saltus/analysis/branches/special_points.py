@@ -10,6 +10,7 @@ Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,12 +116,13 @@ def locate(
     kind : int64[e]
         Which test.
     """
+    if not len(rows):
+        return []
     column = z.shape[1] - 1
+    orbits, rows = orbits.near(z, rows), np.arange(len(rows))
     known: dict[int, SpecialPoint] = {}
 
-    def at(step: np.ndarray, event: np.ndarray) -> np.ndarray:
-        event = event.astype(np.int64)
-        flat, which = step.ravel(), event.ravel()
+    def at(flat: np.ndarray, which: np.ndarray) -> np.ndarray:
         mine = rows[which]
         guess = z[which] + flat[:, None] * tangent[which] * orbits.scale[mine]
         point = correct(orbits, guess, tangent[which], mine)
@@ -136,16 +138,10 @@ def locate(
                 known[int(which[i])] = SpecialPoint(
                     KINDS[kind[which[i]]], -1, point.z[i], direction[i], own[place], derivative[i]
                 )
-        return values.reshape(step.shape)
+        return values
 
-    if not len(rows):
-        return []
-    root = elementwise.find_root(
-        at, (np.zeros(len(rows)), length), args=(np.arange(len(rows), dtype=float),),
-        tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0}, maxiter=60,
-    )  # fmt: skip
-    at(root.x, np.arange(len(rows), dtype=float))
-    result = [known.get(i) if np.isfinite(root.x[i]) else None for i in range(len(rows))]
+    roots = zeros(at, length)
+    result = [known.get(i) if np.isfinite(roots[i]) else None for i in range(len(rows))]
     for i in np.flatnonzero(kind == KINDS.index("branch_point")):
         guess = z[i] + 0.5 * length[i] * tangent[i] * orbits.scale[rows[i]]
         near = known.get(int(i))
@@ -153,6 +149,26 @@ def locate(
             orbits, int(rows[i]), guess if near is None else near.z, tangent[i]
         )
     return result
+
+
+def zeros(at: Callable[[np.ndarray, np.ndarray], np.ndarray], length: np.ndarray) -> np.ndarray:
+    """Places at which functions of a distance vanish between 0 and float64[e], NaN where none is
+    found: ``at`` gives their values at float64[r] for the functions int64[r], and is called at the
+    zeros last.
+    """
+    if not len(length):
+        return length
+    which = np.arange(len(length))
+
+    def values(step: np.ndarray, event: np.ndarray) -> np.ndarray:
+        return at(step.ravel(), event.astype(np.int64).ravel()).reshape(step.shape)
+
+    root = elementwise.find_root(
+        values, (np.zeros(len(length)), length), args=(which.astype(float),),
+        tolerances={"xrtol": 1e-14, "xatol": 1e-15, "fatol": 0.0, "frtol": 0.0}, maxiter=60,
+    )  # fmt: skip
+    at(root.x, which)
+    return np.asarray(root.x)
 
 
 def _branch_point(

@@ -220,8 +220,8 @@ def _both_ways(plan: Plan, starts: _Starts, which: Sequence[int]) -> list[Branch
     orbits.accepted(starts.z[owner], np.arange(len(owner)))
     first = np.array([FIRST if starts.seeds[i].along is None else ASIDE for i in owner])
     curves = follow(
-        orbits, starts.z[owner], np.array(sides), orbits.width - 1, plan.limits, plan.points, first,
-        ends=functools.partial(_halved, orbits), group=whose,
+        orbits, starts.z[owner], np.array(sides), {orbits.width - 1: plan.limits}, plan.points,
+        first, ends=functools.partial(_halved, orbits), group=whose,
     )  # fmt: skip
     result = []
     for i in which:
@@ -347,15 +347,16 @@ def refine(branch: Branch, places: Sequence[int]) -> np.ndarray:
     after = np.array(places, np.int64)
     step = (branch.z[after + 1] - branch.z[after]) / branch.scale
     length = np.einsum("ki,ki->k", step, branch.tangent[after])
-    rows = np.full(len(after), branch.row)
+    orbits = branch.orbits.near(branch.z[after], np.full(len(after), branch.row))
+    rows = np.arange(len(after))
     guess = branch.z[after] + 0.5 * length[:, None] * branch.tangent[after] * branch.scale
-    point = correct(branch.orbits, guess, branch.tangent[after], rows, np.abs(length))
+    point = correct(orbits, guess, branch.tangent[after], rows, np.abs(length))
     good = np.flatnonzero(point.found & (np.abs(length) > LEAST))
     if not len(good):
         return good
     derivative = point.derivative[good]
     tangent = tangents(derivative, branch.tangent[after[good]])
-    own = branch.orbits.multipliers(point.z[good], derivative, rows[good])
+    own = orbits.multipliers(point.z[good], derivative, rows[good])
     middle = 0.5 * (branch.length[after[good]] + branch.length[after[good] + 1])
     new = {"z": point.z[good], "tangent": tangent, "derivative": derivative}
     for name, values in {**new, "multipliers": own, "length": middle}.items():
@@ -392,8 +393,6 @@ def _known(z: np.ndarray, n: int, branches: Sequence[Branch]) -> bool:
 def _lies_on(z: np.ndarray, branch: Branch) -> bool:
     value = branch.z[:, -1]
     across = np.flatnonzero((value[1:] - z[-1]) * (value[:-1] - z[-1]) <= 0)
-    size, rows = branch.orbits.n * branch.orbits.size, np.array([branch.row])
-    others = branch.orbits.alike(z[None], rows)[0]
     normal = np.zeros((1, len(z)))
     normal[0, -1] = 1.0
     for i in across:
@@ -401,14 +400,26 @@ def _lies_on(z: np.ndarray, branch: Branch) -> bool:
         share = (z[-1] - value[i]) / width if width else 0.0
         guess = branch.z[i] + share * (branch.z[i + 1] - branch.z[i])
         guess[-1] = z[-1]
-        apart = np.abs((others - guess)[:, :size] / branch.scale[:size]).max(axis=1)
-        if apart.min() > PASSES:
+        if _apart(z, guess, branch) > PASSES:
             continue
-        point = correct(branch.orbits, guess[None], normal, rows, 2 * PASSES)
-        apart = np.abs((others - point.z)[:, :size] / branch.scale[:size]).max(axis=1)
-        if point.found[0] and apart.min() < SAME:
+        orbits = branch.orbits.near(guess[None], np.array([branch.row]))
+        point = correct(orbits, guess[None], normal, np.array([0]), 2 * PASSES)
+        if point.found[0] and _apart(z, point.z[0], branch, exact=True) < SAME:
             return True
     return False
+
+
+def _apart(a: np.ndarray, b: np.ndarray, branch: Branch, exact: bool = False) -> float:
+    """How far two orbits lie apart, in units of the scale, from whichever point they begin; for
+    limit cycles only roughly unless ``exact``.
+    """
+    orbits, row = branch.orbits, branch.row
+    size = orbits.n * orbits.size
+    if orbits.free:
+        periods = abs(a[size] - b[size]) / abs(b[size])
+        return max(periods, orbits.beside(b, a[: orbits.size], row) if exact else 0.0)
+    others = orbits.alike(a[None], np.array([row]))[0]
+    return float(np.abs((others - b)[:, :size] / branch.scale[:size]).max(axis=1).min())
 
 
 def _ends_there(seed: Seed, branches: Sequence[Branch]) -> bool:

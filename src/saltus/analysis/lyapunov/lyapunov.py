@@ -13,6 +13,7 @@ from saltus.analysis.dataset_parts import provenance, shared_values, subject
 from saltus.analysis.lyapunov.algorithm import Algorithm
 from saltus.analysis.lyapunov.exponents import Exponents
 from saltus.analysis.lyapunov.wolf_on_flow import NeighbourExponents
+from saltus.analysis.orbits.turns import looks_every
 from saltus.analysis.outcome_messages import warn
 from saltus.analysis.starts import Ensemble, check_system, ensemble
 from saltus.analysis.verb import verb
@@ -25,7 +26,6 @@ from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.system.system import System
-from saltus.units import to_si
 
 METHODS = ("variational", "wolf")
 #: Units in which exponents are given: what one block is worth, and whether the logarithm is
@@ -88,8 +88,8 @@ def lyapunov(
     transient : int
         Blocks before them that don't count. In the last 128 of them the directions align.
     every : float or str, optional
-        Time of a block [s], for a system without forcing: about a turn of the motion. Deviations
-        should grow by less than 1e8 in it.
+        Time of a block [s], for a system without forcing; default about a turn of the motion.
+        Deviations should grow by less than 1e8 in it.
     values : mapping
         Parameter values of this call: one each, or an array with one for each trajectory.
     unit : {"1/s", "1/period", "bit/s", "bit/period"}
@@ -146,7 +146,7 @@ def lyapunov(
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     periods, transient = whole(periods, "periods", LEAST_PERIODS), whole(transient, "transient", 0)
     rows = np.broadcast_to(group.parameters, (group.size, len(system.values)))
-    block = None if every is None else to_si(every, "s", "every")
+    block = looks_every(system, every, group.start, rows)
     map_ = Stroboscope(system, flow, rows, block, threads)
     algorithm: type[Algorithm] = Exponents if method == "variational" else NeighbourExponents
     work = algorithm(map_, group.start, periods, transient, block)

@@ -22,13 +22,19 @@ from saltus.flow.room import check_room
 from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Expr
-from saltus.system.quantity import Quantity, quantity, with_integrals
+from saltus.system.quantity import Quantity, quantity, with_integrals, with_losses
 from saltus.system.system import System
 
 #: Intervals into which the span of an unforced system is cut.
 INTERVALS = 100
-#: Names of the two integrals, chosen so that no system has them.
-_SUPPLIED, _DISSIPATED = "work_supplied_", "energy_dissipated_"
+#: Names of the integrals, by what they are of, and of the sum of the losses at impacts, chosen so
+#: that no system has them.
+_NAMES = {
+    "supplied": "work_supplied_",
+    "dissipated": "energy_dissipated_",
+    "friction": "work_friction_",
+}
+_IMPACTS = "energy_impacts_"
 
 
 @verb
@@ -39,6 +45,7 @@ def energy_balance(
     energy: Quantity,
     supplied: Quantity,
     dissipated: Quantity,
+    friction: Quantity | None = None,
     periods: int | None = None,
     t_end: float | str | None = None,
     t_start: float | str = 0.0,
@@ -52,21 +59,29 @@ def energy_balance(
     """Energy stored, supplied and dissipated, forcing period by forcing period; what is left over
     must be zero.
 
-    The two powers are integrated along the motion as states of their own, so with the flow's
-    precision: with :class:`saltus.Taylor` the residual is rounding. A residual that is larger says
-    that a term is missing in one of the three functions, or that the equations aren't those of the
-    system that one has in mind.
+    The powers are integrated along the motion as states of their own, so with the flow's precision:
+    with :class:`saltus.Taylor` the residual is rounding. A residual that is larger says that a term
+    is missing in one of the functions, or that the equations aren't those of the system that one
+    has in mind.
+
+    What impacts and jumps of the state take (``sl.impact``, ``sl.jump``) is counted as they happen:
+    the energy before each less that behind it, those of a chatter and the coming to rest among
+    them.
 
     Parameters
     ----------
     system, start, t_start, method, values, threads, progress
-        As for :func:`saltus.simulate`. ``ODE45`` controls the errors of the two integrals too, so
+        As for :func:`saltus.simulate`. ``ODE45`` controls the errors of the integrals too, so
         its steps may differ from those without.
     energy : callable
         Stored energy [J], a function of (t, states, parameters); its arguments are found by name.
         Comparisons in it that are contacts of the system read the same sides.
     supplied, dissipated : callable
         Power that flows in, and power that is lost [W], likewise.
+    friction : callable, optional
+        Power that friction takes [W], likewise, as a part of its own: leave it out of
+        ``dissipated``. :func:`saltus.friction` and :func:`saltus.sign` of a contact that sticks are
+        the force that holds it.
     periods : int
         Whole forcing periods after the transient.
     t_end : float or str
@@ -82,8 +97,9 @@ def energy_balance(
     Dataset
         Dims ``period`` (at the end of each interval; of an unforced system ``time``), and
         ``trajectory`` for many. ``energy`` at the end of the interval; ``change``, ``supplied``,
-        ``dissipated`` in it, and ``residual`` = supplied - dissipated - change [J]; ``imbalance``:
-        the largest residual relative to the largest of these; ``status``, counters.
+        ``dissipated`` in it, with ``friction=`` ``friction``, of a system with impacts or jumps
+        ``impacts``; and ``residual`` = supplied - dissipated - friction - impacts - change [J];
+        ``imbalance``: the largest residual relative to the largest of these; ``status``, counters.
 
     Raises
     ------
@@ -107,15 +123,21 @@ def energy_balance(
     check_system(system)
     method = check_method(method)
     stored, guards = quantity(system, energy, "the energy")
+    powers = {"supplied": supplied, "dissipated": dissipated, "friction": friction}
+    parts = {name: power for name, power in powers.items() if power is not None}
     whole_system = with_integrals(
         replace(system, guards=guards),
-        {_SUPPLIED: supplied, _DISSIPATED: dissipated},
-        {_SUPPLIED: "J", _DISSIPATED: "J"},
+        {_NAMES[name]: power for name, power in parts.items()},
+        {_NAMES[name]: "J" for name in parts},
     )
+    names = list(parts)
+    if any(guard.law and guard.law.kind in ("impact", "jump") for guard in system.guards):
+        whole_system = with_losses(whole_system, stored, _IMPACTS, "J")
+        names.append("impacts")
     seen = stretch(system, start, values, periods, t_end, t_start, transient)
     schedule = _schedule(seen, intervals)
 
-    answer = partial(_dataset, system, method, seen, whole_system, stored, schedule)
+    answer = partial(_dataset, system, method, seen, whole_system, stored, schedule, names)
     result = computed(
         whole_system,
         method,
@@ -170,6 +192,7 @@ def _dataset(
     extended: System,
     stored: Expr,
     schedule: Schedule,
+    names: list[str],
     outcome: Outcome,
 ) -> xr.Dataset:
     """What each interval holds, under its name."""
@@ -181,16 +204,11 @@ def _dataset(
     states = {name: samples[:, :, i] for i, name in enumerate(system.states)}
     (energy,) = evaluate([stored], t=time, states=states, values={**shared, **columns}, bits=bits)
     energy = np.broadcast_to(energy, samples.shape[:2])
-    supplied, dissipated = (np.diff(samples[:, :, len(system.states) + i], axis=1) for i in (0, 1))
+    integrals = np.diff(samples[:, :, len(system.states) :], axis=1)
+    turned = {name: integrals[:, :, i] for i, name in enumerate(names)}
     change = np.diff(energy, axis=1)
-    residual = supplied - dissipated - change
-    parts = {
-        "energy": energy[:, 1:],
-        "change": change,
-        "supplied": supplied,
-        "dissipated": dissipated,
-        "residual": residual,
-    }
+    residual = 2.0 * turned["supplied"] - sum(turned.values()) - change
+    parts = {"energy": energy[:, 1:], "change": change, **turned, "residual": residual}
     forced = system.forced_at is not None
     intervals = {"period": schedule.count[1:]} if forced else {"time": time[0, 1:]}
     each = {**parts, "imbalance": _imbalance(parts)}

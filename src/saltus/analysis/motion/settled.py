@@ -102,9 +102,8 @@ def _phases(run: xr.Dataset) -> np.ndarray:
         raise ParameterError(
             "settled needs a forced system: without a forcing period there is nothing to repeat "
             "after. For an oscillation by itself ask "
-            'sl.attractors(system, start, every="1 s"), which names equilibria and limit cycles '
-            "with their periods; for a forced system "
-            "declare forced_at=."
+            "sl.attractors(system, start), which names equilibria and limit cycles with their "
+            "periods; for a forced system declare forced_at=."
         )
     phases = np.asarray(run["period"].values, dtype=float)
     nearest = np.round(phases)

@@ -90,9 +90,11 @@ def returns(map_: Stroboscope, start: np.ndarray, window: float) -> Returns:
     return result
 
 
-def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, ...]:
-    """From samples over a window each: time and distance of the return, range of the states,
-    whether samples follow the motion, turns.
+def directions(
+    map_: Stroboscope, start: np.ndarray, length: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """From samples over a window each: the directions of the motion float64[k, SAMPLES, D] in units
+    of the ranges of the states, these ranges float64[k, D], and the samples and their rates.
     """
     k, size = start.shape
     samples = map_.with_period(length).run(start, 1, Schedule.even(1, SAMPLES)).samples
@@ -106,6 +108,16 @@ def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.
         scale = np.where(np.isfinite(scale), scale, 1.0)
         across = rates / scale[:, None]
         across /= np.linalg.norm(across, axis=2, keepdims=True)
+    return across, scale, (samples, rates)
+
+
+def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, ...]:
+    """From samples over a window each: time and distance of the return, range of the states,
+    whether samples follow the motion, turns.
+    """
+    across, scale, (samples, rates) = directions(map_, start, length)
+    k = len(start)
+    with np.errstate(all="ignore"):
         turns = np.einsum("kij,kij->ki", across[:, 1:], across[:, :-1])
         followed = (turns > TURN).mean(axis=1) >= FOLLOWED
         offset = (samples - start[:, None]) / scale[:, None]

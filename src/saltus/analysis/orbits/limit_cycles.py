@@ -14,6 +14,9 @@ from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.results.dataset.kinds import Kind
 
+#: Places on a cycle, as shares of its time, from which it is looked for.
+PLACES = np.array([0.0, 0.36, 0.71, 0.87])
+
 
 def limit_cycles(
     map_: Stroboscope, state: np.ndarray, window: float, scale: np.ndarray
@@ -43,5 +46,12 @@ def limit_cycles(
 
 
 def cycle_of(map_: Stroboscope, one: SampledAttractor) -> OrbitBatch:
-    """A limit cycle that is known by its places: its first one is where it begins."""
-    return attracting_cycles(map_, one.points[:1], ROUND * float(map_.period[0]), NEAR)[0]
+    """A limit cycle that is known by its places.
+
+    Newton's method begins at several of them: at a jump of the state there is no derivative.
+    """
+    start = one.points[(PLACES * len(one.points)).astype(int)]
+    cycles, _, _ = attracting_cycles(
+        map_.rows(np.zeros(len(start), np.int64)), start, ROUND * float(map_.period[0]), NEAR
+    )
+    return cycles.rows(np.array([np.argmax(cycles.period > 0)]))

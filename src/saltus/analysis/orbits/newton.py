@@ -8,7 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from saltus.analysis.orbits.tolerances import AMPLIFIED, CONVERGED, MAX_NEWTON_STEPS, SINGULAR, SLOW
+from saltus.analysis.orbits.tolerances import (
+    AMPLIFIED,
+    CONVERGED,
+    MAX_NEWTON_STEPS,
+    RANK,
+    SINGULAR,
+    SLOW,
+)
 
 #: Residuals float64[m, d] and derivatives float64[m, d, d] of the rows int64[m], at float64[m, d];
 #: all in units of the scale.
@@ -23,6 +30,7 @@ def newton(
     longest_step: float = 1.0,
     farthest: float = np.inf,
     max_slow: int = MAX_NEWTON_STEPS,
+    least_squares: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Zeros of k systems of d equations, float64[k, d], and where the iteration converged, bool[k].
 
@@ -38,6 +46,9 @@ def newton(
         Rows are given up after a longer step, or farther from their start.
     max_slow : int
         Rows are given up after more slow steps.
+    least_squares : bool
+        Of more equations than unknowns, or of zeros that aren't isolated: each step is the shortest
+        of those that fit best. Rows of the derivative should be of one size.
     """
     x, found, rows = (
         np.array(start, float),
@@ -56,9 +67,13 @@ def newton(
         good = np.flatnonzero(
             np.isfinite(derivative).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1)
         )
-        good = good[np.linalg.cond(derivative[good]) < SINGULAR]
+        if not least_squares:
+            good = good[np.linalg.cond(derivative[good]) < SINGULAR]
         rows, residual, derivative = rows[good], residual[good], derivative[good]
-        step = -np.linalg.solve(derivative, residual[:, :, None])[:, :, 0]
+        if least_squares:
+            step = -(np.linalg.pinv(derivative, RANK) @ residual[:, :, None])[:, :, 0]
+        else:
+            step = -np.linalg.solve(derivative, residual[:, :, None])[:, :, 0]
         x[rows] += step * scale[rows]
         length = np.abs(step).max(axis=1)
         rounding = np.all(

@@ -40,6 +40,9 @@ AMPLIFIED = 1e-9
 SLOW = 0.75
 #: Condition number of a linear system from which its solution has no digit.
 SINGULAR = 1e15
+#: Singular values below this share of the largest are zero, where equations may depend on each
+#: other.
+RANK = 1e-9
 #: Distance of a multiplier from the unit circle that rounding can't make.
 MARGINAL = 1e-7
 

@@ -14,6 +14,7 @@ from saltus.analysis.orbits.orbit_measures import Measures
 from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.flow.maps import Stroboscope
 from saltus.system.evaluate import evaluate
+from saltus.system.guards import is_hold
 
 #: Parts of a motion that must each be larger than the one before, and how much the last must be
 #: larger than the first, to run away.
@@ -100,6 +101,8 @@ def rest(map_: Stroboscope, place: np.ndarray, rows: np.ndarray, numbers: Measur
     bits: list[np.ndarray] = []
     nearest = np.full(len(rows), np.inf)
     for guard in map_.system.guards:
+        if is_hold(guard):
+            continue
         (gap,) = evaluate([guard.gap], states=states, values=values, bits=bits)
         bits.append(np.broadcast_to(gap, len(rows)) > 0)
         nearest = np.minimum(nearest, np.abs(gap))

@@ -19,7 +19,7 @@ from saltus.analysis.outputs import outputs_of
 from saltus.analysis.responses.continued import LONGEST_DOUBLED, POINTS, SWITCHES, seeds_of_grid
 from saltus.analysis.responses.grid import grid_of
 from saltus.analysis.responses.responses import find
-from saltus.analysis.starts import check_system, single
+from saltus.analysis.starts import check_system, range_of, single
 from saltus.analysis.verb import verb
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
@@ -184,19 +184,7 @@ def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
             f"sl.branches follows one parameter: {{{example!r}: (low, high)}}, not {shown(vary)}."
         )
     ((name, ends),) = vary.items()
-    if name not in system.values:
-        raise ParameterError(
-            f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
-        )
-    try:
-        low, high = (single(system, name, end) for end in ends)
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"the range of {name} must be (low, high), not {shown(ends)}."
-        ) from None
-    if not low < high:
-        raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")
-    return name, (low, high)
+    return name, range_of(system, name, ends)
 
 
 def _kinds(switch: Any) -> Sequence[str]:

@@ -43,7 +43,7 @@ def bifurcation_diagram(
     Parameters
     ----------
     system : System
-        Any system; one without forcing with ``every``.
+        Any system.
     vary : mapping
         One parameter, or two for a map of types: a range, such as ``{"contact_stiffness": ("1e3
         N/m", "1e9 N/m", 2000, "log")}``, or a list or array of values.
@@ -62,8 +62,8 @@ def bifurcation_diagram(
         of these (-1 of what never repeats), and the Dataset has their variables, on ``point``,
         ``branch`` and ``event``, too.
     every : float or str, optional
-        Time between two samples of the motion of a system without forcing [s], about a turn of it.
-        Equilibria, limit cycles, their periods, sizes and stability don't depend on it.
+        Time between two samples of the motion of a system without forcing [s]; default about a
+        turn of it. Equilibria, limit cycles, their periods, sizes and stability don't depend on it.
     box, values, outputs, method, periods, seed, threads, progress
         As for :func:`saltus.frequency_response`.
 

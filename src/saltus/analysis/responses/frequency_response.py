@@ -124,7 +124,7 @@ def frequency_response(
     if system.forced_at is None:
         raise ParameterError(
             f"{system.name} has no forcing, so no frequency to vary. Take sl.bifurcation_diagram "
-            f"over another parameter, with every=; "
+            f"over another parameter; "
             "if a parameter is the frequency of a forcing, declare forced_at= in @sl.system."
         )
     grid = grid_of(system, {system.forced_at: frequency}, start, box, values, seed, follow)

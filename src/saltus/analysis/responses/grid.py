@@ -6,14 +6,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from saltus.analysis.axes import along
 from saltus.analysis.orbits.tolerances import LONGEST
-from saltus.analysis.starts import check_system, ensemble, looks_every, single
+from saltus.analysis.orbits.turns import ASKED, looks_every
+from saltus.analysis.starts import check_system, ensemble, single
 from saltus.errors import ParameterError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
@@ -113,7 +114,8 @@ def grid_of(
     follow : bool or None
         Whether each start is followed from value to value, upwards.
     every : float, str or None
-        Time between two samples [s] at a system without forcing.
+        Time between two samples [s] at a system without forcing; None for about a turn of its
+        motions.
 
     Raises
     ------
@@ -121,7 +123,6 @@ def grid_of(
         If a name is unknown, a range is empty, or the grid too large.
     """
     check_system(system)
-    seconds = looks_every(system, every)
     if values is not None:
         if not isinstance(values, Mapping):
             raise ParameterError('values must be a mapping, such as values={"force": "4 N"}.')
@@ -138,7 +139,7 @@ def grid_of(
         raise ParameterError(
             "a sweep follows one parameter; this grid has two. Leave follow= and sweeps out."
         )
-    grid = Grid(system, points, starts, sweeps, drawn, seconds)
+    grid = Grid(system, points, starts, sweeps, drawn)
     check_room(
         grid.places
         * (len(starts) * (400.0 + RESPONSE * len(system.states)) + 16.0 * len(system.values)),
@@ -148,7 +149,9 @@ def grid_of(
     corners = {name: np.array([column.min(), column.max()]) for name, column in points.items()}
     # ranges and periodicity of the forcing are checked there
     ensemble(system, np.zeros(len(system.states)), corners)
-    return grid
+    some = np.unique(np.linspace(0, grid.places - 1, ASKED).astype(int))
+    begin = starts[np.arange(len(some)) % len(starts)]
+    return replace(grid, every=looks_every(system, every, begin, grid.rows[some]))
 
 
 def axis(system: System, name: str, given: Any) -> np.ndarray:

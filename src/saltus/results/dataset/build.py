@@ -31,6 +31,7 @@ _NAMES = {
     "contact_<state>": schema.contact_name, "attractor_<state>": schema.attractor_name,
     "start_<state>": schema.start_name,
     "response_<state>": schema.response_name, "response_<parameter>": schema.response_name,
+    "equilibrium_<state>": schema.equilibrium_name,
     "event_<parameter>": schema.event_name, "event_<state>": schema.event_name,
     "point_<parameter>": schema.point_name, "point_<state>": schema.point_name,
 }  # fmt: skip

@@ -162,7 +162,13 @@ ENERGY_VARIABLES = {
     ),
     "supplied": Variable(("trajectory", "period"), "J", "work supplied in the interval"),
     "dissipated": Variable(("trajectory", "period"), "J", "energy dissipated in the interval"),
-    "residual": Variable(("trajectory", "period"), "J", "supplied - dissipated - change"),
+    "friction": Variable(("trajectory", "period"), "J", "work taken by friction in the interval"),
+    "impacts": Variable(
+        ("trajectory", "period"), "J", "energy taken by impacts and jumps in the interval"
+    ),
+    "residual": Variable(
+        ("trajectory", "period"), "J", "supplied - dissipated - friction - impacts - change"
+    ),
     "imbalance": Variable(
         ("trajectory",),
         "1",

@@ -23,7 +23,9 @@ from saltus.results.dataset.attractors import (
     ATTRACTORS_VARIABLES,
     BASINS_VARIABLES,
 )
+from saltus.results.dataset.bifurcation_curves import CURVE_VARIABLES
 from saltus.results.dataset.branches import BRANCHES_VARIABLES
+from saltus.results.dataset.equilibria import EQUILIBRIA_VARIABLES
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.methods import METHODS_VARIABLES, WIDTHS_VARIABLES
@@ -38,6 +40,8 @@ TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS, EXPONENTS = "methods", "exponents"
 SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
+CURVE = "bifurcation_curve"
+EQUILIBRIA = "equilibria"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
 MAKERS = {
@@ -51,6 +55,8 @@ MAKERS = {
     EXPONENTS: "sl.lyapunov or sl.wolf",
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
     MODES: "sl.structure_modes", BRANCHES: "sl.branches",
+    CURVE: "sl.bifurcation_curve",
+    EQUILIBRIA: "sl.equilibria",
 }  # fmt: skip
 
 #: The table of each kind of result.
@@ -70,7 +76,9 @@ TABLES = {
     SETTLED: motions.SETTLED_VARIABLES,
     WIDTHS: WIDTHS_VARIABLES,
     MODES: MODES_VARIABLES,
+    EQUILIBRIA: EQUILIBRIA_VARIABLES,
     BRANCHES: BRANCHES_VARIABLES,
+    CURVE: CURVE_VARIABLES,
 }
 
 
@@ -89,6 +97,14 @@ def attractor_name(state: str) -> str:
     """
     name = f"attractor_{state}"
     return f"attractor_state_{state}" if name in ATTRACTOR_VARIABLES else name
+
+
+def equilibrium_name(state: str) -> str:
+    """Name of the variable that holds a state at rest: ``equilibrium_x``;
+    ``equilibrium_state_type`` where the name is taken.
+    """
+    name = f"equilibrium_{state}"
+    return f"equilibrium_state_{state}" if name in EQUILIBRIA_VARIABLES else name
 
 
 def response_name(name: str) -> str:
@@ -265,7 +281,9 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         EXPONENTS: ("lyapunov_exponent", "running_exponent"),
         SETTLED: ("response_period", "mismatch"),
         MODES: ("shape", "flexibility"),
+        EQUILIBRIA: ("equilibrium_type", "equilibrium_place"),
         BRANCHES: ("point_branch", "point_stable", "branch_periods"),
+        CURVE: ("point_arclength", "codim2_kind"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 

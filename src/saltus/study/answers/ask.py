@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, StudyError, TraceError, UnitError, nearest
 from saltus.study.answers import basins, simulate
+from saltus.study.answers.branches import Branches
 from saltus.study.answers.lyapunov import Exponents
 from saltus.study.answers.motions import Balance, Lines, Section, Statistics
 from saltus.study.answers.question import OneVerb, Question
@@ -27,9 +28,8 @@ if TYPE_CHECKING:
     from saltus.system import System
 
 #: Tables that one question answers.
-_ONE: dict[str, type[OneVerb]] = {
-    one.place: one for one in (Section, Lines, Statistics, Balance, Exponents, Response, Diagram)
-}
+_KINDS = (Section, Lines, Statistics, Balance, Exponents, Response, Diagram, Branches)
+_ONE: dict[str, type[OneVerb]] = {one.place: one for one in _KINDS}
 #: Tables that may be several questions.
 _SEVERAL: dict[str, Callable[[Any, Setting], list[Question]]] = {
     "simulate": simulate.questions,

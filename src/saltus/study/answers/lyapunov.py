@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from saltus.errors import StudyError
 from saltus.study.answers.lyapunov_rows import exponent_table
 from saltus.study.answers.question import Answers, OneVerb, first_figure
 
@@ -18,14 +17,6 @@ class Exponents(OneVerb):
     """Lyapunov exponents of motions."""
 
     place, function, how = "lyapunov", "lyapunov", "flow"
-
-    def check_first(self, table: Any) -> None:
-        """A system without forcing has blocks of a time."""
-        if table.every is None and self.system.forced_at is None:
-            raise StudyError(
-                f"[{self.place}] {self.system.name} has no forcing period. Write "
-                f'every = "1 s", about a turn of the motion.'
-            )
 
     def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
         """A row for each motion."""

@@ -164,17 +164,21 @@ def energy_table(title: str, ds: xr.Dataset) -> TextTable:
     labels = {
         "supplied": "supplied",
         "dissipated": "dissipated",
+        "friction": "friction",
+        "impacts": "impacts",
         "change": "change",
         "energy": "stored at the end",
         "residual": "residual",
     }
     columns += [
-        quantity(label, _flat(ds[name], like, dims), "J", 6) for name, label in labels.items()
+        quantity(label, _flat(ds[name], like, dims), "J", 6)
+        for name, label in labels.items()
+        if name in ds
     ]
     worst = float(np.nanmax(np.atleast_1d(ds["imbalance"].values), initial=0.0))
     notes = [
-        f"residual = supplied - dissipated - change of the stored energy; at most {worst:.1e} "
-        f"of the largest of them."
+        f"residual = supplied - all that is taken - change of the stored energy; at most "
+        f"{worst:.1e} of the largest of them."
     ]
     return table(title, columns, [*notes, *left_out(like.size, "intervals"), *_failed(ds)])
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 #: The key of a surface that is a formula.
 FORMULA = "formula"
-#: Parts of a balance.
-_PARTS = ("energy", "supplied", "dissipated")
+#: Parts of a balance, and those that needn't be there.
+_PARTS, _OPTIONAL = ("energy", "supplied", "dissipated"), ("friction",)
 
 
 class OfMotions(OneVerb):
@@ -204,13 +204,19 @@ class Balance(OfMotions):
                 f"[{self.place}] {self.system.name} is forced: its balance is drawn "
                 f"each forcing period. Leave intervals out."
             )
-        written = {name: text for name in _PARTS if (text := getattr(table, name)) is not None}
+        written = {
+            name: text
+            for name in (*_PARTS, *_OPTIONAL)
+            if (text := getattr(table, name)) is not None
+        }
         model = setting.study.system.model
         self.of_model: dict[str, Any] = {}
         if not written and model is not None:
             self.of_model = models.energy(model)
             self.arguments = {
-                name: value for name, value in self.arguments.items() if name not in _PARTS
+                name: value
+                for name, value in self.arguments.items()
+                if name not in (*_PARTS, *_OPTIONAL)
             }
             return
         if lacking := [name for name in _PARTS if name not in written]:

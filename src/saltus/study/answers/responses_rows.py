@@ -19,6 +19,7 @@ from saltus.results.dataset.schema import (
     states_of,
 )
 from saltus.results.wording import kind_texts, unit_of
+from saltus.study.answers.branches import events
 from saltus.study.table import ROWS, Column, TextTable, interval, number, quantity, table, words
 from saltus.units import from_si
 
@@ -32,7 +33,11 @@ def tables(title: str, ds: xr.Dataset) -> list[TextTable]:
     """
     if len(parameters_of(ds)) == 2:
         return [_kinds(title, ds)]
-    return [_branches(title, ds), *([_events(title, ds)] if ds.sizes.get("event") else [])]
+    if not ds.sizes.get("event"):
+        return [_branches(title, ds)]
+    if "point_branch" in ds:  # of branches that were continued
+        return [_branches(title, ds), events(f"{title}: bifurcations", ds)]
+    return [_branches(title, ds), _events(title, ds)]
 
 
 # -- one parameter ---------------------------------------------------------------------------------

@@ -111,6 +111,7 @@ _READINGS: dict[str, Callable[[Any, _At], Any]] = {
         at.system, str(at.system.forced_at), value, f"{at.place}.{at.key}"
     ),
     "vary": _vary,
+    "ranges": lambda value, at: quantities.ranges(at.system, value, f"{at.place}.{at.key}"),
     "outputs": lambda value, at: at.setting.outputs(at.system, value, at.place),
     "at": lambda value, at: quantities.states(at.system, value, f"{at.place}.{at.key}"),
 }

@@ -108,6 +108,17 @@ def box(
     }
 
 
+def ranges(
+    system: System, given: Mapping[str, list[Quantity]], place: str
+) -> dict[str, tuple[float, float]]:
+    """Ranges of parameters in SI."""
+    found = {}
+    for name, (low, high) in given.items():
+        unit = _unit(system, name, system.values, place)
+        found[name] = (number(low, unit, place, name), number(high, unit, place, name))
+    return found
+
+
 def grid(system: System, name: str, given: Range, place: str) -> tuple[Any, ...] | list[float]:
     """Values of a parameter in SI: (first, last, count, scale), or a list of the
     values themselves.

@@ -91,6 +91,8 @@ KINDS = {
         "a published model it is known.", None),
     "supplied": Kind(Formula, ("force*cos(2*pi*frequency*t)*v",), _POWER.format("flows in"), None),
     "dissipated": Kind(Formula, ("damping*v**2",), _POWER.format("is lost"), None),
+    "friction": Kind(Formula, ("slip*sign(v)*v",), "Power that friction takes [W], a formula, a "
+        "part of its own beside dissipated; 0 by default.", None),
 }  # fmt: skip
 #: Starts of the analyses that follow many, and values that are the same for all of them.
 OF_RESPONSES = KINDS | {
@@ -104,3 +106,17 @@ OF_RESPONSES = KINDS | {
     ),
     "periods": whole(2000, most=MOST_PERIODS),
 }
+#: Branches go over a range, without steps.
+OF_BRANCHES = OF_RESPONSES | {
+    "vary": Kind(
+        dict[str, Interval], ({"frequency": ["2 Hz", "30 Hz"]},),
+        "One parameter and its range.", convert="ranges",
+    ),
+    "at": whole(12, most=MOST_COUNT),
+    "longest": whole(8),
+    "points": whole(1000),
+    "switch": Kind(
+        list[Literal["period_doubling", "branch_point"]], (["period_doubling"],),
+        default=["period_doubling", "branch_point"],
+    ),
+}  # fmt: skip

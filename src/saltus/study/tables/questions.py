@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from saltus.fence import MOST_COUNT, MOST_PERIODS
-from saltus.study.tables.kinds import KINDS, OF_RESPONSES, whole
+from saltus.study.tables.kinds import KINDS, OF_BRANCHES, OF_RESPONSES, whole
 from saltus.study.tables.methods import Method
 from saltus.study.tables.parts import FileTitle, Quantity, Range, Table
 from saltus.study.tables.signature import Asked, Generated, table
@@ -105,6 +105,7 @@ BifurcationDiagram = table(
     base=Varied,
     called="Bifurcation diagram",
 )
+Branches = table("branches", ["branches"], OF_BRANCHES, called="Branches of periodic orbits")
 
 
 # -- basins ----------------------------------------------------------------------------------------

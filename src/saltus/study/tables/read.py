@@ -91,7 +91,7 @@ _LONGEST = {
 }
 _WORD = 100
 #: Tables whose texts are formulas.
-_FORMULAS = ("rates", "terms", "guards", "outputs", "energy", "force", "surface")
+_FORMULAS = ("rates", "terms", "guards", "outputs", "energy", "friction", "force", "surface")
 
 
 def _short(data: Any, key: str = "", most: int = _WORD) -> None:

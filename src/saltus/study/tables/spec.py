@@ -13,6 +13,7 @@ from saltus.study.tables.questions import (
     RUN,
     Basins,
     BifurcationDiagram,
+    Branches,
     Compare,
     Energy,
     FrequencyResponse,
@@ -28,6 +29,7 @@ QUESTIONS: dict[str, type[Table]] = {
     "simulate": Simulate, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts,
     "energy": Energy, "lyapunov": Lyapunov,
     "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram,
+    "branches": Branches,
     "basins": Basins,
 }  # fmt: skip
 #: Those that may be asked several times, as arrays of tables.
@@ -49,6 +51,7 @@ class Study(Table):
     lyapunov: one_or_many(Lyapunov) = Field(default_factory=list)  # type: ignore[valid-type]
     frequency_response: one_or_many(FrequencyResponse) = Field(default_factory=list)  # type: ignore[valid-type]
     bifurcation_diagram: one_or_many(BifurcationDiagram) = Field(default_factory=list)  # type: ignore[valid-type]
+    branches: one_or_many(Branches) = Field(default_factory=list)  # type: ignore[valid-type]
     basins: Basins | None = None
 
     @model_validator(mode="after")

@@ -27,7 +27,7 @@ _CLOSING = {"(": ")", "[": "]", "{": "}"}
 _OF_FORMULAS = {*signature(freeplay).parameters, *signature(piecewise).parameters}
 _QUESTIONS = (
     "simulate", "poincare", "spectrum", "lyapunov", "frequency_response", "bifurcation_diagram",
-    "basins", "compare",
+    "branches", "basins", "compare",
 )  # fmt: skip
 _TABLES = {name: f"[{name}]" for name in _QUESTIONS} | {
     "impact_statistics": "[impacts]",

@@ -21,6 +21,12 @@ def unforced(t, x, v):
     return v, -x - 0.1 * v
 
 
+@sl.system(states="x v", units={"x": "m", "v": "m/s"}, check_units=False)
+def driven(t, x, v):
+    """Something grows with time, and never repeats."""
+    return v, -x + 1e-3 * t
+
+
 @sl.system(states="a b c", forced_at="f", units={"a": "m", "b": "m", "c": "m/s"}, check_units=False)
 def three(t, a, b, c, *, f=1.0):
     """Three states, two of a kind."""
@@ -201,15 +207,17 @@ def test_seeds_that_are_refused(seed):
 
 
 @pytest.mark.parametrize("call", ["basins", "attractors", "basin_fractions"])
-def test_every_is_needed_without_forcing_and_refused_with_it(call):
+def test_every_is_found_without_forcing_and_refused_with_it(call):
     rest = {
         "basins": dict(x=X, v=V),
         "attractors": dict(start=[0.1, 0.0]),
         "basin_fractions": dict(samples=4, x=SPAN_X),
     }[call]
-    with pytest.raises(ParameterError, match="no forcing period: give every="):
-        getattr(sl, call)(unforced, **rest)
-    with pytest.raises(ParameterError, match="is forced: leave every= out"):
+    turn = 2 * np.pi / np.sqrt(1 - 0.05**2)
+    assert getattr(sl, call)(unforced, **rest).attrs["every"] == pytest.approx(turn, rel=0.2)
+    with pytest.raises(ParameterError, match=r"no forcing period: give every="):
+        getattr(sl, call)(driven, **rest)
+    with pytest.raises(ParameterError, match=r"is forced.*Leave every= out"):
         getattr(sl, call)(RIG, every=1.0, **rest)
 
 

@@ -209,3 +209,30 @@ def test_responses_and_the_unstable_orbits_between_them_in_one_dataset():
         sl.bifurcation_diagram(
             system, {"contact_stiffness": [1e4], "force": [4.0]}, unstable=True, progress=False
         )
+
+
+def test_the_limit_cycle_of_a_wing_begins_at_a_fold():
+    """Found from two airspeeds, the cycle is one branch; at its fold a multiplier besides the
+    trivial one is 1, and two cycles meet whose periods differ like a square root.
+    """
+    wing = sl.models.aeroelastic()
+    start = {"plunge": 0, "pitch": "2 deg", "plunge_rate": 0, "pitch_rate": 0}
+    found = sl.branches(
+        wing, {"airspeed": ("9 m/s", "11 m/s")}, start, every="0.25 s", at=3, switch=(),
+        progress=False,
+    )  # fmt: skip
+    assert found.sizes["branch"] == 1
+    assert found.event_kind.values.tolist() == ["fold"]
+    assert found.event_multiplier_real.values[0, 0] == pytest.approx(1.0, abs=1e-9)
+    fold, speed = float(found.event_airspeed[0]), found.point_airspeed.values
+    assert (speed >= fold).all()
+    stable = found.point_stable.values > 0
+    gaps = []
+    for distance in (0.01, 0.04):
+        sides = [
+            np.interp(fold + distance, speed[mine][order], found.point_peak.values[mine][order])
+            for mine in (stable, ~stable)
+            for order in [np.argsort(speed[mine])]
+        ]
+        gaps.append(sides[0] - sides[1])
+    assert gaps[1] / gaps[0] == pytest.approx(2.0, rel=0.1)

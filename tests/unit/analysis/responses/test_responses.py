@@ -103,11 +103,9 @@ def test_an_unforced_system_is_told_what_to_give():
     with pytest.raises(
         ParameterError,
         match=r"Take sl\.bifurcation_diagram over another "
-        r"parameter, with every=",
+        r"parameter;",
     ):
         sl.frequency_response(free, (1.0, 2.0, 3))
-    with pytest.raises(ParameterError, match="give every="):
-        sl.bifurcation_diagram(free, {"stiffness": (1.0, 2.0, 3)})
     with pytest.raises(ParameterError, match="it has no stroboscope"):
         sl.bifurcation_diagram(free, {"stiffness": (1.0, 2.0, 3)}, every=1.0, sample="stroboscope")
     with pytest.raises(ParameterError, match=r"is forced.*Leave every= out"):

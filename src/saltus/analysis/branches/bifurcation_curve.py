@@ -1,0 +1,266 @@
+"""`bifurcation_curve`: where an orbit bifurcates, over two parameters."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from saltus.analysis.branches.branch_table import numbers_of, stacked
+from saltus.analysis.branches.curves import BifurcationCurve, trace_curve
+from saltus.analysis.branches.seeds import units
+from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.singular_orbits import MULTIPLIER
+from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.outputs import outputs_of
+from saltus.analysis.starts import check_system, range_of
+from saltus.analysis.verb import verb
+from saltus.errors import ParameterError, nearest, shown
+from saltus.flow.counts import whole
+from saltus.flow.methods import Method, check_method
+from saltus.flow.progress import reporting
+from saltus.results import build
+from saltus.results.dataset import schema
+from saltus.results.dataset.attractors import padded
+from saltus.results.dataset.schema import event_name, point_name
+from saltus.system.system import System
+
+
+@verb
+def bifurcation_curve(
+    system: System,
+    event: xr.Dataset,
+    vary: Mapping[str, Any],
+    *,
+    points: int = 400,
+    method: Method | None = None,
+    threads: int | None = None,
+    progress: bool | Callable[[float], None] | None = None,
+) -> xr.Dataset:
+    """A bifurcation of periodic orbits followed over two parameters, in both directions.
+
+    Folds, period doublings and Neimark-Sacker bifurcations are followed by pseudo-arclength on
+    equations that define them, so each point is one to rounding. Points of codimension two are
+    located on the way: cusps, resonances, degenerate doublings, and the extrema of a curve of
+    folds, at which closed branches (isolas) are born or join another branch.
+
+    Parameters
+    ----------
+    system : System
+        Of which the branches were followed.
+    event : Dataset
+        A bifurcation that :func:`saltus.branches` found: ``branches.sel(event=0)``. Parameters that
+        aren't in ``vary`` keep its values.
+    vary : mapping
+        Two parameters and their ranges, such as ``{"frequency": ("4 Hz", "30 Hz"), "force": ("0.1
+        N", "8 N")}``.
+    points : int
+        Most points in each direction.
+    method : Method
+        Default :class:`saltus.Taylor`; another one must be exact.
+    threads : int, optional
+        Default all processors.
+    progress : bool or callable
+        Default: a bar on the terminal if the work lasts more than two seconds.
+
+    Returns
+    -------
+    Dataset
+        Dims ``point``, ``codim2``, ``multiplier``, ``phase``. On point: ``point_<parameter>`` of
+        both, ``point_period`` [s], ``point_peak`` and ``point_rms`` of the first state,
+        ``point_itinerary``, ``point_margin``, multipliers (of a limit cycle without the trivial
+        one), the states at whole forcing periods, ``point_arclength``. On codim2: ``codim2_kind``
+        (``cusp``, ``isola_birth``, ``branches_join``, ``extremum``, ``resonance_1_1`` to
+        ``resonance_1_4``, ``fold_flip``, ``degenerate_doubling``, ``fold_neimark_sacker``,
+        ``flip_neimark_sacker``), ``codim2_extremum`` (the parameter that has one), both parameters,
+        multipliers and states. Attributes ``bifurcation``, ``parameter_x``, ``parameter_y``,
+        ``begin`` and ``end`` (why it ends), ``periods``.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If an argument can't be used, the bifurcation isn't one that can be followed, or the
+        equations are others than those of the event.
+
+    References
+    ----------
+    Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria (2000); Kuznetsov, Elements
+    of Applied Bifurcation Theory (2004), chapters 9 and 10; Detroux et al., Comput. Methods Appl.
+    Mech. Engrg. 296 (2015) 18 (isolas at extrema of folds).
+
+    Examples
+    --------
+    >>> import saltus as sl
+    >>> rig = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    >>> found = sl.branches(rig, {"frequency": ("15 Hz", "18 Hz")}, {"x": "5 mm", "v": 0}, at=3)
+    >>> vary = {"frequency": ("8 Hz", "20 Hz"), "force": ("0.5 N", "5 N")}
+    >>> fold = sl.bifurcation_curve(rig, found.sel(event=0), vary)
+    >>> fold.attrs["bifurcation"], fold.attrs["end"]
+    ('fold', 'range')
+    """
+    check_system(system)
+    method = check_method(method)
+    if not method.exact:
+        raise ParameterError(
+            f"sl.bifurcation_curve needs a method whose errors are rounding, not {method.name}. "
+            "Leave method= out."
+        )
+    names, limits = _ranges(system, vary)
+    points = whole(points, "points", 2)
+    start = _start(system, event)
+    for name, (low, high) in zip(names, limits, strict=True):
+        if not low <= start.system.values[name] <= high:
+            raise ParameterError(
+                f"the event lies at {name} = {start.system.values[name]:.6g}, outside the range "
+                f"({low:g}, {high:g}) in vary=."
+            )
+    with reporting(progress) as show:
+        orbits, z = _equations(start, names, limits, method, threads)
+        curve = trace_curve(orbits, start.kind, z, start.multiplier, limits, points, show)
+        if curve is None:
+            raise ParameterError(
+                f"no {start.kind.replace('_', ' ')} was found at the event: it may lie on a graze, "
+                "or the event is of other equations."
+            )
+        return _table(start, names, limits, curve, method)
+
+
+@dataclass(frozen=True)
+class _Start:
+    """The orbit of an event, the system with its values, and how far the states of orbits spread
+    along its branch.
+    """
+
+    system: System
+    kind: str
+    orbit: np.ndarray
+    period: float
+    multiplier: complex
+    spread: np.ndarray
+
+
+def _ranges(system: System, vary: Any) -> tuple[tuple[str, str], list[tuple[float, float]]]:
+    """Both parameters and their ranges [SI]."""
+    if not isinstance(vary, Mapping) or len(vary) != 2:
+        one, two = [*system.values, "name", "other"][:2]
+        raise ParameterError(
+            f"sl.bifurcation_curve varies two parameters: vary={{{one!r}: (low, high), {two!r}: "
+            f"(low, high)}}, not {shown(vary)}."
+        )
+    one, two = vary
+    return (one, two), [range_of(system, name, ends) for name, ends in vary.items()]
+
+
+def _start(system: System, event: Any) -> _Start:
+    """The event, checked."""
+    if not isinstance(event, xr.Dataset) or schema.kind_of(event) != schema.BRANCHES:
+        raise ParameterError(
+            "sl.bifurcation_curve begins at an event of what sl.branches returned: "
+            f"branches.sel(event=0), not {shown(event)[:60]}."
+        )
+    if "event" in event.dims:
+        if event.sizes["event"] != 1:
+            raise ParameterError(
+                f"these branches have {event.sizes['event']} events. Choose one: "
+                "branches.sel(event=0)."
+            )
+        event = event.isel(event=0)
+    if event.attrs.get("fingerprint") != system.fingerprint():
+        raise ParameterError(
+            f"the event is of {event.attrs.get('system')}, whose equations are others than those "
+            f"of {system.name}."
+        )
+    kind = str(event["event_kind"].item())
+    if kind not in MULTIPLIER:
+        raise ParameterError(
+            f"a {kind.replace('_', ' ')} can't be followed in two parameters. "
+            f"{nearest(kind, MULTIPLIER)}"
+        )
+    name = event.attrs["parameter"]
+    known = json.loads(event.attrs["parameters"])
+    values = {**known, name: float(event[event_name(name)])}
+    orbit = np.stack([event[event_name(state)].values for state in system.states], axis=1)
+    own = event["event_multiplier_real"].values + 1j * event["event_multiplier_imag"].values
+    pairs = own[np.abs(own.imag) > 0]
+    multiplier = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))] if len(pairs) else 1.0 + 0j
+    period = float(event["point_period"].values[int(event["event_point"])])
+    mine = event["point_branch"].values == int(event["event_branch"])
+    along = [event[point_name(state)].values[mine] for state in system.states]
+    spread = np.array([np.nanmax(one) - np.nanmin(one) for one in along])
+    orbit = orbit[np.isfinite(orbit).all(axis=1)]
+    return _Start(system.with_values(**values), kind, orbit, period, multiplier, spread)
+
+
+def _equations(
+    start: _Start,
+    names: tuple[str, str],
+    limits: list[tuple[float, float]],
+    method: Method,
+    threads: int | None,
+) -> tuple[PeriodicOrbits, np.ndarray]:
+    """The orbits over two parameters, and the unknowns of the event."""
+    system, n = start.system, len(start.orbit)
+    period = [start.period / n] if system.forced_at is None else []
+    values = [system.values[name] for name in names]
+    z = np.array([*start.orbit.ravel(), *period, *values])
+    bare = PeriodicOrbits(system, names, n, np.ones((2, len(z))), method, threads)
+    numbers = numbers_of(system, [(bare, z)], outputs_of(system, None), method)
+    states = np.fmax(units(numbers.maximum[0], numbers.minimum[0]), start.spread)
+    spans = [high - low for low, high in limits]
+    scale = np.array([*np.tile(np.where(np.isfinite(states), states, 1.0), n), *period, *spans])
+    bare.scale = np.stack([scale, scale])
+    return bare, z
+
+
+def _table(
+    start: _Start,
+    names: tuple[str, str],
+    limits: list[tuple[float, float]],
+    curve: BifurcationCurve,
+    method: Method,
+) -> xr.Dataset:
+    """The Dataset of a curve."""
+    system, orbits, size = start.system, curve.orbits.orbits, len(start.system.states)
+    width, special = orbits.width, curve.special
+    every = [*curve.z[:, :width], *(point.z[:width] for point in special)]
+    numbers = numbers_of(
+        system, [(orbits, z) for z in every[: len(curve.z)]], outputs_of(system, None), method
+    )
+    states = padded([orbits.points(z) for z in every], size)
+    values = np.array([orbits.values(z) for z in every])
+    own = stacked([curve.multipliers, *(point.multipliers[None] for point in special)], size)
+    count = len(curve.z)
+    data: dict[str, Any] = {
+        "point": np.arange(count),
+        "point_<parameter>": {name: values[:count, i] for i, name in enumerate(names)},
+        "point_arclength": curve.length,
+        "point_period": orbits.period(curve.z[:, :width]),
+        "point_peak": numbers.peak[:, 0],
+        "point_rms": numbers.rms[:, 0],
+        "point_itinerary": list(numbers.itinerary),
+        "point_margin": numbers.margin,
+        "point_multiplier_real": own[:count].real,
+        "point_multiplier_imag": own[:count].imag,
+        "point_<state>": states[:count],
+        "codim2": np.arange(len(special)),
+        "codim2_kind": [point.kind for point in special],
+        "codim2_point": np.array([point.after for point in special], np.int64),
+        "codim2_extremum": ["" if p.parameter < 0 else names[p.parameter] for p in special],
+        "codim2_<parameter>": {name: values[count:, i] for i, name in enumerate(names)},
+        "codim2_multiplier_real": own[count:].real,
+        "codim2_multiplier_imag": own[count:].imag,
+        "codim2_<state>": states[count:],
+    }
+    fixed = {key: value for key, value in system.values.items() if key not in names}
+    attrs = provenance(system, method, fixed, names) | {
+        "bifurcation": start.kind, "periods": orbits.n, "begin": curve.ends[0],
+        "end": curve.ends[1],
+    }  # fmt: skip
+    for axis, name, (low, high) in zip("xy", names, limits, strict=True):
+        attrs |= {f"parameter_{axis}": name, f"{axis}_low": low, f"{axis}_high": high}
+    when = "at whole forcing periods" if system.forced_at else "in equal steps of time"
+    return build(schema.CURVE, subject(system, attrs), data, words={"<when>": when})

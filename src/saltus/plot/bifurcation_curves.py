@@ -1,0 +1,153 @@
+"""Curves of bifurcations over two parameters, alone or on the map of what motions settle to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+
+from saltus.errors import ParameterError, shown
+from saltus.plot import axes as draw
+from saltus.plot import response_points as points
+from saltus.plot.branches import MARKS
+from saltus.plot.picture import caller, check, picture
+from saltus.plot.style import CYCLE, QUIET, Scale, display_scale
+from saltus.plot.type_map import type_map
+from saltus.results.dataset import schema
+from saltus.results.dataset.schema import parameters_of, period_text, point_name
+
+#: Name and marker of the points of codimension two.
+_POINTS = {
+    "cusp": ("cusp", "^"), "isola_birth": ("isola is born", "o"),
+    "branches_join": ("branches join", "X"), "extremum": ("extremum", "P"),
+    "resonance_1_1": ("1:1 resonance", "s"), "resonance_1_2": ("1:2 resonance", "s"),
+    "resonance_1_3": ("1:3 resonance", "p"), "resonance_1_4": ("1:4 resonance", "h"),
+    "fold_flip": ("fold and doubling", "D"), "degenerate_doubling": ("degenerate doubling", "d"),
+    "fold_neimark_sacker": ("fold and torus", "<"),
+    "flip_neimark_sacker": ("doubling and torus", ">"),
+}  # fmt: skip
+
+
+@picture()
+def bifurcation_curves(
+    curves: Any, *, over: xr.Dataset | None = None, legend: bool = True, ax: Any = None
+) -> Axes:
+    """Curves of bifurcations over two parameters, with their points of codimension two.
+
+    Parameters
+    ----------
+    curves : Dataset, or sequence or mapping of Datasets
+        What :func:`saltus.bifurcation_curve` returned, all over the same two parameters; in a
+        mapping by the names that the legend shows.
+    over : Dataset, optional
+        What ``sl.bifurcation_diagram`` returned over the same two parameters: its map of types is
+        drawn below the curves.
+    legend : bool
+        Whether to draw the legend of the curves.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If these are no curves, or the parameters of the curves and the map differ.
+    """
+    named = _named(curves)
+    first = named[0][1]
+    pair = first.attrs["parameter_x"], first.attrs["parameter_y"]
+    if over is not None:
+        check(over, (schema.RESPONSES,), ("type", "period", "response_of"))
+        below = parameters_of(over)
+        if len(below) != 2 or set(below) != set(pair):
+            raise ParameterError(
+                f"{caller()}: the curves are over {' and '.join(pair)}, the map in over= is over "
+                f"{' and '.join(below)}."
+            )
+        pair = (below[0], below[1])
+    with draw.panels(ax, 1, (5.4, 3.9)) as (panel,):
+        if over is not None:
+            type_map(over, legend=False, ax=panel)
+        scales = [_scale(name, named, over) for name in pair]
+        panel.set_xlabel(scales[0].label(pair[0].replace("_", " ")))
+        panel.set_ylabel(scales[1].label(pair[1].replace("_", " ")))
+        if over is None:
+            panel.set_xlim(*_limits(pair[0], named, scales[0]))
+            panel.set_ylim(*_limits(pair[1], named, scales[1]))
+        for number, (name, ds) in enumerate(named):
+            _draw(panel, name, ds, pair, scales, CYCLE[number % len(CYCLE)])
+        if legend:
+            points.legend(panel, {})
+    return panel
+
+
+def _named(curves: Any) -> list[tuple[str, xr.Dataset]]:
+    """The curves with the names that they are given in the legend."""
+    if isinstance(curves, Mapping) and not isinstance(curves, xr.Dataset):
+        named = [(str(name), ds) for name, ds in curves.items()]
+    else:
+        given = curves if isinstance(curves, Sequence) else [curves]
+        named = [("", ds) for ds in given]
+    if not named:
+        raise ParameterError(f"{caller()} has no curves to draw: {shown(curves)}.")
+    for _, ds in named:
+        check(ds, (schema.CURVE,))
+    pairs = {frozenset((ds.attrs["parameter_x"], ds.attrs["parameter_y"])) for _, ds in named}
+    if len(pairs) > 1:
+        texts = sorted(" and ".join(sorted(pair)) for pair in pairs)
+        raise ParameterError(
+            f"{caller()}: the curves are over different parameters: {'; '.join(texts)}. Draw them "
+            "apart."
+        )
+    return [(name or _name(ds), ds) for name, ds in named]
+
+
+def _name(ds: xr.Dataset) -> str:
+    return f"{MARKS[ds.attrs['bifurcation']][0]} of {period_text(ds.attrs['periods'])}"
+
+
+def _scale(name: str, named: list[tuple[str, xr.Dataset]], over: xr.Dataset | None) -> Scale:
+    """Unit in which a parameter is shown."""
+    unit = named[0][1][point_name(name)].attrs.get("units", "")
+    if over is not None:
+        values = over[name].values
+        return points.parameter_scale(values, unit, points.is_log(values))
+    return display_scale(unit, max(abs(end) for end in _limits(name, named, Scale(1.0, unit))))
+
+
+def _limits(name: str, named: list[tuple[str, xr.Dataset]], scale: Scale) -> tuple[float, float]:
+    """The widest range of a parameter."""
+    ends = []
+    for _, ds in named:
+        axis = "x" if ds.attrs["parameter_x"] == name else "y"
+        ends.append([ds.attrs[f"{axis}_low"], ds.attrs[f"{axis}_high"]])
+    spans = np.array(ends) * scale.factor
+    return float(spans[:, 0].min()), float(spans[:, 1].max())
+
+
+def _draw(
+    ax: Axes, name: str, ds: xr.Dataset, pair: tuple[str, str], scales: list[Scale], color: Any
+) -> None:
+    """A curve and its points."""
+    x, y = (ds[point_name(one)].values * s.factor for one, s in zip(pair, scales, strict=True))
+    edge = [patheffects.withStroke(linewidth=2.6, foreground="white")]
+    ax.plot(
+        x, y, color=color, lw=1.3, zorder=4, label=name, path_effects=edge,
+        gid=f"curve {ds.attrs['bifurcation']}",
+    )  # fmt: skip
+    at = [ds[f"codim2_{one}"].values * s.factor for one, s in zip(pair, scales, strict=True)]
+    kinds = ds["codim2_kind"].values
+    for kind, (text, marker) in _POINTS.items():
+        here = kinds == kind
+        if here.any():
+            ax.plot(
+                at[0][here], at[1][here], ls="none", marker=marker, ms=5, mfc="white", mec=QUIET,
+                mew=0.9, zorder=6, label=text, gid=f"codim2 {kind}",
+            )  # fmt: skip
