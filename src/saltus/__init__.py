@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.attractors import attractors, basin_fractions
     from saltus.analysis.basins.basins import basins
     from saltus.analysis.basins.compare import compare
+    from saltus.analysis.basins.edge_orbit import edge_orbit
     from saltus.analysis.basins.equilibria import equilibria
+    from saltus.analysis.basins.periodic_orbits import periodic_orbits
     from saltus.analysis.branches.bifurcation_curve import bifurcation_curve
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
@@ -94,11 +96,13 @@ _HOMES = {
     "bifurcation_diagram": "saltus.analysis.responses.bifurcation_diagram",
     "compare": "saltus.analysis.basins.compare",
     "compare_methods": "saltus.analysis.methods.compare_methods",
+    "edge_orbit": "saltus.analysis.basins.edge_orbit",
     "energy_balance": "saltus.analysis.motion.energy",
     "equilibria": "saltus.analysis.basins.equilibria",
     "frequency_response": "saltus.analysis.responses.frequency_response",
     "impact_statistics": "saltus.analysis.motion.impacts",
     "lyapunov": "saltus.analysis.lyapunov.lyapunov",
+    "periodic_orbits": "saltus.analysis.basins.periodic_orbits",
     "poincare": "saltus.analysis.motion.poincare",
     "regularisation_widths": "saltus.analysis.methods.regularisation_widths",
     "settled": "saltus.analysis.motion.settled",
@@ -161,6 +165,7 @@ __all__ = [
     "cos",
     "cosh",
     "describe",
+    "edge_orbit",
     "energy_balance",
     "equilibria",
     "exp",
@@ -179,6 +184,7 @@ __all__ = [
     "min",
     "mod",
     "models",
+    "periodic_orbits",
     "pi",
     "piecewise",
     "plot",

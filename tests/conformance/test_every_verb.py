@@ -94,6 +94,13 @@ CALLS = {
             "start": START[how],
         },
     ),
+    "edge_orbit": lambda how: (
+        RIG,
+        {
+            "a": {"in SI": (0.0, 0.0), "in units": ("0 mm", "0 m/s")}[how],
+            "b": {"in SI": (2.5e-3, 0.56), "in units": ("2.5 mm", "560 mm/s")}[how],
+        },
+    ),
     "energy_balance": started(periods=3, **sl.models.energy("delangre")),
     "equilibria": lambda how: (
         sl.models.double_scroll(),
@@ -109,6 +116,7 @@ CALLS = {
     ),
     "impact_statistics": started(periods=30),
     "lyapunov": started(periods=64, transient=20),
+    "periodic_orbits": started(periods=1),
     "poincare": started(surface="x turns", periods=5),
     "regularisation_widths": started(points=2, transient=20, widths=[1e-4, 1e-5]),
     "settled": of_result("simulate"),
@@ -230,6 +238,8 @@ def with_bad_start(verb, bad):
     subject, arguments = CALLS[verb]("in SI")
     if "start" in arguments:
         return subject, arguments | {"start": (bad, 0.0)}
+    if "a" in arguments:
+        return subject, arguments | {"a": (bad, 0.0)}
     if "x" in arguments:
         return subject, arguments | {"x": (bad, *arguments["x"][1:])}
     if isinstance(subject, xr.Dataset | System):

@@ -63,6 +63,13 @@ def tiny(name, count=8):
     return small
 
 
+def ran(text, folder):
+    """What comes out of a study, without pictures."""
+    return run_study(
+        parse(text), text, folder, None, Resources(threads=1), lambda _: None, print, False
+    )
+
+
 @pytest.fixture(autouse=True)
 def few_checks(monkeypatch):
     monkeypatch.setattr(pipeline, "CHECKED", 16)
@@ -185,16 +192,7 @@ def test_fig_8_has_a_third_attractor_after_the_grazing():
 def test_fig_6b_runs_as_a_study(tmp_path):
     """The whole way, once, from the file as it stands but for its grid."""
     text = tiny("fig6b")
-    outcome = run_study(
-        parse(text),
-        text,
-        tmp_path,
-        None,
-        Resources(threads=1),
-        lambda _: None,
-        print,
-        pictures=False,
-    )
+    outcome = ran(text, tmp_path)
     (table,) = outcome.tables
     assert [row[1] for row in table.rows] == ["T", "3T", "4T", "5T", "24T"]
 
@@ -208,16 +206,7 @@ def test_the_maps_of_one_value_run(name, tmp_path, brief):
         tiny(name, 3).replace("[basins]", "[basins]\nperiods = 16").split("[[basins.map]]")[:4]
     )
     jobs = maps_of(parse(text))
-    outcome = run_study(
-        parse(text),
-        text,
-        tmp_path,
-        None,
-        Resources(threads=1),
-        lambda _: None,
-        print,
-        pictures=False,
-    )
+    outcome = ran(text, tmp_path)
     assert outcome.waiting == []
     assert {file.name for file in outcome.files if file.suffix == ".nc"} == {
         f"{job.stem}.nc" for job in jobs
@@ -230,10 +219,7 @@ def test_the_motions_run(name, periods, tmp_path):
     """As they stand. The paper reads 12T where 24T is; its fourth start lies where rounding
     decides.
     """
-    spec, text = read(FOLDER / f"{name}.toml")
-    outcome = run_study(
-        spec, text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False
-    )
+    outcome = ran((FOLDER / f"{name}.toml").read_text(encoding="utf-8"), tmp_path)
     (file,) = (file for file in outcome.files if file.suffix == ".nc")
     assert settled(load(file))["response_period"].values.tolist()[: len(periods)] == periods
 
@@ -264,10 +250,7 @@ def test_the_responses_run(name, panels, tmp_path, brief):
     )
     text = re.sub(r"count = \d+", "count = 2", re.sub(r"periods = \d+", "periods = 256", text))
     text = re.sub(r'x = \[("[^"]*"), [^]]*\]', r"x = [\1]", text)
-    spec = parse(text)
-    outcome = run_study(
-        spec, text, tmp_path, None, Resources(threads=1), lambda _: None, print, pictures=False
-    )
+    outcome = ran(text, tmp_path)
     assert outcome.waiting == []
     assert sum(file.suffix == ".nc" for file in outcome.files) == text.count("[[")
     assert len(outcome.tables) >= text.count("[[")

@@ -253,7 +253,7 @@ def test_the_size_of_chunks_changes_nothing(coarse, few_scouts, monkeypatch, siz
 def test_chunks_of_a_chaotic_map_change_nothing(monkeypatch):
     monkeypatch.setattr(plans, "SCOUTS", 16)
     # periods that the chaotic ones are followed
-    monkeypatch.setattr("saltus.analysis.orbits.find_attractors.WATCHING_ITERATES", 2048)
+    monkeypatch.setattr("saltus.analysis.orbits.find_attractors.WATCHING_ITERATES", 1024)
     system = duffing.with_values(damping=0.1, force=12.0)
     axes = dict(x=(-3, 3, 6), v=(-6, 6, 6), periods=256, progress=False)
     whole = sl.basins(system, **axes)
@@ -458,7 +458,7 @@ def test_scatter_about_an_orbit_falls_with_the_tolerance(five):
     for rtol in (1e-4, 1e-6):
         ds = sl.attractors(
             B4,
-            orbit_points(five, 4)[::8],
+            orbit_points(five, 4)[::12],
             method=sl.ODE45(rtol, 1e-3 * rtol),
             periods=512,
             progress=False,
@@ -552,10 +552,10 @@ def test_long_chaotic_transients_are_no_attractor(monkeypatch):
 # -- fractions -------------------------------------------------------------------------------------
 def test_intervals_of_fractions_hold_those_of_a_fine_map():
     """Wilson's 95 % intervals; four of them at once are widened to 99.9 %: 3.29 / 1.96 times as
-    wide. The fine map: 120 x 120 cells.
+    wide. The fine map: 80 x 80 cells.
     """
     rig = sl.models.delangre("a", frequency=17.0)
-    fine = sl.basins(rig, **box(120))
+    fine = sl.basins(rig, **box(80))
     some = sl.basin_fractions(rig, samples=2000, x=SPAN_X, v=SPAN_V, progress=False)
     assert (
         some.attractor_period.values.tolist()
@@ -578,7 +578,7 @@ def test_intervals_of_fractions_hold_those_of_a_fine_map():
 def test_the_same_seed_gives_the_same_fractions():
     def share(seed, **more):
         return sl.basin_fractions(
-            B16, samples=100, seed=seed, x=SPAN_X, v=SPAN_V, progress=False, **more
+            B16, samples=40, seed=seed, x=SPAN_X, v=SPAN_V, progress=False, **more
         )
 
     one, again, other = share(7), share(7, threads=1), share(8)

@@ -94,6 +94,27 @@ def test_multipliers_come_to_the_exact_ones_with_order_4():
     assert np.abs(tangent(sl.ODE45(1e-9, 1e-12)) - exact).max() < 1e-5
 
 
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    "method", [sl.RK4(0.01), sl.ODE45(1e-10, 1e-13)], ids=lambda one: one.label
+)
+def test_the_tangent_of_a_jump_into_another_law_is_the_slope_of_the_map(method):
+    """Central differences of the ends: the force behind the jump isn't that before it."""
+
+    @sl.system(states="x v")
+    def carried(t, x, v):
+        spring = sl.piecewise((5.0 * x, x < -1.0), otherwise=0.0)
+        return v, -1.0 - spring, sl.jump(x < 0.5, x=x - 3.0, v=0.5 * v)
+
+    start, step = np.array([2.0, 0.1]), 1e-4
+    tangent = Stroboscope(carried, method, every=2.1).tangent(start[None], 1)[1][0]
+    near = start + step * np.concatenate([np.eye(2), -np.eye(2)])
+    found = run(carried, near, method, 2.1, samples=1)
+    ends_near = np.stack([found["end_x"].values, found["end_v"].values], axis=1)
+    slopes = (ends_near[:2] - ends_near[2:]).T / (2 * step)
+    np.testing.assert_allclose(tangent, slopes, rtol=1e-5)
+
+
 # -- closed forms ----------------------------------------------------------------------------------
 @located
 def test_the_flights_of_a_ball_are_those_of_its_closed_form(method):
@@ -129,6 +150,7 @@ def test_the_table_of_contacts_is_that_of_the_default_method():
         np.testing.assert_array_equal(found["mode"].values, exact["mode"].values)
 
 
+@pytest.mark.nojit
 @every
 def test_a_start_on_the_stop_with_the_velocity_into_it_rebounds(method):
     """As an initial condition: up with 1.5, no event."""
@@ -158,6 +180,7 @@ def test_a_heater_with_hysteresis_switches_at_its_times(method):
     np.testing.assert_allclose(switched, exact, rtol=0, atol=0.05 if rough else 1e-4)
 
 
+@pytest.mark.nojit
 @located
 def test_a_jump_that_leads_on_happens_once(method):
     """From 0 at 1: a count; at 2.5 back by 4, over the boundary of the count, met anew."""
@@ -194,6 +217,26 @@ def test_an_angle_is_wrapped_again_and_again(method):
         )
 
 
+@pytest.mark.nojit
+@pytest.mark.parametrize("method", MATLAB, ids=lambda one: one.label)
+def test_a_stop_in_the_step_that_leaves_another_boundary_is_seen(method):
+    """From x = 0, where the force bends, with the speed 1: the stop at 1e-7 lies in the first step,
+    in which MATLAB's rule would look no further than the start.
+    """
+
+    @sl.system(states="x v")
+    def near(t, x, v):
+        return (
+            v,
+            -sl.piecewise((x, x > 0.0), otherwise=0.0),
+            sl.impact(x < 1e-7, v, restitution=1.0),
+        )
+
+    found = run(near, (0.0, 1.0), method, 0.01, samples=1)
+    assert times(found, "impact") == pytest.approx([1e-7], rel=1e-9)
+    assert float(found.end_x) == pytest.approx(2e-7 - 0.01, rel=1e-9)
+
+
 @located
 def test_a_jump_may_carry_the_state_over_other_boundaries(method):
     """From 2 with x'' = -1: at 1/2 to -5/2, over the boundary of a count and that of a spring, of
@@ -216,6 +259,7 @@ def test_a_jump_may_carry_the_state_over_other_boundaries(method):
     assert float(found.end_x) == pytest.approx(-1.0 + speed * rest - rest**2 / 2, rel=1e-5)
 
 
+@pytest.mark.nojit
 @located
 def test_a_row_of_balls_that_touch_hands_its_momentum_on(method):
     @sl.system(states="a b c u v w")
@@ -283,6 +327,7 @@ def test_just_the_motions_that_come_to_rest_are_named(method, name):
         assert off.max(initial=0.0) < 1e-4
 
 
+@pytest.mark.nojit
 @every
 def test_a_stop_that_is_pressed_from_the_start_is_named(method):
     with pytest.warns(SaltusWarning, match="sl.Taylor"):

@@ -131,7 +131,7 @@ def test_an_equilibrium_has_the_eigenvalues_of_the_jacobian_and_begins_to_oscill
     assert np.isnan(rests.response_multiplier_real).all()
     assert np.isnan(rests.response_cycle).all()
     assert ds.event_kind.values.tolist() == ["hopf"]
-    assert abs(ds.event_mu.item()) < 1e-9
+    assert abs(ds.event_mu.item()) < 1e-14
     assert (ds.type.sel(mu=0.0) == "unconverged").all(), (
         "at the bifurcation nothing decays exponentially"
     )

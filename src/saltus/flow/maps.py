@@ -29,6 +29,8 @@ NO_PERIOD = (
     'every="0.1 s", about a turn of it. '
     "Answers don't depend on it."
 )
+#: End of the message where a time is given for a forced one.
+FORCED = "is forced: it is looked at once a forcing period. Leave every= out."
 #: The noise of a method is relative to a box of starts; a motion is some ten times smaller.
 #: Measured for ode45 at (1e-4, 1e-7) on the rig's responses: its returns scatter by 0.05 to 2 % of
 #: their range with location, by 0.3 to 4 % without.
@@ -149,9 +151,7 @@ class Stroboscope:
         threads: int | None = None,
     ):
         if (every is None) == (system.forced_at is None):
-            raise ParameterError(
-                f"{system.name} {NO_PERIOD if every is None else 'is forced: leave every= out.'}"
-            )
+            raise ParameterError(f"{system.name} {NO_PERIOD if every is None else FORCED}")
         if every is not None and not (np.isfinite(every) & (np.asarray(every) > 0)).all():
             raise ParameterError(f"every must be a positive time, not {shown(every)}.")
         self.system, self.method, self.states, self.threads = system, method, system.states, threads

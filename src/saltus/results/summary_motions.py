@@ -17,12 +17,14 @@ from saltus.results.dataset.schema import (
     EQUILIBRIA,
     IMPACTS,
     MODES,
+    ORBITS,
     SECTION,
     SETTLED,
     SPECTRUM,
     WIDTHS,
     equilibrium_name,
     event_name,
+    kind_text,
     period_text,
     point_name,
     states_of,
@@ -31,6 +33,8 @@ from saltus.results.wording import unit_of
 
 #: Largest lines of a spectrum that are listed.
 _LINES = 5
+#: Orbits that get a line of their own.
+_ORBITS = 12
 
 
 def _section(ds: xr.Dataset) -> list[str]:
@@ -186,6 +190,35 @@ def _curve(ds: xr.Dataset) -> list[str]:
 
 
 #: For each kind, what writes its lines.
+def _orbits(ds: xr.Dataset) -> list[str]:
+    """A line on each orbit, and what the search says of those that it missed."""
+    unit = unit_of(ds["orbit_peak"])
+    stable = int((ds["orbit_stable"].values == 1).sum())
+    lines = [f"found    {counted(ds.sizes['orbit'], 'orbit')}, {stable} of them stable"]
+    for i in range(min(ds.sizes["orbit"], _ORBITS)):
+        one = ds.isel(orbit=i)
+        size = f"peak {float(one['orbit_peak']):.4g} {unit}".rstrip()
+        real, imag = (
+            float(np.ravel(one[f"orbit_multiplier_{part}"].values)[0]) for part in ("real", "imag")
+        )
+        lines.append(
+            f"  {i}: {kind_text(str(one['orbit_type'].item()), int(one['orbit_period']))}, "
+            f"{one['orbit_stability'].item()}, {size}, "
+            f"largest multiplier {np.hypot(real, imag):.4g}"
+        )
+    if ds.sizes["orbit"] > _ORBITS:
+        lines.append(f"  and {ds.sizes['orbit'] - _ORBITS} more")
+    for i in range(ds.sizes.get("search_period", 0)):
+        one = ds.isel(search_period=i)
+        lines.append(
+            f"search   {period_text(int(one['search_period']))}: {int(one['search_converged'])} of "
+            f"{ds.attrs.get('starts', '?')} starts led to an orbit, about "
+            f"{float(one['search_unseen']):.1%} of them to one that isn't known; deflation found "
+            f"{int(one['search_deflated'])} more"
+        )
+    return lines
+
+
 WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SECTION: _section,
     SPECTRUM: _spectrum,
@@ -194,6 +227,7 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     SETTLED: _settled,
     WIDTHS: _widths,
     MODES: _modes,
+    ORBITS: _orbits,
     EQUILIBRIA: _equilibria,
     BRANCHES: _branches,
     CURVE: _curve,

@@ -254,23 +254,12 @@ def test_what_changed_is_computed_again(whole, tmp_path, monkeypatch, old, new, 
     folder = tmp_path / "copy"
     folder.mkdir()
     (folder / "upper-stop.nc").write_bytes((whole[0] / "upper-stop.nc").read_bytes())
-    calls, said = [], []
+    calls = []
     monkeypatch.setattr(
         "saltus.analysis.motion.poincare.poincare",
         lambda *_, **call: calls.append(call) or load(folder / "upper-stop.nc"),
     )
-    text = STUDY.replace(old, new)
-    run_study(
-        parse(text),
-        text,
-        folder,
-        None,
-        Resources(threads=1),
-        lambda _: None,
-        said.append,
-        False,
-        only=["poincare"],
-    )
+    _, said = run(folder, STUDY.replace(old, new), only=["poincare"])
     assert told in said[0]
     assert len(calls) == 1
 

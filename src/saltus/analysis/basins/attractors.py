@@ -114,7 +114,7 @@ def attractors(
         every=looks_every(system, every, group.start),
         threads=threads,
     )
-    scale = _spread(map_, group.start)
+    scale = spread(map_, group.start)
     with reporting(progress) as show:
         found, label, settled = find_attractors(map_, group.start, scale, periods, progress=show)
     starts = {
@@ -208,7 +208,7 @@ def basin_fractions(
         every=looks_every(system, every, start),
         threads=threads,
     )
-    scale = _spread(map_, start[:SPREAD_STARTS])
+    scale = spread(map_, start[:SPREAD_STARTS])
     with reporting(progress) as show:
         scouts = fill(system, draw(ranges, halton(min(SCOUTS, samples), len(ranges))), fixed)
         found = find_attractors(map_, scouts, scale, periods)[0]
@@ -287,7 +287,7 @@ def draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[st
     }
 
 
-def _spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
+def spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
     """Range of each state over the starts, their first iterates and the time between two of them; 1
     for a state that never moves.
     """

@@ -14,8 +14,9 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import outside
 from saltus.analysis.branches.tracing import Branch
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
-from saltus.analysis.orbits.orbit_measures import Measures, measure
-from saltus.analysis.outputs import Outputs, outputs_of
+from saltus.analysis.orbits.orbit_measures import Measures, measure, unknown
+from saltus.analysis.outputs import Outputs
+from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.results import build
@@ -23,6 +24,8 @@ from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.system.system import System
 
+#: Samples of a period by which branches are resolved.
+SAMPLES = 64
 #: Multipliers nearer to the unit circle than this don't count as inside: the orbit may not attract.
 MARGINAL = 1e-9
 
@@ -61,7 +64,7 @@ def values_of(
 ) -> dict[str, Any]:
     """The variables on the dims ``point``, ``branch`` and ``event``."""
     size = len(system.states)
-    resolve(branches, functools.partial(_peaks, system, method))
+    resolve(branches, functools.partial(_sampled_peaks, system, method))
     counts = [len(branch.z) for branch in branches]
     points = [(branch, z) for branch in branches for z in branch.z]
     numbers = numbers_of(system, _with_equations(points), outputs, method)
@@ -119,10 +122,28 @@ def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
     }
 
 
-def _peaks(system: System, method: Method, branch: Branch, z: np.ndarray) -> np.ndarray:
-    """Largest magnitude of the first state of orbits float64[r, z] of a branch."""
-    points = _with_equations([(branch, one) for one in z])
-    return numbers_of(system, points, outputs_of(system, None), method).peak[:, 0]
+def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray) -> np.ndarray:
+    """Largest magnitude of the first state of orbits float64[r, z] of a branch, nearly: at samples,
+    to say where more orbits are needed.
+    """
+    n = branch.orbits.n if system.forced_at is not None else 1
+    map_ = _map_of(system, method, [(branch.orbits, one) for one in z])
+    starts = branch.orbits.points(z)[:, 0]
+    samples = map_.run(starts, n, Schedule.even(n, SAMPLES)).samples
+    return np.asarray(np.abs(samples[:, :, 0]).max(axis=1))
+
+
+def _map_of(
+    system: System, method: Method, points: Sequence[tuple[PeriodicOrbits, np.ndarray]]
+) -> Stroboscope:
+    """A map for each orbit: over its forcing period, or its own period."""
+    rows = np.tile(np.array(list(system.values.values())), (len(points), 1))
+    for row, (orbits, z) in zip(rows, points, strict=True):
+        row[[list(system.values).index(name) for name in orbits.names]] = orbits.values(z)
+    if system.forced_at is not None:
+        return Stroboscope(system, method, rows)
+    times = np.array([float(orbits.period(z)) for orbits, z in points])
+    return Stroboscope(system, method, rows, every=times)
 
 
 def _with_equations(
@@ -138,17 +159,13 @@ def numbers_of(
     method: Method,
 ) -> Measures:
     """The numbers of orbits, each with its unknowns: extremes, means, contacts and margins."""
-    rows = np.tile(np.array(list(system.values.values())), (len(points), 1))
-    for row, (orbits, z) in zip(rows, points, strict=True):
-        row[[list(system.values).index(name) for name in orbits.names]] = orbits.values(z)
     starts = np.array([orbits.points(z)[0] for orbits, z in points])
     starts = starts.reshape(len(points), len(system.states))
+    if not len(points):
+        return unknown(0, starts.shape[1], len(outputs))
     periods = np.array([orbits.n for orbits, _ in points], np.int64)
-    if system.forced_at is not None:
-        return measure(Stroboscope(system, method, rows), starts, periods, outputs=outputs)
-    times = np.array([float(orbits.period(z)) for orbits, z in points])
-    map_ = Stroboscope(system, method, rows, every=times)
-    return measure(map_, starts, np.ones(len(points), np.int64), outputs=outputs)
+    periods = periods if system.forced_at is not None else np.ones_like(periods)
+    return measure(_map_of(system, method, points), starts, periods, outputs=outputs)
 
 
 def stacked(parts: Sequence[np.ndarray], size: int) -> np.ndarray:

@@ -18,7 +18,16 @@ from saltus.results.dataset import schema
 from saltus.system.system import System
 
 #: Names of what a Dataset knows of its orbits: points, period, limit cycles' time.
-_PREFIX = {schema.RESPONSES: "response", schema.ATTRACTORS: "attractor", schema.BASINS: "attractor"}
+_PREFIX = {
+    schema.RESPONSES: "response", schema.ATTRACTORS: "attractor", schema.BASINS: "attractor",
+    schema.ORBITS: "orbit",
+}  # fmt: skip
+#: How variables that hold their points are named.
+_POINTS = {
+    "response": schema.response_name,
+    "attractor": schema.attractor_name,
+    "orbit": schema.orbit_name,
+}
 
 
 def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
@@ -32,8 +41,8 @@ def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
     kind = schema.kind_of(found)
     if kind not in _PREFIX:
         raise ParameterError(
-            "start= takes what sl.frequency_response, sl.bifurcation_diagram, sl.attractors or "
-            f"sl.basins returned, or starts, not {shown(found)[:60]}."
+            "start= takes what sl.frequency_response, sl.bifurcation_diagram, sl.attractors, "
+            f"sl.basins or sl.periodic_orbits returned, or starts, not {shown(found)[:60]}."
         )
     if found.attrs.get("fingerprint") != system.fingerprint():
         raise ParameterError(
@@ -44,8 +53,7 @@ def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
     own = f"{prefix}_{name}" if kind != schema.RESPONSES else schema.response_name(name)
     values = found[own].values if own in found else np.full(found.sizes[prefix], np.nan)
     values = np.where(np.isfinite(values), values, system.values[name])
-    label = schema.response_name if prefix == "response" else schema.attractor_name
-    points = np.stack([found[label(state)].values for state in system.states], axis=2)
+    points = np.stack([found[_POINTS[prefix](state)].values for state in system.states], axis=2)
     times = found.get(f"{prefix}_cycle")
     cycles = np.full(len(values), np.nan) if times is None else times.values
     periods = found[f"{prefix}_period"].values

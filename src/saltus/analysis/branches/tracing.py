@@ -20,7 +20,7 @@ ASIDE = 0.001
 #: Farthest that a seed lies from its orbit, in units of the scale.
 ASTRAY = 0.5
 #: Branches that are followed side by side.
-ABREAST = 8
+ABREAST = 2
 #: A fold so near to a branch point is none, in units of the scale: it is located less well there.
 VERTEX = 1e-4
 #: Orbits nearer than this, in units of the scale, are one.

@@ -15,7 +15,7 @@ import numpy as np
 from saltus.analysis.orbits.cycles import directions
 from saltus.analysis.orbits.equilibria import autonomous, jacobian_of
 from saltus.errors import ParameterError, shown
-from saltus.flow.maps import NO_PERIOD, Stroboscope
+from saltus.flow.maps import FORCED, NO_PERIOD, Stroboscope
 from saltus.flow.taylor import Taylor
 from saltus.system.system import System
 from saltus.units import to_si
@@ -53,9 +53,7 @@ def looks_every(
     """
     if system.forced_at is not None:
         if every is not None:
-            raise ParameterError(
-                f"{system.name} is forced: it is looked at once a forcing period. Leave every= out."
-            )
+            raise ParameterError(f"{system.name} {FORCED}")
         return None
     if every is None:
         if not autonomous(system):

@@ -36,8 +36,8 @@ class Event:
     Attributes
     ----------
     value : float
-        Where [SI]: a fold or Hopf bifurcation to some ten thousandths of the step; anything else is
-        in the middle of the two values.
+        Where [SI]: a fold to some ten thousandths of the step, of an equilibrium and a Hopf
+        bifurcation to rounding; anything else is in the middle of the two values.
     kind : str
         ``graze`` (contacts come or go), ``period_doubling``, ``fold``, ``hopf`` (an equilibrium
         begins to oscillate), ``neimark_sacker`` (a torus is born), ``chaos`` (its starts are
@@ -237,5 +237,7 @@ def _located(
             if not oscillates and not beyond[i]
             else "end"
         )
+        if here and rests and word != "end":
+            place = follower.special(int(rows[i]), word, near.points[i, 0], float(place))
         result.append((word, float(place)) if here else ("end", np.nan))
     return result

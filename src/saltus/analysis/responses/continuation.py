@@ -15,6 +15,7 @@ import numpy as np
 
 from saltus.analysis.orbits.find_responses import motion_range
 from saltus.analysis.orbits.orbits import OrbitBatch, find_orbits, orbit_distance, phase_distances
+from saltus.analysis.orbits.special_equilibria import fold_point, hopf_point
 from saltus.analysis.orbits.tolerances import SAME
 from saltus.analysis.orbits.unforced import close_again
 from saltus.analysis.responses.grid import Grid
@@ -158,6 +159,19 @@ class Follower:
         """
         found, apart = self._near(rows, value, self.orbits.rows(rows))
         return found, apart < LINK
+
+    def special(self, row: int, kind: str, state: np.ndarray, place: float) -> float:
+        """The value at the Hopf point or fold of an equilibrium, by Newton's method on its defining
+        system from a state float64[D] and a value near it; that value itself where there is none.
+        """
+        system = self._map.system
+        values = dict(zip(system.values, self._map.parameters[row].tolist(), strict=True))
+        values[list(values)[self._column]] = place
+        find = {"hopf": hopf_point, "fold": fold_point}[kind]
+        name = list(values)[self._column]
+        found = find(system.with_values(**values), name, state, self._scale[row])
+        near = 1e-3 * max(abs(place), abs(self._map.parameters[row, self._column] - place))
+        return found.value if found is not None and abs(found.value - place) <= near else place
 
     def beside(self, row: int, points: np.ndarray) -> float:
         """How far a row's orbit lies from that with points float64[n, D], in units of its range."""

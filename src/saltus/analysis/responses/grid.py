@@ -4,7 +4,6 @@ bifurcation diagrams run over.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,14 +13,14 @@ import numpy as np
 from saltus.analysis.axes import along
 from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.orbits.turns import ASKED, looks_every
+from saltus.analysis.random_starts import random_starts
 from saltus.analysis.starts import check_system, ensemble, single
 from saltus.errors import ParameterError, nearest, shown
-from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
 from saltus.flow.room import check_room
 from saltus.system.system import System
-from saltus.units import from_si, to_si
+from saltus.units import from_si
 
 #: Directions of a sweep by what users write.
 SWEEPS = {"sweep_up": "up", "sweep_down": "down"}
@@ -188,13 +187,7 @@ def _starts(
     if isinstance(start, str) and start in SWEEPS:
         return np.zeros((1, len(system.states))), (SWEEPS[start],), False
     if isinstance(start, str):
-        word, _, number = start.partition(" ")
-        if word != "random" or not re.fullmatch("0*[1-9][0-9]{0,11}", number.strip()):
-            raise ParameterError(
-                f"start={shown(start)} isn't known. "
-                f"{nearest(start, (*SWEEPS, 'random 20'))} Or give states."
-            )
-        return _random(system, int(number), box, seed), (), True
+        return random_starts(system, start, box, seed, tuple(SWEEPS)), (), True
     if box is not None:
         raise ParameterError('box= is for random starts: start="random 20".')
     return (
@@ -202,33 +195,3 @@ def _starts(
         (),
         False,
     )
-
-
-def _random(system: System, count: int, box: Any, seed: int) -> np.ndarray:
-    """Starts uniform in a box; states without a range start at zero."""
-    if not isinstance(box, Mapping) or not box:
-        example = ", ".join(
-            f'"{name}": ("-1 {system.units[name]}", "1 {system.units[name]}")'
-            for name in system.states[:2]
-        )
-        raise ParameterError(f"random starts need a box to be drawn from: box={{{example}}}.")
-    unit = np.random.default_rng(whole(seed, "seed", 0)).random((count, len(system.states)))
-    starts = np.zeros((count, len(system.states)))
-    for name, ends in box.items():
-        if name not in system.states:
-            raise ParameterError(
-                f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}"
-            )
-        try:
-            low, high = (to_si(end, system.units[name], name) for end in ends)
-        except (TypeError, ValueError):
-            raise ParameterError(
-                f"the range of {name} must be (low, high), not {shown(ends)}."
-            ) from None
-        if not (np.isfinite([low, high]).all() and low < high):
-            raise ParameterError(
-                f"the range of {name} must ascend and be finite, not {shown(ends)}."
-            )
-        column = system.states.index(name)
-        starts[:, column] = low + (high - low) * unit[:, column]
-    return starts

@@ -29,7 +29,7 @@ _TWICE = (
 #: Where a name of the system would collide with one of the table, another is taken.
 _NAMES = {
     "contact_<state>": schema.contact_name, "attractor_<state>": schema.attractor_name,
-    "start_<state>": schema.start_name,
+    "start_<state>": schema.start_name, "orbit_<state>": schema.orbit_name,
     "response_<state>": schema.response_name, "response_<parameter>": schema.response_name,
     "equilibrium_<state>": schema.equilibrium_name,
     "event_<parameter>": schema.event_name, "event_<state>": schema.event_name,

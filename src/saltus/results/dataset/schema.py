@@ -29,6 +29,7 @@ from saltus.results.dataset.equilibria import EQUILIBRIA_VARIABLES
 from saltus.results.dataset.exponents import EXPONENTS_VARIABLES
 from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.methods import METHODS_VARIABLES, WIDTHS_VARIABLES
+from saltus.results.dataset.orbits import ORBIT_VARIABLES
 from saltus.results.dataset.responses import RESPONSES_VARIABLES
 from saltus.results.dataset.result import Result
 from saltus.results.dataset.structures import MODES_VARIABLES
@@ -39,6 +40,7 @@ VERSION = 1
 TRAJECTORY, STROBOSCOPE = "trajectory", "stroboscope"
 BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", "responses"
 METHODS, EXPONENTS = "methods", "exponents"
+ORBITS = "orbits"
 SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
 CURVE = "bifurcation_curve"
 EQUILIBRIA = "equilibria"
@@ -54,6 +56,7 @@ MAKERS = {
     ENERGY: "sl.energy_balance",
     EXPONENTS: "sl.lyapunov or sl.wolf",
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
+    ORBITS: "sl.periodic_orbits or sl.edge_orbit",
     MODES: "sl.structure_modes", BRANCHES: "sl.branches",
     CURVE: "sl.bifurcation_curve",
     EQUILIBRIA: "sl.equilibria",
@@ -76,6 +79,7 @@ TABLES = {
     SETTLED: motions.SETTLED_VARIABLES,
     WIDTHS: WIDTHS_VARIABLES,
     MODES: MODES_VARIABLES,
+    ORBITS: ORBIT_VARIABLES,
     EQUILIBRIA: EQUILIBRIA_VARIABLES,
     BRANCHES: BRANCHES_VARIABLES,
     CURVE: CURVE_VARIABLES,
@@ -97,6 +101,14 @@ def attractor_name(state: str) -> str:
     """
     name = f"attractor_{state}"
     return f"attractor_state_{state}" if name in ATTRACTOR_VARIABLES else name
+
+
+def orbit_name(state: str) -> str:
+    """Name of the variable that holds the points of periodic orbits: ``orbit_x``;
+    ``orbit_state_type`` where the name is taken.
+    """
+    name = f"orbit_{state}"
+    return f"orbit_state_{state}" if name in ORBIT_VARIABLES else name
 
 
 def equilibrium_name(state: str) -> str:
@@ -281,6 +293,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         EXPONENTS: ("lyapunov_exponent", "running_exponent"),
         SETTLED: ("response_period", "mismatch"),
         MODES: ("shape", "flexibility"),
+        ORBITS: ("orbit_type", "orbit_stable"),
         EQUILIBRIA: ("equilibrium_type", "equilibrium_place"),
         BRANCHES: ("point_branch", "point_stable", "branch_periods"),
         CURVE: ("point_arclength", "codim2_kind"),

@@ -1,0 +1,76 @@
+"""Random starts from a box of states: ``start="random 20"``, ``box={...}``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from saltus.errors import ParameterError, nearest, shown
+from saltus.flow.counts import whole
+from saltus.system.system import System
+from saltus.units import to_si
+
+
+def random_starts(
+    system: System, start: str, box: Any, seed: int, others: Sequence[str] = ()
+) -> np.ndarray:
+    """Starts uniform in a box, float64[n, D]; states without a range start at zero.
+
+    Parameters
+    ----------
+    system : System
+        Names of states and their units.
+    start : str
+        ``"random 20"``.
+    box : mapping
+        Range (low, high) of each state that varies [SI or text with a unit].
+    seed : int
+        Of the random numbers.
+    others : sequence of str
+        Words that the caller knows besides, for its message.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If that is no such word, or no such box.
+    """
+    word, _, number = start.partition(" ")
+    if word != "random" or not re.fullmatch("0*[1-9][0-9]{0,11}", number.strip()):
+        raise ParameterError(
+            f"start={shown(start)} isn't known. "
+            f"{nearest(start, (*others, 'random 20'))} Or give states."
+        )
+    if not isinstance(box, Mapping) or not box:
+        example = ", ".join(
+            f'"{name}": ("-1 {system.units[name]}", "1 {system.units[name]}")'
+            for name in system.states[:2]
+        )
+        raise ParameterError(f"random starts need a box to be drawn from: box={{{example}}}.")
+    count = int(number)
+    unit = np.random.default_rng(whole(seed, "seed", 0)).random((count, len(system.states)))
+    starts = np.zeros((count, len(system.states)))
+    for name, ends in box.items():
+        low, high = _range(system, name, ends)
+        column = system.states.index(name)
+        starts[:, column] = low + (high - low) * unit[:, column]
+    return starts
+
+
+def _range(system: System, name: str, ends: Any) -> tuple[float, float]:
+    """The range of a state [SI]."""
+    if name not in system.states:
+        raise ParameterError(
+            f"{system.name} has no state {shown(name)}. {nearest(name, system.states)}"
+        )
+    try:
+        low, high = (to_si(end, system.units[name], name) for end in ends)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"the range of {name} must be (low, high), not {shown(ends)}."
+        ) from None
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise ParameterError(f"the range of {name} must ascend and be finite, not {shown(ends)}.")
+    return low, high

@@ -1,0 +1,130 @@
+"""Periodic orbits of flows, unstable ones too, against closed forms, an independent solver and
+invariants.
+"""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import impact_orbits
+import saltus as sl
+
+RIG_BOX = {"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")}
+RECIPES = {
+    "stiffness": 1.0, "damping": 0.1, "gap": 1.0, "restitution": 0.8, "force": 0.3,
+    "frequency": 1.2,
+}  # fmt: skip
+
+
+@sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+def duffing(t, x, v, *, w=1.0, d=0.05, force=7.5):
+    """Ueda's oscillator."""
+    return v, -d * v - x**3 + force * sl.cos(w * t)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    system = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    return sl.periodic_orbits(system, "random 400", box=RIG_BOX)
+
+
+@pytest.fixture(scope="module")
+def ueda():
+    return sl.periodic_orbits(duffing, "random 300", box={"x": (-4, 4), "v": (-8, 8)}, periods=2)
+
+
+def multipliers(found):
+    return found.orbit_multiplier_real.values + 1j * found.orbit_multiplier_imag.values
+
+
+def test_the_saddle_and_the_stable_orbit_of_an_impact_oscillator():
+    """Both orbits with one impact in a period have closed forms; so has the multiplier."""
+    with (Path(__file__).parents[1] / "reference" / "laws_impact.csv").open() as file:
+        known = {row["id"]: row["value"] for row in csv.DictReader(file)}
+    system = sl.models.impact_oscillator(**RECIPES)
+    found = sl.periodic_orbits(
+        system, "random 200", box={"x": (-1.5, 0.9), "v": (-2, 2)}, periods=1
+    )
+    one_impact = found.isel(orbit=found.orbit_contacts.values == 1)
+    points = np.stack([one_impact.orbit_x.values[:, 0], one_impact.orbit_v.values[:, 0]], axis=1)
+    (_, saddle), (_, stable) = impact_orbits.oscillator(**RECIPES)
+    of = {int(flag): point for flag, point in zip(one_impact.orbit_stable, points, strict=True)}
+    assert of[0] == pytest.approx(saddle, abs=1e-11)
+    assert of[1] == pytest.approx(stable, abs=1e-11)
+    (where,) = np.flatnonzero(one_impact.orbit_stable.values == 0)
+    assert multipliers(one_impact)[where, 0] == pytest.approx(float(known["I04m"]), rel=1e-10)
+    assert one_impact.orbit_stability.values[where] == "saddle"
+
+
+def test_the_three_period_response_of_the_rig_has_its_saddle(rig):
+    """A closed branch in frequency has two sides: one stable, one not."""
+    three = rig.isel(orbit=rig.orbit_period.values == 3)
+    assert sorted(three.orbit_stability.values) == ["saddle", "stable focus"]
+
+
+def test_a_branch_goes_on_from_an_unstable_orbit(rig):
+    """From the saddle of the 3T response round the fold where both sides meet (row G02 of
+    tests/reference/branches_rig.csv).
+    """
+    system = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    chosen = (rig.orbit_period.values == 3) & (rig.orbit_stable.values == 0)
+    branch = sl.branches(system, {"frequency": ("15 Hz", "17.2 Hz")}, start=rig.isel(orbit=chosen))
+    assert branch.event_kind.values.tolist() == ["fold"]
+    assert branch.event_frequency.values == pytest.approx([15.70602680244704], abs=1e-9)
+
+
+def test_the_stable_ones_are_the_attractors(rig):
+    system = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    start = np.stack([rig.orbit_x.values[:, 0], rig.orbit_v.values[:, 0]], axis=1)
+    stable = rig.orbit_stable.values == 1
+    known = sl.attractors(system, start[stable])
+    assert known.attractor_period.values.tolist() == rig.orbit_period.values[stable].tolist()
+    assert known.attractor_rms.values == pytest.approx(rig.orbit_rms.values[stable], rel=1e-10)
+    assert known.attractor_margin.values == pytest.approx(rig.orbit_margin.values[stable], rel=1e-6)
+
+
+def test_areas_shrink_by_the_damping(rig):
+    """det M = exp(-integral of the damping) over one period of the orbit."""
+    system = sl.models.delangre("a", force="4 N", frequency="17 Hz")
+    rate = 2 * system.values["damping_ratio"] * 2 * math.pi * system.values["natural_frequency"]
+    exact = np.exp(-rate * rig.orbit_period.values / 17.0)
+    assert np.prod(multipliers(rig), axis=1).real == pytest.approx(exact, rel=1e-11)
+
+
+def test_an_independent_solver_closes_them(ueda):
+    """Over one forcing period each, DOP853 at 1e-13 comes from each point to the next."""
+    unstable = ueda.isel(orbit=ueda.orbit_stable.values == 0)
+    assert unstable.sizes["orbit"] >= 4
+    for i in range(unstable.sizes["orbit"]):
+        n = int(unstable.orbit_period[i])
+        points = np.stack([unstable.orbit_x.values[i, :n], unstable.orbit_v.values[i, :n]], axis=1)
+        for here, there in zip(points, np.roll(points, -1, axis=0), strict=True):
+            run = solve_ivp(
+                lambda t, y: [y[1], -0.05 * y[1] - y[0] ** 3 + 7.5 * np.cos(t)],
+                (0.0, 2 * np.pi),
+                here,
+                "DOP853",
+                rtol=1e-13,
+                atol=1e-13,
+            )
+            assert run.y[:, -1] == pytest.approx(there, abs=1e-10)
+
+
+def test_the_mirror_image_of_an_orbit_is_one(ueda):
+    """The equation is the same for -x half a period later: orbits that aren't their own images
+    come in pairs, with the same multipliers.
+    """
+    first = np.sort_complex(np.round(multipliers(ueda)[ueda.orbit_period.values == 2, 0], 8))
+    assert len(first) % 2 == 0
+    assert (first[::2] == first[1::2]).all()
+
+
+def test_only_a_forced_system_and_an_exact_method_are_taken():
+    with pytest.raises(sl.SaltusError, match="no forcing period"):
+        sl.periodic_orbits(sl.models.double_scroll(), (0.1, 0.0, 0.0))
+    with pytest.raises(sl.SaltusError, match="errors of ODE45"):
+        sl.periodic_orbits(duffing, (0.0, 0.0), method=sl.ODE45())
