@@ -161,6 +161,7 @@ class FunctionFlow(TangentFlow):
         """See :class:`TangentFlow`."""
         return self.map.launch(start, SAMPLED_BLOCKS).advance(SAMPLED_BLOCKS)
 
-    def divergences(self, states: np.ndarray) -> np.ndarray:
+    def divergences(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`TangentFlow`."""
-        return np.linalg.slogdet(self.derivatives(states))[1]
+        growth = np.linalg.slogdet(self.derivatives(states))[1]
+        return growth, np.zeros(growth.shape, np.int64)

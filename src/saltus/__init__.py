@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from saltus.analysis.basins.edge_orbit import edge_orbit
     from saltus.analysis.basins.equilibria import equilibria
     from saltus.analysis.basins.periodic_orbits import periodic_orbits
+    from saltus.analysis.branches.backbone import backbone
     from saltus.analysis.branches.bifurcation_curve import bifurcation_curve
     from saltus.analysis.lyapunov.lyapunov import lyapunov
     from saltus.analysis.methods.compare_methods import compare_methods
@@ -59,12 +60,16 @@ if TYPE_CHECKING:
         cos,
         cosh,
         exp,
+        flores,
         freeplay,
         friction,
         heaviside,
+        hertz,
+        hunt_crossley,
         hypot,
         impact,
         jump,
+        lankarani_nikravesh,
         log,
         max,
         min,
@@ -110,6 +115,7 @@ _HOMES = {
     "spectrum": "saltus.analysis.motion.spectrum",
     "stroboscope": "saltus.analysis.motion.stroboscope",
     "structure_modes": "saltus.analysis.motion.structure_modes",
+    "backbone": "saltus.analysis.branches.backbone",
     "bifurcation_curve": "saltus.analysis.branches.bifurcation_curve",
     "branches": "saltus.analysis.responses.all_branches",
     "transmissibility": "saltus.analysis.motion.transmissibility",
@@ -121,8 +127,9 @@ _HOMES = {
     **dict.fromkeys(("contacts", "describe", "load", "samples", "save", "to_csv", "to_mat"),
         "saltus.results"),
     **dict.fromkeys(
-        ("System", "abs", "atan", "cos", "exp", "freeplay", "log", "max", "min", "pi", "piecewise",
-            "sin", "sqrt", "system", "tan", "tanh"),
+        ("System", "abs", "atan", "cos", "exp", "flores", "freeplay", "hertz",
+            "hunt_crossley", "lankarani_nikravesh", "log", "max", "min", "pi", "piecewise", "sin",
+            "sqrt", "system", "tan", "tanh"),
         "saltus.system",
     ),
     **dict.fromkeys(("acos", "asin", "atan2", "clip", "cosh", "heaviside", "hypot", "mod", "sign",
@@ -153,6 +160,7 @@ __all__ = [
     "atan",
     "atan2",
     "attractors",
+    "backbone",
     "basin_fractions",
     "basins",
     "bifurcation_curve",
@@ -169,14 +177,18 @@ __all__ = [
     "energy_balance",
     "equilibria",
     "exp",
+    "flores",
     "freeplay",
     "frequency_response",
     "friction",
     "heaviside",
+    "hertz",
+    "hunt_crossley",
     "hypot",
     "impact",
     "impact_statistics",
     "jump",
+    "lankarani_nikravesh",
     "load",
     "log",
     "lyapunov",

@@ -35,6 +35,9 @@ FOLD = {"in SI": (16.0, 19.0), "in units": ("16 Hz", "19 Hz")}
 FORCE = {"in SI": (3.9, 4.1), "in units": ("3.9 N", "4.1 N")}
 
 
+SIZES = {"in SI": (2e-4, 6e-4), "in units": ("0.2 mm", "0.6 mm")}
+
+
 @cache
 def the_fold():
     """The end of the resonance."""
@@ -67,6 +70,10 @@ def logistic():
 #: A small call of every public verb: how -> what it looks at, and its arguments.
 CALLS = {
     "attractors": started(),
+    "backbone": lambda how: (
+        RIG,
+        {"amplitude": SIZES[how], "values": {"force": 0, "damping_ratio": 0}, "points": 40},
+    ),
     "basin_fractions": lambda how: (
         RIG,
         {"samples": 16, **{name: span[:2] for name, span in BOX[how].items()}},

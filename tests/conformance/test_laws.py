@@ -446,3 +446,61 @@ def test_a_section_at_an_impact_is_that_of_impacts():
     run = sl.poincare(stop, (-0.5, 0.0), "gap", periods=5)
     hits = times(sl.simulate(stop, (-0.5, 0.0), periods=5), "impact")
     assert run["crossing_time"].values.tolist() == hits.tolist()
+
+
+def test_volumes_shrink_at_impacts_by_what_the_exponents_sum_to():
+    """The mean divergence is found without the tangent: impacts with friction turned round, and a
+    restitution that falls with the speed.
+    """
+
+    @sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+    def rubbed(t, x, v, *, slip=0.05, w=1.3):
+        push = sl.cos(w * t) - x - 0.1 * v - sl.friction(v, slip=slip)
+        return v, push, sl.impact(x < 0.3, v, restitution=0.8 / (1 + 0.1 * v * v))
+
+    found = sl.lyapunov(rubbed, (0.1, 0.1), periods=100, transient=1500)
+    assert found["exponent_sum"].item() == pytest.approx(found["mean_divergence"].item(), rel=1e-9)
+    assert found["exponent_sum"].item() < -0.2, "more than the damping"
+
+
+def test_of_directions_off_a_contact_that_is_held_nothing_is_left():
+    """Exponents of -inf, without an error: one of a block that sticks, one of a switch."""
+    stick = sl.lyapunov(belt, (0.0, 0.0), periods=200, every=2.0)
+    heater = sl.models.thermostat()
+    switch = sl.lyapunov(heater, (15.0, 1.0), periods=200, every=1.0)
+    for found in (stick, switch):
+        first, last = found["lyapunov_exponent"].values[0]
+        assert abs(first) < 5 * found["lyapunov_error"].values[0, 0], "along the flow"
+        assert last == found["mean_divergence"].item() == -math.inf
+        assert found["lyapunov_error"].values[0, 1] == 0.0
+        assert "nothing is left" in sl.describe(found)
+
+
+@pytest.mark.parametrize("start", [(15.0, 1.0), (22.5, 0.0), (23.4, 1.0)])
+def test_a_cycle_of_jumps_has_its_period(start):
+    """The thermostat: heated for 10 ln(16/14.5), cooled for 10 ln(5.5/4)."""
+    heater = sl.models.thermostat()
+    found = sl.attractors(heater, start, every=1.0)
+    period = 10 * math.log(16 / 14.5) + 10 * math.log(5.5 / 4)
+    assert found["attractor_cycle"].values == pytest.approx([period], rel=1e-13)
+    assert abs(found["attractor_multiplier_real"].values.ravel()[-1]) < 1e-12
+
+
+def test_an_impact_with_a_tangential_part_keeps_the_angular_momentum_about_its_point():
+    """A ball of m*gyration*radius**2: u - gyration*radius*spin stays, the slip u + radius*spin
+    becomes -tangential times itself each time, the normal velocity -normal times.
+    """
+
+    @sl.system(states="x y u v spin")
+    def superball(t, x, y, u, v, spin, *, radius=0.02, normal=0.8, tangential=0.6, gyration=0.4):
+        kick = -(1 + tangential) * (u + radius * spin) * gyration / (1 + gyration)
+        after = {"v": -normal * v, "u": u + kick, "spin": spin + kick / (gyration * radius)}
+        return u, v, 0.0, -9.81, 0.0, sl.jump(y < radius, **after)
+
+    run = sl.simulate(superball, (0.0, 1.02, 1.0, 0.0, 30.0), t_end=2.0)
+    fall = math.sqrt(2 / 9.81)
+    count = len(run["contact_time"])
+    assert run["contact_time"].values[:2] == pytest.approx([fall, fall * 2.6], rel=1e-13)
+    u, spin = float(run.end_u), float(run.end_spin)
+    assert u - 0.4 * 0.02 * spin == pytest.approx(1.0 - 0.4 * 0.02 * 30.0, rel=1e-14)
+    assert u + 0.02 * spin == pytest.approx((-0.6) ** count * 1.6, rel=1e-13)

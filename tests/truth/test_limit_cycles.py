@@ -64,6 +64,7 @@ def test_stick_and_slip_have_the_period_of_the_closed_form():
     assert one.attractor_type.item() == "limit_cycle"
     assert one.attractor_cycle.item() == pytest.approx(5 + 3.902605407814523, rel=1e-13)
     assert one.attractor_peak.item() == pytest.approx(1.0385164807134504, rel=1e-13)
+    assert "limit cycle, period 8.903 s, 0.1123 Hz" in sl.describe(found)
     # the stick forgets where the slip began: nothing is left of a deviation
     np.testing.assert_allclose(one.attractor_multiplier_real, [1.0, 0.0], atol=1e-12)
 

@@ -40,6 +40,22 @@ def test_the_coefficient_of_the_normal_form(cubic):
     assert found.coefficient == pytest.approx(2 * cubic / 2.0, rel=1e-12)
 
 
+@sl.system(states="x v")
+def skewed(t, x, v, *, mu=0.0, square=1.0, product=0.5):
+    return v, mu * v - x - square * x * x + product * x * v - x * x * v
+
+
+def test_the_coefficient_tells_the_size_of_the_cycle_with_square_terms():
+    """|z|^2 = -(mu/2)/l1, and x = sqrt(2) |z| cos t to first order."""
+    found = hopf_point(skewed, "mu", np.array([0.01, 0.0]))
+    mu = 1e-3
+    cycle = sl.attractors(skewed.with_values(mu=mu), [0.05, 0.0], every=6.0)
+    x = cycle.attractor_x.values[0]
+    size = 0.5 * (np.nanmax(x) - np.nanmin(x))
+    assert cycle.attractor_type.item() == "limit_cycle"
+    assert size == pytest.approx(np.sqrt(mu / -found.coefficient), rel=1e-2)
+
+
 def test_lorenz_loses_its_rest_to_an_unstable_cycle():
     """rho = sigma (sigma + beta + 3)/(sigma - beta - 1), subcritical (Marsden & McCracken 1976)."""
     found = hopf_point(lorenz, "rho", np.array([7.8, 7.8, 23.0]))

@@ -39,6 +39,8 @@ class Kind(StrEnum):
     frequency_response = "frequency_response"
     bifurcation_diagram = "bifurcation_diagram"
     branches = "branches"
+    bifurcation_curves = "bifurcation_curves"
+    periodic_orbits = "periodic_orbits"
     type_map = "type_map"
     section = "section"
     spectrum = "spectrum"
@@ -105,8 +107,7 @@ def demo(
     from saltus.results import save, usable_folder
 
     usable_folder(out)
-    if plot:
-        study.prepare_drawing()
+    study.prepare_files(plot)
 
     with screen.working() as progress:
         result = study.demo(frequency, case.value, force, periods, progress)

@@ -103,16 +103,23 @@ def demo(
     return Demo(run, found, neighbours, _table(run, found, neighbours, title))
 
 
-def prepare_drawing() -> None:
-    """Begin to import what :func:`draw` needs, in a thread: the first demo on a machine waits for
-    another process to compile meanwhile.
+def prepare_files(plot: bool) -> None:
+    """Begin to import what the files need, in a thread: while the demo computes, or waits for
+    another process to compile, a processor is free.
     """
 
     def imported() -> None:
-        with contextlib.suppress(Exception):  # `draw` meets it again, and says it
-            _pyplot()
+        for begin in (_netcdf, _pyplot) if plot else (_netcdf,):
+            with contextlib.suppress(Exception):  # `save` or `draw` meets it again, and says it
+                begin()
 
-    threading.Thread(target=imported, name="imports for the picture", daemon=True).start()
+    threading.Thread(target=imported, name="imports for the files", daemon=True).start()
+
+
+def _netcdf() -> None:
+    import xarray as xr
+
+    xr.Dataset({"one": 1.0}).to_netcdf(engine="h5netcdf")  # it imports dask too, where there is one
 
 
 def _pyplot() -> Any:

@@ -17,7 +17,8 @@ _WORDS = {
     "responses": "responses", "section": "a section", "spectrum": "a spectrum",
     "impacts": "impacts", "energy": "energies",
     "methods": "one question by several methods", "exponents": "exponents",
-    "branches": "branches of periodic orbits",
+    "branches": "branches of periodic orbits", "orbits": "periodic orbits",
+    "bifurcation_curve": "a curve of bifurcations",
 }  # fmt: skip
 #: Pictures that show trajectories of a batch.
 OF_TRAJECTORIES = ("history", "phase", "section", "spectrum", "impacts", "energy", "exponents")

@@ -26,7 +26,7 @@ from saltus.codegen import machine, templates
 from saltus.codegen.announce import announce
 from saltus.codegen.asker import PARENT_ID
 from saltus.errors import CacheError
-from saltus.interrupt import check_stop
+from saltus.interrupt import check_stop, ctrl_c_waits
 
 #: Time between two checks for a stop [s].
 CHECK_INTERVAL = 0.1
@@ -201,24 +201,26 @@ def _answer_of(module: str, options: tuple[str, ...], given: bytes, title: str) 
         [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
     )
     environment = {**os.environ, "PYTHONPATH": path, PARENT_ID: str(os.getpid())}
+    process: subprocess.Popen | None = None
     try:
         # a pipe is full after 64 kB, and communicate() doesn't go on filling it after a timeout
         with tempfile.TemporaryFile() as file:
             file.write(given)
             file.seek(0)
-            process = subprocess.Popen(
-                # -P: not what lies in the working folder
-                [sys.executable, "-P", "-m", module, *options],
-                stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
-                start_new_session=True,  # Ctrl-C is for this process
-            )  # fmt: skip
-    except OSError:  # no processes here
-        return None
-    _COMPILING.add(process)
-    try:
+            with ctrl_c_waits():  # half started, nobody would end it and close its pipe
+                process = subprocess.Popen(
+                    # -P: not what lies in the working folder
+                    [sys.executable, "-P", "-m", module, *options],
+                    stdin=file, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
+                    start_new_session=True,  # Ctrl-C is for this process
+                )  # fmt: skip
+                _COMPILING.add(process)
         data = _wait(process)
+    except OSError:  # no processes here, or none that can be heard
+        return None
     finally:
-        _end(process)
+        if process is not None:
+            _end(process)
     if process.returncode < 0:
         raise CacheError(
             f"the process that compiled {title} was ended by signal {-process.returncode}, as when "

@@ -6,6 +6,7 @@ from typing import Any
 
 from saltus.errors import nearest, shown
 from saltus.plot.agreement import agreement
+from saltus.plot.backbone import backbone
 from saltus.plot.basins import basins
 from saltus.plot.bifurcation import bifurcation_diagram
 from saltus.plot.bifurcation_curves import bifurcation_curves
@@ -16,6 +17,7 @@ from saltus.plot.gallery import gallery
 from saltus.plot.history import history
 from saltus.plot.measures import energy, impacts
 from saltus.plot.methods import methods
+from saltus.plot.orbits import periodic_orbits
 from saltus.plot.phase import phase
 from saltus.plot.section import section
 from saltus.plot.spectrum import spectrum
@@ -23,9 +25,9 @@ from saltus.plot.style import OKABE_ITO, style
 from saltus.plot.type_map import type_map
 
 __all__ = [
-    "OKABE_ITO", "agreement", "basins", "bifurcation_curves", "bifurcation_diagram", "branches",
-    "energy", "exponents", "frequency_response", "gallery", "history",
-    "impacts", "methods", "phase", "section", "spectrum", "style", "type_map",
+    "OKABE_ITO", "agreement", "backbone", "basins", "bifurcation_curves", "bifurcation_diagram",
+    "branches", "energy", "exponents", "frequency_response", "gallery", "history",
+    "impacts", "methods", "periodic_orbits", "phase", "section", "spectrum", "style", "type_map",
 ]  # fmt: skip
 
 

@@ -20,7 +20,9 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "methods": ("methods",),
     "exponents": ("exponents",),
     "branches": ("branches",),
+    "orbits": ("periodic_orbits",),
     "bifurcation_curve": ("bifurcation_curves",),
+    "backbone": ("backbone",),
 }
 
 

@@ -86,10 +86,8 @@ def _panel(ax: Axes, one: xr.Dataset, legend: bool) -> None:
         )
         ax.fill_between(time * x.factor, low, high, color=color, alpha=0.18, lw=0, zorder=1)
         ax.plot(time * x.factor, mean, color=color, lw=1.1, zorder=2, label=_value(one, i, unit))
-        if settled:
-            ax.axhline(
-                float(one["lyapunov_exponent"][i]), color=color, lw=0.9, ls=(0, (4, 3)), zorder=3
-            )
+        if settled and np.isfinite(final := float(one["lyapunov_exponent"][i])):
+            ax.axhline(final, color=color, lw=0.9, ls=(0, (4, 3)), zorder=3)
     ax.set_xlabel(x.label("time after the transient"))
     ax.set_ylabel(Scale(1.0, unit).label("Lyapunov exponent"))
     ax.set_title("motion: " + kind_text(str(one["kind"].item()), int(one["response_period"])))
@@ -104,6 +102,8 @@ def _value(one: xr.Dataset, i: int, unit: str) -> str:
     """
     value = float(one["lyapunov_exponent"][i])
     half = float(one["lyapunov_high"][i]) - value
+    if np.isneginf(value):
+        return "\N{MINUS SIGN}\N{INFINITY}: nothing is left of it"
     if not np.isfinite(value):
         return "not known"
     if not half > 1e-6 * max(abs(value), 1e-300):

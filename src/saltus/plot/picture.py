@@ -33,6 +33,7 @@ _PICTURES = {
     schema.RESPONSES: "plot.frequency_response, plot.bifurcation_diagram or plot.type_map",
     schema.BRANCHES: "plot.branches",
     schema.CURVE: "plot.bifurcation_curves",
+    schema.BACKBONE: "plot.backbone",
 }
 _NAME: ContextVar[str] = ContextVar("name", default="the picture")
 

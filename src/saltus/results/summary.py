@@ -118,7 +118,8 @@ def _attractors(ds: xr.Dataset) -> list[str]:
         kind = str(one["attractor_type"].item())
         name = f"{kind} {period}T" if kind == "periodic" else kind_text(kind, period)
         if kind == "limit_cycle" and "attractor_cycle" in one:
-            name += f", period {float(one['attractor_cycle']):.4g} s"
+            cycle = float(one["attractor_cycle"])
+            name += f", period {cycle:.4g} s, {1 / cycle:.4g} Hz"
         size = f"peak {float(one['attractor_peak']):.4g} {unit}".rstrip()
         if kind == Kind.NOISY_PERIODIC.word:
             size += f", scatter {float(one['attractor_scatter']):.2g} {unit}".rstrip()
@@ -196,11 +197,15 @@ def _exponents(ds: xr.Dataset) -> list[str]:
     for i in range(min(count, _LINES)):
         one = ds.isel(trajectory=i)
         values = ", ".join(f"{value:.6g}" for value in one["lyapunov_exponent"].values)
-        width = float(one["lyapunov_high"][0] - one["lyapunov_exponent"][0])
+        first = float(one["lyapunov_exponent"][0])
+        width = float(one["lyapunov_high"][0]) - first if np.isfinite(first) else 0.0
         graze = ", near a graze" if "near_graze" in one and int(one["near_graze"]) else ""
         kind = kind_text(str(one["kind"].item()), int(one["response_period"]))
         lines.append(f"  {i}: {kind}, {values} {unit}, the first +- {width:.1e}{graze}")
-    return lines + _more(count)
+    lines += _more(count)
+    if np.isneginf(ds["lyapunov_exponent"].values).any():
+        lines.append("-inf     where a contact sticks or rests, nothing is left of a deviation")
+    return lines
 
 
 def _agreement(ds: xr.Dataset) -> list[str]:

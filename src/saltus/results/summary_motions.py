@@ -11,6 +11,7 @@ import xarray as xr
 
 from saltus.errors import counted
 from saltus.results.dataset.schema import (
+    BACKBONE,
     BRANCHES,
     CURVE,
     ENERGY,
@@ -189,6 +190,18 @@ def _curve(ds: xr.Dataset) -> list[str]:
     return lines
 
 
+def _backbone(ds: xr.Dataset) -> list[str]:
+    frequency, name = ds["backbone_frequency"].values, ds.attrs["amplitude_of"]
+    one = ds.sel(output=name)
+    peak, unit = one["point_output_peak"].values, one["output_units"].item()
+    return [
+        f"found    mode {ds.attrs['mode']} at {len(peak)} points, {frequency[0]:.8g} Hz at "
+        f"|{name}| {peak[0]:.4g} {unit} to {frequency[-1]:.8g} Hz at {peak[-1]:.4g} "
+        f"{unit}".rstrip(),
+        f"ends     {ds.attrs['end']}, {ds['point_stable'].values.mean():.0%} of it stable",
+    ]
+
+
 #: For each kind, what writes its lines.
 def _orbits(ds: xr.Dataset) -> list[str]:
     """A line on each orbit, and what the search says of those that it missed."""
@@ -231,4 +244,5 @@ WRITERS: dict[str, Callable[[xr.Dataset], list[str]]] = {
     EQUILIBRIA: _equilibria,
     BRANCHES: _branches,
     CURVE: _curve,
+    BACKBONE: _backbone,
 }

@@ -21,7 +21,7 @@ from saltus.system import compositions, functions
 from saltus.system.clocks import mod
 from saltus.system.expression import Condition
 from saltus.system.inputs import pulse, sawtooth, square
-from saltus.system.laws import freeplay
+from saltus.system.laws import flores, freeplay, hertz, hunt_crossley, lankarani_nikravesh
 from saltus.system.names import why_no_name
 from saltus.system.tables import Table, look_up
 
@@ -60,7 +60,9 @@ _COMPOSED = (
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(functions, name) for name in _SIMPLE},
     **{name: getattr(compositions, name) for name in _COMPOSED},
-    "freeplay": freeplay, "mod": mod, "square": square, "sawtooth": sawtooth, "pulse": pulse,
+    "freeplay": freeplay, "hertz": hertz, "hunt_crossley": hunt_crossley,
+    "lankarani_nikravesh": lankarani_nikravesh, "flores": flores, "mod": mod,
+    "square": square, "sawtooth": sawtooth, "pulse": pulse,
 }  # fmt: skip
 _CONSTANTS = {"pi": functions.pi}
 _BINARY: dict[type[ast.AST], Callable[[Any, Any], Any]] = {

@@ -13,7 +13,7 @@ def test_every_kind_of_result_is_known():
     """Attractors alone have no picture, nor have tables of a few numbers; a new kind needs a line
     in the table, and a word for messages.
     """
-    assert set(TABLES) == set(PICTURES) | {"attractors", "settled", "widths", "modes"}
+    assert set(TABLES) == set(PICTURES) | {"attractors", "equilibria", "settled", "widths", "modes"}
     assert set(draw._WORDS) == set(PICTURES)
 
 

@@ -388,6 +388,36 @@ def test_ctrl_c_while_it_compiles_ends_at_once_and_leaves_no_process(folder, slo
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+def test_ctrl_c_while_the_process_starts_leaves_neither_it_nor_its_pipe(folder, slow, monkeypatch):
+    """The exception holds what was half made until the garbage is collected, in whatever runs
+    then.
+    """
+    started = []
+
+    class Pressed(subprocess.Popen):
+        def __init__(self, *args, **options):
+            super().__init__(*args, **options)
+            started.append(self)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(building.subprocess, "Popen", Pressed)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            load()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    (process,) = started
+    try:
+        assert process.poll() is not None
+        assert process.stdout.closed
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="the slow process is a script")
 def test_threads_that_wait_for_a_kernel_stop_when_they_are_told(folder, slow):
     """Both the one that compiles and the one that waits for it: they are part of work that Ctrl-C

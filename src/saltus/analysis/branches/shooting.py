@@ -88,30 +88,30 @@ class PeriodicOrbits:
             return np.asarray(self.n * self._turns / self.values(z)[..., self.names.index(where)])
         return np.full(z.shape[:-1], self.n * self.system.period())
 
-    def _own(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the states of the parametric system beside the points begin with, float64[r, e], and
-        the derivative of each with respect to its unknown.
+    def own(self, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the states of the parametric system beside the points begin with, from the unknowns
+        beside the points float64[r, e], the derivative of each with respect to its unknown, both
+        float64[r, e], and which unknown that is, int64[e].
         """
-        values, slopes = self.values(z).copy(), np.ones_like(self.values(z))
-        if self.free:
-            return np.concatenate([z[:, [self.n * self.size]], values], axis=1), np.ones(
-                (len(z), 1 + values.shape[1])
-            )
-        order = list(range(len(self.names)))
+        values, slopes, order = rest.copy(), np.ones_like(rest), np.arange(rest.shape[1])
         if self.system.forced_at in self.names:
             j = self.names.index(self.system.forced_at)
             slopes[:, j] = -self._turns / values[:, j] ** 2
             values[:, j] = self._turns / values[:, j]
-            order = [j, *(i for i in order if i != j)]
-        self._order = np.array(order)
-        return values[:, order], slopes[:, order]
+            order = np.array([j, *(i for i in order if i != j)])
+        return values[:, order], slopes[:, order], order
+
+    def starts(self, z: np.ndarray) -> np.ndarray:
+        """The points as states of the parametric system, float64[r, n, E]."""
+        own = self.own(z[:, self.n * self.size :])[0]
+        return np.concatenate([self.points(z), np.repeat(own[:, None], self.n, axis=1)], axis=2)
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`saltus.analysis.branches.arclength.Equations`."""
         r, n, size = len(z), self.n, self.size
-        points, (own, slopes) = self.points(z), self._own(z)
-        start = np.concatenate([points, np.repeat(own[:, None], n, axis=1)], axis=2)
+        points, start = self.points(z), self.starts(z)
+        _, slopes, order = self.own(z[:, n * size :])
         ends, matrices = self.map.tangent(start.reshape(r * n, -1), 1)
         ends = ends.reshape(r, n, -1)[:, :, :size]
         matrices = matrices.reshape(r, n, start.shape[2], start.shape[2])[:, :, :size]
@@ -122,8 +122,7 @@ class PeriodicOrbits:
             j = (i + 1) % n * size
             derivative[:, i, :, j : j + size] -= np.eye(size)
         by_own = matrices[..., size:] * slopes[:, None, None]
-        columns = n * size + (np.arange(by_own.shape[3]) if self.free else self._order)
-        derivative[..., columns] = by_own
+        derivative[..., n * size + order] = by_own
         unit = self.scale[rows]
         each = unit[:, : n * size].reshape(r, n, size)
         residual = (residual / each).reshape(r, -1)
@@ -154,8 +153,7 @@ class PeriodicOrbits:
 
     def beside(self, z: np.ndarray, point: np.ndarray, row: int) -> float:
         """How far a point float64[D] lies from the limit cycle z, in units of the scale."""
-        values = self._own(z[None])[0]
-        start = np.concatenate([z[None, : self.size], values], axis=1)
+        start = self.starts(z[None])[:, 0]
         unit = self.scale[row, : self.size]
         run = self.map.run(start, self.n, Schedule.even(self.n, SAMPLES)).samples[0]
         apart = np.abs((run[:, : self.size] - point) / unit).max(axis=1)
@@ -207,12 +205,12 @@ class PeriodicOrbits:
             segments = self.segments(derivative[i], row)
             if flows is not None:
                 whole = np.linalg.multi_dot([*segments[::-1], np.eye(self.size)])
-                segments = _across(whole, flows[i])[None]
+                segments = across(whole, flows[i])[None]
             result.append(multipliers(segments))
         return np.array(result)
 
 
-def _across(matrix: np.ndarray, flow: np.ndarray) -> np.ndarray:
+def across(matrix: np.ndarray, flow: np.ndarray) -> np.ndarray:
     """The tangent map across the flow, float64[D - 1, D - 1]."""
     frame = np.linalg.qr(np.concatenate([flow[:, None], np.eye(len(flow))], axis=1))[0]
     rest = frame[:, 1 : len(flow)]

@@ -41,7 +41,8 @@ class SpecialPoint:
     Attributes
     ----------
     kind : str
-        One of KINDS.
+        One of KINDS; ``graze``: a contact appears or vanishes; ``corner``: two contacts come at
+        once.
     after : int
         The point of the curve that it comes after.
     z, tangent : float64[m + 1]
@@ -50,6 +51,13 @@ class SpecialPoint:
         There.
     derivative : float64[m, m + 1]
         Of the equations there, in units of the scale.
+    guards : tuple of int
+        The guard that is grazed; the two that are met at once.
+    phase : float
+        When, in forcing periods since the orbit's first point.
+    outcome : str
+        How a branch of orbits with impacts goes on behind a graze: ``persistence`` or
+        ``nonsmooth_fold``.
     """
 
     kind: str
@@ -58,6 +66,9 @@ class SpecialPoint:
     tangent: np.ndarray
     multipliers: np.ndarray
     derivative: np.ndarray
+    guards: tuple[int, ...] = ()
+    phase: float = np.nan
+    outcome: str = ""
 
 
 def tests(

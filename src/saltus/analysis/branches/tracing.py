@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from saltus.analysis.branches.arclength import ENDING, FIRST, Curve, correct, follow, tangents
+from saltus.analysis.branches.sequence_changes import contact_points
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import SpecialPoint, locate, outside, tests
 
@@ -115,6 +116,21 @@ class Branch:
         """Unit of each unknown."""
         return np.asarray(self.orbits.scale[self.row])
 
+    def find_events(self) -> None:
+        """Locate what happens along the branch; halve the intervals where stability doesn't add
+        up.
+        """
+        for left in reversed(range(HALVINGS)):
+            self.events = _located(self)
+            self.unexplained = _unexplained(self)
+            if not left or not self.unexplained or not len(refine(self, self.unexplained)):
+                break
+        self.events = _in_order(self, [*self.events, *self._contacts()])
+
+    def _contacts(self) -> list[SpecialPoint]:
+        """Where the contact sequence changes."""
+        return contact_points(self.orbits, self.row, self.z, self.tangent)
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -132,6 +148,8 @@ class Plan:
         Doubled branches are followed to orbits of this number of periods.
     switch : set of str
         Kinds of events at which the branches that leave are followed.
+    follow : callable
+        The branches of some starts, such as :func:`both_ways`; None where there is none.
     """
 
     make: Callable[[int, np.ndarray], PeriodicOrbits]
@@ -139,6 +157,7 @@ class Plan:
     points: int
     longest: int
     switch: frozenset[str]
+    follow: Callable[[Plan, Starts, Sequence[int]], list[Branch | None]]
 
 
 def trace(
@@ -157,16 +176,16 @@ def trace(
         wave = [seed for seed in waiting if len(seed.points) == n][:ABREAST]
         waiting = [seed for seed in waiting if all(seed is not other for other in wave)]
         begun += len(wave)
-        starts = _Starts.of(plan, wave)
+        starts = Starts.of(plan, wave)
         fresh = [i for i in starts.found if not _known(starts.z[i], starts.n, branches)]
         fresh = [i for i in fresh if not _ends_there(wave[i], branches)]
-        for i, branch in zip(fresh, _both_ways(plan, starts, fresh), strict=True):
+        for i, branch in zip(fresh, plan.follow(plan, starts, fresh), strict=True):
             if branch is None or _known(starts.z[i], starts.n, branches):
                 continue
             if _ends_there(wave[i], branches):
                 continue
             branches.append(branch)
-            _find_events(branch)
+            branch.find_events()
             waiting += _children(plan, branch, len(branches) - 1)
         if progress is not None:
             progress(begun / (begun + len(waiting)))
@@ -174,7 +193,7 @@ def trace(
 
 # -- following -------------------------------------------------------------------------------------
 @dataclass(frozen=True)
-class _Starts:
+class Starts:
     """Seeds of n periods, closed by Newton's method: float64[k, z], their units, and which were."""
 
     seeds: Sequence[Seed]
@@ -184,7 +203,7 @@ class _Starts:
     found: list[int]
 
     @classmethod
-    def of(cls, plan: Plan, seeds: Sequence[Seed]) -> _Starts:
+    def of(cls, plan: Plan, seeds: Sequence[Seed]) -> Starts:
         """At the parameter of each seed; beside it where a branch leaves another."""
         n = len(seeds[0].points)
         z = np.array([seed.z for seed in seeds])
@@ -204,7 +223,7 @@ class _Starts:
         return cls(seeds, n, point.z, scale, [int(i) for i in np.flatnonzero(point.found)])
 
 
-def _both_ways(plan: Plan, starts: _Starts, which: Sequence[int]) -> list[Branch | None]:
+def both_ways(plan: Plan, starts: Starts, which: Sequence[int]) -> list[Branch | None]:
     """The branches of some seeds of one period; None where there is none."""
     if not which:
         return []
@@ -272,15 +291,6 @@ def _of(
 
 
 # -- events ----------------------------------------------------------------------------------------
-def _find_events(branch: Branch) -> None:
-    """Locate what happens along a branch; halve the intervals where stability doesn't add up."""
-    for left in reversed(range(HALVINGS)):
-        branch.events = _located(branch)
-        branch.unexplained = _unexplained(branch)
-        if not left or not branch.unexplained or not len(refine(branch, branch.unexplained)):
-            break
-
-
 def _located(branch: Branch) -> list[SpecialPoint]:
     values = tests(branch.tangent, branch.derivative, branch.multipliers, branch.z.shape[1] - 1)
     kinds, after = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
@@ -296,8 +306,12 @@ def _located(branch: Branch) -> list[SpecialPoint]:
         if point is not None and _is_real(point)
     ]
     events = [event for event in events if not _is_vertex(event, events, branch)]
-    order = sorted(range(len(events)), key=lambda i: (events[i].after, _ahead(branch, events[i])))
-    return [events[i] for i in order]
+    return _in_order(branch, events)
+
+
+def _in_order(branch: Branch, events: Sequence[SpecialPoint]) -> list[SpecialPoint]:
+    """Events in the order in which the branch comes by."""
+    return sorted(events, key=lambda event: (event.after, _ahead(branch, event)))
 
 
 def _is_vertex(event: SpecialPoint, events: Sequence[SpecialPoint], branch: Branch) -> bool:
@@ -330,7 +344,7 @@ def _unexplained(branch: Branch) -> list[int]:
     count = outside(branch.multipliers).sum(axis=1)
     result = []
     for place, change in enumerate(np.diff(count)):
-        crossings = [_CROSSING[e.kind] for e in branch.events if e.after == place]
+        crossings = [_CROSSING.get(e.kind, 0) for e in branch.events if e.after == place]
         sums = {
             sum(sign * one for sign, one in zip(signs, crossings, strict=True))
             for signs in itertools.product((-1, 1), repeat=len(crossings))

@@ -4,27 +4,31 @@ what contacts add.
 By Liouville's rule the logarithm of the determinant of the tangent is the integral of the trace of
 the Jacobian. At a contact where the force jumps the determinant is multiplied by that of the
 saltation matrix, (n'f_after + g_t) / (n'f_before + g_t): the rate of the gap after the contact over
-the rate before. Nothing here uses the tangent flow, so that the sum of Lyapunov exponents can be
-held against it.
+the rate before. Where the state jumps the matrix itself is made, from the state on both sides;
+where a contact begins to be held volumes vanish. Nothing here uses the tangent flow, so that the
+sum of Lyapunov exponents can be held against it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from saltus.flow.contact_table import ContactTable
 from saltus.flow.engine import Outcome
 from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr, add, depends_on, walk
+from saltus.system.expression import Expr, add, constant, depends_on, state, walk
 from saltus.system.system import System
 
-#: Name of the state that holds the integral, where one is needed; no user can write it.
-_INTEGRAL = "integral of the divergence"
+#: Names of states that are added, which no user can write: the integral, where one is needed, and
+#: the states before the last impact or jump.
+_INTEGRAL, _BEFORE = "integral of the divergence", "{} before a jump"
 
 
 class Divergence:
@@ -40,27 +44,20 @@ class Divergence:
         self._trace = _sum([row[i] for i, row in enumerate(system.jacobian)])
         self._moves = depends_on(self._trace, ("state", "time"))
         self._by_mode = any(node.op == "select" for node in walk(self._trace))
-        units = {**system.units, _INTEGRAL: ""}
-        self._extended = replace(
-            system,
-            states=(*system.states, _INTEGRAL),
-            field=(*system.field, self._trace),
-            units=units,
-        )
+        self._remembering = _remembering(system)
+        self._extended = _with_states(self._remembering, {_INTEGRAL: self._trace})
 
-    def of_blocks(self, map_: Stroboscope, start: np.ndarray) -> np.ndarray:
-        """Logarithm of the growth of volumes over one block from float64[k, D], each with its row
-        of the map, float64[k].
+    def of_blocks(self, map_: Stroboscope, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Over one block from float64[k, D], each with its row of the map: logarithm of the growth
+        of volumes, float64[k], and how many directions are lost where contacts are held, int64[k].
         """
         constant = not self._moves and not self._by_mode
         if constant and not self._system.guards:
-            return self._constant(map_)
+            return self._constant(map_), np.zeros(len(start), np.int64)
         integrated = self._moves or (self._by_mode and not map_.method.records_contacts)
-        if integrated:
-            start = np.concatenate([start, np.zeros((len(start), 1))], axis=1)
-        outcome = map_.of_system(self._extended if integrated else self._system).run(
-            start, 1, record=0
-        )
+        system = self._extended if integrated else self._remembering
+        more = len(system.states) - start.shape[1]
+        outcome = map_.of_system(system).run(np.pad(start, ((0, 0), (0, more))), 1, record=0)
         total = (
             outcome.state[:, -1].copy()
             if integrated
@@ -69,7 +66,23 @@ class Divergence:
             else self._dwelling(map_, outcome)
         )
         np.add.at(total, outcome.contacts.trajectory, self._jumps(map_, outcome))
-        return np.where(np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED)), total, np.nan)
+        good = np.isin(outcome.status, (st.OK, st.GRAZE_UNRESOLVED))
+        lost = np.maximum(self._lost(outcome, len(start)), np.isneginf(total))
+        return np.where(good, total, np.nan), lost
+
+    def _lost(self, outcome: Outcome, size: int) -> np.ndarray:
+        """The most constraints that are held at once, int64[k]: two of a contact at rest, its place
+        and its velocity, one of a surface.
+        """
+        contacts, most = outcome.contacts, np.zeros(size, np.int64)
+        held = np.zeros(len(contacts), np.int64)
+        for guard, bit in zip(self._system.guards, self._bits(contacts.mode_after), strict=True):
+            if guard.law is not None and guard.law.kind == "hold":
+                owner = self._system.guards[guard.law.partner].law
+                held += np.where(bit, 2 if owner is not None and owner.kind == "impact" else 1, 0)
+        begins = contacts.kind == st.HOLD
+        np.maximum.at(most, contacts.trajectory[begins], held[begins])
+        return np.minimum(most, len(self._system.states))
 
     def _constant(self, map_: Stroboscope) -> np.ndarray:
         """A trace of parameters only."""
@@ -102,17 +115,15 @@ class Divergence:
         return [(mode >> i) & 1 == 1 for i in range(len(self._system.guards))]
 
     def _jumps(self, map_: Stroboscope, outcome: Outcome) -> np.ndarray:
-        """Logarithm of the determinant of the saltation matrix at each contact."""
+        """Logarithm of the determinant of the saltation matrix at each contact; where one begins to
+        be held -inf.
+        """
         system, contacts = self._system, outcome.contacts
-        here: dict[str, Any] = {
-            "t": contacts.time,
-            # an integral may follow them
-            "states": dict(zip(system.states, contacts.state.T, strict=False)),
-            "values": {name: column[contacts.trajectory] for name, column in map_.values.items()},
-        }
+        carried, behind = _carried(contacts)
+        here = self._here(map_, contacts, 0)
         before, after = self._bits(contacts.mode_before), self._bits(contacts.mode_after)
         fields = [evaluate(system.field, bits=bits, **here) for bits in (before, after)]
-        logarithm = np.zeros(len(contacts))
+        logarithm = np.where(contacts.kind == st.HOLD, -np.inf, 0.0)
         for g, guard in enumerate(system.guards):
             *normal, drift = evaluate(
                 [*gradient(guard.gap, system.states), time_derivative(guard.gap)],
@@ -123,10 +134,99 @@ class Divergence:
                 sum((n * f for n, f in zip(normal, field, strict=True)), start=drift)
                 for field in fields
             ]
-            mine = (contacts.guard == g) & (contacts.kind == st.CROSSING)
+            mine = (contacts.guard == g) & (contacts.kind == st.CROSSING) & ~carried
             with np.errstate(all="ignore"):
                 logarithm = np.where(mine, np.log(np.abs(rates[1] / rates[0])), logarithm)
+            if guard.law is not None and guard.law.reset:
+                rows = np.flatnonzero((contacts.guard == g) & (contacts.kind == st.IMPACT))
+                logarithm[rows] = self._reset(map_, contacts.rows(rows), g, behind[rows])
         return logarithm
+
+    def _reset(
+        self, map_: Stroboscope, contacts: ContactTable, g: int, behind: np.ndarray
+    ) -> np.ndarray:
+        """Logarithm of the determinant of S = J + (f_after - J f_before - J_t) n'/(n'f_before +
+        g_t) at impacts or jumps of one guard, J the derivative of the state after by that before.
+        """
+        system, guard = self._system, self._system.guards[g]
+        assert guard.law is not None
+        size, k = len(system.states), len(contacts)
+        was = self._here(map_, contacts, size) | {"bits": self._bits(contacts.mode_before)}
+        now = self._here(map_, contacts, 0) | {"bits": self._bits(behind)}
+
+        def columns(expressions: Sequence[Expr], **where: Any) -> np.ndarray:
+            return np.stack(
+                [np.broadcast_to(one, k) for one in evaluate(expressions, **where)], axis=-1
+            )
+
+        reset = guard.law.reset
+        slopes = [entry for one in reset for entry in gradient(one, system.states)]
+        jacobian = columns(slopes, **was).reshape(k, size, size)
+        drift = columns([time_derivative(one) for one in reset], **was)
+        normal = columns([*gradient(guard.gap, system.states), time_derivative(guard.gap)], **was)
+        first, last = columns(system.field, **was), columns(system.field, **now)
+        leap = last - np.einsum("kij,kj->ki", jacobian, first) - drift
+        closing = np.einsum("kj,kj->k", normal[:, :size], first) + normal[:, size]
+        with np.errstate(all="ignore"):
+            along = normal[:, None, :size] / closing[:, None, None]
+            return np.asarray(np.linalg.slogdet(jacobian + leap[:, :, None] * along)[1])
+
+    def _here(self, map_: Stroboscope, contacts: ContactTable, first: int) -> dict[str, Any]:
+        """Where contacts are, for :func:`evaluate`; the states are columns from ``first`` on."""
+        columns = contacts.state.T[first:]  # more may follow them
+        return {
+            "t": contacts.time,
+            "states": dict(zip(self._system.states, columns, strict=False)),
+            "values": {name: column[contacts.trajectory] for name, column in map_.values.items()},
+        }
+
+
+def _carried(contacts: ContactTable) -> tuple[np.ndarray, np.ndarray]:
+    """Which contacts are boundaries over which an impact has carried the state, bool[n], and the
+    mode behind each contact and those that it has carried over, int64[n].
+    """
+    same = (np.diff(contacts.trajectory, prepend=-1) == 0) & (
+        np.diff(contacts.time, prepend=np.nan) == 0
+    )
+    carried = same & (contacts.kind == st.CROSSING) & (contacts.velocity == 0.0)
+    begins = np.flatnonzero(~carried)
+    last = np.append(begins[1:], len(contacts))[: len(begins)] - 1
+    return carried, np.repeat(contacts.mode_after[last], np.diff(np.append(begins, len(contacts))))
+
+
+def _with_states(system: System, rates: Mapping[str, Expr]) -> System:
+    """The system with more states, which laws don't touch."""
+    new = [state(name) for name in rates]
+    return replace(
+        system,
+        states=(*system.states, *rates),
+        field=(*system.field, *rates.values()),
+        units={**system.units, **dict.fromkeys(rates, "")},
+        guards=tuple(
+            replace(guard, law=guard.law.extended(new)) if guard.law else guard
+            for guard in system.guards
+        ),
+    )
+
+
+def _remembering(system: System) -> System:
+    """The system with the states before the last impact or jump as further states, if it has any
+    such law.
+    """
+    if not any(guard.law and guard.law.reset for guard in system.guards):
+        return system
+    size = len(system.states)
+    extended = _with_states(system, {_BEFORE.format(name): constant(0.0) for name in system.states})
+    was = tuple(map(state, system.states))
+    return replace(
+        extended,
+        guards=tuple(
+            replace(guard, law=replace(guard.law, reset=(*guard.law.reset[:size], *was)))
+            if guard.law and guard.law.reset
+            else guard
+            for guard in extended.guards
+        ),
+    )
 
 
 def _sum(terms: list[Expr]) -> Expr:

@@ -189,7 +189,7 @@ def _rest(found: Spectrum, flow: TangentFlow, start: np.ndarray, every: float) -
         found.exponents[i] = own.real * every
         found.errors[i] = found.half_width[i] = rounding * np.abs(own).max() * every
         found.batches[i], found.kinds[i] = 0, Kind.EQUILIBRIUM.word
-        found.volume[i] = flow.rows(np.array([i])).divergences(still.place[[i]][:, None])[0, 0]
+        found.volume[i] = flow.rows(np.array([i])).divergences(still.place[[i]][:, None])[0][0, 0]
 
 
 def _with_phase(exponents: np.ndarray) -> np.ndarray:

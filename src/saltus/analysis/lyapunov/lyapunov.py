@@ -107,7 +107,9 @@ def lyapunov(
         ``lyapunov_exponent`` with ``lyapunov_error`` (standard error) and the 95 % interval
         ``lyapunov_low``, ``lyapunov_high``: of an orbit the effect of rounding; of any other motion
         from batch means whose batches grow until they are independent (Flyvbjerg & Petersen 1989),
-        ``independent_batches`` of them, by Student's t. ``kind``: ``periodic``, ``quasi_periodic``,
+        ``independent_batches`` of them, by Student's t; -inf, without an error, of directions
+        of which nothing is left where a contact sticks or rests, and NaN of those that are lost in
+        the rounding of the fastest. ``kind``: ``periodic``, ``quasi_periodic``,
         ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``; ``response_period``: n of nT,
         or 0. ``exponent_sum`` beside ``mean_divergence``, which must agree: the mean trace of the
         Jacobian and what contacts add, found without the tangent. ``near_graze``: 1 if the motion

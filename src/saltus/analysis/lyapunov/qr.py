@@ -39,6 +39,8 @@ class Growth:
         Logarithm of the growth of the frame's axes in each block.
     volume : float64[k, n]
         Logarithm of the growth of volumes, found without the tangent.
+    zeros : int64[k]
+        Directions that vanish: contacts that are held keep no deviation from them.
     scale : float64[k, D]
         Range of each state.
     segment : Segment
@@ -48,6 +50,7 @@ class Growth:
 
     rates: np.ndarray
     volume: np.ndarray
+    zeros: np.ndarray
     scale: np.ndarray
     segment: Segment
 
@@ -87,17 +90,19 @@ def grow(
         [before],
         before.points[:, -1],
     )
+    zeros = np.zeros(k, np.int64)
     for first in range(0, count, SEGMENT):
         last = min(first + SEGMENT, count)
         segment = flow.advance(state, last - first)
         blocks = segment.points[:, :-1]
         rates[:, first:last], frame = carry(flow.derivatives(blocks), frame, scale)
-        volume[:, first:last] = flow.divergences(blocks)
+        volume[:, first:last], lost = flow.divergences(blocks)
+        zeros = np.maximum(zeros, lost.max(axis=1))
         segments.append(segment)
         state = segment.points[:, -1]
         if progress:
             progress(last / count)
-    return Growth(rates, volume, scale, _joined(segments))
+    return Growth(rates, volume, zeros, scale, _joined(segments))
 
 
 def _scale(start: np.ndarray, motion: np.ndarray) -> np.ndarray:

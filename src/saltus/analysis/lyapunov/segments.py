@@ -78,14 +78,13 @@ class TangentFlow:
             self._blocks(k, n).tangent(states.reshape(k * n, size), 1)[1].reshape(k, n, size, size)
         )
 
-    def divergences(self, states: np.ndarray) -> np.ndarray:
-        """Logarithm float64[k, n] of the factor by which volumes grow in the block that begins at
-        each of float64[k, n, D].
+    def divergences(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of the block that begins at each of float64[k, n, D]: logarithm of the factor by which
+        volumes grow, float64[k, n], and directions that are lost in it for good, int64[k, n].
         """
         k, n, size = states.shape
-        return self._divergence.of_blocks(self._blocks(k, n), states.reshape(k * n, size)).reshape(
-            k, n
-        )
+        growth, lost = self._divergence.of_blocks(self._blocks(k, n), states.reshape(k * n, size))
+        return growth.reshape(k, n), lost.reshape(k, n)
 
     def rows(self, which: np.ndarray) -> Self:
         """Some of the trajectories, int64[m], with repeats if wanted."""

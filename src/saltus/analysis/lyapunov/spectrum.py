@@ -101,11 +101,13 @@ def spectrum(
     for i, orbit in enumerate(orbits):
         if orbit is None:
             kinds.append(kind_of(rates[i], errors[i], forced))
+            _vanish(growth.zeros[i], exponents[i], errors[i], half_width[i])
             continue
         kinds.append((Kind.PERIODIC if forced else Kind.EQUILIBRIUM).word)
         exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i])
+        volume[i], zeros = _volume(flow, i, orbit)
+        _vanish(zeros, exponents[i], errors[i])
         half_width[i], batches[i] = errors[i], 0
-        volume[i] = _volume(flow, i, orbit)
     return Spectrum(
         exponents, errors, half_width, volume, batches, orbits, kinds, ends, running, growth
     )
@@ -118,6 +120,16 @@ def _told(rates: np.ndarray) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         lost = ~((rates[:, :, :1] - rates).mean(axis=1, keepdims=True) < LOST)
     return np.where(lost, np.nan, rates)
+
+
+def _vanish(zeros: int, exponents: np.ndarray, *errors: np.ndarray) -> None:
+    """Let the last exponents of a trajectory float64[D] be those of directions that vanish, without
+    an error: a contact that is held keeps no deviation from it.
+    """
+    last = len(exponents) - zeros
+    exponents[last:] = -np.inf
+    for one in errors:
+        one[last:] = 0.0
 
 
 # -- orbits ----------------------------------------------------------------------------------------
@@ -181,12 +193,14 @@ def _round_trips(
     trips = max(-(-TRIPS // n), 8) // 4 * 4
     rates, _ = carry(np.tile(blocks, (trips, 1, 1))[None], np.eye(size)[None], scale[None])
     early, late = rates[0, trips // 2 * n :].reshape(2, -1, size).mean(axis=1)
-    return 0.5 * (early + late), np.abs(late - early) + flow.map.noise
+    with np.errstate(invalid="ignore"):  # both may be -inf
+        return 0.5 * (early + late), np.abs(late - early) + flow.map.noise
 
 
-def _volume(flow: TangentFlow, i: int, orbit: Orbit) -> float:
-    """Mean growth of volumes over an orbit."""
-    return float(flow.rows(np.full(orbit.period, i)).divergences(orbit.points[:, None]).mean())
+def _volume(flow: TangentFlow, i: int, orbit: Orbit) -> tuple[float, int]:
+    """Mean growth of volumes over an orbit, and directions that vanish on it."""
+    growth, lost = flow.rows(np.full(orbit.period, i)).divergences(orbit.points[:, None])
+    return float(growth.mean()), int(lost.max())
 
 
 # -- kinds -----------------------------------------------------------------------------------------

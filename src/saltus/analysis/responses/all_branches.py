@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.branch_table import table_of
+from saltus.analysis.branches.plans import plan_of
 from saltus.analysis.branches.seeds import scaled, seeds_of
-from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.tracing import Branch, Plan, Seed, trace
+from saltus.analysis.branches.tracing import Branch, Seed, trace
 from saltus.analysis.outputs import outputs_of
 from saltus.analysis.responses.continued import LONGEST_DOUBLED, POINTS, SWITCHES, seeds_of_grid
 from saltus.analysis.responses.grid import grid_of
@@ -50,14 +50,15 @@ def branches(
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
     """Branches of periodic orbits over a parameter, stable and unstable, with folds, period
-    doublings, branch points and tori.
+    doublings, branch points, tori and grazes.
 
     Each branch is followed by pseudo-arclength continuation on the exact flow, in both directions
     and through its folds, until it leaves the range or closes: an isola. Contacts come and go by
     themselves; no contact sequence is given. Derivatives, also with respect to the parameter, are
     those of the tangent flow. Bifurcations are located to rounding; where the number of multipliers
     outside the unit circle changes otherwise, the step is refined, and what stays unexplained is
-    counted in ``branch_unexplained``.
+    counted in ``branch_unexplained``. Orbits with impacts are followed from contact to contact,
+    through the grazes at which an impact appears or vanishes.
 
     Parameters
     ----------
@@ -109,7 +110,11 @@ def branches(
         ``point_output_maximum`` and so on of each state and output. On branch:
         ``branch_periods``, ``branch_closed``, ``branch_parent``, ``branch_begin``, ``branch_end``.
         On event: ``event_kind`` (``fold``, ``period_doubling``, ``branch_point``,
-        ``neimark_sacker``), ``event_<parameter>``, its states and multipliers.
+        ``neimark_sacker``; ``graze``: a contact appears or vanishes; ``corner``: two contacts come
+        at once), ``event_<parameter>``, its states and multipliers, ``event_guard`` and
+        ``event_phase`` of a graze or corner, and of a graze of orbits with impacts
+        ``event_outcome``: ``persistence``, where orbits with the impact go on from those without
+        it, or ``nonsmooth_fold``, where both lie on one side.
 
     Raises
     ------
@@ -165,10 +170,7 @@ def branches(
                     f'{limits[1]:g}: give other starts, more of them (start="random 20" with '
                     "box=), or longer runs (periods=)."
                 )
-            plan = Plan(
-                lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads),
-                limits, points, longest, chosen,
-            )  # fmt: skip
+            plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
             trace(plan, begins, done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:
             partial = functools.partial(table_of, system, name, limits, done, wanted, method)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.branches.branch_table import attributes_of, values_of
+from saltus.analysis.branches.plans import plan_of
 from saltus.analysis.branches.seeds import scaled, seeds_at
-from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.tracing import Branch, Plan, Seed, branch_of, trace
+from saltus.analysis.branches.tracing import Branch, Seed, branch_of, trace
 from saltus.analysis.orbits.tolerances import LONGEST
 from saltus.analysis.outputs import Outputs
 from saltus.analysis.responses.grid import Grid
@@ -66,10 +66,7 @@ def continued(
     """
     ((name, values),) = grid.axes.items()
     system, limits = grid.system, (float(values[0]), float(values[-1]))
-    plan = Plan(
-        lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads),
-        limits, POINTS, LONGEST_DOUBLED, frozenset(SWITCHES),
-    )  # fmt: skip
+    plan = plan_of(system, name, limits, method, threads, POINTS, LONGEST_DOUBLED, SWITCHES)
     branches = list[Branch]()
     trace(plan, seeds_of_grid(found, grid, method), branches, progress)
     of = np.full(len(found), -1, np.int64)

@@ -18,6 +18,8 @@ BRANCH_ENDS = {
     "period_doubling": "where it becomes an orbit of half the period",
     "points": "as many points as were asked for",
     "lost": "no step leads on, however short",
+    "graze": "a graze behind which it isn't known how it goes on",
+    "corner": "two contacts at once, behind which it isn't known how it goes on",
     "interrupted": "interrupted",
 }
 
@@ -83,6 +85,15 @@ BRANCHES_VARIABLES = {
     ),
     "event": Variable(_EVENT, "1", "event", "i8", coord=True),
     "event_kind": Variable(_EVENT, "", "bifurcation", "str"),
+    "event_guard": Variable(
+        _EVENT, "", "guard that is grazed, or guards that are met at once", "str"
+    ),
+    "event_phase": Variable(
+        _EVENT, "1", "when it is grazed, in forcing periods since the orbit's first point"
+    ),
+    "event_outcome": Variable(
+        _EVENT, "", "how a branch of orbits with impacts goes on behind a graze", "str"
+    ),
     "event_branch": Variable(_EVENT, "1", "branch on which it lies", "i8"),
     "event_point": Variable(_EVENT, "1", "point of the branch that comes before it", "i8"),
     "event_<parameter>": Variable(_EVENT, "<parameter>", "<parameter>"),

@@ -23,6 +23,7 @@ from saltus.results.dataset.attractors import (
     ATTRACTORS_VARIABLES,
     BASINS_VARIABLES,
 )
+from saltus.results.dataset.backbones import BACKBONE_VARIABLES
 from saltus.results.dataset.bifurcation_curves import CURVE_VARIABLES
 from saltus.results.dataset.branches import BRANCHES_VARIABLES
 from saltus.results.dataset.equilibria import EQUILIBRIA_VARIABLES
@@ -42,7 +43,7 @@ BASINS, ATTRACTORS, AGREEMENT, RESPONSES = "basins", "attractors", "agreement", 
 METHODS, EXPONENTS = "methods", "exponents"
 ORBITS = "orbits"
 SETTLED, WIDTHS, MODES, BRANCHES = "settled", "widths", "modes", "branches"
-CURVE = "bifurcation_curve"
+CURVE, BACKBONE = "bifurcation_curve", "backbone"
 EQUILIBRIA = "equilibria"
 SECTION, SPECTRUM, IMPACTS, ENERGY = "section", "spectrum", "impacts", "energy"
 #: The function that returns each kind.
@@ -58,7 +59,7 @@ MAKERS = {
     SETTLED: "sl.settled", WIDTHS: "sl.regularisation_widths",
     ORBITS: "sl.periodic_orbits or sl.edge_orbit",
     MODES: "sl.structure_modes", BRANCHES: "sl.branches",
-    CURVE: "sl.bifurcation_curve",
+    CURVE: "sl.bifurcation_curve", BACKBONE: "sl.backbone",
     EQUILIBRIA: "sl.equilibria",
 }  # fmt: skip
 
@@ -83,6 +84,7 @@ TABLES = {
     EQUILIBRIA: EQUILIBRIA_VARIABLES,
     BRANCHES: BRANCHES_VARIABLES,
     CURVE: CURVE_VARIABLES,
+    BACKBONE: BACKBONE_VARIABLES,
 }
 
 
@@ -297,6 +299,7 @@ def _needed(ds: xr.Dataset, kind: str) -> tuple[str, ...]:
         EQUILIBRIA: ("equilibrium_type", "equilibrium_place"),
         BRANCHES: ("point_branch", "point_stable", "branch_periods"),
         CURVE: ("point_arclength", "codim2_kind"),
+        BACKBONE: ("backbone_frequency", "point_output_peak"),
         WIDTHS: ("regularisation_error", "error", "steps_per_period"),
     }[kind]
 

@@ -11,7 +11,7 @@ from inspect import signature
 from typing import Any
 
 from saltus.errors import StudyError
-from saltus.system import freeplay, piecewise
+from saltus.system import freeplay, hunt_crossley, piecewise
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 #: Texts in quotes, which repeat what somebody wrote; calls and arguments of Python.
@@ -24,7 +24,9 @@ _PYTHON = re.compile("|".join((_QUOTED, _METHOD, _SYSTEM, _CALL, _KEY)))
 _NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?\b|True\b|False\b")
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
 #: Arguments that formulas give by name too, as Python does: ``piecewise(..., otherwise=0)``.
-_OF_FORMULAS = {*signature(freeplay).parameters, *signature(piecewise).parameters}
+_OF_FORMULAS = {
+    *(name for one in (freeplay, hunt_crossley, piecewise) for name in signature(one).parameters)
+}
 _QUESTIONS = (
     "simulate", "poincare", "spectrum", "lyapunov", "frequency_response", "bifurcation_diagram",
     "branches", "basins", "compare",

@@ -30,8 +30,8 @@ class Ellipses:
 
 def test_closed_curves_are_closed_whatever_their_size():
     curves = follow(
-        Ellipses([1.0, 3.0]), np.array([[1.0, 0.0]] * 2), np.array([[0.0, 1.0]] * 2), 1,
-        (-10, 10), 2000,
+        Ellipses([1.0, 3.0]), np.array([[1.0, 0.0]] * 2), np.array([[0.0, 1.0]] * 2),
+        {1: (-10, 10)}, 2000,
     )  # fmt: skip
     for curve, b in zip(curves, (1.0, 3.0), strict=True):
         z = np.array(curve.z)
@@ -44,7 +44,7 @@ def test_closed_curves_are_closed_whatever_their_size():
 
 def test_a_curve_ends_exactly_at_the_end_of_the_range():
     (curve,) = follow(
-        Ellipses([1.0]), np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), 1, (-0.5, 0.5), 2000
+        Ellipses([1.0]), np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), {1: (-0.5, 0.5)}, 2000
     )
     assert curve.end == "range"
     assert curve.z[-1][1] == 0.5
@@ -59,7 +59,7 @@ def test_where_no_step_leads_on_the_curve_says_so():
             return value, derivative
 
     (curve,) = follow(
-        Ending([1.0]), np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), 1, (-2, 2), 2000
+        Ending([1.0]), np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), {1: (-2, 2)}, 2000
     )
     assert curve.end == "lost"
     assert 0.299 < curve.z[-1][1] <= 0.3

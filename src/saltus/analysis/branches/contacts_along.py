@@ -1,0 +1,99 @@
+"""What happens at the contacts of a sequence, as functions of the state and the time: the gap, its
+rate, the state behind the contact, and their derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.branches.contact_sequences import Contact
+from saltus.system import expression as ex
+from saltus.system.derivatives import gradient, time_derivative
+from saltus.system.evaluate import evaluate
+from saltus.system.expression import Expr
+from saltus.system.leg import frozen
+from saltus.system.system import System
+
+
+@dataclass(frozen=True)
+class At:
+    """The contacts of r orbits; times are in the unit of the parametric system.
+
+    Attributes
+    ----------
+    gap : float64[r, m]
+        Of the guard of each contact.
+    normal, gap_by_time : float64[r, m, E], float64[r, m]
+        Its derivatives with respect to the states and the time.
+    rate : float64[r, m, D]
+        Of the states before the contact.
+    after : float64[r, m, D]
+        The states behind it.
+    by_state, by_time : float64[r, m, D, E], float64[r, m, D]
+        Their derivatives.
+    """
+
+    gap: np.ndarray
+    normal: np.ndarray
+    gap_by_time: np.ndarray
+    rate: np.ndarray
+    after: np.ndarray
+    by_state: np.ndarray
+    by_time: np.ndarray
+
+
+class Jumps:
+    """The contacts of a sequence in a system.
+
+    Parameters
+    ----------
+    system : System
+        E states, of which the first ``size`` move.
+    contacts : sequence of Contact
+        None: an orbit without contacts, of which the first point is the only place.
+    size : int
+        D.
+    """
+
+    def __init__(self, system: System, contacts: Sequence[Contact], size: int, mode: int = 0):
+        self._system = system
+        states = [ex.state(name) for name in system.states]
+        self._entries: list[tuple[Expr, ...]] = []
+        for contact in contacts or (None,):
+            gap, after, before = ex.constant(0.0), tuple(states[:size]), mode
+            if contact is not None:
+                guard, before = system.guards[contact.guard], contact.before
+                gap, law = guard.gap, guard.law
+                if law is not None and law.reset and contact.direction == -law.side:
+                    after = law.reset[:size]
+            gap, *left = frozen(system, (gap, *after), before)
+            rates = frozen(system, system.field[:size], before)
+            self._entries.append(
+                (
+                    gap, *gradient(gap, system.states), time_derivative(gap), *rates, *left,
+                    *(slope for one in left for slope in gradient(one, system.states)),
+                    *map(time_derivative, left),
+                )
+            )  # fmt: skip
+        self._size = size
+
+    def at(self, time: np.ndarray, states: np.ndarray) -> At:
+        """What happens at times float64[r, m] in states float64[r, m, E]."""
+        (r, m, width), size = states.shape, self._size
+        columns = np.empty((len(self._entries[0]), r, m))
+        for i, entries in enumerate(self._entries):
+            named = dict(zip(self._system.states, states[:, i].T, strict=True))
+            values = evaluate(entries, t=time[:, i], states=named, values=self._system.values)
+            for column, value in zip(columns, values, strict=True):
+                column[:, i] = value
+        last = np.moveaxis(columns, 0, -1)
+        gap, normal, by_time, rate, after, by_state, after_by_time = np.split(
+            last, np.cumsum([1, width, 1, size, size, size * width]), axis=2
+        )
+        return At(
+            gap[..., 0], normal, by_time[..., 0], rate, after,
+            by_state.reshape(r, m, size, width), after_by_time,
+        )  # fmt: skip

@@ -1,0 +1,166 @@
+"""The equations of free vibrations without damping: a system whose forcing and damping are zero,
+and the families of its periodic orbits.
+
+Such orbits come in families, of which the amplitude is a parameter, and one of the equations that
+close them follows from the others, since energy is conserved. A damping ``-d v`` of all velocities
+makes the equations independent; d vanishes on the family. Munoz-Almaraz et al., Physica D 181
+(2003) 1; Kerschen et al., Mech. Syst. Signal Process. 23 (2009) 170 (nonlinear normal modes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.orbits.equilibria import autonomous, field_of, jacobian_of
+from saltus.errors import ParameterError
+from saltus.flow.engine import Schedule
+from saltus.flow.methods import Method
+from saltus.system import expression as ex
+from saltus.system.expression import Expr
+from saltus.system.guards import Guard
+from saltus.system.system import System
+
+#: Samples among which a first return is looked for.
+SAMPLES = 1024
+#: Steps of Newton's method to the place of rest, and the last one's share of the largest state.
+MOST_STEPS, CONVERGED = 60, 1e-13
+#: A mode vibrates if its decay is smaller than this share of its frequency.
+UNDAMPED = 1e-6
+
+
+def free_system(system: System) -> tuple[System, str]:
+    """The system without those parameters that are zero, and with a damping d of all velocities;
+    the name of that parameter.
+
+    Raises
+    ------
+    ParameterError
+        If its equations still depend on time, or no state is the velocity of another.
+    """
+    zeros = {ex.parameter(n): ex.constant(0.0) for n, value in system.values.items() if value == 0}
+    field = [ex.substituted(entry, zeros) for entry in system.field]
+    speeds = {entry.payload for entry in system.field if entry.op == "state"}
+    if not speeds:
+        raise ParameterError(
+            f"{system.name} has no state that is the velocity of another: sl.backbone needs "
+            "displacements x and velocities v with dx/dt = v."
+        )
+    name = "fictitious_damping"
+    drag = ex.parameter(name)
+    for i, state in enumerate(system.states):
+        if state in speeds:
+            field[i] = ex.sub(field[i], ex.mul(drag, ex.state(state)))
+    made = replace(
+        system, field=tuple(field), guards=tuple(_guard(guard, zeros) for guard in system.guards),
+        forced_at=None, values={**system.values, name: 0.0},
+        units={**system.units, name: "1/s"},
+    )  # fmt: skip
+    if not autonomous(made):
+        raise ParameterError(
+            f"{system.name} is forced: its equations depend on time. Set the force, and what "
+            'damps, to zero: values={"force": 0, "damping_ratio": 0}.'
+        )
+    return made, name
+
+
+def _guard(guard: Guard, new: Mapping[Expr, Expr]) -> Guard:
+    """A boundary and its law with other nodes in the places of some."""
+
+    def each(value: Any) -> Any:
+        if isinstance(value, Expr):
+            return ex.substituted(value, new)
+        return tuple(map(each, value)) if isinstance(value, tuple) else value
+
+    law = guard.law and replace(
+        guard.law, **{one.name: each(getattr(guard.law, one.name)) for one in fields(guard.law)}
+    )
+    return replace(guard, gap=each(guard.gap), boundary=each(guard.boundary), law=law)
+
+
+class FreeOrbits(PeriodicOrbits):
+    """Periodic orbits that begin where a state passes its place of rest.
+
+    Parameters
+    ----------
+    system, name
+        From :func:`free_system`.
+    scale : float64[1, z]
+        Units of the points, the period and the damping.
+    rest : float64[D]
+        The place of rest.
+    column : int
+        The state.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        name: str,
+        scale: np.ndarray,
+        method: Method,
+        rest: np.ndarray,
+        column: int,
+        threads: int | None = None,
+    ) -> None:
+        super().__init__(system, (name,), 1, scale, method, threads)
+        self.phase[:, 0], self.phase[:, 1] = rest, np.eye(self.size)[column]
+        self._rest, self._column = rest[column], column
+
+    def first_return(self, start: np.ndarray, longest: float) -> tuple[float, np.ndarray]:
+        """Time after which a motion from float64[D] first passes the place of rest again in the
+        same direction, to a sample [s], NaN if it doesn't; and the largest magnitudes float64[D]
+        on the way.
+        """
+        begin = np.array([[*start, longest, 0.0]])
+        seen = self.map.run(begin, 1, Schedule.even(1, SAMPLES)).samples[0][:, : self.size]
+        above = seen[:, self._column] > self._rest
+        back = np.flatnonzero(above[1:] & ~above[:-1] & (np.arange(SAMPLES - 1) > 0))
+        if not len(back):
+            return np.nan, np.full(self.size, np.nan)
+        return float((back[0] + 1) / SAMPLES * longest), np.abs(seen[: back[0] + 1]).max(axis=0)
+
+    def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
+        """The condition on the phase stays."""
+
+
+def place_of_rest(system: System) -> np.ndarray:
+    """Where the field vanishes, by Newton's method from zero."""
+    values = {name: np.array([value]) for name, value in system.values.items()}
+    state = np.zeros((1, len(system.states)))
+    for _ in range(MOST_STEPS):
+        rates, matrix = field_of(system, state, values), jacobian_of(system, state, values)
+        step = -np.linalg.lstsq(matrix[0], rates[0], rcond=None)[0]
+        state = state + step
+        if not np.isfinite(state).all():
+            break
+        if np.abs(step).max() <= CONVERGED * np.abs(state).max(initial=0.0):
+            return np.asarray(state[0])
+    raise ParameterError(
+        f"no place of rest of {system.name} was found from zero: a backbone begins with small "
+        "vibrations about one."
+    )
+
+
+def linear_mode(system: System, rest: np.ndarray, mode: int) -> tuple[float, np.ndarray, int]:
+    """Period of a mode of small vibrations [s], its complex amplitudes complex128[D] in units of
+    the largest displacement, which passes its rest at phase zero, and which state that is.
+    """
+    values = {name: np.array([value]) for name, value in system.values.items()}
+    roots, shapes = np.linalg.eig(jacobian_of(system, rest[None], values)[0])
+    fit = (roots.imag > 0) & (np.abs(roots.real) <= UNDAMPED * np.abs(roots.imag))
+    order = np.flatnonzero(fit)[np.argsort(roots.imag[fit])]
+    if not 1 <= mode <= len(order):
+        raise ParameterError(
+            f"{system.name} has {len(order)} undamped modes of small vibrations, and mode={mode} "
+            "was asked for. Set what damps to zero by values=."
+        )
+    root, shape = roots[order[mode - 1]], shapes[:, order[mode - 1]]
+    places = [i for i, entry in enumerate(system.field) if entry.op == "state"]
+    column = max(places, key=lambda i: abs(shape[i]))
+    shape = shape / shape[column] * -1j
+    return 2 * np.pi / float(root.imag), shape, column

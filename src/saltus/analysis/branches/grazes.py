@@ -1,0 +1,203 @@
+"""Grazes and corners: the orbits of a branch at which a contact appears or vanishes, or two
+contacts come at once and change their order.
+
+A graze is the orbit without the contact that touches the boundary: R = 0, g(y(t)) = 0 and
+g'(y(t)) = 0 in the orbit, the parameter and the time t, with the legs of the orbit (legs.py) in R.
+All of it is smooth, whatever the contact does to a motion that meets it, so Newton's method finds
+it to rounding. At a corner a leg lasts no time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from saltus.analysis.branches.legs import Legs
+from saltus.analysis.orbits.newton import newton
+from saltus.system.derivatives import gradient, time_derivative
+from saltus.system.evaluate import evaluate
+from saltus.system.expression import Expr, add, mul
+from saltus.system.leg import frozen
+
+#: Places along a leg at which its gap is looked at for a first guess.
+LOOKS = 200
+
+
+@dataclass(frozen=True)
+class ContactEvent:
+    """An orbit at which a contact sequence changes.
+
+    Attributes
+    ----------
+    kind : str
+        ``graze`` or ``corner``.
+    guards : tuple of int
+        The guard that is grazed; the two that are met at once.
+    phase : float
+        When, in periods since the orbit's first point.
+    legs : Legs
+        The orbit's equations, without the contact that grazes.
+    z : float64[z]
+        The orbit in them.
+    place : int
+        The leg on which it happens.
+    state : float64[D]
+        There.
+    slope : float64[z]
+        Derivative of the gap that grazes with respect to the orbit; of a corner, of the time
+        between the contacts.
+    """
+
+    kind: str
+    guards: tuple[int, ...]
+    phase: float
+    legs: Legs
+    z: np.ndarray
+    place: int
+    state: np.ndarray
+    slope: np.ndarray
+
+    @property
+    def orbit(self) -> np.ndarray:
+        """The orbit by its points at whole periods, float64[z]."""
+        return np.asarray(self.legs.orbit(self.z[None])[0])
+
+
+class _Gap:
+    """A gap in one mode, its rate along the flow, and their derivatives."""
+
+    def __init__(self, legs: Legs, guard: int, mode: int) -> None:
+        self._system, self._size = legs.orbits.parametric.system, legs.size
+        system, self.side = self._system, 1 if mode >> guard & 1 else -1
+        gap, *rates = frozen(system, (system.guards[guard].gap, *system.field), mode)
+        rate: Expr = time_derivative(gap)
+        for slope, speed in zip(gradient(gap, system.states), rates, strict=True):
+            rate = add(rate, mul(slope, speed))
+        self._entries = [
+            entry
+            for one in (gap, rate)
+            for entry in (one, *gradient(one, system.states), time_derivative(one))
+        ]
+
+    def at(self, time: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """The gap, its derivatives with respect to states and time, and those of its rate, at times
+        float64[k] in states float64[k, E]: float64[k, 2, E + 2].
+        """
+        named = dict(zip(self._system.states, states.T, strict=True))
+        values = evaluate(self._entries, t=time, states=named, values=self._system.values)
+        columns = np.stack(np.broadcast_arrays(time, *values)[1:], axis=-1)
+        return columns.reshape(len(time), 2, -1)
+
+
+def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent | None:
+    """The orbit that touches a boundary, by Newton's method from another one.
+
+    Parameters
+    ----------
+    legs : Legs
+        The orbit's equations, without the contact that grazes.
+    z : float64[z]
+        An orbit near it.
+    guard : int
+        The boundary.
+    phase : float
+        About when, in periods since the orbit's first point.
+    """
+    place = legs.leg_at(z, phase)
+    gap = _Gap(legs, guard, legs.mode_of(place))
+    begins = legs.nodes(z[None])[0][0, place]
+    phase = _nearest_turn(legs, z, place, gap, (phase - begins) % legs.n) + begins
+    row, scale = np.zeros(1, np.int64), np.append(legs.scale[0], 1.0)
+
+    def equations(u: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        residual, derivative = legs.evaluate(u[:, :-1], row)
+        _, value, slopes = _touch(legs, place, gap, u)
+        whole = np.zeros((1, len(scale), len(scale)))
+        whole[:, :-2, :-1], whole[:, -2:] = derivative, slopes * scale
+        unit = np.abs(whole[:, -2:]).max(axis=2)
+        whole[:, -2:] /= unit[..., None]
+        return np.concatenate([residual, value / unit], axis=1), whole
+
+    legs.accepted(z[None], row)
+    u, found = newton(equations, np.append(z, phase)[None], scale[None])
+    if not found[0]:
+        return None
+    state, _, slopes = _touch(legs, place, gap, u)
+    phase = float(u[0, -1]) % legs.n
+    return ContactEvent(
+        "graze", (guard,), phase, legs, u[0, :-1], place, state[0], slopes[0, 0, :-1]
+    )
+
+
+def _touch(
+    legs: Legs, place: int, gap: _Gap, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The state on a leg at a time, the gap there and its rate, and their derivatives with respect
+    to the orbit and the time: float64[k, D], float64[k, 2], float64[k, 2, z + 1].
+    """
+    z, when, size = u[:, :-1], u[:, -1], legs.size
+    first, _, rest = legs.nodes(z)
+    span = np.zeros_like(first)
+    span[:, place] = when - first[:, place]
+    state, by_z, by_time = legs.along(z, legs.at(z), span)
+    own, slopes, order = legs.orbits.own(rest)
+    found = gap.at(when * legs.unit, np.concatenate([state[:, place], own], axis=1))
+    value, normal, by_clock = found[..., 0], found[..., 1:-1], found[..., -1] * legs.unit
+    rows = normal[..., :size] @ by_z[:, place]
+    rows[..., legs.count * (size + 1) + order] += normal[..., size:] * slopes[:, None]
+    last = (normal[..., :size] @ by_time[:, place, :, None])[..., 0] + by_clock
+    return state[:, place], value, np.concatenate([rows, last[..., None]], axis=2)
+
+
+def _nearest_turn(legs: Legs, z: np.ndarray, place: int, gap: _Gap, since: float) -> float:
+    """When after a contact the motion turns away from the boundary, next to a time [periods]."""
+    first, _, rest = legs.nodes(z[None])
+    longest = legs.spans(first)[0, place]
+    spans = np.linspace(0.0, longest, LOOKS)
+    many = np.repeat(z[None], LOOKS, axis=0)
+    wanted = np.zeros((LOOKS, legs.count))
+    wanted[:, place] = spans
+    state = legs.along(many, legs.at(many), wanted)[0][:, place]
+    own = np.repeat(legs.orbits.own(rest)[0], LOOKS, axis=0)
+    found = gap.at((first[0, place] + spans) * legs.unit, np.concatenate([state, own], axis=1))
+    rate = found[:, 1, 0] * gap.side
+    turns = np.flatnonzero((rate[:-1] <= 0) & (rate[1:] > 0))
+    if not len(turns):
+        return since
+    middle = spans[turns] + (spans[1] - spans[0]) * rate[turns] / (rate[turns] - rate[turns + 1])
+    return float(middle[np.abs(middle - since).argmin()])
+
+
+def corner(legs: Legs, z: np.ndarray, place: int) -> ContactEvent | None:
+    """The orbit that meets two boundaries at once, by Newton's method from another one.
+
+    Parameters
+    ----------
+    legs : Legs
+        The orbit's equations.
+    z : float64[z]
+        An orbit near it.
+    place : int
+        The leg that vanishes.
+    """
+    row, after = np.zeros(1, np.int64), (place + 1) % legs.count
+    width = legs.size + 1
+
+    def equations(u: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        residual, derivative = legs.evaluate(u, row)
+        last = np.zeros((1, 1, u.shape[1]))
+        last[0, 0, after * width] += 1.0
+        last[0, 0, place * width] -= 1.0
+        span = legs.spans(legs.nodes(u)[0])[:, [place]]
+        return np.append(residual, span, axis=1), np.append(derivative, last, axis=1)
+
+    u, found = newton(equations, z[None], legs.scale)
+    if not found[0]:
+        return None
+    guards = (legs.contacts[place].guard, legs.contacts[after].guard)
+    phase = float(legs.nodes(u)[0][0, place]) % legs.n
+    slope = np.zeros(len(z))
+    slope[after * width], slope[place * width] = 1.0, -1.0
+    state = legs.nodes(u)[1][0, place]
+    return ContactEvent("corner", guards, phase, legs, u[0], place, state, slope)

@@ -1,0 +1,197 @@
+"""Branches of orbits from contact to contact in one direction, in pieces of one contact sequence
+each, up to the events at which one becomes another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from saltus.analysis.branches.arclength import FIRST, Curve, correct, follow, tangents
+from saltus.analysis.branches.contact_sequences import sequences
+from saltus.analysis.branches.leg_ends import End, end_of
+from saltus.analysis.branches.legs import Legs
+from saltus.analysis.branches.shooting import PeriodicOrbits
+
+#: Contact sequences of one branch in one direction.
+MOST_PIECES = 40
+#: How far a branch may pass its start sideways, over the step that passes it.
+SIDEWAYS = 0.3
+#: Where before an event the last point of a piece lies, in steps, and the shortest such step in
+#: units of the scale.
+NEXT_TO, LEAST = 1e-3, 1e-7
+#: First step behind an event, in units of the scale.
+AFTER = 1e-4
+_ROW = np.zeros(1, np.int64)
+
+
+@dataclass
+class Piece:
+    """A part of a branch, of orbits with one contact sequence.
+
+    Attributes
+    ----------
+    legs : Legs
+        Its equations.
+    curve : Curve
+        Its points, all of the free flow.
+    after_event : bool
+        Whether its first point is an event.
+    end : End or None
+        The event behind its last point.
+    """
+
+    legs: Legs
+    curve: Curve
+    after_event: bool = False
+    end: End | None = None
+
+    @property
+    def outcome(self) -> str:
+        """How the branch goes on behind the end: see above; empty if it doesn't."""
+        if self.end is None or self.end.onto is None or not self.curve.tangent:
+            return ""
+        into = self.end.into(self.legs, self.curve.tangent[-1])
+        return "persistence" if into[-1] * self.end.along[-1] > 0 else "nonsmooth_fold"
+
+    def close_up(self) -> None:
+        """Add a point next to the end, so that what lies before it isn't overlooked."""
+        legs, curve = self.legs, self.curve
+        if self.end is None or not curve.z:
+            return
+        ahead = self.end.z - curve.z[-1]
+        normal = ahead / legs.scale[0]
+        length = float(np.linalg.norm(normal))
+        if length < LEAST:
+            return
+        guess = curve.z[-1] + (1.0 - NEXT_TO) * ahead
+        point = correct(legs, guess[None], normal[None] / length, _ROW, length)
+        if point.found[0] and legs.admissible(point.z)[0]:
+            curve.z.append(point.z[0])
+            curve.derivative.append(point.derivative[0])
+            curve.tangent.append(tangents(point.derivative, curve.tangent[-1][None])[0])
+            curve.length.append(curve.length[-1] + length)
+
+
+@dataclass
+class _Way:
+    """A branch in one direction."""
+
+    limits: tuple[float, float]
+    points: int
+    first: float
+    home: tuple[Legs, np.ndarray]
+    pieces: list[Piece] = field(default_factory=list)
+    end: str = ""
+
+    def follow(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> None:
+        """Follow the branch from an orbit on, piece by piece."""
+        for _ in range(MOST_PIECES):
+            end = self._piece(legs, z, along)
+            if end is None:
+                return
+            if end.onto is None:
+                self.end = end.event.kind
+                return
+            legs, z, along = end.onto, end.start, end.along
+        self.end = "points"
+
+    def _piece(self, legs: Legs, z: np.ndarray, along: np.ndarray) -> End | None:
+        """One contact sequence, and where it ends if that is at an event."""
+        again, virtual = bool(self.pieces), list[np.ndarray]()
+
+        def ends(curve: Curve) -> str:
+            if not legs.admissible(curve.z[-1][None])[0]:
+                virtual.append(curve.z[-1])
+                return "virtual"
+            if again and self._returns(legs, curve):
+                return "closed"
+            return _halved(legs, curve)
+
+        left = self.points - sum(len(piece.curve.z) for piece in self.pieces)
+        step = AFTER if again else self.first
+        limits = {legs.width - 1: self.limits}
+        curve = follow(legs, z[None], along[None], limits, max(left, 2), step, ends=ends)[0]
+        piece = Piece(legs, curve, again)
+        self.pieces.append(piece)
+        if curve.end != "virtual":
+            self.end = curve.end
+            return None
+        piece.end = end_of(legs, curve.z[-1], virtual[-1], curve.tangent[-1])
+        piece.close_up()
+        if piece.end is None:
+            self.end = "lost"
+        return piece.end
+
+    def _returns(self, legs: Legs, curve: Curve) -> bool:
+        """Whether the last step passed the orbit from which the branch was followed."""
+        own, start = self.home
+        if legs.contacts != own.contacts or len(curve.z) < 2:
+            return False
+        scale = legs.scale[0]
+        step = (curve.z[-1] - curve.z[-2]) / scale
+        length = np.linalg.norm(step)
+        for same in own.alike(start[None], _ROW)[0]:
+            there = (same - curve.z[-2]) / scale
+            ahead = there @ step / length
+            aside = np.linalg.norm(there - ahead * step / length)
+            if 0 <= ahead <= length and aside <= SIDEWAYS * length:
+                return True
+        return False
+
+
+def _halved(legs: Legs, curve: Curve) -> str:
+    """``period_doubling`` if an orbit of 2m periods has just passed one of m periods."""
+    if legs.n % 2 or len(curve.z) < 2:
+        return ""
+    half, points = legs.n // 2, legs.orbits.points(legs.orbit(np.array(curve.z[-2:])))
+    apart = (points[:, :half] - points[:, half:]).reshape(2, -1)
+    return "period_doubling" if apart[0] @ apart[1] < 0.0 else ""
+
+
+def follow_legs(
+    orbits: PeriodicOrbits,
+    z: np.ndarray,
+    scale: np.ndarray,
+    along: np.ndarray,
+    limits: tuple[float, float],
+    points: int,
+    first: float = FIRST,
+) -> tuple[list[Piece], str]:
+    """A branch of periodic orbits in one direction, contact by contact.
+
+    Parameters
+    ----------
+    orbits : PeriodicOrbits
+        The equations.
+    z, scale : float64[z]
+        An orbit of the free flow by its points, and the units of these unknowns.
+    along : float64[z]
+        On which side to leave, in units of the scale.
+    limits : (float, float)
+        Range of the parameter, the last unknown.
+    points : int
+        Most points.
+    first : float
+        First step, in units of the scale.
+
+    Returns
+    -------
+    list of Piece, str
+        The contact sequences one after the other, and why the branch ends: see
+        :class:`saltus.analysis.branches.arclength.Curve`; ``graze`` or ``corner`` where it isn't
+        known how it goes on.
+    """
+    sequence = sequences(orbits, z[None])[0]
+    if sequence is None:
+        return [], "lost"
+    legs, start = Legs.of(orbits, sequence, z, scale)
+    legs.accepted(start[None], _ROW)
+    tangent = legs.tangent(start)
+    step = 1e-6 * tangent * legs.scale[0]
+    moved = np.subtract(*legs.orbit(np.array([start + step, start - step])))
+    side = 1.0 if (moved / scale) @ along > 0 else -1.0
+    way = _Way(limits, points, first, (legs, start))
+    way.follow(legs, start, side * tangent)
+    return way.pieces, way.end

@@ -1,0 +1,398 @@
+"""The equations of periodic orbits with a given contact sequence: each leg from one contact to the
+next must end where that one begins, and on its boundary.
+
+The unknowns are the times of all contacts and the states before them. A leg is a flight in one mode
+without boundaries (system/leg.py), so the equations are smooth where a contact appears or vanishes,
+and beyond: an impact may have no speed, or be met from behind. Orbits there are *virtual*, see
+:meth:`Legs.admissible`. The map over a period has a square root at such a place, or a jump.
+Dankowicz & Schilder, Recipes for Continuation (2013), chapter 9.
+"""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+
+from saltus.analysis.branches.contact_sequences import ContactSequence, sequences, shift
+from saltus.analysis.branches.contacts_along import At, Jumps
+from saltus.analysis.branches.shooting import PeriodicOrbits, across, multipliers
+from saltus.flow.maps import Stroboscope
+from saltus.kernels import status as st
+from saltus.system.leg import leg
+
+#: Legs that last less are flown by a detour that lasts so long, in periods.
+BRIEF, DETOUR = 1e-3, 1e-2
+#: Shorter times are rounding, in periods.
+AT_ONCE = 1e-14
+
+
+class Legs:
+    """Curves of periodic orbits of n periods with one contact sequence; an arclength ``Equations``.
+
+    Unknowns z: the time of each contact in periods since the orbit's first point and the state
+    before it, one contact after the other; the period [s] of a system without forcing; the
+    parameters [SI]. An orbit without contacts has its first point in their place, at time 0.
+
+    Parameters
+    ----------
+    orbits : PeriodicOrbits
+        The equations with the contact sequence left to the flow.
+    sequence : ContactSequence
+        The contacts.
+    scale : float64[k, z]
+        Units of the unknowns.
+    """
+
+    def __init__(
+        self, orbits: PeriodicOrbits, sequence: ContactSequence, scale: np.ndarray
+    ) -> None:
+        self.orbits, self.sequence, self.scale = orbits, sequence, scale
+        self.n, self.size, self.free = orbits.n, orbits.size, orbits.free
+        self.contacts = sequence.contacts
+        self.count = max(len(self.contacts), 1)
+        self._modes = [one.after for one in self.contacts] or [sequence.mode]
+        self._jumps = Jumps(orbits.parametric.system, self.contacts, self.size, sequence.mode)
+        self.unit = float(orbits.map.period[0])  # of the time, in those of the parametric system
+        self._maps = {
+            mode: Stroboscope(
+                leg(orbits.parametric.system, mode), orbits.map.method, every=1.0,
+                threads=orbits.map.threads,
+            )
+            for mode in set(self._modes)
+        }  # fmt: skip
+        self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
+
+    @classmethod
+    def of(
+        cls, orbits: PeriodicOrbits, sequence: ContactSequence, z: np.ndarray, scale: np.ndarray
+    ) -> tuple[Legs, np.ndarray]:
+        """The equations of an orbit's own sequence, and its unknowns float64[z] in them.
+
+        Parameters
+        ----------
+        orbits, z, scale
+            An orbit float64[z] and the units of its unknowns.
+        sequence : ContactSequence
+            Its contacts, or some of them.
+        """
+        size, n, count = orbits.size, orbits.n, max(len(sequence.contacts), 1)
+        rest, unit = z[n * size :], scale[n * size :]
+        each = np.append(1.0, scale[:size])
+        legs = cls(orbits, sequence, np.append(np.tile(each, count), unit)[None])
+        phase, after = sequence.phase, sequence.after
+        if not sequence.contacts:
+            phase, after = np.zeros(1), z[None, :size]
+            before = after
+        else:
+            span = legs.spans(phase[None])
+            before = np.roll(legs.fly(after[None], rest[None], phase[None], span)[0][0], 1, axis=0)
+        nodes = np.concatenate([phase[:, None], before], axis=1)
+        return legs, np.append(nodes.ravel(), rest)
+
+    @property
+    def width(self) -> int:
+        """Number of unknowns."""
+        return self.count * (self.size + 1) + len(self.orbits.names) + self.free
+
+    # -- unknowns ----------------------------------------------------------------------------------
+    def nodes(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times of the contacts of orbits float64[r, z] in periods, float64[r, m], the states
+        before them, float64[r, m, D], and the other unknowns, float64[r, e].
+        """
+        used = self.count * (self.size + 1)
+        nodes = z[:, :used].reshape(len(z), self.count, self.size + 1)
+        return nodes[..., 0], nodes[..., 1:], z[:, used:]
+
+    def values(self, z: np.ndarray) -> np.ndarray:
+        """The parameters of orbits float64[..., z], float64[..., names]."""
+        return z[..., self.count * (self.size + 1) + self.free :]
+
+    def spans(self, phase: np.ndarray) -> np.ndarray:
+        """How long the leg behind each contact lasts, in periods."""
+        span = np.roll(phase, -1, axis=1) - phase
+        span[:, -1] += self.n
+        return span
+
+    def leg_at(self, z: np.ndarray, phase: float) -> int:
+        """The leg of an orbit float64[z] that flies at a time [periods]."""
+        return int(((phase - self.nodes(z[None])[0][0]) % self.n).argmin())
+
+    def mode_of(self, place: int) -> int:
+        """The mode of a leg, as bits."""
+        return self._modes[place]
+
+    def jumps_at(self, place: int) -> bool:
+        """Whether the state jumps at a contact."""
+        return self.contacts[place].kind == st.IMPACT
+
+    def sequence_at(self, z: np.ndarray) -> ContactSequence:
+        """The contacts of an orbit float64[z]."""
+        phase, _, _ = self.nodes(z[None])
+        after = self.at(z[None]).after[0]
+        speeds = self.speeds(z[None])[0] if self.contacts else np.zeros(1)
+        count = len(self.contacts)
+        return ContactSequence(
+            self.contacts, phase[0, :count], after[:count], speeds[:count], self.sequence.mode
+        )
+
+    @property
+    def free_scale(self) -> np.ndarray:
+        """Units of the unknowns with the contact sequence left to the flow."""
+        unit = self.scale[0]
+        rest = unit[self.count * (self.size + 1) :]
+        return np.append(np.tile(unit[1 : self.size + 1], self.n), rest)
+
+    def tangent(self, z: np.ndarray) -> np.ndarray:
+        """A unit vector along the curve at an orbit float64[z], in units of the scale."""
+        derivative = self.evaluate(z[None], np.zeros(1, np.int64))[1]
+        return np.asarray(np.linalg.svd(derivative[0])[2][-1])
+
+    # -- flights -----------------------------------------------------------------------------------
+    def fly(
+        self, after: np.ndarray, rest: np.ndarray, phase: np.ndarray, span: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Legs from states float64[r, m, D] behind each contact, at times and for times float64[r,
+        m] in periods.
+
+        Returns
+        -------
+        float64[r, m, D], float64[r, m, D, E + 2]
+            Their ends, and the derivatives with respect to the states of the parametric system, the
+            time and the span [periods].
+        """
+        start = self._states(after, rest, phase, span)
+        ends = np.empty(after.shape)
+        matrices = np.empty((*after.shape, start.shape[2]))
+        for mode, map_ in self._maps.items():
+            mine = [i for i, one in enumerate(self._modes) if one == mode]
+            end, matrix = self._flown(map_, start[:, mine].reshape(-1, start.shape[2]))
+            shape = (len(after), len(mine))
+            ends[:, mine] = end[:, : self.size].reshape(*shape, -1)
+            matrices[:, mine] = matrix[:, : self.size].reshape(*shape, self.size, -1)
+        matrices[..., -2:] *= self.unit
+        return ends, matrices
+
+    def _flown(self, map_: Stroboscope, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Ends of legs float64[k, E + 2] and their tangent maps. One that lasts next to no time
+        goes back first and then forth: all of its rates would be next to nothing.
+        """
+        span, away = start[:, -1], DETOUR * self.unit
+        short = np.flatnonzero((np.abs(span) < BRIEF * self.unit) & (span != 0))
+        if not len(short):
+            return map_.tangent(start, 1)
+        first = start.copy()
+        first[short, -1] = -away
+        end, matrix = map_.tangent(first, 1)
+        onwards = end[short]
+        onwards[:, -2:] = start[short, -2:] + np.array([-away, away])
+        there, second = map_.tangent(onwards, 1)
+        back = matrix[short]
+        back[:, :-1, -1] = 0.0  # the time it goes back is the same for all
+        there[:, -2:] = start[short, -2:]
+        end[short], matrix[short] = there, second @ back
+        return end, matrix
+
+    def _states(
+        self, after: np.ndarray, rest: np.ndarray, phase: np.ndarray, span: np.ndarray
+    ) -> np.ndarray:
+        """States of legs, float64[r, m, E + 2]."""
+        own = np.repeat(self.orbits.own(rest)[0][:, None], after.shape[1], axis=1)
+        times = np.stack([phase, span], axis=2) * self.unit
+        return np.concatenate([after, own, times], axis=2)
+
+    def at(self, z: np.ndarray) -> At:
+        """What happens at the contacts of orbits float64[r, z]."""
+        phase, before, rest = self.nodes(z)
+        own = np.repeat(self.orbits.own(rest)[0][:, None], self.count, axis=1)
+        return self._jumps.at(phase * self.unit, np.concatenate([before, own], axis=2))
+
+    # -- equations ---------------------------------------------------------------------------------
+    def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        phase, before, rest = self.nodes(z)
+        at, spans = self.at(z), self.spans(phase)
+        ends, derivative, by_end = self.along(z, at, spans)
+        derivative = np.concatenate([derivative, self._of_gaps(at, rest)], axis=2)
+        for i in range(self.count):
+            there = (i + 1) % self.count * (self.size + 1)
+            derivative[:, i, : self.size, there] += by_end[:, i]
+            derivative[:, i, : self.size, there + 1 : there + 1 + self.size] -= np.eye(self.size)
+        unit = self.scale[rows]
+        residual = np.concatenate([ends - np.roll(before, -1, axis=1), at.gap[..., None]], axis=2)
+        each = np.repeat(unit[:, None, 1 : self.size + 1], self.count, axis=1)
+        if self.contacts:
+            slope = np.abs(derivative[:, :, -1] * unit[:, None]).max(axis=2)
+        else:  # the first point is at time 0
+            residual[:, :, -1], derivative[:, :, -1] = phase, 0.0
+            derivative[:, 0, -1, 0] = slope = np.ones((len(z), 1))
+        each = np.concatenate([each, slope[..., None]], axis=2)
+        residual = (residual / each).reshape(len(z), -1)
+        derivative = (derivative / each[..., None]).reshape(*residual.shape, -1) * unit[:, None]
+        if not self.free:
+            return residual, derivative
+        row, where = np.zeros((len(z), 1, z.shape[1])), phase[:, 0]
+        row[:, 0, 0] = 1.0
+        if not self.contacts:
+            along = self.phase[rows, 1]
+            where = ((before[:, 0] - self.phase[rows, 0]) / unit[:, 1 : self.size + 1] * along).sum(
+                axis=1
+            )
+            row[:, 0, 0], row[:, 0, 1 : self.size + 1] = 0.0, along
+        return np.append(residual, where[:, None], axis=1), np.append(derivative, row, axis=1)
+
+    def along(
+        self, z: np.ndarray, at: At, spans: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """States some time [periods] float64[r, m] after each contact of orbits float64[r, z].
+
+        Returns
+        -------
+        float64[r, m, D], float64[r, m, D, z], float64[r, m, D]
+            The states, their derivatives with respect to the unknowns at a time that stays, and
+            those with respect to that time [periods].
+        """
+        size, used = self.size, self.count * (self.size + 1)
+        phase, _, rest = self.nodes(z)
+        _, slopes, order = self.orbits.own(rest)
+        ends, matrices = self.fly(at.after, rest, phase, spans)
+        by_state, by_start, by_span = matrices[..., :size], matrices[..., -2], matrices[..., -1]
+        through = by_state @ at.by_state  # with respect to the states before the contact
+        jumped = (by_state @ at.by_time[..., None])[..., 0] * self.unit
+        derivative = np.zeros((*ends.shape, z.shape[1]))
+        for i in range(self.count):
+            here = i * (size + 1)
+            derivative[:, i, :, here] = by_start[:, i] - by_span[:, i] + jumped[:, i]
+            derivative[:, i, :, here + 1 : here + 1 + size] = through[:, i, :, :size]
+        own = matrices[..., size:-2] + through[..., size:]
+        derivative[..., used + order] = own * slopes[:, None, None]
+        return ends, derivative, by_span
+
+    def _of_gaps(self, at: At, rest: np.ndarray) -> np.ndarray:
+        """Derivatives of the gaps at the contacts, float64[r, m, 1, z]."""
+        size, used = self.size, self.count * (self.size + 1)
+        _, slopes, order = self.orbits.own(rest)
+        result = np.zeros((*at.gap.shape, 1, used + rest.shape[1]))
+        for i in range(self.count):
+            here = i * (size + 1)
+            result[:, i, 0, here] = at.gap_by_time[:, i] * self.unit
+            result[:, i, 0, here + 1 : here + 1 + size] = at.normal[:, i, :size]
+        result[..., 0, used + order] = at.normal[..., size:] * slopes[:, None]
+        return result
+
+    def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
+        """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        if self.free and not self.contacts:
+            self.phase[rows, 0] = self.nodes(z)[1][:, 0]
+            flow = self.at(z).rate[:, 0] / self.scale[rows, 1 : self.size + 1]
+            self.phase[rows, 1] = flow / np.linalg.norm(flow, axis=1)[:, None]
+
+    def near(self, z: np.ndarray, rows: np.ndarray) -> Legs:
+        """The equations whose row i is curve rows[i], int64[r], with the condition on its phase at
+        the orbit float64[r, z].
+        """
+        other = copy.copy(self)
+        other.scale, other.phase = self.scale[rows], self.phase[rows].copy()
+        other.accepted(z, np.arange(len(rows)))
+        return other
+
+    def alike(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        """The same orbits from another period on, float64[r, s, z]."""
+        phase, before, rest = self.nodes(z)
+        m, n, result = self.count, self.n, [z]
+        for by in range(1, m):
+            order = (np.arange(m) + by) % m
+            if any(self.contacts[i] != self.contacts[j] for i, j in enumerate(order)):
+                continue
+            rolled = phase[:, order] + n * (np.arange(m) + by >= m)
+            for periods in range(1, n):
+                nodes = np.concatenate([(rolled - periods)[..., None], before[:, order]], axis=2)
+                result.append(np.concatenate([nodes.reshape(len(z), -1), rest], axis=1))
+        return np.stack(result, axis=1)
+
+    # -- what an orbit is --------------------------------------------------------------------------
+    def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Floquet multipliers of orbits float64[r, z], the largest first, without the trivial one
+        of a system without forcing; complex128[r, D] or [r, D - 1].
+        """
+        at, result = self.at(z), []
+        for i in range(len(z)):
+            segments = self._segments(at, derivative[i], i, int(rows[i]))
+            if self.free:
+                segments = across(_product(segments), at.rate[i, 0])[None]
+            result.append(multipliers(segments))
+        return np.array(result)
+
+    def multipliers_at(self, z: np.ndarray) -> np.ndarray:
+        """Those of one orbit float64[z]."""
+        row = np.zeros(1, np.int64)
+        return np.asarray(self.multipliers(z[None], self.evaluate(z[None], row)[1], row)[0])
+
+    def _segments(self, at: At, derivative: np.ndarray, i: int, row: int) -> np.ndarray:
+        """The tangent map from each contact to the next one, both before them, float64[m, D, D]."""
+        size, m, unit = self.size, self.count, self.scale[row]
+        result = np.empty((m, size, size))
+        for j in range(m):
+            rows = slice(j * (size + 1), j * (size + 1) + size)
+            here = j * (size + 1)
+            block = derivative[rows, here : here + size + 1] / unit[here : here + size + 1]
+            block = block * unit[1 : size + 1, None]
+            through, by_time = block[:, 1:], block[:, 0]
+            if m == 1:  # the end of the leg is at the same unknowns
+                through, by_time = through + np.eye(size), by_time - at.rate[i, 0] * self.unit
+            if self.contacts:
+                normal, rate = at.normal[i, j, :size], at.rate[i, j] * self.unit
+                closing = normal @ rate + at.gap_by_time[i, j] * self.unit
+                through = through - np.outer(through @ rate + by_time, normal) / closing
+            result[j] = through
+        return result
+
+    def speeds(self, z: np.ndarray) -> np.ndarray:
+        """Rates of the gaps before the contacts of orbits float64[r, z] in the directions in which
+        they are met [unit/s or per period]; negative where one is met from behind, float64[r, m].
+        """
+        at, way = self.at(z), np.array([one.direction for one in self.contacts])
+        closing = np.einsum("rmi,rmi->rm", at.normal[..., : self.size], at.rate) + at.gap_by_time
+        return np.asarray(closing * way)
+
+    def orbit(self, z: np.ndarray) -> np.ndarray:
+        """Orbits float64[r, z] by their points at whole periods: unknowns of the free sequence."""
+        phase, _, rest = self.nodes(z)
+        after = self.at(z).after
+        points = np.empty((len(z), self.n, self.size))
+        for k in range(self.n):
+            since = (k - phase) % self.n  # time since each contact
+            since[np.minimum(since, self.n - since) < AT_ONCE] = 0.0
+            last = since.argmin(axis=1)
+            rows = np.arange(len(z))
+            wanted = np.zeros_like(phase)
+            wanted[rows, last] = since[rows, last]
+            points[:, k] = self.fly(after, rest, phase, wanted)[0][rows, last]
+        return np.concatenate([points.reshape(len(z), -1), rest], axis=1)
+
+    def admissible(self, z: np.ndarray) -> np.ndarray:
+        """Whether the free flow makes the orbits float64[r, z]: they meet these contacts and no
+        others, bool[r].
+        """
+        result = np.array((self.spans(self.nodes(z)[0]) > 0).all(axis=1))
+        if self.contacts:
+            result &= (self.speeds(z) > 0).all(axis=1)
+        which = np.flatnonzero(result)
+        if not len(which):
+            return result
+        phase = self.nodes(z)[0]
+        for i, free in zip(which, sequences(self.orbits, self.orbit(z[which])), strict=True):
+            own = ContactSequence(
+                self.contacts, phase[i], self.sequence.after, self.sequence.velocity,
+                self.sequence.mode,
+            )  # fmt: skip
+            result[i] = free is not None and shift(own, free, self.n) is not None
+        return result
+
+
+def _product(segments: np.ndarray) -> np.ndarray:
+    """The last times ... times the first."""
+    result = np.eye(len(segments[0]))
+    for one in segments:
+        result = one @ result
+    return result

@@ -1,0 +1,36 @@
+"""How the branches of a system are followed: over one period, or from contact to contact."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from saltus.analysis.branches.leg_branches import leg_branches
+from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.tracing import Plan, both_ways
+from saltus.flow.methods import Method
+from saltus.system.leg import has_legs
+from saltus.system.system import System
+
+
+def plan_of(
+    system: System,
+    name: str,
+    limits: tuple[float, float],
+    method: Method,
+    threads: int | None,
+    points: int,
+    longest: int,
+    switch: Iterable[str],
+) -> Plan:
+    """The plan of the branches of a system over a parameter ``name``; the rest is as in
+    :class:`Plan`.
+
+    Where states jump at contacts, branches are followed from contact to contact: the map over a
+    period jumps when a contact crosses the whole period, and has a square root at a graze.
+    """
+    jumps = any(guard.law is not None and guard.law.reset for guard in system.guards)
+    return Plan(
+        lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads),
+        limits, points, longest, frozenset(switch),
+        leg_branches if jumps and has_legs(system) else both_ways,
+    )  # fmt: skip

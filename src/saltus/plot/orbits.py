@@ -1,0 +1,127 @@
+"""Points of periodic orbits in the plane of two states, also over a map of basins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from saltus.errors import ParameterError, nearest, shown
+from saltus.plot import axes as draw
+from saltus.plot import maps
+from saltus.plot.basins import basins
+from saltus.plot.picture import picture
+from saltus.plot.style import CYCLE, display_scale
+from saltus.results.dataset.schema import BASINS, ORBITS, check, kind_text, orbit_name, states_of
+
+#: Orbits that are named in the legend.
+_NAMED = 14
+
+
+@picture(ORBITS)
+def periodic_orbits(
+    ds: xr.Dataset,
+    x: str | None = None,
+    y: str | None = None,
+    ax: Any = None,
+    *,
+    over: xr.Dataset | None = None,
+    units: Mapping[str, str] | None = None,
+    legend: bool = True,
+) -> Axes:
+    """Points of periodic orbits at whole periods: dots for the stable ones, crosses for those that
+    repel.
+
+    Parameters
+    ----------
+    ds : Dataset
+        What ``periodic_orbits`` or ``edge_orbit`` returned.
+    x, y : str, optional
+        States on the axes; by default those of ``over``, else the first two.
+    ax : Axes, optional
+        Where to draw; a new figure by default.
+    over : Dataset, optional
+        A map of basins to draw them over: the saddles lie on its boundaries.
+    units : mapping of str to str, optional
+        Display units, such as ``{"v": "mm/s"}``; by the size of the numbers by default, or as the
+        map has them.
+    legend : bool
+        Whether to name the orbits.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        If ``ds`` or ``over`` is of another kind, or an argument doesn't fit.
+    """
+    pair = _pair(ds, x, y, over)
+    with draw.panels(ax, 1, (4.6, 3.4) if over is None else (6.3, 3.9)) as (panel,):
+        if over is None:
+            scales = tuple(
+                display_scale(
+                    ds[orbit_name(name)].attrs.get("units", ""),
+                    float(np.nanmax(np.abs(ds[orbit_name(name)].values), initial=0.0)),
+                    (units or {}).get(name),
+                )
+                for name in pair
+            )
+            panel.set_xlabel(scales[0].label(pair[0]))
+            panel.set_ylabel(scales[1].label(pair[1]))
+        else:
+            basins(over, ax=panel, legend=False, points=False)
+            scales = tuple(maps.scale_of(over, name) for name in pair)
+        for i in range(ds.sizes["orbit"]):
+            _orbit(panel, ds.isel(orbit=i), pair, scales, i, over is not None)
+        if legend and ds.sizes["orbit"]:
+            panel.legend(loc="upper left", bbox_to_anchor=(1.02, 1), fontsize=7)
+    return panel
+
+
+def _pair(ds: xr.Dataset, x: str | None, y: str | None, over: xr.Dataset | None) -> tuple[str, str]:
+    """The states on the axes."""
+    known = states_of(ds)
+    for name in (x, y):
+        if name is not None and name not in known:
+            raise ParameterError(
+                f"these orbits have no state {shown(name)}. {nearest(name, known)}"
+            )
+    if over is not None:
+        check(over, caller="plot.periodic_orbits(over=)", kinds=(BASINS,))
+        pair = maps.plane(over, "basin")
+        if any(name not in known for name in pair) or (x or pair[0], y or pair[1]) != pair:
+            raise ParameterError(
+                f"over is a map of {pair[0]} and {pair[1]}. Leave x and y out, and give orbits of "
+                f"the same system."
+            )
+        return pair
+    if len(known) < 2:
+        raise ParameterError(f"this picture needs two states; these orbits have {known[0]} only.")
+    first = x or next(name for name in known if name != y)
+    return first, y or next(name for name in known if name != first)
+
+
+def _orbit(
+    ax: Axes, one: xr.Dataset, pair: tuple[str, str], scales: Any, number: int, over: bool
+) -> None:
+    """The points of an orbit."""
+    at = [
+        one[orbit_name(name)].values * scale.factor
+        for name, scale in zip(pair, scales, strict=True)
+    ]
+    here = np.isfinite(at[0]) & np.isfinite(at[1])
+    stable = int(one["orbit_stable"]) == 1
+    name = kind_text(str(one["orbit_type"].item()), int(one["orbit_period"]))
+    color = "#222222" if over else CYCLE[number % len(CYCLE)]
+    marks: dict[str, Any] = (
+        {"marker": "o", "ms": 5, "mfc": color, "mec": "white", "mew": 0.8}
+        if stable
+        else {"marker": "x", "ms": 6, "mec": color, "mew": 1.6}
+    )
+    label = f"{name}, {one['orbit_stability'].item()}" if number < _NAMED else None
+    draw.draw_points(ax, at[0][here], at[1][here], label=label, zorder=5, **marks)
