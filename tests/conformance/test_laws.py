@@ -147,6 +147,111 @@ def test_a_row_of_balls_that_touch_hands_its_momentum_on():
     assert str(run.status.values) == "ok"
 
 
+@sl.system(states="a b c u v w")
+def pinched(t, a, b, c, u, v, w, *, middle=1.0, restitution=1.0):
+    return (
+        u, v, w, 0.0, 0.0, 0.0,
+        sl.impact(a < b, u - v, restitution=restitution, inertia=(1.0, middle)),
+        sl.impact(b < c, v - w, restitution=restitution, inertia=(middle, 1.0)),
+    )  # fmt: skip
+
+
+def test_balls_that_strike_one_from_both_sides_at_once():
+    """Equal elastic ones exchange velocities, in any order; three of masses 1, 3, 1 end as -0.5,
+    -0.25, 1.25 or as the mirror of it, and with e = 0.5 the orders differ too.
+    """
+    start = (-1.0, 0.0, 1.0, 1.0, 0.0, -1.0)
+    run = sl.simulate(pinched, start, t_end=2.0, samples=1)
+    assert [float(run[f"end_{name}"]) for name in "uvw"] == [-1.0, 0.0, 1.0]
+    for values in ({"middle": 3.0}, {"restitution": 0.5}):
+        with pytest.warns(SaltusWarning, match="depends on which is taken first"):
+            run = sl.simulate(pinched.with_values(**values), start, t_end=2.0, samples=1)
+        assert str(run.status.values) == "ambiguous_impact"
+        assert (float(run.end_time), float(run.end_u)) == (1.0, 1.0), "as they meet"
+    # one of them a little later: no question
+    for sign in (-1, 1):
+        moved = (-1.0 + 1e-9 * sign, *start[1:])
+        run = sl.simulate(pinched.with_values(middle=3.0), moved, t_end=2.0, samples=1)
+        ends = [float(run[f"end_{name}"]) for name in "uvw"]
+        first = [-0.5, -0.25, 1.25] if sign > 0 else [-1.25, 0.25, 0.5]
+        assert ends == pytest.approx(first, abs=1e-14)
+
+
+@pytest.mark.parametrize("middle", [0.01, 1.0, 3.0])
+def test_three_bodies_that_meet_without_rebound_go_on_as_one(middle):
+    """All orders lead to the common velocity that keeps the momentum."""
+    system = pinched.with_values(middle=middle, restitution=0.0)
+    run = sl.simulate(system, (-1.0, 0.0, 1.0, 1.0, 0.0, -1.0), t_end=2.0, samples=4)
+    assert str(run.status.values) == "ok"
+    assert [float(run[f"end_{name}"]) for name in "uvw"] == pytest.approx([0.0] * 3, abs=1e-13)
+    assert [float(run[f"end_{name}"]) for name in "abc"] == pytest.approx([0.0] * 3, abs=1e-13)
+    four = row_of_four.with_values(restitution=0.0)
+    run = sl.simulate(four, (-1.0, 0.0, 1.0, 2.0, 1.0, 0.0, -1.0, -2.0), t_end=2.0, samples=1)
+    assert [float(run[f"end_{n}"]) for n in "uvwz"] == pytest.approx([-0.5] * 4, abs=1e-13)
+
+
+@sl.system(states="a b c d u v w z")
+def row_of_four(t, a, b, c, d, u, v, w, z, *, restitution=1.0):
+    return (
+        u, v, w, z, 0.0, 0.0, 0.0, 0.0,
+        sl.impact(a < b, u - v, restitution=restitution, inertia=(1.0, 1.0)),
+        sl.impact(b < c, v - w, restitution=restitution, inertia=(1.0, 1.0)),
+        sl.impact(c < d, w - z, restitution=restitution, inertia=(1.0, 1.0)),
+    )  # fmt: skip
+
+
+def test_impacts_that_have_nothing_to_do_with_each_other_may_coincide():
+    @sl.system(states="x y v w")
+    def two(t, x, y, v, w):
+        return (
+            v, w, -1.0, -1.0,
+            sl.impact(x > 0, -v, restitution=0.5), sl.impact(y > 0, -w, restitution=0.9),
+        )  # fmt: skip
+
+    run = sl.simulate(two, (0.5, 0.5, 0.0, 0.0), t_end=1.5, samples=1)
+    assert times(run, "impact").tolist() == [1.0, 1.0]
+    assert float(run.end_v) == pytest.approx(0.0, abs=1e-15)
+    assert float(run.end_w) == pytest.approx(0.4, rel=1e-15)
+
+
+def test_impacts_at_the_very_end_have_an_order_too():
+    with pytest.warns(SaltusWarning, match="depends on which is taken first"):
+        run = sl.simulate(
+            pinched.with_values(middle=3.0), (-1.0, 0.0, 1.0, 1.0, 0.0, -1.0), t_end=1.0
+        )
+    assert str(run.status.values) == "ambiguous_impact"
+
+
+def test_a_restitution_that_leaves_its_bounds_on_the_way():
+    """Of 0.5 + v: at -sqrt(2) it is negative; at -0.1 it is 0.4."""
+
+    @sl.system(states="x v")
+    def ball_of_clay(t, x, v, *, slope=1.0):
+        return v, -1.0, sl.impact(x > 0, -v, restitution=0.5 + slope * v)
+
+    for slope in (1.0, -1.0):
+        with pytest.warns(SaltusWarning, match=r"outside \[0, 1\]"):
+            run = sl.simulate(ball_of_clay.with_values(slope=slope), (1.0, 0.0), t_end=3.0)
+        assert str(run.status.values) == "invalid_restitution"
+        assert float(run.end_v) == pytest.approx(-math.sqrt(2.0), rel=1e-14)
+    run = sl.simulate(ball_of_clay, (0.005, 0.0), t_end=0.14, samples=1)
+    assert float(run["contact_v"][0]) == pytest.approx(0.04, rel=1e-14)
+
+
+def test_a_start_on_a_boundary_that_both_sides_leave_has_no_one_motion():
+    @sl.system(states="x y")
+    def ridge(t, x, y, *, tilt=0.0):
+        return sl.sign(x) + tilt, 1.0
+
+    starts = {"x": np.array([0.0, 1e-300, -1e-300, 0.5]), "y": np.zeros(4)}
+    with pytest.warns(SaltusWarning, match="more than one motion"):
+        run = sl.simulate(ridge, starts, t_end=1.0, samples=3)
+    assert run["status"].values.tolist() == ["nonunique", "ok", "ok", "ok"]
+    assert run["end_x"].values.tolist() == [0.0, 1.0, -1.0, 1.5]
+    run = sl.simulate(ridge.with_values(tilt=2.0), (0.0, 0.0), t_end=1.0, samples=1)
+    assert (str(run.status.values), float(run.end_x)) == ("ok", 3.0), "both sides lead one way"
+
+
 def test_a_block_that_sticks_is_struck_loose():
     """Equal masses, e = 0.5: the blow at t = 1 leaves velocities 1/4 and 3/4; the block stops after
     3/4/0.3 = 2.5 s.

@@ -29,6 +29,10 @@ _ADVICE = {
     st.NONFINITE: "The motion left the range of numbers, or met a pole or a root of something "
     "negative: check the equations at that state.",
     st.TURNED: 'Take sl.RK4(..., events="bisect"), a shorter step, or sl.Taylor().',
+    st.AMBIGUOUS_IMPACT: "end_* is the state before them. Move a start or a gap so that one comes "
+    "first, or give the stops a stiffness, which shares the blow.",
+    st.NONUNIQUE: "Begin on the side that is meant: a little beyond the boundary.",
+    st.INVALID_RESTITUTION: "Bound it where it is written, as sl.max(0.0, sl.min(1.0, e)) does.",
     st.INVALID: "Check the starts and values of these trajectories.",
     st.INTERRUPTED: "The run was stopped; its end_* are where it stood. Start it again.",
     st.NOT_COMPUTED: "The run was stopped; start it again.",

@@ -18,6 +18,9 @@ NOT_COMPUTED = 10
 INTERRUPTED = 11
 LONG_TRANSIENT = 12
 TURNED = 13
+AMBIGUOUS_IMPACT = 14
+NONUNIQUE = 15
+INVALID_RESTITUTION = 16
 
 #: Name and meaning of every status code.
 STATUS = {
@@ -55,6 +58,20 @@ STATUS = {
         "turned",
         "a gap turned about in the step that crossed its boundary (a graze), which steps in the "
         "gap and inverse interpolation can't follow",
+    ),
+    AMBIGUOUS_IMPACT: (
+        "ambiguous_impact",
+        "several impacts at one instant, and what follows depends on which is taken first: the "
+        "equations don't say",
+    ),
+    NONUNIQUE: (
+        "nonunique",
+        "the start lies on a boundary from which both sides lead away: more than one motion "
+        "begins there",
+    ),
+    INVALID_RESTITUTION: (
+        "invalid_restitution",
+        "the coefficient of restitution is outside [0, 1] at an impact",
     ),
 }
 

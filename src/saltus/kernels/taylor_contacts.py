@@ -1,4 +1,4 @@
-"""Template, 5 of 7 of the Taylor flow: contacts of one lane - settling what the quadratic bound
+"""Template, 5 of 8 of the Taylor flow: contacts of one lane - settling what the quadratic bound
 could not, landing, recording. The first crossing of a step is found before, by `locate` in
 taylor_crossings.
 """
@@ -24,7 +24,6 @@ from saltus.kernels.status import (
     GRAZE,
     GRAZE_SHALLOW,
     GRAZES,
-    IMPACT_LAW,
     REC_DIRECTION,
     REC_GUARD,
     REC_KIND,
@@ -541,10 +540,7 @@ def land_all(lanes, lane, batch, hits, slow):
     who, d = lanes.memo[lane, WHO], lanes.found[DELTA, lane]
     arrived = note_arrival(lanes, lane)
     if LAWS:  # stops before surfaces: friction holds nothing where a stop does
-        for g in range(NGUARDS):
-            stops = (hits >> g) & 1 and LAW[g] == IMPACT_LAW
-            if stops and meet(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow):
-                hits &= ~(1 << g)
+        hits = strike_together(lanes, lane, batch, hits, slow)
     for g in range(NGUARDS):
         if (hits >> g) & 1:
             # Newton's slope is right to some 1e-9

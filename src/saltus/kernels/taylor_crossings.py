@@ -1,4 +1,4 @@
-"""Template, 3 of 7 of the Taylor flow: where gaps close within a step, in all lanes at once.
+"""Template, 3 of 8 of the Taylor flow: where gaps close within a step, in all lanes at once.
 
 `locate` bounds the series, classifies each gap and chooses the first crossing. What is proven to
 cross is refined by Newton's method. What stays open is tried on a shorter step (`settle_sooner`),

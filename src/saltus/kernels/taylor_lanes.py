@@ -1,4 +1,4 @@
-"""Template, 7 of 7 of the Taylor flow: the life of a lane - filled, attended to at contacts,
+"""Template, 8 of 8 of the Taylor flow: the life of a lane - filled, attended to at contacts,
 samples and ends of periods, emptied.
 """
 
@@ -17,6 +17,7 @@ from saltus.kernels.status import (
     IMPACT_LAW,
     NO_LAW,
     NONFINITE,
+    NONUNIQUE,
     OK,
     PAUSED,
     RESTING,
@@ -103,6 +104,8 @@ def final_contacts(lanes, lane, batch, slow):
                 past |= is_past(lanes, lane, g, slow) << g
     if met != 0:
         note_arrival(lanes, lane)
+    if LAWS and met & ~past != 0:
+        met = strike_together(lanes, lane, batch, met & ~past, slow)
     for g in range(NGUARDS):
         if (past >> g) & 1:
             jump_over(lanes, lane, batch, g, gap_rate(lanes, lane, g, d), slow)
@@ -131,6 +134,8 @@ def end_stretch(lanes, lane, batch, slow):
     ):
         return RUNNING
     final_contacts(lanes, lane, batch, slow)
+    if LAWS and lanes.memo[lane, FAULT] != 0:
+        return lanes.memo[lane, FAULT]
     for g in range(NGUARDS):
         if (lanes.memo[lane, RESTS] >> g) & 1 and LAW[g] == NO_LAW:
             return RESTING
@@ -196,6 +201,8 @@ def attend(lanes, lane, batch, slow):
         if (lanes.memo[lane, RESTS] >> g) & 1:
             lanes.fresh[g, lane] = 1.0
     status = land_all(lanes, lane, batch, hits, slow) if hits != 0 else RUNNING
+    if LAWS and lanes.memo[lane, FAULT] != 0:
+        return lanes.memo[lane, FAULT]
     if NCLOCKS > 0 and lanes.clock[TAU, lane] >= lanes.run[WATCH, lane]:
         pass_break(lanes, lane, batch, slow)
     if status == RUNNING and lanes.clock[TAU, lane] >= lanes.run[END, lane]:
@@ -226,6 +233,8 @@ def start_sides(lanes, lane, batch, slow):
             lanes.side[g, lane] = LAW_SIDE[g]
     if LAWS:
         watch(lanes, lane)
+        if not begins_uniquely(lanes, lane, batch, slow):
+            lanes.memo[lane, FAULT] = NONUNIQUE
     lanes.run[STARTING, lane] = 1.0
     lanes.run[LANDED, lane] = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
 
@@ -338,8 +347,11 @@ def refill(lanes, lane, cursor, batch, slow):
                 or batch.phase[cursor] < batch.end_phase[cursor]
             ):
                 fill(lanes, lane, cursor, batch, slow)
-                return cursor + 1
-            batch.status[cursor] = OK
+                if not (LAWS and lanes.memo[lane, FAULT] != 0):
+                    return cursor + 1
+                empty(lanes, lane, batch, lanes.memo[lane, FAULT])
+            else:
+                batch.status[cursor] = OK
         cursor += 1
     return cursor
 

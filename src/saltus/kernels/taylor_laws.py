@@ -1,4 +1,4 @@
-"""Template, 6 of 7 of the Taylor flow: laws of contact of one lane - impacts, jumps, contacts that
+"""Template, 6 of 8 of the Taylor flow: laws of contact of one lane - impacts, jumps, contacts that
 are held: at rest, stuck, sliding along a boundary.
 
 A contact that is held has a guard of its own, the hold guard: on its positive side the equations
@@ -15,6 +15,7 @@ from saltus.kernels.status import (
     HOLD_LAW,
     IMPACT,
     IMPACT_LAW,
+    INVALID_RESTITUTION,
     JUMP_LAW,
     NO_LAW,
     RELEASE,
@@ -116,6 +117,9 @@ def strike(lanes, lane, batch, g, rate, slow):
     now, parameters = time_of_law(lanes, lane, batch), batch.param[who * batch.stride]
     reset(now, slow.state, parameters, slow.held, mode, mode, g, slow.out)
     restitution, closing = slow.out[0], slow.out[1]
+    if LAW[g] == IMPACT_LAW and closing > 0.0 and not is_restitution(restitution):
+        lanes.memo[lane, FAULT] = INVALID_RESTITUTION
+        return
     if closing > 0.0:
         for i in range(NSTATES):
             lanes.probe_y[i, lane], lanes.y[i, lane] = lanes.y[i, lane], slow.state[i]
@@ -192,14 +196,18 @@ def face(lanes, lane, batch, g, slow):
 @kernel
 def loosen(lanes, lane, batch, struck, closing, slow):
     """Let go of the contacts that are held and that feel the blow of another: their surfaces slide
-    then, their stops are struck or left.
+    then, their stops are struck or left. A stop that had nothing to leave it closes or opens now.
     """
     mode = mode_of(lanes, lane)
     gaps_here(lanes, lane, batch, slow)
     for g in range(NGUARDS):
-        if g != struck and PARTNER[g] >= 0 and LAW[g] != HOLD_LAW and (mode >> PARTNER[g]) & 1:
+        if g != struck and PARTNER[g] >= 0 and LAW[g] != HOLD_LAW:
             left = slow.gaps[3 * NGUARDS + g]
-            if abs(left) > FELT * closing:
+            feels = abs(left) > FELT * closing
+            if feels and (mode >> PARTNER[g]) & 1 == 0:
+                if LAW[g] == IMPACT_LAW and lanes.fresh[g, lane] > 1.5:
+                    lanes.fresh[g, lane] = 1.0
+            elif feels:
                 lanes.side[PARTNER[g], lane] = -1.0
                 if LAW[g] == SURFACE_LAW:
                     lanes.side[g, lane] = 1.0 if left > 0.0 else -1.0

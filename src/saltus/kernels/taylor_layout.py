@@ -1,5 +1,5 @@
-"""Template, 1 of 7 of the Taylor flow: what its work arrays hold. codegen puts a generated head
-before the six.
+"""Template, 1 of 8 of the Taylor flow: what its work arrays hold. codegen puts a generated head
+before the templates.
 
 One step of all lanes reads: jets -> step length (taylor_step.py) -> locate contacts
 (taylor_crossings.py) -> advance and land (taylor_step.py), then attend to the lanes where more
@@ -78,9 +78,10 @@ DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, UNTIL, P0, P1
 )
 # Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that
 # it found to cross (bits), guards on which the state rests (bits), whether a harmonic of time has
-# another phase in every period, whether this step isn't made of numbers.
-WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN = range(7)
-MEMO = 7
+# another phase in every period, whether this step isn't made of numbers, the status with which a
+# law of contact ends the motion (0: none does).
+WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN, FAULT = range(8)
+MEMO = 8
 # Columns of `options`: log2 of the tolerance; steps after which a trajectory's pace is looked at;
 # contacts that it may make; periods that it must have gained by then, infinite if the steps are all
 # that it may take.
@@ -103,6 +104,12 @@ SLOW_START = 1.0e-9
 #: Part of the closing velocity of an impact by which the constraint of another contact changes, if
 #: it changes at all.
 FELT = 1.0e-9
+#: Part of the first closing velocity at which impacts of one instant, each caused by the one
+#: before, have come to an end for a comparison of orders, and for good; the most of them; landings
+#: at one instant before the rest of them is taken at once.
+ENDED, CLOSED, MOST_IMPACTS, MOST_STRIKES = 1.0e-12, 1.0e-16, 50_000, 50
+#: By how much rounding may carry a coefficient of restitution out of [0, 1].
+RESTITUTION_ROUNDING = 1.0e-12
 #: Part of the time scale of the acceleration that may be left of a chatter when it is completed.
 CHATTER = 1.0e-8
 #: Times within this many ulp are one event (EVENTS.md, rule 6).

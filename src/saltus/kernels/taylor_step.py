@@ -1,4 +1,4 @@
-"""Template, 4 of 7 of the Taylor flow: one step of all lanes, as arithmetic on lanes: how long it
+"""Template, 4 of 8 of the Taylor flow: one step of all lanes, as arithmetic on lanes: how long it
 is, how it is taken.
 """
 

@@ -18,6 +18,7 @@ COLD = {
     "note_touch", "note_touches", "is_exact_zero", "final_contacts", "start_sides", "fill", "empty",
     "refill", "set_period", "is_broken",
     "record", "saltate", "overflowed", "end_stretch", "is_slow", "periods_behind", "write_samples",
+    "take_impacts", "order_matters", "end_impacts", "begins_uniquely",
 }  # fmt: skip
 #: Functions of lanes that few equations need: never inlined, so that they are out of the way of the
 #: others.
