@@ -99,17 +99,21 @@ def note(lanes, lane, batch, g, kind, direction, velocity, before, later, slow):
     )
 
 
+@inner
+def carried_over(lanes, lane, g):
+    """Whether another jump has put the state beyond a boundary, so that it isn't on it."""
+    near = TOLD * ROUNDING * lanes.prior[PRIOR_ROWS * g + NEW, lane]
+    at_once = lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] < 0.5
+    return at_once and abs(lanes.work[GAP_ROW + g, lane]) > near
+
+
 @kernel
 def strike(lanes, lane, batch, g, rate, slow):
     """The state jumps at a boundary that it may not pass. Rebounds too small to be followed end at
     rest.
     """
     who, mode = lanes.memo[lane, WHO], mode_of(lanes, lane)
-    gap = lanes.work[GAP_ROW + g, lane]
-    carried = lanes.found[DELTA, lane] == 0.0 and lanes.fresh[g, lane] < 0.5 and gap != 0.0
-    if LAW[g] == JUMP_LAW and carried:  # by another jump, far beyond the boundary
-        lanes.fresh[g, lane] = 1.0
-    else:
+    if LAW[g] == IMPACT_LAW or not carried_over(lanes, lane, g):
         snap(lanes, lane, g)
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
