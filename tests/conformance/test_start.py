@@ -99,10 +99,12 @@ def test_start_where_both_sides_push_onto_the_boundary_sticks():
     assert contacts(run) == []
 
 
-def test_start_where_both_sides_push_off_the_boundary_leaves():
+def test_start_where_both_sides_push_off_the_boundary_has_no_unique_motion():
     run = sl.simulate(slider.with_values(force=0.0, friction=-1.0), (0.0,), t_end=1.0)
-    assert (str(run.status.values), contacts(run)) == ("ok", [])
-    assert abs(float(run.end_v)) == 1.0
+    assert (str(run.status.values), contacts(run)) == ("nonunique", [])
+    assert (float(run.end_time), float(run.end_v)) == (0.0, 0.0)
+    beside = sl.simulate(slider.with_values(force=0.0, friction=-1.0), (1e-9,), t_end=1.0)
+    assert (str(beside.status.values), float(beside.end_v)) == ("ok", pytest.approx(1.0 + 1e-9))
 
 
 def test_rest_at_zero_where_the_gap_of_the_case_is_zero():

@@ -73,8 +73,8 @@ def test_a_branch_goes_on_from_an_unstable_orbit(rig):
     system = sl.models.delangre("a", force="4 N", frequency="17 Hz")
     chosen = (rig.orbit_period.values == 3) & (rig.orbit_stable.values == 0)
     branch = sl.branches(system, {"frequency": ("15 Hz", "17.2 Hz")}, start=rig.isel(orbit=chosen))
-    assert branch.event_kind.values.tolist() == ["fold"]
-    assert branch.event_frequency.values == pytest.approx([15.70602680244704], abs=1e-9)
+    folds = branch.event_frequency.values[branch.event_kind.values == "fold"]
+    assert folds == pytest.approx([15.70602680244704], abs=1e-9)
 
 
 def test_the_stable_ones_are_the_attractors(rig):

@@ -39,6 +39,7 @@ class Kind(StrEnum):
     frequency_response = "frequency_response"
     bifurcation_diagram = "bifurcation_diagram"
     branches = "branches"
+    backbone = "backbone"
     bifurcation_curves = "bifurcation_curves"
     periodic_orbits = "periodic_orbits"
     type_map = "type_map"

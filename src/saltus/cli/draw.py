@@ -18,7 +18,7 @@ _WORDS = {
     "impacts": "impacts", "energy": "energies",
     "methods": "one question by several methods", "exponents": "exponents",
     "branches": "branches of periodic orbits", "orbits": "periodic orbits",
-    "bifurcation_curve": "a curve of bifurcations",
+    "bifurcation_curve": "a curve of bifurcations", "backbone": "a backbone",
 }  # fmt: skip
 #: Pictures that show trajectories of a batch.
 OF_TRAJECTORIES = ("history", "phase", "section", "spectrum", "impacts", "energy", "exponents")

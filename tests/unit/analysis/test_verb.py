@@ -59,11 +59,6 @@ WING = sl.models.aeroelastic()
             lambda: sl.stroboscope(WING),
             "no forcing period to be seen once in. Take sl.simulate with t_end=",
         ),
-        (lambda: sl.attractors(WING, (0, 0, 0, 0)), "no forcing period: give every="),
-        (
-            lambda: sl.bifurcation_diagram(WING, {"airspeed": (9.0, 12.0, 4)}),
-            "no forcing period: give every=",
-        ),
     ],
 )
 def test_each_verb_names_what_tells_it_how_long_to_go_on(call, teaches):

@@ -20,7 +20,7 @@ from saltus.flow.methods import Method
 
 #: Doubled branches are followed to orbits of this number of periods, each way over this number of
 #: points.
-LONGEST_DOUBLED, POINTS = 8, 1000
+LONGEST_DOUBLED, POINTS = 2, 1000
 #: Events at which the branches that leave are followed.
 SWITCHES = ("period_doubling", "branch_point")
 
