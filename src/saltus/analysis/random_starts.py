@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, UnitError, nearest, shown
 from saltus.flow.counts import whole
 from saltus.system.system import System
 from saltus.units import to_si
@@ -67,6 +67,8 @@ def _range(system: System, name: str, ends: Any) -> tuple[float, float]:
         )
     try:
         low, high = (to_si(end, system.units[name], name) for end in ends)
+    except UnitError:
+        raise
     except (TypeError, ValueError):
         raise ParameterError(
             f"the range of {name} must be (low, high), not {shown(ends)}."

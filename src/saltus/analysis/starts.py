@@ -258,12 +258,9 @@ def range_of(system: System, name: Any, ends: Any) -> tuple[float, float]:
         raise ParameterError(
             f"{system.name} has no parameter {shown(name)}. {nearest(name, system.values)}"
         )
-    try:
-        low, high = (single(system, name, end) for end in ends)
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"the range of {name} must be (low, high), not {shown(ends)}."
-        ) from None
+    if not isinstance(ends, list | tuple | np.ndarray) or len(ends) != 2:
+        raise ParameterError(f"the range of {name} must be (low, high), not {shown(ends)}.")
+    low, high = (single(system, name, end) for end in ends)
     if not low < high:
         raise ParameterError(f"the range of {name} must ascend, not {shown(ends)}.")
     return low, high

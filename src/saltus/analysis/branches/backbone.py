@@ -21,7 +21,7 @@ from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.outputs import outputs_of
 from saltus.analysis.starts import check_system, single
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, among, nearest, shown
+from saltus.errors import ParameterError, UnitError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
@@ -165,6 +165,8 @@ def _range(system: System, state: str, given: Any) -> tuple[float, float]:
     unit = system.units.get(state, "")
     try:
         low, high = (to_si(end, unit, "amplitude") for end in given)
+    except UnitError:
+        raise
     except (TypeError, ValueError):
         raise ParameterError(
             f'amplitude= must be (low, high), such as ("0.1 mm", "5 mm"), not {shown(given)}.'

@@ -21,7 +21,7 @@ from saltus.analysis.responses.grid import grid_of
 from saltus.analysis.responses.responses import find
 from saltus.analysis.starts import check_system, range_of, single
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError, nearest, shown
+from saltus.errors import ParameterError, among, nearest, shown
 from saltus.flow.counts import whole
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting, stage
@@ -191,9 +191,9 @@ def _range(system: System, vary: Any) -> tuple[str, tuple[float, float]]:
 
 def _kinds(switch: Any) -> Sequence[str]:
     """Kinds of events, checked."""
-    given = (switch,) if isinstance(switch, str) else tuple(switch)
+    given = tuple(switch) if isinstance(switch, list | tuple | set | frozenset) else (switch,)
     for one in given:
-        if one not in SWITCHES:
+        if not among(one, SWITCHES):
             raise ParameterError(f"switch={shown(one)} isn't known. {nearest(one, SWITCHES)}")
     return given
 

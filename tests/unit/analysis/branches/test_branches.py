@@ -12,7 +12,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import saltus as sl
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, SaltusError
 
 REFERENCE = Path(__file__).parents[3] / "reference"
 
@@ -236,3 +236,16 @@ def test_the_limit_cycle_of_a_wing_begins_at_a_fold():
         ]
         gaps.append(sides[0] - sides[1])
     assert gaps[1] / gaps[0] == pytest.approx(2.0, rel=0.1)
+
+
+def test_wrong_units_and_odd_arguments_are_answered_in_a_sentence():
+    rig_b = sl.models.delangre("b")
+    for arguments, words in (
+        ({"vary": {"frequency": ("12 mm", "20 Hz")}}, "mm"),
+        ({"vary": {"frequency": ("12 Hz", float("nan"))}}, "finite"),
+        ({"vary": {"frequency": "12 Hz"}}, r"\(low, high\)"),
+        ({"vary": {"frequency": (10.0, 20.0)}, "switch": 3}, "switch=3"),
+        ({"vary": {"frequency": (10.0, 20.0)}, "start": (float("nan"), 0)}, "finite"),
+    ):
+        with pytest.raises(SaltusError, match=words):
+            sl.branches(rig_b, **arguments)
