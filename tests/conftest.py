@@ -16,9 +16,13 @@ import pytest
 LONGEST = (
     "faults/test_study_faults.py",
     "truth/test_basins.py",
+    "conformance/test_every_verb.py",
+    "conformance/test_every_method.py",
     "paper/test_figures.py",
     "conformance/test_tiers.py",
     "truth/test_wolf.py",
+    "truth/test_order.py",
+    "test_examples.py",
     "truth/test_attractors.py",
     "truth/test_lyapunov.py",
     "unit/study/test_questions.py",
@@ -26,14 +30,14 @@ LONGEST = (
     "truth/test_responses.py",
     "unit/results/files/test_files.py",
     "faults/test_result_files.py",
-    "truth/test_order.py",
     "unit/analysis/orbits/test_aperiodic.py",
     "oracles/test_oracles.py",
     "truth/test_unforced.py",
-    "test_examples.py",
     "unit/cli/test_cli_maps.py",
     "unit/cli/test_cli.py",
     "test_docs.py",
+    "test_docstrings.py",
+    "test_readme.py",
     "unit/codegen/test_compiled.py",
     "unit/codegen/test_machine.py",
     "unit/replication/test_run.py",
@@ -83,6 +87,18 @@ def never_steady():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "STEADY_AFTER", math.inf)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def compiled_here():
+    """No process of its own for a compilation that takes long: it begins by importing what is here
+    already. unit/codegen/test_cache.py asks for one.
+    """
+    from saltus.codegen import building
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(building, "OTHER_PROCESS", math.inf)
         yield
 
 

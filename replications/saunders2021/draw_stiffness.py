@@ -139,6 +139,13 @@ def three_stiffnesses(data: Data) -> Figure:
     return figure
 
 
+def one_branch(data: Data, of: str) -> Figure:
+    """Stable and unstable orbits over a parameter."""
+    figure, ax = plt.subplots(figsize=(7.0, 3.8), layout="constrained")
+    plot.branches(data[of], ax=ax)
+    return figure
+
+
 def _turning(ax: Axes, ds: xr.Dataset, color: str, size: float) -> None:
     y = ds["sample_x"].values * 1e3
     x = np.broadcast_to(ds["response_contact_stiffness"].values[:, None], y.shape)

@@ -23,6 +23,7 @@ from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.capture import Neighbourhoods
 from saltus.analysis.orbits.orbits import Orbit, find_orbits, same
 from saltus.analysis.orbits.portrait import portraits
+from saltus.analysis.responses.all_branches import branches
 from saltus.analysis.responses.bifurcation_diagram import bifurcation_diagram
 from saltus.analysis.responses.frequency_response import frequency_response
 from saltus.flow import ODE45, Taylor
@@ -66,6 +67,11 @@ NANOMETRE, BUNCH = 1e-9, (101, 21)
 #: A quick run: values of a frequency response, by ode45 at the tight tolerances, of a bifurcation
 #: diagram; every fourth start; periods.
 QUICK_FREQUENCIES, QUICK_TIGHT, QUICK_STIFFNESSES, QUICK_EVERY, QUICK_PERIODS = 57, 8, 181, 4, 400
+#: Stiffnesses about the jump, the grazing and the period doubling.
+_LOW, _AROUND, _DOUBLING = ("10 kN/m", "40 kN/m"), ("12 kN/m", "32 kN/m"), ("7.5 kN/m", "9 kN/m")
+_SYMMETRIC = {"lower_gap": "0.4 mm", "upper_gap": "0.4 mm"}
+#: Starts from which branches are looked for, at that many values of the parameter: full, quick.
+SEEDS, SEEDED_AT = ("random 24", "random 12"), (6, 4)
 #: A basin smaller than this share of the starts is looked at on its own.
 RARE = 0.01
 #: Distance [in ranges of the axes] within which two orbits are one.
@@ -82,6 +88,7 @@ def jobs(folder: Path, quick: bool) -> list[Job]:
         *plan.fig5(),
         *plan.fig6(),
         *plan.fig7(),
+        *plan.branches(),
     ]
     late = [
         ("fig8", "25.5 kN per m"),
@@ -226,6 +233,30 @@ class _Plan:
                     )
                 )
         return made
+
+    def branches(self) -> list[Job]:
+        """Stable and unstable orbits over what the paper varies, where it speaks of an isolated
+        branch, a jump, a grazing and a period doubling.
+        """
+        wide = {"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")}
+        return [
+            Job(
+                f"{figure}, branches",
+                branches,
+                self._study(study)[1].with_values(force="4 N", **values),
+                Taylor(),
+                {
+                    "vary": {name: limits}, "start": SEEDS[self.quick], "box": wide,
+                    "at": SEEDED_AT[self.quick], "longest": longest,
+                },
+            )
+            for figure, study, values, name, limits, longest in (
+                ("fig3/a4", "fig3", _SYMMETRIC, "frequency", ("13 Hz", "30 Hz"), 1),
+                ("fig7/f", "fig8", {"frequency": "23 Hz"}, "contact_stiffness", _LOW, 1),
+                ("fig8/5 Hz", "fig8", {}, "contact_stiffness", _AROUND, 1),
+                ("fig11/17 Hz", "fig11", {}, "contact_stiffness", _DOUBLING, 2),
+            )
+        ]  # fmt: skip
 
     def maps(self, name: str) -> list[Job]:
         """A job for each basin map of a study file."""

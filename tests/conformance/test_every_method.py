@@ -156,6 +156,29 @@ def test_impacts_that_accumulate_are_completed_or_named(method):
         assert str(run.status.values) in ("budget_events", "turned")
 
 
+@sl.system(states="v")
+def rub(t, v, *, friction=1.0):
+    """It sticks once 1 + 0.5 sin(t) - t is zero: there the force is weaker than the friction."""
+    return 0.5 * sl.cos(t) - friction * sl.sign(v)
+
+
+@pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
+@every
+def test_friction_that_sticks_is_followed_or_named(method):
+    """Only what isn't located goes to and fro across v = 0."""
+    stops = brentq(lambda t: 1 + 0.5 * math.sin(t) - t, 1.0, 2.0, xtol=1e-15)
+    method = dataclasses.replace(method, max_steps=20_000)
+    run = sl.simulate(rub, (1.0,), t_end=3.0, samples=1, method=method, time_errors="local")
+    if method.exact:
+        assert (str(run.status.values), float(run.end_v)) == ("ok", 0.0)
+        assert run.contact_time.values == pytest.approx([stops], rel=1e-14)
+        return
+    assert abs(float(run.end_v)) < 3.0 * method.noise + FINE["step"]
+    if method.records_contacts:
+        assert str(run.status.values) == "sliding"
+        assert float(run.end_time) == pytest.approx(stops, abs=3.0 * method.noise + FINE["step"])
+
+
 # -- one trajectory and many -----------------------------------------------------------------------
 RIG = sl.models.delangre("b", force="4 N", frequency="7 Hz")
 START = np.random.default_rng(5).uniform((-1e-3, -0.1), (1e-3, 0.1), (6, 2))

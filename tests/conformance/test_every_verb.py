@@ -72,7 +72,7 @@ CALLS = {
     "attractors": started(),
     "backbone": lambda how: (
         RIG,
-        {"amplitude": SIZES[how], "values": {"force": 0, "damping_ratio": 0}, "points": 40},
+        {"amplitude": SIZES[how], "values": {"force": 0, "damping_ratio": 0}, "points": 12},
     ),
     "basin_fractions": lambda how: (
         RIG,

@@ -111,6 +111,65 @@ def test_a_ball_without_rebound_is_followed_whether_its_table_presses_or_not(amp
     assert (run["x"].values - table).min() > -1e-12
 
 
+@sl.system(states="x v")
+def lifted(t, x, v, *, restitution=0.5, turn=1.0):
+    """What presses onto the floor fades, and lifts from the turn on."""
+    return v, 6 * (t - turn), sl.impact(x > 0, -v, restitution=restitution)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_an_impact_at_the_instant_at_which_the_force_turns(restitution):
+    """From 3 at -1 it strikes at -4 at t = 1, and leaves: 4 e (t - 1) + (t - 1)^3."""
+    run = sl.simulate(lifted.with_values(restitution=restitution), (3.0, -1.0), t_end=2.0)
+    assert (str(run.status.values), times(run, "impact").tolist()) == ("ok", [1.0])
+    assert float(run.end_x) == pytest.approx(4 * restitution + 1, rel=1e-15)
+
+
+@pytest.mark.parametrize("restitution", [0.8, 0.9, 0.95])
+def test_a_chatter_that_a_force_ends_before_rest(restitution):
+    """Each flight is v s + 3 (t - turn) s^2 + s^3; once that has no root the ball is gone."""
+    t, v, turn, exact = 0.0, 1.0, 1.5, []
+    while (under := 9 * (t - turn) ** 2 - 4 * v) > 0:
+        flight = (3 * (turn - t) - math.sqrt(under)) / 2
+        v = -restitution * (v + 6 * (t - turn) * flight + 3 * flight**2)
+        t += flight
+        exact.append(t)
+    system = lifted.with_values(restitution=restitution, turn=turn)
+    run = sl.simulate(system, (0.0, 1.0), t_end=3.0, samples=4)
+    assert run["contact_kind"].values.tolist() == ["impact"] * len(exact)
+    assert run["contact_time"].values == pytest.approx(exact, rel=1e-14)
+    last = 3.0 - t
+    end = v * last + 3 * (t - turn) * last**2 + last**3
+    assert float(run.end_x) == pytest.approx(end, rel=1e-14)
+
+
+def test_an_impact_at_the_very_end_is_reported_once():
+    run = sl.simulate(ball.with_values(gravity=1.0), (0.5, 0.0), t_end=1.0, samples=2)
+    assert times(run, "impact").tolist() == [1.0]
+    assert (str(run.status.values), float(run.end_v)) == ("ok", 0.5)
+
+
+def test_speeds_whose_square_is_no_number():
+    run = sl.simulate(ball.with_values(gravity=0.0), (1e-160, -1e-160), t_end=2.0, samples=2)
+    assert times(run, "impact").tolist() == [1.0]
+    assert (float(run.end_x), float(run.end_v)) == pytest.approx((5e-161, 5e-161), rel=1e-15, abs=0)
+    run = sl.simulate(ball, (0.0, 1e-160), t_end=1.0, samples=2)
+    assert (str(run.status.values), float(run.end_x), float(run.end_v)) == ("ok", 0.0, 0.0)
+
+
+def test_a_ball_never_falls_through_and_a_contact_that_lasts_is_kept():
+    """On a floor for 1e6 s; for a thousand periods on a table that never throws it off."""
+    run = sl.simulate(ball, (1.0, 0.0), t_end=1e6, samples=100)
+    assert run["x"].values[1:].tolist() == [0.0] * 100
+    table = sl.models.bouncing_ball(amplitude=0.9)
+    run = sl.simulate(table, (1.5, 0.0), periods=1000, samples=4)
+    assert (str(run.status.values), run["contact_kind"].values[-1]) == ("ok", "hold")
+    assert float(run["contact_time"][-1]) < 40 * math.pi
+    x = run["x"].values[1:].reshape(1000, 4)[20:]
+    roundings = 4 * int(run.steps) * 2.0**-52
+    assert x == pytest.approx(np.tile([0.9, 0.0, -0.9, 0.0], (980, 1)), abs=roundings)
+
+
 def test_three_bodies_share_their_momentum():
     """An elastic row: the first body's velocity goes to the last; energy and momentum stay."""
 

@@ -224,6 +224,30 @@ def test_40_digits_give_the_run_of_the_full_rig():
     assert abs(float(exact.times[0]) - float(row["first_event_time_s"])) < 1e-16
 
 
+def test_40_digits_close_the_doubling_of_case_b():
+    """Row G07 of branches_rig.csv: R = 0 and det(M + I) = 0, M by central differences."""
+    (row,) = (row for row in rows("branches_rig") if row["id"] == "G07")
+    words = dict(word.split("=") for word in row["check"].partition(";")[0].split()[1:])
+    with mp.workdps(50):
+        x, v, frequency = mpf(words["x0"]), mpf(words["v0"]), row["value"]
+        parameters = {
+            "mass": 3, "damping_ratio": "0.03", "natural_frequency": 5, "cubic": "7e8",
+            "contact_stiffness": 14000, "lower_gap": 0, "upper_gap": "0.0004", "force": 4,
+            "frequency": frequency,
+        }  # fmt: skip
+
+        def end(dx, dv):
+            run = high_precision.simulate(parameters, x + dx, v + dv, 1)
+            return np.array([run.x, run.v])
+
+        assert np.all(np.abs(end(0, 0) - [x, v]) < mpf("1e-19"))
+        dx, dv = mpf("1e-17"), mpf("1e-15")
+        by_x = (end(dx, 0) - end(-dx, 0)) / (2 * dx)
+        by_v = (end(0, dv) - end(0, -dv)) / (2 * dv)
+        # an error of 1e-12 in the frequency would make it 1e-10
+        assert abs((by_x[0] + 1) * (by_v[1] + 1) - by_x[1] * by_v[0]) < mpf("1e-16")
+
+
 @pytest.mark.parametrize("number", [5, 70, 128])
 def test_reference_file_is_what_the_generator_makes(number):
     row = rows("rig_b4_15hz_5periods")[number]

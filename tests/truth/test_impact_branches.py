@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import impact_orbits
 import saltus as sl
 
 REFERENCE = Path(__file__).parents[1] / "reference"
@@ -37,6 +38,16 @@ def test_an_oscillator_whose_stop_is_at_its_place_of_rest(number, restitution):
     assert nearest(found, "period_doubling", exact) == pytest.approx(exact, rel=1e-14)
 
 
+def test_an_orbit_with_one_impact_in_three_periods():
+    exact = float(rows("laws_impact")["I14"])
+    start = impact_orbits.oscillator(frequency=6.62, n=3)[-1][1]
+    found = sl.branches(
+        IMPACT("thompson"), {"frequency": (6.62, 6.66)}, tuple(start), at=2, switch=(),
+        progress=False,
+    )  # fmt: skip
+    assert nearest(found, "period_doubling", exact) == pytest.approx(exact, rel=1e-14)
+
+
 def test_an_oscillator_that_leaves_its_stop():
     exact = rows("laws_impact")
     system = IMPACT(damping=0.04, gap=0.2, restitution=0.7)
@@ -58,6 +69,44 @@ def test_a_ball_on_a_shaken_table():
     found = sl.branches(system, {"amplitude": (1.0, 1.6)}, start, at=1, switch=(), progress=False)
     assert nearest(found, "fold", fold) == pytest.approx(fold, rel=1e-14)
     assert nearest(found, "period_doubling", doubling) == pytest.approx(doubling, rel=1e-14)
+
+
+def test_a_ball_without_rebound_on_a_shaken_table():
+    exact = float(rows("laws_ball")["B04b"])
+    start = impact_orbits.ball_on_table(3.72, 0.0)[0]
+    found = sl.branches(
+        sl.models.bouncing_ball(restitution=0.0), {"amplitude": (3.72, 3.73)}, tuple(start), at=2,
+        switch=(), progress=False,
+    )  # fmt: skip
+    assert nearest(found, "period_doubling", exact) == pytest.approx(exact, rel=1e-14)
+
+
+def test_a_ball_that_takes_on_the_velocity_of_its_table_but_passes_it():
+    """Without rebound the orbit of the closed form begins where the table presses on, so it is no
+    motion of an impact; of a jump, after which nothing holds the ball up, it is.
+    """
+
+    @sl.system(states="x v", forced_at="frequency")
+    def through(t, x, v, *, amplitude=3.2, frequency="1 rad/s"):
+        table = amplitude * sl.sin(frequency * t)
+        return v, -1.0, sl.jump(x < table, v=amplitude * frequency * sl.cos(frequency * t))
+
+    exact = float(rows("laws_ball")["B04a"])
+    start = impact_orbits.ball_on_table(3.2, 0.0)[0]
+    found = sl.branches(
+        through, {"amplitude": (3.1, 3.25)}, tuple(start), at=2, switch=(), progress=False
+    )
+    assert nearest(found, "fold", exact) == pytest.approx(exact, rel=1e-14)
+
+
+def test_a_stiff_spring_behind_a_gap_begins_at_the_graze_of_the_closed_form():
+    exact = float(rows("laws_more")["M01"])
+    x = 0.7 * 0.75**2 / (1 - 0.75**2 + 0.015j)  # the response without contact
+    found = sl.branches(
+        sl.models.bilinear_rig(), {"frequency": ("0.75 rad/s", "0.82 rad/s")},
+        (x.imag, 0.75 * x.real), at=1, switch=(), progress=False,
+    )  # fmt: skip
+    assert nearest(found, "graze", exact) == pytest.approx(exact, rel=1e-14)
 
 
 def test_a_ball_in_a_shaken_box():

@@ -37,6 +37,36 @@ def times(found, kind):
     return found["contact_time"].values[found["contact_kind"].values == kind]
 
 
+# -- both sides of an impact -----------------------------------------------------------------------
+@pytest.mark.parametrize("method", [sl.Taylor(), *LOCATED, *NOT_LOCATED], ids=lambda one: one.label)
+def test_a_contact_has_both_sides_of_a_jump(method):
+    """The velocity behind an impact is that before it, times -0.5 to the last bit; the first is met
+    at 2 m/s.
+    """
+    found = run(ball, (2.0 / 9.81, 0.0), method, 0.45)
+    before, behind = found["contact_v_before"].values, found["contact_v"].values
+    assert len(before) >= 2
+    assert behind.tolist() == (-0.5 * before).tolist()
+    off = 0.03 if method in NOT_LOCATED else 1e-6
+    assert before[0] == pytest.approx(-2.0, abs=off)
+    assert (found["contact_x_before"].values == found["contact_x"].values).all()
+
+
+def test_a_jump_that_forgets_what_was_before_it():
+    """x'' + x = 0 from (0, 2) meets x = 1 with the velocity sqrt(3), and again behind each turn."""
+
+    @sl.system(states="x v hits")
+    def thrown(t, x, v, hits):
+        return v, -x, 0.0, sl.jump(x > 1, v=0.25, hits=hits + 1)
+
+    found = run(thrown, (0.0, 2.0, 0.0), sl.Taylor(), 5.0)
+    jumped = found["contact_kind"].values == "impact"
+    assert found["contact_v_before"].values[jumped] == pytest.approx([3**0.5], rel=1e-14)
+    assert found["contact_v"].values[jumped].tolist() == [0.25]
+    assert found["contact_hits_before"].values[jumped].tolist() == [0.0]
+    assert found["contact_hits"].values[jumped].tolist() == [1.0]
+
+
 # -- orders ----------------------------------------------------------------------------------------
 #: The oscillator's solution is no polynomial, so steps err; the ball's is a parabola.
 STOP = sl.models.impact_oscillator()

@@ -509,6 +509,48 @@ def test_volumes_grow_where_the_acceleration_jumps_at_zero_speed():
 
 
 # -- use -------------------------------------------------------------------------------------------
+# -- directions that shrink fast -------------------------------------------------------------------
+def test_a_direction_that_is_lost_in_rounding_has_its_exponent():
+    """z' = -rate (z - x) behind an oscillator: its exponent is -rate, whatever is left of it after
+    a period of 5 s (exp(-2500) is nothing).
+    """
+
+    @sl.system(states="x v z", forced_at="f")
+    def followed(t, x, v, z, *, f=0.2, rate=1.0):
+        return v, sl.cos(2 * sl.pi * f * t) - 0.2 * v - x, -rate * (z - x)
+
+    rates = np.array([1.0, 10.0, 500.0])
+    ds = sl.lyapunov(followed, values={"rate": rates}, periods=64, transient=100)
+    assert ds["kind"].values.tolist() == ["periodic"] * 3
+    found, error = ds["lyapunov_exponent"].values, ds["lyapunov_error"].values
+    assert (np.abs(found[:, 2] + rates) <= error[:, 2]).all()
+    assert (error[:, 2] < 1e-11 * (1 + rates) * 10).all()
+    assert found[:, :2] == pytest.approx(-0.1, rel=1e-11)
+
+
+def test_the_fast_chamber_of_a_relief_valve():
+    """The third exponent of its limit cycle, lost in the rounding of a turn, beside that from
+    blocks a tenth as long, in which it isn't: the second way knows it from the tangent.
+    """
+    valve, start = sl.models.relief_valve(flow=8.0), (1.0, 0.1, 12.0)
+    turns = sl.lyapunov(valve, start, every=2.2, periods=128, transient=64)
+    parts = sl.lyapunov(valve, start, every=0.22, periods=1280, transient=640)
+    (slow,), (short,) = turns["lyapunov_exponent"].values, parts["lyapunov_exponent"].values
+    assert np.isfinite(slow).all()
+    assert slow[2] == pytest.approx(short[2], abs=1e-3)
+    assert slow[2] == pytest.approx(-20.6, abs=0.1)
+
+
+def test_of_several_directions_that_are_lost_nothing_is_known():
+    @sl.system(states="x v y z", forced_at="f")
+    def both(t, x, v, y, z, *, f=0.2):
+        return v, sl.cos(2 * sl.pi * f * t) - 0.2 * v - x, 50.0 * (x - y), 90.0 * (x - z)
+
+    (found,) = sl.lyapunov(both, periods=64, transient=64)["lyapunov_exponent"].values
+    assert found[:2] == pytest.approx(-0.1, rel=1e-11)
+    assert np.isnan(found[2:]).all()
+
+
 def test_units():
     rig = sl.models.delangre("a", force=4.0, frequency=16.0)
     values = {

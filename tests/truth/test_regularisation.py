@@ -37,9 +37,10 @@ def force_error(system, smooth, x):
     return abs(smooth.rhs(0.0, start)[1] - system.rhs(0.0, start)[1])
 
 
-@pytest.mark.parametrize("width", [1e-3, 0.05])
+@pytest.mark.parametrize("width", [1e-3, 0.01, 0.05])
 @pytest.mark.parametrize("law", WORST)
 def test_largest_force_error(law, width):
+    """The row M40 of tests/reference/laws_more.csv is that of tanh with the width 0.01."""
     smooth = sl.regularise(stop, law, width=width)
     worst = minimize_scalar(
         lambda u: -force_error(stop, smooth, 0.3 + u * width), bounds=(0.05, 1.4), method="bounded"

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from saltus.analysis.starts import Ensemble
+from saltus.flow.contact_table import ContactTable
 from saltus.flow.engine import Outcome
 from saltus.flow.methods import Method
 from saltus.kernels import status as st
 from saltus.results import Guards, Subject, attributes
 from saltus.system.dimensions import gap_units
 from saltus.system.evaluate import evaluate
+from saltus.system.quantity import jumping_states
 from saltus.system.system import System
 
 
@@ -107,11 +109,13 @@ def gap_unit(system: System) -> str:
 
 
 def contacts(system: System, outcome: Outcome, time_error: np.ndarray) -> dict[str, Any]:
-    """The table of contacts."""
+    """The table of contacts; with the states before them, if the run has been that of the system
+    that remembers what jumps.
+    """
     table = outcome.contacts
     names = np.array([guard.name for guard in system.guards] or [""], dtype=np.str_)
     columns = ("direction", "velocity", "kind", "mode_before", "mode_after", "steps", "trajectory")
-    return {
+    values = {
         "contact_time": table.time,
         "contact_time_error": time_error,
         "contact_guard": names[table.guard],
@@ -121,3 +125,17 @@ def contacts(system: System, outcome: Outcome, time_error: np.ndarray) -> dict[s
         },
         "contact_<state>": table.state[:, : len(system.states)],
     }
+    if jumping_states(system):
+        values["contact_<state>_before"] = before_jumps(system, table)
+    return values
+
+
+def before_jumps(system: System, table: ContactTable) -> np.ndarray:
+    """States before the contacts of a run of the system that remembers what jumps
+    (:func:`saltus.system.quantity.remembering`), float64[c, D]: only impacts and jumps change them.
+    """
+    names, struck = jumping_states(system), table.kind == st.IMPACT
+    states = table.state[:, : len(system.states)].copy()
+    for name, was in zip(reversed(names), table.state.T[::-1], strict=False):
+        states[struck, system.states.index(name)] = was[struck]
+    return states

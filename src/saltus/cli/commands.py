@@ -108,10 +108,11 @@ def demo(
     from saltus.results import save, usable_folder
 
     usable_folder(out)
-    study.prepare_files(plot)
+    files = study.prepare_files(plot)
 
     with screen.working() as progress:
         result = study.demo(frequency, case.value, force, periods, progress)
+    files.join()
     screen.show(result.table)
     written = [save(result.run, out / "demo.nc"), result.table.write_csv(out / "demo.csv")]
     if plot:

@@ -5,6 +5,7 @@ settles to the same.
 from __future__ import annotations
 
 import contextlib
+import io
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -36,6 +37,10 @@ PERIODS = 2000
 #: Forcing periods drawn in a time history, and in the phase portrait of a response that doesn't
 #: repeat.
 SHOWN, SHOWN_IF_APERIODIC = 12, 24
+#: Room about the panels, in shares of the figure: to look for it takes longer than to draw.
+MARGINS = {
+    "left": 0.075, "right": 0.985, "bottom": 0.075, "top": 0.975, "hspace": 0.6, "wspace": 0.36,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -103,17 +108,19 @@ def demo(
     return Demo(run, found, neighbours, _table(run, found, neighbours, title))
 
 
-def prepare_files(plot: bool) -> None:
-    """Begin to import what the files need, in a thread: while the demo computes, or waits for
-    another process to compile, a processor is free.
+def prepare_files(plot: bool) -> threading.Thread:
+    """Begin to import what the files need, in a thread to be joined before they are written: while
+    the demo computes, or waits for another process to compile, a processor is free.
     """
 
     def imported() -> None:
-        for begin in (_netcdf, _pyplot) if plot else (_netcdf,):
+        for begin in (_netcdf, _fonts) if plot else (_netcdf,):
             with contextlib.suppress(Exception):  # `save` or `draw` meets it again, and says it
                 begin()
 
-    threading.Thread(target=imported, name="imports for the files", daemon=True).start()
+    thread = threading.Thread(target=imported, name="imports for the files", daemon=True)
+    thread.start()
+    return thread
 
 
 def _netcdf() -> None:
@@ -133,6 +140,15 @@ def _pyplot() -> Any:
     return matplotlib.pyplot
 
 
+def _fonts() -> None:
+    """A first picture reads the fonts, which takes as long as a row of the demo's."""
+    plt = _pyplot()
+    figure = plt.figure(figsize=(1.0, 1.0))
+    figure.add_subplot().plot([0.0, 1.0])
+    figure.savefig(io.BytesIO())
+    plt.close(figure)
+
+
 def draw(result: Demo, file: Path) -> Path:
     """A row for each start, the time history and the phase portrait of its response; returns the
     file.
@@ -146,7 +162,8 @@ def draw(result: Demo, file: Path) -> Path:
             2,
             figsize=(9.0, 1.75 * len(STARTS)),
             width_ratios=(2.6, 1),
-            layout="constrained",
+            gridspec_kw=MARGINS,
+            layout="none",
         )
         for i, (row, text) in enumerate(zip(axes, response_texts(result.run), strict=True)):
             n = int(result.settled["response_period"][i]) or SHOWN_IF_APERIODIC
@@ -156,7 +173,7 @@ def draw(result: Demo, file: Path) -> Path:
                 row[0].set_xlabel("")
             row[0].set_title(f"start x, v = {_start(i)}: {text}", loc="left")
         named = {label: handle for handle, label in _handles(axes.flat)}
-        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
+        figure.legend(named.values(), named.keys(), loc="lower center", ncols=len(named))
         figure.savefig(file)
         plt.close(figure)
     return file

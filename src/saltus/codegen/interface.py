@@ -85,7 +85,7 @@ TAYLOR = Interface(
             (
                 "STEP_ROW", "SERIES_ROW", "GUARD_ROW", "GUARD_SERIES", "SNAP_STATE", "SNAP_CONST",
                 "SINGULAR_GUARD", "CLOCK_KIND",
-                "CLOCK_TABLE", "LAW", "PARTNER",
+                "CLOCK_TABLE", "LAW", "PARTNER", "SUPPORT",
             ),
             WHOLE,
         )

@@ -63,8 +63,13 @@ class Call:
         TypeError
             If an array isn't of its type, or isn't contiguous.
         """
+        return np.array(self.numbers(values, 0), np.int64)
+
+    def numbers(self, values: tuple, first: int) -> list[int]:
+        """Those of some arguments that follow each other, the first of which has this place."""
         numbers: list[int] = []
-        for value, (dtype, dimensions) in zip(values, self._kinds, strict=True):
+        kinds = self._kinds[first : first + len(values)]
+        for value, (dtype, dimensions) in zip(values, kinds, strict=True):
             if dtype is None:
                 numbers.append(int(value))
             elif value.dtype != dtype or value.ndim != dimensions or not value.flags.c_contiguous:
@@ -74,7 +79,7 @@ class Call:
                 )
             else:
                 numbers += (0, 0, value.size, 8, _address(value), *value.shape, *value.strides)
-        return np.array(numbers, np.int64)
+        return numbers
 
 
 def _address(array: np.ndarray) -> int:
@@ -137,13 +142,16 @@ class Kernels:
         """The memory that one call works in; one set for each thread, made once: many a call takes
         no longer than making it.
         """
-        if not hasattr(self._memory, "arrays"):
-            self._memory.arrays = self._layout["workspace"]()
-        return self._memory.arrays
+        memory = self._memory
+        if not hasattr(memory, "arrays"):
+            memory.arrays = self._layout["workspace"]()
+            first = len(self.interface.arguments) - len(memory.arrays)
+            memory.numbers = self._call.numbers(memory.arrays, first)
+        return memory.arrays
 
     def propagate(self, *values: Any) -> int:
         """Call the kernel, without the GIL; kernels/batch.py describes its arrays."""
-        block = self._call.block(values)
+        block = self._block(values)
         begun = time.perf_counter()
         answer = int(self._entry(block.ctypes.data))
         self._worked += time.perf_counter() - begun
@@ -156,6 +164,14 @@ class Kernels:
                 target=self._settle, name=f"kernels: {self.title}", daemon=True
             ).start()
         return answer
+
+    def _block(self, values: tuple) -> np.ndarray:
+        """The arguments of a call; where those of the workspace lie is known."""
+        own = getattr(self._memory, "arrays", ())
+        rest = len(values) - len(own)
+        if not own or any(a is not b for a, b in zip(values[rest:], own, strict=True)):
+            return self._call.block(values)
+        return np.array(self._call.numbers(values[:rest], 0) + self._memory.numbers, np.int64)
 
     def exchange(self, tier: str) -> None:
         """Go on with another tier, made here if it isn't on disk. The next call uses it; a call

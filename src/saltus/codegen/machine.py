@@ -17,7 +17,7 @@ from saltus.errors import CacheError, ParameterError, nearest, shown
 
 #: Rises when the same templates and equations would be made into other code: entries of the cache
 #: carry it in their names.
-PIPELINE = 3
+PIPELINE = 4
 #: LLVM's level for a template, and for an equation alone: that is straight lines of lanes, of which
 #: level 3 makes nothing faster (0026).
 LEVEL, LEVEL_ALONE = 3, 1
@@ -116,7 +116,10 @@ def object_code(
             if not one.is_declaration:
                 one.linkage = "external" if one.name in called else "internal"
         module.verify()
-        _optimise(module, machine, LEVEL_ALONE if alone or open_sizes else LEVEL, open_sizes)
+        if open_sizes:
+            _optimise_open(module, machine)
+        else:
+            _optimise(module, machine, LEVEL_ALONE if alone else LEVEL)
         return machine.emit_object(module)
 
 
@@ -134,22 +137,50 @@ def _target_machine(made_for: Target, level: int = LEVEL) -> llvm.TargetMachine:
     )
 
 
-def _optimise(
-    module: llvm.ModuleRef, machine: llvm.TargetMachine, level: int, open_sizes: bool
-) -> None:
+def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine, level: int) -> None:
     """LLVM's passes. Lanes are vectors already: nothing is to be made into vectors, least of all
     sums of doubles.
     """
-    options = llvm.create_pipeline_tuning_options(speed_level=level)
-    options.loop_vectorization, options.slp_vectorization, options.loop_unrolling = (
-        False,
-        False,
-        not open_sizes,
-    )
-    if open_sizes:
-        options.inlining_threshold = 0
-    builder = llvm.create_pass_builder(machine, options)
+    builder = llvm.create_pass_builder(machine, _options(level))
     builder.getModulePassManager().run(module, builder)
+
+
+def _optimise_open(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    """Passes for a template whose sizes are open: LLVM's own for each function, and few across
+    functions. Its pipeline for modules takes three times as long: it follows pointers to functions,
+    of which there are none, and simplifies everything twice (0028).
+    """
+    options = _options(LEVEL_ALONE)
+    options.loop_unrolling, options.inlining_threshold = False, 0
+    builder = llvm.create_pass_builder(machine, options)
+    first = llvm.create_new_module_pass_manager()
+    first.add_always_inliner_pass()
+    first.add_global_dead_code_eliminate_pass()
+    first.add_sroa_pass()
+    first.add_simplify_cfg_pass()
+    first.add_ipsccp_pass()
+    first.add_global_opt_pass()
+    first.add_dead_arg_elimination_pass()
+    first.add_post_order_function_attributes_pass()
+    first.run(module, builder)
+    each = builder.getFunctionPassManager()
+    for function in module.functions:
+        if not function.is_declaration:
+            each.run(function, builder)
+    last = llvm.create_new_module_pass_manager()
+    last.add_ipsccp_pass()
+    last.add_global_opt_pass()
+    last.add_dead_arg_elimination_pass()
+    last.add_global_dead_code_eliminate_pass()
+    last.add_simplify_cfg_pass()
+    last.add_instruction_combine_pass()
+    last.run(module, builder)
+
+
+def _options(level: int) -> llvm.PipelineTuningOptions:
+    options = llvm.create_pipeline_tuning_options(speed_level=level)
+    options.loop_vectorization, options.slp_vectorization = False, False
+    return options
 
 
 @cache

@@ -14,6 +14,7 @@ from saltus.kernels.status import LAW_KINDS, NO_LAW
 from saltus.system import expression as ex
 from saltus.system.expression import Expr
 from saltus.system.guards import Guard
+from saltus.system.quantity import is_remembered
 from saltus.system.singular import set_aside
 from saltus.system.system import System
 from saltus.system.tangent import first_column
@@ -28,7 +29,8 @@ def gaps_function(system: System, clocks: Clocks) -> str:
 
     Whether a contact is held, and the side of a gap that is zero, are taken from out. Behind the
     gaps come, for a guard whose contact can be held, the rate at which its constraint is left
-    without its own force, what that force changes of it, and the constraint itself.
+    without its own force, what that force changes of it (of an impact, over what it changes without
+    friction), and the constraint itself.
     """
     laws = any(guard.law for guard in system.guards)
     code = ScalarCode(
@@ -48,7 +50,11 @@ def gaps_function(system: System, clocks: Clocks) -> str:
         if guard.law and guard.law.kind == "hold":
             held.append(f"out[{i}] = {code.value(guard.gap)}")
         elif guard.law:
-            behind = (guard.law.drive, guard.law.pivot, guard.law.constraint)
+            pivot = guard.law.pivot
+            if guard.law.kind == "impact":
+                rough = guard.law.remaining is not None
+                pivot = guard.law.remaining if rough else ex.constant(1.0)
+            behind = (guard.law.drive, pivot, guard.law.constraint)
             held += [
                 f"out[{(1 + block) * count + i}] = {code.value(value)}"
                 for block, value in enumerate(behind)
@@ -135,10 +141,13 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
     clocks = Clocks(system)
     builder, constants = SeriesBuilder(clocks), Constants()
     aside = set_aside(system.field, system.guards)
-    moved, column = len((system.tangent_of or system).states), first_column(system)
-    written = (*range(moved), *column)
+    own, column = (system.tangent_of or system).states, first_column(system)
+    moved = len([name for name in own if not is_remembered(name)])
+    written = (*range(len(own)), *column)
     fields = tuple(builder.form(aside.field[i]) for i in written)
-    code = JetCode({system.states[i]: i for i in written}, fields, builder, constants, shared=moved)
+    code = JetCode(
+        {system.states[i]: i for i in written}, fields, builder, constants, shared=len(own)
+    )
     for i, row in enumerate(written):
         for k in range(order + 1):
             code.write(row * (order + 1) + k, code.state(i, k), of_column=row in column)
@@ -192,12 +201,13 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
 
 def tables_of_laws(system: System) -> dict[str, list]:
     """Tables of the laws of contact, for each guard: its kind, the guard that says whether it is
-    held (of that one: whose contact), its side.
+    held (of that one: whose contact), the one without which it can't be, its side.
     """
     laws = [guard.law for guard in system.guards]
     return dict(
         LAW=[LAW_KINDS[law.kind] if law else NO_LAW for law in laws],
         PARTNER=[law.partner if law else -1 for law in laws],
+        SUPPORT=[law.support if law else -1 for law in laws],
         LAW_SIDE=[float(law.side) if law else 0.0 for law in laws],
     )
 

@@ -21,6 +21,7 @@ TURNED = 13
 AMBIGUOUS_IMPACT = 14
 NONUNIQUE = 15
 INVALID_RESTITUTION = 16
+PAINLEVE = 17
 
 #: Name and meaning of every status code.
 STATUS = {
@@ -72,6 +73,11 @@ STATUS = {
     INVALID_RESTITUTION: (
         "invalid_restitution",
         "the coefficient of restitution is outside [0, 1] at an impact",
+    ),
+    PAINLEVE: (
+        "painleve",
+        "friction takes away more of what presses a contact than the contact's force adds "
+        "(Painleve's paradox): there is no motion with a rigid contact, or there are several",
     ),
 }
 

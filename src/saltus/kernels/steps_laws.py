@@ -9,7 +9,7 @@ Symbols
 g, m guards; t_hit the time of the contact; t_leg that of the contact before. Times in s.
 """
 
-from saltus.kernels.status import CROSSING, IMPACT, IMPACT_LAW, JUMP_LAW
+from saltus.kernels.status import CROSSING, IMPACT, IMPACT_LAW, JUMP_LAW, SURFACE_LAW
 
 #: Flights in a row that are too short to be told, after which impacts count as accumulating.
 MOST_AT_ONCE = 20
@@ -35,9 +35,7 @@ def before_strikes(i, t_hit, t_leg, h, batch, work):
 def count_at_once(i, t_hit, t_leg, batch, work):
     """Count the landings from which the state jumps after a flight that is too short."""
     flight, struck = t_hit - t_leg, False
-    for j in range(NSTATES):
-        work[BEHIND + j] = ROUNDING * max(abs(work[NEXT + j]), least_state(i, batch))
-    gap_changes(t_hit, BEFORE, work)
+    gap_roundings(i, t_hit, BEFORE, batch, work)
     for g in range(NGUARDS):
         if changes_sign(work, LEFT, RIGHT, g):
             rounding = work[BEFORE + g] + ROUNDING * abs(t_hit * work[RATE_AT_REST + g])
@@ -48,6 +46,14 @@ def count_at_once(i, t_hit, t_leg, batch, work):
             struck |= strikes(work, g)
     if struck:
         batch.carry[i, AT_ONCE] += 1.0
+
+
+@kernel
+def gap_roundings(i, t_hit, out, batch, work):
+    """How far the rounding of the state in NEXT moves each gap, to `out`."""
+    for j in range(NSTATES):
+        work[BEHIND + j] = ROUNDING * max(abs(work[NEXT + j]), least_state(i, batch))
+    gap_changes(t_hit, out, work)
 
 
 @kernel
@@ -180,6 +186,37 @@ def strike_at_start(i, t, t_end, batch, work):
             struck = True
     if struck:
         start_leg(i, t, t_end, True, batch, work)
+
+
+@kernel
+def is_held(i, t_hit, batch, work):
+    """Whether both sides push onto a surface that the state in NEXT has just reached: it would have
+    to stay there, and a method without that mode would go to and fro. Needs q at t_hit in Q.
+    """
+    held = False
+    for g in range(NGUARDS):
+        if LAW[g] == SURFACE_LAW and changes_sign(work, LEFT, RIGHT, g):
+            rate_at(t_hit, NEXT, Q, batch.mode[i] | 1 << g, BEHIND, work)
+            gap_rates_at(t_hit, NEXT, BEHIND, Q, RATE_BEHIND, work)
+            above = work[RATE_BEHIND + g]
+            rate_at(t_hit, NEXT, Q, batch.mode[i] & ~(1 << g), BEHIND, work)
+            gap_rates_at(t_hit, NEXT, BEHIND, Q, RATE_BEHIND, work)
+            below = work[RATE_BEHIND + g]
+            held |= above < 0.0 and below > 0.0 and lies_there(i, g, t_hit, batch, work)
+    return held
+
+
+@kernel
+def lies_there(i, g, t_hit, batch, work):
+    """Whether the state in NEXT lies on boundary g. A boundary that another one moves as its side
+    changes is crossed without having been reached.
+    """
+    gap_roundings(i, t_hit, TRY, batch, work)
+    gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
+    late = 128.0 * ulp(t_hit) * abs(work[RATE + g])
+    lies = abs(work[AT_NEXT + g]) <= late + FLAT * work[TRY + g]
+    face(i, AT_NEXT, batch, work)
+    return lies
 
 
 @kernel

@@ -24,6 +24,7 @@ from saltus.kernels.status import (
     GRAZE,
     GRAZE_SHALLOW,
     GRAZES,
+    HOLD_LAW,
     REC_DIRECTION,
     REC_GUARD,
     REC_KIND,
@@ -219,8 +220,11 @@ def touch_error(lanes, lane, g, d, slow):
 @kernel
 def note_touch(lanes, lane, batch, slow, g, d, start):
     """Count and record one tangency at time d into the step that began at phase `start`: exact, or
-    within the gap's rounding error.
+    within the gap's rounding error. Friction that fades out with its contact's force is none.
     """
+    support = SUPPORT[PARTNER[g]] if LAW[g] == HOLD_LAW else -1
+    if support >= 0 and (lanes.memo[lane, HITS] >> support) & 1:
+        return
     who, kind = (
         lanes.memo[lane, WHO],
         GRAZE if touches_exactly(lanes, lane, g, d, slow) else GRAZE_SHALLOW,

@@ -235,6 +235,9 @@ def start_sides(lanes, lane, batch, slow):
         watch(lanes, lane)
         if not begins_uniquely(lanes, lane, batch, slow):
             lanes.memo[lane, FAULT] = NONUNIQUE
+        for g in range(NGUARDS):
+            if LAW[g] == IMPACT_LAW and slow.gaps[g] == 0.0 and slow.gaps[3 * NGUARDS + g] == 0.0:
+                ask_for_paradox(lanes, lane, g, slow)
     lanes.run[STARTING, lane] = 1.0
     lanes.run[LANDED, lane] = lanes.clock[TAU, lane] + lanes.clock[BASE, lane]
 

@@ -18,6 +18,7 @@ from saltus.kernels.status import (
     INVALID_RESTITUTION,
     JUMP_LAW,
     NO_LAW,
+    PAINLEVE,
     RELEASE,
     SURFACE_LAW,
 )
@@ -29,7 +30,8 @@ def watch(lanes, lane):
     """Watch the guards that can act in the mode of a lane."""
     for g in range(NGUARDS):
         held = PARTNER[g] >= 0 and lanes.side[g if LAW[g] == HOLD_LAW else PARTNER[g], lane] > 0.0
-        lanes.side[WATCHED + g, lane] = 1.0 if held == (LAW[g] == HOLD_LAW) else 0.0
+        rubs = SUPPORT[g] < 0 or lanes.side[SUPPORT[g], lane] > 0.0
+        lanes.side[WATCHED + g, lane] = 1.0 if rubs and held == (LAW[g] == HOLD_LAW) else 0.0
 
 
 @inner
@@ -154,6 +156,7 @@ def strike(lanes, lane, batch, g, rate, slow):
             hold(lanes, lane, batch, g, later, slow)
     elif rebound <= 0.0:
         lanes.fresh[g, lane] = 2.0  # it leaves at once: gap and rate are known to be zero
+        ask_for_paradox(lanes, lane, g, slow)
 
 
 @kernel
@@ -213,6 +216,7 @@ def loosen(lanes, lane, batch, struck, closing, slow):
                     lanes.fresh[g, lane] = 1.0
             elif feels:
                 lanes.side[PARTNER[g], lane] = -1.0
+                let_go(lanes, lane, batch, PARTNER[g], slow)
                 if LAW[g] == SURFACE_LAW:
                     lanes.side[g, lane] = 1.0 if left > 0.0 else -1.0
                     lanes.fresh[g, lane] = 0.0
@@ -283,18 +287,63 @@ def hold(lanes, lane, batch, g, later, slow):
     who, before, h = lanes.memo[lane, WHO], mode_of(lanes, lane), PARTNER[g]
     lanes.side[h, lane], lanes.fresh[h, lane] = 1.0, 0.0
     watch(lanes, lane)
+    if LAW[g] == IMPACT_LAW:
+        rub(lanes, lane, batch, h, slow)
     if TANGENT and LAW[g] == SURFACE_LAW and lanes.run[STARTING, lane] < 0.5:
         saltate(lanes, lane, batch, g, before, slow)
     for i in range(NSTATES):
         slow.state[i] = lanes.y[i, lane]
     show_clocks(lanes, lane, slow)
     now = time_of_law(lanes, lane, batch)
-    settle(now, slow.state, batch.param[who * batch.stride], slow.held, before, g)
+    mode = mode_of(lanes, lane) & ~(1 << h)
+    settle(now, slow.state, batch.param[who * batch.stride], slow.held, mode, g)
     for i in range(NSTATES):
         lanes.y[i, lane] = slow.state[i]
     if LAW[g] == IMPACT_LAW:
         face(lanes, lane, batch, g, slow)
     note(lanes, lane, batch, h, HOLD, 1, 0.0, before, later, slow)
+    if LAW[g] == IMPACT_LAW:
+        gaps_here(lanes, lane, batch, slow)
+        ask_for_paradox(lanes, lane, g, slow)
+
+
+# -- friction of contacts --------------------------------------------------------------------------
+@kernel
+def rub(lanes, lane, batch, h, slow):
+    """The way in which a contact slides as it begins to be held; where it doesn't slide, the first
+    step finds out whether it sticks.
+    """
+    for m in range(NGUARDS):
+        if SUPPORT[m] == h:
+            gaps_here(lanes, lane, batch, slow)
+            slip, pull = slow.gaps[m], slow.gaps[NGUARDS + m]
+            positive = slip > 0.0 or (slip == 0.0 and pull > 0.0)
+            lanes.side[m, lane] = 1.0 if positive else -1.0
+            lanes.fresh[m, lane] = 1.0 if slip == 0.0 else 0.0
+
+
+@kernel
+def ask_for_paradox(lanes, lane, g, slow):
+    """Name the paradox of Painleve of a contact that begins to rest or leaves at once: sliding,
+    friction leaves nothing of what its force does. One that may stick will. Needs slow.gaps.
+    """
+    paradox = slow.gaps[2 * NGUARDS + g] <= 0.0
+    for m in range(NGUARDS):
+        if SUPPORT[m] == PARTNER[g] and slow.gaps[m] == 0.0:
+            sticks = lanes.side[PARTNER[g], lane] < 0.0 or slow.gaps[PARTNER[m]] > 0.0
+            paradox = paradox and not sticks
+    if paradox:
+        lanes.memo[lane, FAULT] = PAINLEVE
+
+
+@kernel
+def let_go(lanes, lane, batch, h, slow):
+    """A contact is held no longer, so its friction holds nothing either."""
+    before = mode_of(lanes, lane)
+    for m in range(NGUARDS):
+        if SUPPORT[m] == h and lanes.side[PARTNER[m], lane] > 0.0:
+            lanes.side[PARTNER[m], lane] = -1.0
+            note(lanes, lane, batch, PARTNER[m], RELEASE, -1, 0.0, before, 0.0, slow)
 
 
 @kernel
@@ -304,8 +353,12 @@ def release(lanes, lane, batch, h, slow):
     """
     before, g = mode_of(lanes, lane), PARTNER[h]
     gaps_here(lanes, lane, batch, slow)
+    if LAW[g] == IMPACT_LAW and slow.gaps[2 * NGUARDS + g] <= PARADOX:
+        lanes.memo[lane, FAULT] = PAINLEVE
+        return
     fades = lanes.found[DELTA, lane] > 0.0
     lanes.side[h, lane] = -1.0
+    let_go(lanes, lane, batch, h, slow)
     if LAW[g] == SURFACE_LAW:
         needed, most = slow.gaps[NGUARDS + g], abs(slow.gaps[2 * NGUARDS + g])
         lanes.side[g, lane] = 1.0 if needed > 0.0 else -1.0

@@ -17,7 +17,7 @@ zeros, of P and its derivatives.
 
 The head supplies the sizes LANES, NSTATES, NGUARDS, ORDER, NCONST, NTURNS, ROWS, NSERIES, the rows
 SERIES_ROW, GUARD_ROW, GUARD_SERIES, GUARD_SIGN, GAP_ROW, SCALE_ROW, SNAP_STATE, SNAP_CONST, the
-laws LAW, PARTNER, LAW_SIDE of the guards (LAWS: whether there is one), the
+laws LAW, PARTNER, SUPPORT, LAW_SIDE of the guards (LAWS: whether there is one), the
 degrees NEWTON_DEGREE_1 and _2, and the functions constants(p, c, lane), gaps(t, y, p, h, out),
 turns(p, origin, period, count, lane, clock) -> whether they change from period to period, jets(y,
 side, c, clock, work) and rates(y, side, c, clock, work), the right-hand side alone; PROBED says
@@ -110,6 +110,9 @@ FELT = 1.0e-9
 ENDED, CLOSED, MOST_IMPACTS, MOST_STRIKES = 1.0e-12, 1.0e-16, 50_000, 50
 #: By how much rounding may carry a coefficient of restitution out of [0, 1].
 RESTITUTION_ROUNDING = 1.0e-12
+#: Part that friction leaves of what the force of a contact does, at which a contact is given up
+#: rather than released.
+PARADOX = 1.0e-9
 #: Part of the time scale of the acceleration that may be left of a chatter when it is completed.
 CHATTER = 1.0e-8
 #: Times within this many ulp are one event (EVENTS.md, rule 6).

@@ -135,6 +135,7 @@ def rest_or_leave(lanes, lane, batch, g, slow):
         hold(lanes, lane, batch, g, 0.0, slow)
     else:
         lanes.fresh[g, lane] = 2.0
+        ask_for_paradox(lanes, lane, g, slow)
 
 
 @kernel

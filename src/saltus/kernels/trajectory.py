@@ -44,6 +44,7 @@ from saltus.kernels.status import (
     RECORD_FLOATS,
     REJECTED,
     RUNNING,
+    SLIDING,
     STEPS,
     VIOLATIONS,
 )
@@ -399,9 +400,13 @@ def advance(i, budget, batch, work):
             batch.carry[i, ERRORS + j] += abs(h * work[ERROR + j])
         if lands:
             land(i, t, t_hit, t_new, t_leg, h, batch, work)
+            held = locate and is_held(i, t_hit, batch, work)
             go_on(K1, work)
             begin_leg(i, t_hit, t_end, batch, work)
             t = t_leg = t_hit
+            if held:
+                status = SLIDING
+                break
         else:
             write_samples(i, t, h, t_new, batch, work)
             if locate:

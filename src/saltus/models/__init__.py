@@ -31,6 +31,7 @@ from saltus.models.gear_pair import gear_pair
 from saltus.models.hertz_stop import hertz_stop
 from saltus.models.impact_oscillator import impact_oscillator
 from saltus.models.one_sided_spring import one_sided_spring
+from saltus.models.painleve_rod import painleve_rod
 from saltus.models.pulled_pair import pulled_pair
 from saltus.models.relief_valve import relief_valve
 from saltus.models.rocking_block import rocking_block
@@ -69,6 +70,7 @@ MODELS: dict[str, Callable[..., System]] = {
         relief_valve,
         falling_ball,
         dropped_oscillator,
+        painleve_rod,
         thermostat,
         den_hartog,
         belt_two_values,
@@ -167,6 +169,7 @@ __all__ = [
     "hertz_stop",
     "impact_oscillator",
     "one_sided_spring",
+    "painleve_rod",
     "pulled_pair",
     "relief_valve",
     "rocking_block",

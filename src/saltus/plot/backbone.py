@@ -1,4 +1,4 @@
-"""Backbones: amplitude of free vibrations over their frequency."""
+"""Backbones: amplitude of resonant vibrations over their frequency."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from saltus.results.dataset import schema
 
 @picture(schema.BACKBONE)
 def backbone(ds: xr.Dataset, *, output: str | None = None, ax: Any = None) -> Axes:
-    """Largest magnitude of a state in free vibration over the frequency; where it is unstable,
-    dashed.
+    """Largest magnitude of a state in free vibration, or in phase quadrature, over the frequency;
+    where it is unstable, dashed.
 
     Parameters
     ----------

@@ -29,6 +29,8 @@ _POINTS = {
     "fold_flip": ("fold and doubling", "D"), "degenerate_doubling": ("degenerate doubling", "d"),
     "fold_neimark_sacker": ("fold and torus", "<"),
     "flip_neimark_sacker": ("doubling and torus", ">"),
+    "fold_graze": ("fold and graze", "v"), "flip_graze": ("doubling and graze", "^"),
+    "resonant_graze": ("resonant graze", "*"), "double_graze": ("two grazes", "H"),
 }  # fmt: skip
 
 
@@ -110,7 +112,9 @@ def _named(curves: Any) -> list[tuple[str, xr.Dataset]]:
 
 
 def _name(ds: xr.Dataset) -> str:
-    return f"{MARKS[ds.attrs['bifurcation']][0]} of {period_text(ds.attrs['periods'])}"
+    what = MARKS[ds.attrs["bifurcation"]][0]
+    guard = ds.attrs["guard"]
+    return f"{what} of {period_text(ds.attrs['periods'])}" + (f" at {guard}" if guard else "")
 
 
 def _scale(name: str, named: list[tuple[str, xr.Dataset]], over: xr.Dataset | None) -> Scale:

@@ -1,4 +1,6 @@
-"""Branches of periodic orbits: stable ones solid, unstable ones dashed, bifurcations marked."""
+"""Branches of periodic orbits and equilibria: stable ones solid, unstable ones dashed,
+bifurcations marked.
+"""
 
 from __future__ import annotations
 
@@ -121,25 +123,60 @@ def draw_branches(
     ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: Scale
 ) -> dict[str, Any]:
     """Lines along the branches; the entries of the legend."""
-    forced = bool((ds["branch_periods"].values > 0).all())
-    place = ds[point_name(ds.attrs["parameter"])].values * across.factor
-    periods, of = ds["branch_periods"].values, ds["point_branch"].values
-    stable, height = ds["point_stable"].values > 0, values * up.factor
+    kind = ds["branch_kind"].values
+    periods = np.where(kind == "periodic", ds["branch_periods"].values, 0)
+    drawn = motion_colors.codes(kind, periods)
+    place, height, of, stable = _with_events(ds, values)
+    place, height = place * across.factor, height * up.factor
     named: dict[str, Any] = {}
-    for code in np.unique(motion_colors.codes(["periodic"] * len(periods), periods)):
+    for code in np.unique(drawn):
         color = tuple(motion_colors.color(int(code)).tolist())
-        mine = np.flatnonzero(motion_colors.codes(["periodic"] * len(periods), periods)[of] == code)
+        mine = np.flatnonzero(drawn[of] == code)
         for solid in (False, True):
             x, y = _lines(mine, of, stable == solid, place, height)
             ax.plot(
                 x, y, color=color, lw=1.3 if solid else 0.9, ls="-" if solid else _DASHES,
                 zorder=3 if solid else 2, gid=f"{'stable' if solid else 'unstable'} {code}",
             )  # fmt: skip
-        label = motion_colors.label(int(code), periods) if forced else "limit cycle"
-        named[label] = Line2D([], [], color=color, lw=1.3)
+        named[motion_colors.label(int(code), periods)] = Line2D([], [], color=color, lw=1.3)
     if not stable.all():
         named["unstable"] = Line2D([], [], color=QUIET, lw=0.9, ls=_DASHES)
     return named
+
+
+def _with_events(
+    ds: xr.Dataset, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where points lie and how high, their branches, and whether orbits behind them are stable;
+    between them the events at which stability changes.
+    """
+    place, of = ds[point_name(ds.attrs["parameter"])].values, ds["point_branch"].values
+    stable = ds["point_stable"].values > 0
+    if not ds.sizes.get("event"):
+        return place, values, of, stable
+    before = ds["event_point"].values
+    after = np.minimum(before + 1, ds.sizes["point"] - 1)
+    turns = np.flatnonzero((stable[before] != stable[after]) & (of[before] == of[after]))
+    at, height = _heights(ds, values)
+    where = before[turns] + 1
+    return (
+        np.insert(place, where, at[turns]),
+        np.insert(values, where, height[turns]),
+        np.insert(of, where, of[before[turns]]),
+        np.insert(stable, where, stable[after[turns]]),
+    )
+
+
+def _heights(ds: xr.Dataset, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where events lie, and how high: between the points that they lie between."""
+    at = ds[event_name(ds.attrs["parameter"])].values
+    before = ds["event_point"].values
+    after = np.minimum(before + 1, ds.sizes["point"] - 1)
+    place = ds[point_name(ds.attrs["parameter"])].values
+    with np.errstate(all="ignore"):
+        share = (at - place[before]) / (place[after] - place[before])
+    share = np.where((share >= 0) & (share <= 1), share, 0.5)
+    return at, values[before] + share * (values[after] - values[before])
 
 
 def _lines(
@@ -160,14 +197,7 @@ def draw_marks(ax: Axes, ds: xr.Dataset, values: np.ndarray, across: Scale, up: 
     """Bifurcations on the branches, between the points that they lie between."""
     if not ds.sizes.get("event"):
         return
-    at = ds[event_name(ds.attrs["parameter"])].values
-    before = ds["event_point"].values
-    after = np.minimum(before + 1, ds.sizes["point"] - 1)
-    place = ds[point_name(ds.attrs["parameter"])].values
-    with np.errstate(all="ignore"):
-        share = (at - place[before]) / (place[after] - place[before])
-    share = np.where((share >= 0) & (share <= 1), share, 0.5)
-    height = values[before] + share * (values[after] - values[before])
+    at, height = _heights(ds, values)
     size = 4.5 if len(at) <= 40 else 3.2
     for kind, (text, marker) in MARKS.items():
         here = ds["event_kind"].values == kind

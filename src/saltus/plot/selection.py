@@ -17,6 +17,7 @@ import xarray as xr
 from saltus.errors import ParameterError, among, nearest, shown
 from saltus.plot.picture import caller
 from saltus.results.dataset.schema import (
+    before_name,
     contact_name,
     equations_of,
     forcing_period,
@@ -229,14 +230,17 @@ class Path:
 
 def contacts_in(ds: xr.Dataset, begin: float, end: float) -> xr.Dataset:
     """The rows of the table of contacts in the window."""
-    time = ds["contact_time"].values
-    where = time / forcing_period(ds) if "period" in ds else time
+    where = ds["contact_time"].values
+    if "period" in ds:  # counted from the start of the run, which may be at any time
+        first = {sample_dim(ds): 0}
+        since = where - float(ds["time"].isel(first))
+        where = float(ds["period"].isel(first)) + since / forcing_period(ds)
     return ds.isel(contact=np.flatnonzero((where >= begin) & (where <= end)))
 
 
 def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> Path:
     """The curve of one trajectory in the window, with the contacts put in, so that colours change
-    exactly there.
+    exactly there; where a state jumps, with both sides of the jump.
     """
     axis = sample_axis(ds)
     slack = 1e-9 * max(1.0, abs(end))
@@ -244,18 +248,21 @@ def path(ds: xr.Dataset, states: tuple[str, ...], begin: float, end: float) -> P
         {sample_dim(ds): np.flatnonzero((axis >= begin - slack) & (axis <= end + slack))}
     )
     table = contacts_in(ds, begin, end)
-    time = np.concatenate([inside["time"].values, table["contact_time"].values])
+    sides = [(contact_name, "contact_mode_after")]
+    if all(before_name(name) in table for name in states):
+        sides.insert(0, (before_name, "contact_mode_before"))
+
+    def joined(samples: str, contacts: list[str]) -> np.ndarray:
+        columns = np.stack([table[name].values for name in contacts], axis=-1)
+        return np.concatenate([inside[samples].values, columns.ravel()])
+
+    time = joined("time", ["contact_time"] * len(sides))
     values = np.stack(
-        [
-            np.concatenate([inside[name].values, table[contact_name(name)].values])
-            for name in states
-        ],
-        axis=-1,
+        [joined(name, [of_state(name) for of_state, _ in sides]) for name in states], axis=-1
     )
-    mode = np.concatenate([inside["mode"].values, table["contact_mode_after"].values])
-    is_contact = np.arange(time.size) >= inside["time"].size
-    # at equal times the contact comes last: the curve goes on in its mode
-    order = np.lexsort((is_contact, time))
+    mode = joined("mode", [name for _, name in sides])
+    # at equal times the contacts come last: the curve goes on in their mode
+    order = np.argsort(time, kind="stable")
     return Path(time[order], values[order], mode[order])
 
 

@@ -155,7 +155,7 @@ def _branches(ds: xr.Dataset) -> list[str]:
     closed, stable = ds["branch_closed"].values, ds["point_stable"].values
     lines = [
         f"found    {counted(ds.sizes['branch'], 'branch')}, {int(closed.sum())} of "
-        f"them closed, {ds.sizes['point']} orbits, {stable.mean():.0%} of them stable",
+        f"them closed, {ds.sizes['point']} points, {stable.mean():.0%} of them stable",
     ]
     at, kind, of = (ds[one].values for one in (event_name(name), "event_kind", "event_branch"))
     for i, periods in enumerate(ds["branch_periods"].values.tolist()):
@@ -166,7 +166,9 @@ def _branches(ds: xr.Dataset) -> list[str]:
         )
         extent = f"{mine.min():.6g} to {mine.max():.6g} {unit}".rstrip()
         ends = ", closed" if closed[i] else ""
-        lines.append(f"  {i}: {period_text(periods)} from {extent}{ends}{text and '; ' + text}")
+        what = ds["branch_kind"].values[i]
+        what = period_text(periods) if what == "periodic" else what.replace("_", " ")
+        lines.append(f"  {i}: {what} from {extent}{ends}{text and '; ' + text}")
     if ds.attrs["unexplained_changes"]:
         lines.append(f"unsure   {ds.attrs['unexplained_changes']} changes of stability unexplained")
     return lines
@@ -194,8 +196,9 @@ def _backbone(ds: xr.Dataset) -> list[str]:
     frequency, name = ds["backbone_frequency"].values, ds.attrs["amplitude_of"]
     one = ds.sel(output=name)
     peak, unit = one["point_output_peak"].values, one["output_units"].item()
+    phase = " in quadrature" if ds.attrs["phase"] == "quadrature" else ""
     return [
-        f"found    mode {ds.attrs['mode']} at {len(peak)} points, {frequency[0]:.8g} Hz at "
+        f"found    mode {ds.attrs['mode']}{phase} at {len(peak)} points, {frequency[0]:.8g} Hz at "
         f"|{name}| {peak[0]:.4g} {unit} to {frequency[-1]:.8g} Hz at {peak[-1]:.4g} "
         f"{unit}".rstrip(),
         f"ends     {ds.attrs['end']}, {ds['point_stable'].values.mean():.0%} of it stable",

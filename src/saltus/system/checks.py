@@ -9,9 +9,10 @@ import numpy as np
 
 from saltus.errors import ParameterError, TraceError
 from saltus.system.compositions import sticks_less
-from saltus.system.declared import outside
+from saltus.system.declared import outside, pushes_on
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import varies
+from saltus.system.guards import Law
 from saltus.system.overlaps import check_overlaps
 from saltus.units import to_si
 
@@ -35,7 +36,8 @@ def check_guards(system: str, count: int) -> None:
 
 def check_values(system: System, values: Mapping[str, Any]) -> None:
     """Raise a ParameterError if pieces overlap with some values of the parameters, a restitution is
-    outside [0, 1], or friction holds less at rest than in motion.
+    outside [0, 1], a coefficient of friction is negative, or friction holds less at rest than in
+    motion.
 
     Parameters
     ----------
@@ -46,11 +48,11 @@ def check_values(system: System, values: Mapping[str, Any]) -> None:
     """
     check_overlaps(system, values)
     for guard in system.guards:
-        restitution = guard.law.restitution if guard.law else None
-        limit = guard.law.limit if guard.law else None
+        law = guard.law or Law("jump")
         for part, low, high, why in (
-            (restitution, 0.0, 1.0, outside),
-            (limit, 1.0, np.inf, sticks_less),
+            (law.restitution, 0.0, 1.0, outside),
+            (law.friction, 0.0, np.inf, pushes_on),
+            (law.limit, 1.0, np.inf, sticks_less),
         ):
             if part is None or part.op == "const" or varies(part):
                 continue

@@ -47,7 +47,8 @@ def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) 
     velocity : Expr or float
         Sliding velocity [m/s, or any], zero where it sticks.
     slip : Expr or float
-        Force in motion [N, or any], > 0; it may depend on the velocity (Stribeck).
+        Force in motion [N, or any], > 0; it may depend on the velocity (Stribeck). Whether it stays
+        positive isn't watched: bound one that may not, as ``sl.max(slip, 0.0)`` does.
     stick : Expr or float, optional
         Largest force at rest [as slip], at least ``slip`` at rest; default: the same.
 

@@ -10,10 +10,10 @@ import numpy as np
 from saltus.errors import TraceError, nearest, shown
 from saltus.system import expression as ex
 from saltus.system.canonical import Canonical, proportion
-from saltus.system.declared import Declared, Impact, Jump
+from saltus.system.declared import FACING, FRICTION, SLIP, Declared, Impact, Jump, weight
 from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.evaluate import evaluate
-from saltus.system.expression import Bit, Expr, Friction, Not
+from saltus.system.expression import Bit, Expr, Friction, Not, Operand
 from saltus.system.guards import (
     Guard,
     Law,
@@ -24,7 +24,7 @@ from saltus.system.guards import (
     relations,
 )
 from saltus.system.reduction import Elimination, Held, dot, held_contact, hold_gap, with_pivots
-from saltus.system.singular import check_finite, check_gaps, lifted
+from saltus.system.singular import assuming, check_finite, check_gaps, lifted
 from saltus.system.surfaces import (
     OnSurface,
     averaged,
@@ -32,6 +32,7 @@ from saltus.system.surfaces import (
     held_at,
     is_surface,
     level,
+    ratio,
     split,
 )
 
@@ -43,6 +44,11 @@ _PLACES, _ROUNDING = 16, 1e-9
 Field = tuple[Expr, ...]
 
 
+#: Share of a pivot without friction at which one with friction counts as none: the force that it
+#: takes to hold the contact grows beyond all bounds.
+_NO_PIVOT = ex.constant(2.0**-40)
+
+
 @dataclass(frozen=True, eq=False)
 class _Met:
     """A declared law, its comparison and parts written with bits."""
@@ -51,6 +57,32 @@ class _Met:
     number: int
     positive: bool
     parts: dict[str, Expr]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rubbing:
+    """The friction of a contact that rests.
+
+    Attributes
+    ----------
+    contact, guard : int
+        Number of the contact's guard; of the guard whose gap is the velocity of sliding.
+    coefficient : Expr
+        Friction over the force that presses the contact.
+    sign : Expr
+        Of the velocity of sliding: 1 or -1, by its guard.
+    direction : tuple of Expr
+        What a unit of force against a positive velocity adds to the field.
+    along : int
+        Sign of the gap where that velocity is positive.
+    """
+
+    contact: int
+    guard: int
+    coefficient: Expr
+    sign: Expr
+    direction: Field
+    along: int
 
 
 def find_contacts(
@@ -138,26 +170,31 @@ def with_laws(
             if isinstance(declared.law, Impact)
             else _jump(declared, states)
         )
+    rubbing = [one for one in (_rubbing(each, states) for each in met) if one]
+    _check_rubbing(rubbing, laws, field, guards)
     laws |= {
         number: Law("surface", constraint=guards[number].gap)
         for number in range(len(guards))
-        if number not in laws and is_surface(number, field, guards, states)
+        if number in {one.guard for one in rubbing}
+        or (number not in laws and is_surface(number, field, guards, states))
     }
     if not laws:
         return field, guards
-    held, field = _held_contacts(field, guards, states, laws)
-    elimination = Elimination(field, held)
+    held, field = _held_contacts(field, guards, states, laws, rubbing)
+    forces = _Forces(field, held, rubbing)
     owners, holds = list(guards), []
     for number, law in laws.items():
         owners[number] = replace(guards[number], law=law)
     for one in held:
-        law = _completed(laws[one.owner], one, elimination, limits.get(one.owner, _ONE), states)
+        law = _completed(laws[one.owner], one, forces, limits.get(one.owner, _ONE), states)
         owners[one.owner] = replace(owners[one.owner], law=law)
         assert law.drive is not None
         assert law.pivot is not None
         gap = hold_gap(law.kind, law.drive, law.pivot, law.limit)
+        if law.remaining is not None:
+            gap = ex.mul(gap, ex.sub(law.remaining, _NO_PIVOT))
         holds.append(Guard(hold_name(owners[one.owner]), gap, law=Law("hold", partner=one.owner)))
-    return elimination.reduced(), (*owners, *holds)
+    return forces.elimination.reduced(), (*owners, *holds)
 
 
 def hold_name(owner: Guard) -> str:
@@ -180,16 +217,30 @@ def renamed(guards: Sequence[Guard], names: Mapping[int, str]) -> tuple[Guard, .
 
 
 def _held_contacts(
-    field: Field, guards: Sequence[Guard], states: Sequence[str], laws: Mapping[int, Law]
+    field: Field,
+    guards: Sequence[Guard],
+    states: Sequence[str],
+    laws: Mapping[int, Law],
+    rubbing: Sequence[_Rubbing],
 ) -> tuple[list[Held], Field]:
     """The contacts that can be held, and the field with the middle of each surface where it is
     held.
     """
+    of_contacts = {one.guard: one for one in rubbing}
     surfaces = sorted(number for number, law in laws.items() if law.kind == "surface")
     order = sorted(number for number, law in laws.items() if law.kind != "jump")
     holds = {number: len(guards) + place for place, number in enumerate(order)}
-    directions: dict[int, Field] = {}
+    directions = {number: law.direction for number, law in laws.items() if law.kind == "impact"}
+    for one in rubbing:
+        directions[one.guard] = _scaled(-one.along, one.direction)
+        slides = _scaled(ex.neg(ex.mul(one.coefficient, one.sign)), one.direction)
+        directions[one.contact] = tuple(
+            ex.add(by, ex.select(Bit(holds[one.guard]), _ZERO, more)) if more is not _ZERO else by
+            for by, more in zip(directions[one.contact], slides, strict=True)
+        )
     for number in surfaces:
+        if number in of_contacts:
+            continue
         surface = split(number, field, OnSurface(guards[number].gap, states))
         directions = {
             other: tuple(averaged(entry, number, holds[number]) for entry in direction)
@@ -199,19 +250,76 @@ def _held_contacts(
         field = held_at(field, surface, holds[number])
     held = []
     for number in order:
-        law = laws[number]
-        assert law.constraint is not None
-        direction = directions[number] if number in surfaces else law.direction
-        held.append(held_contact(number, holds[number], law.constraint, direction, states))
+        constraint = laws[number].constraint
+        assert constraint is not None
+        held.append(held_contact(number, holds[number], constraint, directions[number], states))
     return with_pivots(held), field
 
 
-def _completed(
-    law: Law, held: Held, elimination: Elimination, limit: Expr, states: Sequence[str]
-) -> Law:
+def _scaled(factor: Operand, direction: Sequence[Expr]) -> Field:
+    return tuple(one if one is _ZERO else ex.mul(factor, one) for one in direction)
+
+
+class _Forces:
+    """What holds each contact, all others that are held eliminated.
+
+    Parameters
+    ----------
+    field : tuple of Expr
+        As :class:`Elimination` takes it.
+    held : sequence of Held
+        The contacts that can be held.
+    rubbing : sequence of _Rubbing
+        The friction of some.
+    """
+
+    def __init__(
+        self,
+        field: Field,
+        held: Sequence[Held],
+        rubbing: Sequence[_Rubbing],
+    ) -> None:
+        self.elimination = Elimination(field, held)
+        self._held = {one.owner: one for one in held}
+        self._by_contact = {one.contact: one for one in rubbing}
+        self._by_guard = {one.guard: one for one in rubbing}
+        smooth = [self._without_friction(one) for one in held]
+        self._smooth = Elimination(field, smooth) if rubbing else self.elimination
+        self._smoothly = dict(zip(self._held, smooth, strict=True))
+
+    def _without_friction(self, one: Held) -> Held:
+        rubbing = self._by_contact.get(one.owner)
+        if rubbing is None:
+            return one
+        sticks = self._held[rubbing.guard].hold
+        return replace(one, direction=tuple(assuming(x, sticks, True) for x in one.direction))
+
+    def without_friction(self, one: Held) -> Expr:
+        """The pivot of a contact without its friction."""
+        _, pivot, _ = self._smooth.own(self._smoothly[one.owner])
+        return pivot
+
+    def own(self, one: Held) -> tuple[Expr, Expr, Field, int]:
+        """Drive, pivot and direction of a contact as :class:`Law` has them, and what supports it:
+        the force of friction is in units of its limit.
+        """
+        drive, pivot, direction = self.elimination.own(one)
+        if one.owner not in self._by_guard:
+            return drive, pivot, direction, -1
+        rubbing = self._by_guard[one.owner]
+        contact = self._held[rubbing.contact]
+        pressed, by, _ = self.elimination.own(contact)
+        force = ex.neg(ex.div(assuming(pressed, one.hold, True), assuming(by, one.hold, True)))
+        limit = ex.mul(rubbing.coefficient, assuming(force, contact.hold, True))
+        most = ex.select(Bit(contact.hold), ex.mul(limit, pivot), _ZERO)
+        return drive, most, direction, contact.hold
+
+
+def _completed(law: Law, held: Held, forces: _Forces, limit: Expr, states: Sequence[str]) -> Law:
     """The law of a contact with what holding it needs."""
-    drive, pivot, direction = elimination.own(held)
+    drive, pivot, direction, support = forces.own(held)
     surface = law.kind == "surface"
+    rough = law.friction is not None
     return replace(
         law,
         partner=held.hold,
@@ -221,7 +329,9 @@ def _completed(
         drive=drive,
         pivot=pivot,
         limit=limit if surface else None,
+        remaining=ex.div(pivot, forces.without_friction(held)) if rough else None,
         zeros=(2 if limit is _ONE else 1) if surface else 3,
+        support=support,
     )
 
 
@@ -255,7 +365,7 @@ def _impact(met: _Met, field: Field, guards: Sequence[Guard], states: Sequence[s
                 f"a sum of velocities times functions of positions and time."
             )
     impulse = [
-        ex.div(normal[i], met.parts[name]) if name in met.law.moved else _ZERO
+        ex.div(normal[i], met.parts[weight(name)]) if name in met.law.moved else _ZERO
         for i, name in enumerate(states)
     ]
     side = 1 if met.positive else -1
@@ -267,6 +377,8 @@ def _impact(met: _Met, field: Field, guards: Sequence[Guard], states: Sequence[s
         constraint=w,
         direction=tuple(ex.neg(one) for one in impulse),
         restitution=restitution,
+        friction=met.parts.get(FRICTION),
+        mass=ratio(_ONE, dot(normal, impulse)),
     )
 
 
@@ -333,6 +445,50 @@ def _equal(a: Expr, b: Expr) -> bool:
     with np.errstate(invalid="ignore"):
         apart = np.abs(first - second) > _ROUNDING * size
     return bool(np.any(known) and not np.any(apart & known))
+
+
+# -- friction of contacts --------------------------------------------------------------------------
+def _rubbing(met: _Met, states: Sequence[str]) -> _Rubbing | None:
+    """The friction of a declared impact, if it has any."""
+    if not (isinstance(met.law, Impact) and met.law.rubs):
+        return None
+    slip, sign = met.parts[SLIP], met.parts[FACING]
+    found = sign.payload if sign.op == "select" else None
+    bit = found.inner if isinstance(found, Not) else found
+    if not isinstance(bit, Bit):
+        raise TraceError(
+            f"{met.law!r}: slip_velocity = {slip!r} is decided by the time alone. Give the "
+            f"velocity at which the contact slides."
+        )
+    normal = gradient(slip, states)
+    for name in met.law.rubbed:
+        slope = normal[states.index(name)]
+        if any(ex.state(other) in set(ex.walk(slope)) for other in met.law.rubbed):
+            raise TraceError(
+                f"{met.law!r}: slip_velocity = {slip!r} isn't linear in {name}. The velocity of "
+                f"sliding is a sum of velocities times functions of positions and time."
+            )
+    direction = tuple(
+        ex.div(normal[i], met.parts[weight(name)]) if name in met.law.rubbed else _ZERO
+        for i, name in enumerate(states)
+    )
+    along = 1 if bit is found else -1
+    return _Rubbing(met.number, bit.guard, met.parts[FRICTION], sign, direction, along)
+
+
+def _check_rubbing(
+    rubbing: Sequence[_Rubbing], laws: Mapping[int, Law], field: Field, guards: Sequence[Guard]
+) -> None:
+    """Raise a TraceError where something else happens at the velocity at which a contact turns."""
+    owned = set(laws) | bits_in(field)
+    for one in rubbing:
+        if one.guard in owned:
+            raise TraceError(
+                f"the friction of a contact changes its direction where "
+                f"{equation_of(one.guard, guards)}, and another force or law does too. Leave "
+                f"friction= and slip_velocity= out, or the other."
+            )
+        owned.add(one.guard)
 
 
 # -- jumps -----------------------------------------------------------------------------------------

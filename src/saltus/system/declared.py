@@ -13,6 +13,10 @@ from typing import Any, ClassVar
 from saltus.errors import TraceError, shown
 from saltus.system.expression import Condition, Expr, Operand, Relation, as_expr, select, walk
 
+#: Names of the parts of an impact with friction: its coefficient, the velocity of sliding, and the
+#: sign of that.
+FRICTION, SLIP, FACING = "friction", "slip_velocity", "the sign of slip_velocity"
+
 _MADE: ContextVar[list[Declared] | None] = ContextVar("made", default=None)
 
 
@@ -55,12 +59,25 @@ class Impact(Declared):
     name = "sl.impact"
 
     def __init__(
-        self, allowed: Relation, velocity: Expr, restitution: Expr, inertia: Mapping[str, Expr]
+        self,
+        allowed: Relation,
+        velocity: Expr,
+        restitution: Expr,
+        inertia: Mapping[str, Expr],
+        rubbing: Mapping[str, Expr],
     ) -> None:
+        weights = {weight(name): value for name, value in inertia.items()}
         super().__init__(
-            allowed, {"velocity": velocity, "restitution": restitution, **dict(inertia.items())}
+            allowed, {"velocity": velocity, "restitution": restitution, **weights, **rubbing}
         )
-        self.moved = tuple(inertia)
+        self.moved = tuple(name for name in _states_in(velocity) if name in inertia)
+        slipping = [rubbing[SLIP]] if rubbing else []
+        self.rubbed = tuple(name for name in _states_in(*slipping) if name in inertia)
+
+    @property
+    def rubs(self) -> bool:
+        """Whether friction acts in the contact while it rests."""
+        return SLIP in self.parts
 
 
 class Jump(Declared):
@@ -86,13 +103,17 @@ def impact(
     *,
     restitution: Operand,
     inertia: Sequence[Operand] | Mapping[str, Operand] | None = None,
+    friction: Operand | None = None,
+    slip_velocity: Operand | None = None,
 ) -> Impact:
     """A rigid stop: the state never leaves the allowed side, and at the stop its velocity jumps by
     Newton's law, ``velocity`` to ``-restitution*velocity``.
 
     An equation returns it after its rates. Rest and release come with it: where the rebounds
     become smaller and smaller the contact comes to rest, and it is left when the stop would have
-    to pull.
+    to pull. With ``friction`` a stop without rebound is rough: while the contact rests it slides
+    or sticks by Coulomb's law, under the force with which it is pressed. The blow of an impact
+    itself has no friction.
 
     Parameters
     ----------
@@ -107,8 +128,15 @@ def impact(
         the state.
     inertia : sequence or mapping of str to Expr or float, optional
         Masses or moments of inertia [kg, kg*m**2] of the states whose velocities are in
-        ``velocity``, in the order in which they stand there, or by the state's name. Needed where
-        there are several; then momentum is kept.
+        ``velocity`` (and then of those that stand in ``slip_velocity`` alone), in the order in
+        which they stand there, or by the state's name. Needed where there are several; then
+        momentum is kept.
+    friction : Expr or float, optional
+        Coefficient of friction [1], at least 0: the friction is at most this times the force with
+        which the contact is pressed, and that much while it slides. It needs ``restitution=0``.
+    slip_velocity : Expr, optional
+        Velocity at which the contact slides [as ``velocity``], linear in velocities. It comes with
+        ``friction``.
 
     Returns
     -------
@@ -118,12 +146,15 @@ def impact(
     Raises
     ------
     TraceError
-        If ``allowed`` isn't one comparison, a restitution is outside [0, 1], or the inertias don't
-        fit the velocity.
+        If ``allowed`` isn't one comparison, a restitution is outside [0, 1], friction is negative,
+        comes without its velocity or with a rebound, or the inertias don't fit the velocities.
 
     Notes
     -----
-    Newton's law of impact; Brogliato, Nonsmooth Mechanics (2016), section 4.1.
+    Newton's law of impact; Brogliato, Nonsmooth Mechanics (2016), section 4.1. Where friction takes
+    away more of the closing acceleration than the force that causes it adds (Painleve's paradox)
+    there is no motion, or there are several: status ``painleve``. Genot & Brogliato, New results on
+    Painleve paradoxes, Eur. J. Mech. A/Solids 18 (1999) 653-677.
 
     Examples
     --------
@@ -136,12 +167,67 @@ def impact(
     >>> fall = sl.simulate(ball, (10.0, 0.0), t_end=5.0)
     >>> round(float(fall["contact_time"][-1] / fall["contact_time"][0]), 12), float(fall["end_v"])
     (3.0, 0.0)
+
+    A block thrown along a rough floor at 1 m/s comes to a stop after v/(friction*gravity).
+
+    >>> @sl.system(states="x y u v")
+    ... def block(t, x, y, u, v, *, gravity=10.0, friction=0.5):
+    ...     floor = sl.impact(y > 0, -v, restitution=0, friction=friction, slip_velocity=u,
+    ...                       inertia={"u": 1.0, "v": 1.0})
+    ...     return u, v, 0.0, -gravity, floor
+    >>> run = sl.simulate(block, (0.0, 0.0, 1.0, 0.0), t_end=1.0)
+    >>> round(float(run["contact_time"][-1]), 12), round(float(run["end_x"]), 12)
+    (0.2, 0.1)
     """
     condition, closing = _one_comparison("impact", allowed), as_expr(velocity)
     bounce = as_expr(restitution)
     if bounce.op == "const" and not 0 <= bounce.payload <= 1:
         raise TraceError(outside(bounce.payload))
-    return Impact(condition, closing, bounce, _inertias(closing, inertia))
+    rubbing = _rubbing(friction, slip_velocity)
+    if rubbing and not (bounce.op == "const" and bounce.payload == 0):
+        raise TraceError(
+            "sl.impact: friction= is for a stop without rebound, restitution=0: how a blow rubs "
+            "doesn't follow from a coefficient of friction. Leave friction= and slip_velocity= "
+            "out, or set restitution=0."
+        )
+    return Impact(condition, closing, bounce, _inertias(closing, rubbing, inertia), rubbing)
+
+
+def weight(name: str) -> str:
+    """Name of the part of an impact that is the inertia of a state."""
+    return f"inertia of {name}"
+
+
+def _rubbing(friction: Operand | None, slip_velocity: Operand | None) -> dict[str, Expr]:
+    """The parts of an impact with friction; none without."""
+    if friction is None and slip_velocity is None:
+        return {}
+    if friction is None or slip_velocity is None:
+        raise TraceError(
+            "sl.impact: friction= and slip_velocity= come together: the coefficient, and the "
+            "velocity at which the contact slides."
+        )
+    coefficient, slip = as_expr(friction), as_expr(slip_velocity)
+    if coefficient.op == "const" and not coefficient.payload >= 0:
+        raise TraceError(pushes_on(coefficient.payload))
+    if not _states_in(slip):
+        raise TraceError(
+            f"sl.impact: slip_velocity= is the velocity at which the contact slides, which holds "
+            f"a state, not {shown(slip_velocity)}."
+        )
+    facing = select(slip > 0, 1.0, -1.0)
+    return {FRICTION: coefficient, SLIP: slip, FACING: facing}
+
+
+def pushes_on(friction: float) -> str:
+    """What to say of a negative coefficient of friction."""
+    return f"the coefficient of friction {friction:g} is negative: friction never pushes on."
+
+
+def _states_in(*expressions: Expr) -> list[str]:
+    """Names of the states in expressions, in the order in which they stand there."""
+    nodes = (node for one in expressions for node in walk(one, conditions=False))
+    return list(dict.fromkeys(node.payload for node in nodes if node.op == "state"))
 
 
 def outside(restitution: float) -> str:
@@ -152,21 +238,23 @@ def outside(restitution: float) -> str:
     )
 
 
-def _inertias(velocity: Expr, inertia: Any) -> dict[str, Expr]:
-    """Inertia of each state that an impact moves, by its name."""
-    states = list(
-        dict.fromkeys(
-            node.payload for node in walk(velocity, conditions=False) if node.op == "state"
-        )
-    )
+def _inertias(velocity: Expr, rubbing: Mapping[str, Expr], inertia: Any) -> dict[str, Expr]:
+    """Inertia of each state that an impact moves, or its friction, by its name."""
+    states = _states_in(velocity)
     if not states:
         raise TraceError(
             f"sl.impact needs the velocity at which the contact closes, such as v of x < gap, not "
             f"{shown(velocity)}."
         )
+    states = _states_in(velocity, *([rubbing[SLIP]] if rubbing else []))
+    held = (
+        f"the velocities {velocity!r} and {rubbing[SLIP]!r} hold"
+        if rubbing
+        else f"the velocity {velocity!r} holds"
+    )
     if inertia is None and len(states) > 1:
         raise TraceError(
-            f"sl.impact: the velocity {velocity!r} holds the states {', '.join(states)}, and how "
+            f"sl.impact: {held} the states {', '.join(states)}, and how "
             f"they share the impulse depends on their inertia. Add inertia=("
             f"{', '.join(f'mass of {name}' for name in states)}), or by name "
             f"inertia={{{states[0]!r}: ...}} for those that jump."
@@ -181,7 +269,7 @@ def _inertias(velocity: Expr, inertia: Any) -> dict[str, Expr]:
         )
         if len(given) != len(states):
             raise TraceError(
-                f"sl.impact got {len(given)} inertias, but the velocity {velocity!r} holds "
+                f"sl.impact got {len(given)} inertias, but {held} "
                 f"{len(states)} states: {', '.join(states)}. Give one for each, or by name "
                 f"inertia={{{states[0]!r}: ...}} for those that jump."
             )
@@ -189,13 +277,14 @@ def _inertias(velocity: Expr, inertia: Any) -> dict[str, Expr]:
     for name, value in inertia.items():
         if name not in states:
             raise TraceError(
-                f"sl.impact: inertia= names {shown(name)}, but the velocity {velocity!r} holds "
-                f"{', '.join(states)}."
+                f"sl.impact: inertia= names {shown(name)}, but {held} {', '.join(states)}."
             )
         if as_expr(value).op == "const" and not as_expr(value).payload > 0:
             raise TraceError(f"sl.impact: the inertia of {name} must be positive.")
-    if not inertia:
-        raise TraceError("sl.impact: inertia={} names no state that could jump.")
+    for moving, what in ((velocity, "could jump"), (rubbing.get(SLIP), "friction could act on")):
+        if moving is not None and not any(name in inertia for name in _states_in(moving)):
+            names = ", ".join(map(shown, inertia)) or "{}"
+            raise TraceError(f"sl.impact: inertia={names} names no state that {what}.")
     return {name: as_expr(value) for name, value in inertia.items()}
 
 

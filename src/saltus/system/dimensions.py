@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from saltus.errors import UnitError
-from saltus.system.declared import Declared, Jump
+from saltus.system.declared import FRICTION, Declared, Jump
 from saltus.system.expression import ELEMENTARY, Expr, walk
 from saltus.system.text import PI_MULTIPLES
 from saltus.units import dimension, unit_text
@@ -97,9 +97,9 @@ class DimensionCheck:
         for name, part in law.parts.items():
             found, gap = self._dimension(part), self._dimension(law.condition.gap)
             wanted: Dimension | None = None
-            if name == "restitution":
+            if name in ("restitution", FRICTION) and not isinstance(law, Jump):
                 wanted = _PLAIN
-            elif name == "velocity":
+            elif name == "velocity" and not isinstance(law, Jump):
                 known = gap is not None and not isinstance(gap, _Number) and self._time is not None
                 wanted = _product(gap, self._time, -1) if known else None  # type: ignore[arg-type]
             elif isinstance(law, Jump):

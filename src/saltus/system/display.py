@@ -147,15 +147,27 @@ def _by_law(law: Law | None, place: str, system: System, writer: Writer) -> str:
     if law.kind == "surface":
         limit = writer.text(law.limit) if law.limit is not None else "1"
         stronger = "" if limit == "1" else f", held by up to {limit} times the force of sliding"
+        if law.support >= 0:
+            contact = system.guards[law.support].law
+            assert contact is not None
+            return (
+                f"sticks or slides at {place} while {system.guards[contact.partner].name!r} rests"
+            )
         return f"sticks or slides at {place}{stronger}"
     if law.restitution is None:
         return f"jump at {place}"
-    if varies(law.restitution):
-        return f"impact with restitution {writer.text(law.restitution)} at {place}"
+    rough = "" if law.friction is None else f" and friction {_number(law.friction, system, writer)}"
+    return f"impact with restitution {_number(law.restitution, system, writer)}{rough} at {place}"
+
+
+def _number(part: Expr, system: System, writer: Writer) -> str:
+    """A plain number of a law: its value, or how it depends on the state."""
+    if varies(part):
+        return writer.text(part)
     from saltus.system.evaluate import evaluate
 
-    (value,) = evaluate([law.restitution], values=system.values)
-    return f"impact with restitution {from_si(float(value) + 0.0, '1')} at {place}"
+    (value,) = evaluate([part], values=system.values)
+    return from_si(float(value) + 0.0, "1")
 
 
 def _parameter_rows(system: System) -> list[tuple[str, str]]:

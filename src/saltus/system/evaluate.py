@@ -5,6 +5,7 @@ generated code, not here.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,8 +51,8 @@ def evaluate(
         One for each expression. Where an operation isn't defined the value is nan or inf, without a
         warning.
     """
-    expressions = list(expressions)
-    known: dict[Expr, Any] = {}
+    steps, places, wanted = _program(tuple(expressions))
+    known: list[Any] = []
     leaves = {"state": states or {}, "param": values or {}}
 
     def truth(condition: Condition) -> Any:
@@ -59,7 +60,7 @@ def evaluate(
             case Bit(guard):
                 return bits[guard]
             case Relation(gap):
-                return known[gap] > 0
+                return known[places[gap]] > 0
             case Not(inner):
                 return np.logical_not(truth(inner))
             case And(left, right):
@@ -69,19 +70,39 @@ def evaluate(
         raise TypeError(condition)
 
     with np.errstate(all="ignore"):
-        for node in walk(*expressions):
-            args = [known[child] for child in node.args]
-            if node.op == "const":
-                known[node] = np.float64(node.payload)
-            elif node.op == "time":
-                known[node] = np.asarray(t, dtype=np.float64)[()]
-            elif node.op in leaves:
-                known[node] = np.asarray(leaves[node.op][node.payload], dtype=np.float64)[()]
-            elif node.op == "select":
-                known[node] = np.where(truth(node.payload), *args)[()]
+        for op, payload, args in steps:
+            if op == "const":
+                known.append(payload)
+            elif op == "time":
+                known.append(np.asarray(t, dtype=np.float64)[()])
+            elif op in leaves:
+                known.append(np.asarray(leaves[op][payload], dtype=np.float64)[()])
+            elif op == "select":
+                where, otherwise = (known[i] for i in args)
+                known.append(np.where(truth(payload), where, otherwise)[()])
             else:
-                known[node] = (node.payload if node.op == "table" else _OPERATIONS[node.op])(*args)
-    return [known[expression] for expression in expressions]
+                known.append(payload(*[known[i] for i in args]))
+    return [known[place] for place in wanted]
+
+
+@lru_cache(maxsize=512)
+def _program(
+    expressions: tuple[Expr, ...],
+) -> tuple[list[tuple[str, Any, tuple[int, ...]]], dict[Expr, int], list[int]]:
+    """The operations that make some expressions, each with its payload (a function, if it has
+    operands) and the places of its operands; where each node's value stands; and those wanted.
+    """
+    places: dict[Expr, int] = {}
+    steps: list[tuple[str, Any, tuple[int, ...]]] = []
+    for node in walk(*expressions):
+        payload = node.payload
+        if node.op == "const":
+            payload = np.float64(payload)
+        elif node.op in _OPERATIONS:
+            payload = _OPERATIONS[node.op]
+        steps.append((node.op, payload, tuple(places[child] for child in node.args)))
+        places[node] = len(places)
+    return steps, places, [places[one] for one in expressions]
 
 
 def sides(system: System, t: Any, y: Any, values: Mapping[str, Any] | None = None) -> list[Any]:

@@ -49,10 +49,18 @@ class Law:
         Rate of w without the contact's own force, and what a unit of it adds to that rate.
     limit : Expr or None
         Of a surface: static over kinetic force.
-    restitution : Expr or None
-        Of an impact.
+    restitution, friction : Expr or None
+        Of an impact; its coefficient of friction while it rests, if it has any.
+    remaining : Expr or None
+        Of an impact with friction: its pivot over that without.
+    mass : Expr or None
+        Of an impact: its impulse for each unit by which the closing velocity changes, all other
+        contacts free; of a system whose inertias aren't given relative to its mass.
     zeros : int
         Derivatives of the gap that are zero where holding fades out, the gap among them.
+    support : int
+        Of the friction of a contact: the hold guard of that contact, without which there is none;
+        else -1.
     """
 
     kind: str
@@ -67,11 +75,18 @@ class Law:
     pivot: Expr | None = None
     limit: Expr | None = None
     restitution: Expr | None = None
+    friction: Expr | None = None
+    remaining: Expr | None = None
+    mass: Expr | None = None
     zeros: int = 1
+    support: int = -1
 
     def expressions(self) -> tuple[Expr, ...]:
         """All expressions of the law."""
-        single = (self.constraint, self.drive, self.pivot, self.limit, self.restitution)
+        single = (
+            self.constraint, self.drive, self.pivot, self.limit, self.restitution, self.friction,
+            self.remaining, self.mass,
+        )  # fmt: skip
         several = (*self.reset, *self.settled, *self.normal, *self.direction)
         return (*several, *(one for one in single if one is not None))
 

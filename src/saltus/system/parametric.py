@@ -129,6 +129,8 @@ class _Rewriting:
             pivot=None if law.pivot is None else self.rate(law.pivot),
             limit=None if law.limit is None else each(law.limit),
             restitution=None if law.restitution is None else each(law.restitution),
+            friction=None if law.friction is None else each(law.friction),
+            remaining=None if law.remaining is None else self.rate(law.remaining),
         )
 
     def expression(self, root: Expr) -> Expr:

@@ -15,8 +15,23 @@ from dataclasses import replace
 from typing import Any
 
 from saltus.errors import ParameterError, TraceError, nearest, shown
-from saltus.system.expression import TIME, Expr, add, as_expr, parameter, state, sub, substituted
-from saltus.system.guards import Guard, bits_in, expressions_of, join_guards, surface_guard
+from saltus.system.expression import (
+    TIME,
+    Bit,
+    Expr,
+    add,
+    as_expr,
+    constant,
+    div,
+    mul,
+    neg,
+    parameter,
+    select,
+    state,
+    sub,
+    substituted,
+)
+from saltus.system.guards import Guard, Law, bits_in, expressions_of, join_guards, surface_guard
 from saltus.system.names import why_no_name
 from saltus.system.singular import lifted
 from saltus.system.surfaces import with_held_signs
@@ -24,6 +39,8 @@ from saltus.system.system import System
 from saltus.system.trace import explained, place
 from saltus.units import check_declared, to_si
 
+#: How the name of a state that is remembered ends: as no user can write it.
+_REMEMBERED = " before a jump"
 #: A function of (t, states, parameters), each argument by its name.
 Quantity = Callable[..., Any]
 
@@ -293,17 +310,76 @@ def with_integrals(
         rate, guards = quantity(extended, function, f"the integrand {shown(name)}")
         extended = replace(extended, guards=guards)
         rates.append(rate)
-    integrals = tuple(map(state, integrands))
+    return with_states(extended, dict(zip(integrands, rates, strict=True)), new_units)
+
+
+def with_states(
+    system: System, rates: Mapping[str, Expr], units: Mapping[str, str] | None = None
+) -> System:
+    """The system with more states, the last, which its laws of contact don't touch.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    rates : mapping of str to Expr
+        Rate of each new state by its name, which isn't taken.
+    units : mapping of str to str, optional
+        Coherent SI unit of each new state.
+    """
+    new = tuple(map(state, rates))
     return replace(
-        extended,
+        system,
         guards=tuple(
-            replace(guard, law=guard.law.extended(integrals)) if guard.law else guard
-            for guard in extended.guards
+            replace(guard, law=guard.law.extended(new)) if guard.law else guard
+            for guard in system.guards
         ),
-        states=(*system.states, *integrands),
-        field=(*system.field, *rates),
-        units={**system.units, **{name: new_units.get(name, "") for name in integrands}},
+        states=(*system.states, *rates),
+        field=(*system.field, *rates.values()),
+        units={**system.units, **{name: (units or {}).get(name, "") for name in rates}},
     )
+
+
+# -- jumps of the state ----------------------------------------------------------------------------
+def jumping_states(system: System) -> tuple[str, ...]:
+    """The states that impacts and jumps change, in the order of the system."""
+    resets = [guard.law.reset for guard in system.guards if guard.law and guard.law.reset]
+    return tuple(
+        name
+        for i, name in enumerate(system.states)
+        if any(reset[i] is not state(name) for reset in resets)
+    )
+
+
+def is_remembered(name: str) -> bool:
+    """Whether a state is one that :func:`remembering` has added: it says what was, and what happens
+    doesn't depend on it.
+    """
+    return name.endswith(_REMEMBERED)
+
+
+def remembering(system: System) -> System:
+    """The system with more states, the last: its :func:`jumping_states` as they were before the
+    last impact or jump. Where nothing jumps it is the system itself.
+    """
+    names, size = jumping_states(system), len(system.states)
+    if not names:
+        return system
+    new = {f"{name}{_REMEMBERED}": name for name in names}
+    extended = with_states(
+        system,
+        dict.fromkeys(new, constant(0.0)),
+        {one: system.units.get(name, "") for one, name in new.items()},
+    )
+    was = tuple(map(state, names))
+
+    def told(guard: Guard) -> Guard:
+        law = guard.law
+        if law is None or not law.reset:
+            return guard
+        return replace(guard, law=replace(law, reset=(*law.reset[:size], *was)))
+
+    return replace(extended, guards=tuple(map(told, extended.guards)))
 
 
 def with_losses(system: System, stored: Expr, name: str, unit: str) -> System:
@@ -340,6 +416,57 @@ def with_losses(system: System, stored: Expr, name: str, unit: str) -> System:
         return replace(guard, law=replace(law, reset=taken(law.reset), settled=settled))
 
     return replace(extended, guards=tuple(map(lossy, extended.guards)))
+
+
+def with_impulses(system: System, names: Mapping[int, str]) -> System:
+    """The system with more states, the last: each the impulse of a stop so far, of its impacts and
+    of the force at rest. Where impacts accumulate, the force that would hold the contact stands for
+    those that aren't followed: their impulse is the same.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    names : mapping of int to str
+        Names of the new states by the number of the guard, all of which have the law of an impact.
+
+    Returns
+    -------
+    System
+        An impulse is relative to the mass where the law has no inertias.
+    """
+    rates: list[Expr] = []
+    for number in names:
+        law = system.guards[number].law
+        assert law is not None
+        assert law.drive is not None
+        assert law.pivot is not None
+        rates.append(select(Bit(law.partner), neg(div(law.drive, law.pivot)), 0.0))
+    extended = with_integrals(system, dict.fromkeys(names.values(), lambda: 0.0))
+    guards = list(extended.guards)
+    for number, name in names.items():
+        guards[number] = replace(guards[number], law=_summed(guards[number].law, name, extended))
+    field = (*system.field, *rates)
+    return replace(extended, field=field, guards=tuple(guards))
+
+
+def _summed(law: Law | None, name: str, system: System) -> Law:
+    """The law of an impact that adds its impulse to a state."""
+    assert law is not None
+    assert law.constraint is not None
+    assert law.restitution is not None
+    assert law.mass is not None
+    place, own = system.states.index(name), state(name)
+    turned = mul(law.mass, mul(add(1.0, law.restitution), law.constraint))
+    return replace(
+        law,
+        reset=_with(law.reset, place, add(own, turned)),
+        settled=_with(law.settled, place, add(own, mul(law.mass, law.constraint))),
+    )
+
+
+def _with(entries: tuple[Expr, ...], place: int, entry: Expr) -> tuple[Expr, ...]:
+    return (*entries[:place], entry, *entries[place + 1 :])
 
 
 def _free(name: str, system: System) -> str:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 FORMAT, WITH_LAWS = "saltus-system/1", "saltus-system/2"
 #: Entries of a law's data, by what they hold: expressions, one of them or none, anything else.
 _TUPLES = ("reset", "settled", "normal", "direction")
-_SINGLE = ("constraint", "drive", "pivot", "limit", "restitution")
+_SINGLE = ("constraint", "drive", "pivot", "limit", "restitution", "friction", "remaining", "mass")
 _PLAIN = ("kind", "side", "partner", "zeros")
 
 _OPERANDS = {
@@ -108,6 +108,8 @@ def _equations(system: System) -> dict[str, Any]:
 def _law_data(law: Law, index: Mapping[Expr, int]) -> dict[str, Any]:
     """The entries of a law that hold anything; expressions by their numbers."""
     data = {name: getattr(law, name) for name in _PLAIN}
+    if law.support >= 0:
+        data["support"] = law.support
     data |= {name: [index[one] for one in getattr(law, name)] for name in _TUPLES}
     single = {name: getattr(law, name) for name in _SINGLE}
     return data | {name: index[one] for name, one in single.items() if one is not None}
@@ -281,11 +283,13 @@ def _law(
     expressions += [data[name] for name in _SINGLE if name in data]
     _require(all(0 <= i < len(nodes) for i in expressions), "a law stands in no node")
     kind, side, partner, zeros = (data[name] for name in _PLAIN)
+    support = data.get("support", -1)
     _require(
         among(kind, ("impact", "jump", "surface", "hold"))
-        and all(type(number) is int for number in (side, partner, zeros))
+        and all(type(number) is int for number in (side, partner, zeros, support))
         and abs(side) <= 1
         and -1 <= partner < guards
+        and -1 <= support < guards
         and 1 <= zeros <= 3
         and (partner < 0) == (kind == "jump"),
         "a law isn't one of contact",
@@ -293,13 +297,13 @@ def _law(
     several: dict[str, Any] = {name: tuple(nodes[i] for i in data[name]) for name in _TUPLES}
     _require(all(len(one) in (0, states) for one in several.values()), "a law has other states")
     single: dict[str, Any] = {name: nodes[data[name]] for name in _SINGLE if name in data}
-    needed = {"impact": _SINGLE[:3] + _SINGLE[4:], "surface": _SINGLE[:4]}.get(kind, ())
+    needed = {"impact": (*_SINGLE[:3], "restitution"), "surface": _SINGLE[:4]}.get(kind, ())
     rows = {"impact": _TUPLES, "surface": _TUPLES[1:], "jump": _TUPLES[:1]}.get(kind, ())
     _require(
         all(name in single for name in needed) and all(several[name] for name in rows),
         "a law isn't whole",
     )
-    return Law(kind, side, partner, zeros=zeros, **several, **single)
+    return Law(kind, side, partner, zeros=zeros, support=support, **several, **single)
 
 
 def _node(

@@ -225,8 +225,16 @@ def test_a_wrong_figure_gets_those_that_there_are(tmp_path):
     assert "2, 3, 4, 5, 6" in wrong.output
 
 
-@pytest.mark.parametrize("command", [["models"], ["schema"], ["models", "delangre"]])
-@pytest.mark.parametrize("how", ["nobody reads on", "closed from the start", "closed on the way"])
+@pytest.mark.parametrize(
+    ("command", "how"),
+    [
+        (["models"], "nobody reads on"),
+        (["models"], "closed from the start"),
+        (["models"], "closed on the way"),
+        (["schema"], "nobody reads on"),
+        (["models", "delangre"], "closed on the way"),
+    ],
+)
 def test_a_closed_output_ends_quietly(command, how):
     """``saltus models | head``, ``saltus models >&-``: nothing is wrong with a file, so nothing is
     said about one.

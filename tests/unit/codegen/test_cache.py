@@ -40,6 +40,12 @@ def order(source=SOURCE):
 KEY = order().key
 
 
+@pytest.fixture(autouse=True)
+def another_process(monkeypatch):
+    """For what takes long, as everywhere but in tests (conftest.py)."""
+    monkeypatch.setattr(building, "OTHER_PROCESS", 0.5)
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """An empty cache folder of this test's own."""

@@ -105,12 +105,15 @@ def test_the_saddle_and_the_stable_orbit_of_the_recipes():
     (_, saddle), (_, stable) = impact_orbits.oscillator(**values)
     system = impact_oscillator(**values)
     _, multipliers = orbit(system, saddle)
-    assert np.abs(multipliers).max() == pytest.approx(known("I04m"), rel=1e-10)
+    assert np.abs(multipliers).max() == pytest.approx(known("I04m"), rel=1e-13)
     found = sl.attractors(system, (stable[0] + 1e-3, stable[1]))
     assert found.attractor_period.values.tolist() == [1]
     point = [found.attractor_x.values[0, 0], found.attractor_v.values[0, 0]]
     run = sl.simulate(system, point, periods=1)
     assert run.contact_velocity.values == pytest.approx([known("I05")], rel=1e-11)
+    assert run.contact_v_before.values == pytest.approx([known("I05")], rel=1e-11)
+    assert run.contact_v.values.tolist() == (-0.8 * run.contact_v_before.values).tolist()
+    assert run.contact_x.values.tolist() == run.contact_x_before.values.tolist() == [1.0]
 
 
 def test_the_resonant_graze():
@@ -156,6 +159,11 @@ def test_chatter_and_rest_of_the_oscillator():
     assert times[0] == pytest.approx(known("C01"), rel=1e-14)
     assert times[1] == pytest.approx(known("C02"), rel=1e-13)
     assert run.contact_velocity.values[1] == pytest.approx(known("C03"), rel=1e-12)
+    assert run.contact_v_before.values[:2] == pytest.approx([0.0, known("C03")], rel=1e-12)
+    struck = run.contact_kind.values == "impact"
+    before, behind = run.contact_v_before.values, run.contact_v.values
+    assert behind[struck].tolist() == (-0.6 * before[struck]).tolist()
+    assert behind[~struck].tolist() == before[~struck].tolist()
     assert times[-1] == pytest.approx(known("C06"), rel=1e-13)
     assert (run.end_x.item(), run.end_v.item()) == (0.2, 0.0)
 
@@ -197,6 +205,11 @@ def test_the_falling_ball(height, gravity, restitution):
     assert run.contact_kind.values[-1] == "hold"
     assert times[-1] == pytest.approx(rest, rel=1e-14)
     assert (run.end_x.item(), run.end_v.item()) == (0.0, 0.0)
+    found = sl.impact_statistics(system, (height, 0.0), t_end=1.1 * rest)
+    assert found["contacts"].values.tolist() == [1, 1]
+    struck = found["contact_impulse_of_impacts"].values[0]
+    speed = math.sqrt(2 * height * gravity)
+    assert struck == pytest.approx(speed * (1 + restitution) / (1 - restitution), rel=1e-13)
 
 
 def test_the_rocking_block():
@@ -257,7 +270,7 @@ def test_the_bounce_doubles_its_period(row, restitution):
 
 
 def test_a_ball_without_rebound_rests_where_it_would_be_born():
-    """B04a is a root of the formula, no motion: where the table rises fastest it presses on."""
+    """At B04a it would begin where the table rises fastest, but there the table presses on."""
     amplitude = known("B04a")
     system = bouncing_ball(amplitude=amplitude * (1 + 1e-9), restitution=0.0)
     start = impact_orbits.ball_on_table(amplitude * (1 + 1e-9), 0.0)[0]
@@ -297,6 +310,13 @@ def test_chatter_on_the_table():
     rest = kinds.index("hold")
     assert times[rest] == pytest.approx(known("B20c"), rel=1e-13)
     assert times[rest + 1] - times[rest] == pytest.approx(known("B20d"), rel=1e-13)
+    start = {"start": (1.0, math.sqrt(1.2**2 - 1)), "t_start": math.asin(1 / 1.2)}
+    found = sl.impact_statistics(bouncing_ball(), **start, t_end=8.0)
+    chatter = found.isel(contact=0)
+    assert chatter["contact_time"].item() == pytest.approx(known("B20a"), rel=1e-14)
+    assert chatter["contact_exit_speed"].item() == pytest.approx(0.0, abs=1e-12)
+    # thrown off once a period, always with the same velocity: the table bears its weight
+    assert chatter["contact_impulse"].item() == pytest.approx(2 * math.pi, rel=1e-12)
 
 
 def test_rest_on_a_moving_table_goes_on_as_if_it_stood():

@@ -278,3 +278,22 @@ def test_where_a_contact_is_held_the_line_says_so():
         axes = np.ravel(axes)[0]
         legend = axes.get_legend() or axes.figure.legends[0]
         assert words <= {text.get_text() for text in legend.get_texts()}
+
+
+def test_a_state_that_jumps_does_so_upright():
+    """Both sides of every impact lie one above the other, in a history and in a phase portrait,
+    also of a run that starts anywhere in the period.
+    """
+    chatter = sl.models.impact_oscillator("chatter")
+    run = sl.simulate(chatter, (0.2, 0.0), t_start=4.0, t_end=40.0, time_errors="local")
+    struck = run["contact_kind"].values == "impact"
+    t, v = run["contact_time"].values[struck], run["contact_v"].values[struck]
+    assert t[-1] > 39.0
+    late, of_speed = history(run, state="v"), phase(run)
+    for ax, place in ((late, t), (of_speed, np.full(t.size, 0.2))):
+        (free,) = (one.get_xydata() for one in ax.lines if one.get_label() == "free")
+        at = np.flatnonzero(np.isin(free[:, 1], v) & (np.abs(free[:, 1]) > 1e-3))
+        assert len(at) > 10
+        assert free[at, 0].tolist() == free[at - 1, 0].tolist()
+        assert set(free[at, 0]) <= set(place)
+        assert free[at, 1].tolist() == (-0.6 * free[at - 1, 1]).tolist()

@@ -437,3 +437,15 @@ def test_unstable_branches_are_drawn_with_the_responses():
     ):
         ax = draw(found)
         assert any((line.get_gid() or "").startswith("stable") for line in ax.lines)
+
+
+def test_lines_of_stable_orbits_end_where_stability_does():
+    """At the bifurcation, not at the next orbit that happens to have been computed."""
+    rig = sl.models.delangre("c", force="4 N", frequency="17 Hz")
+    found = sl.branches(rig, {"contact_stiffness": (7.5e3, 9e3)}, at=1, switch=(), progress=False)
+    (doubled,) = found.event_contact_stiffness.values[found.event_kind.values == "period_doubling"]
+    lines = {line.get_gid(): line for line in sl.plot.branches(found).lines}
+    solid = next(line for gid, line in lines.items() if (gid or "").startswith("stable"))
+    dashed = next(line for gid, line in lines.items() if (gid or "").startswith("unstable"))
+    assert np.nanmax(solid.get_xdata()) == pytest.approx(doubled / 1e3)
+    assert np.nanmin(dashed.get_xdata()) == pytest.approx(doubled / 1e3)

@@ -1,4 +1,4 @@
-"""[branches] in a study: its table, its picture, its errors."""
+"""[branches], [backbone] and [periodic_orbits] in a study: tables, pictures, errors."""
 
 from __future__ import annotations
 
@@ -56,3 +56,111 @@ def test_branches_are_tabulated_and_drawn(tmp_path):
 def test_mistakes_are_answered_by_a_sentence(old, new, words, tmp_path):
     with pytest.raises(SaltusError, match=words):
         run(STUDY.replace(old, new), tmp_path / "out")
+
+
+BACKBONE = """
+[study]
+name = "Backbone"
+[system]
+model = "delangre"
+case = "a"
+[backbone]
+amplitude = ["0.1 mm", "2 mm"]
+values = { force = "0 N", damping_ratio = 0 }
+"""
+ORBITS = """
+[study]
+name = "Orbits"
+[system]
+model = "delangre"
+case = "b"
+force = "4 N"
+frequency = "15 Hz"
+[periodic_orbits]
+start = "random 200"
+box = { x = ["-5 mm", "5 mm"], v = ["-1 m/s", "1 m/s"] }
+periods = 1
+"""
+
+
+def rows_of(outcome):
+    (table,) = (file for file in outcome.files if file.suffix == ".csv")
+    with table.open() as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def test_a_backbone_ends_at_the_frequency_of_an_energy_integral(tmp_path):
+    outcome = run(BACKBONE, tmp_path / "out")
+    rows = rows_of(outcome)
+    assert float(rows[-1]["peak |x| [m]"]) == pytest.approx(2e-3, rel=1e-10)
+    assert float(rows[-1]["frequency [Hz]"]) == pytest.approx(11.42066832049569, rel=1e-10)
+    assert any(file.suffix == ".png" for file in outcome.files)
+
+
+def test_a_backbone_in_quadrature_names_its_force(tmp_path):
+    text = BACKBONE.replace(
+        'values = { force = "0 N", damping_ratio = 0 }', 'phase = "quadrature"\nforce = "force"'
+    )
+    rows = rows_of(run(text, tmp_path / "out"))
+    assert float(rows[-1]["peak |x| [m]"]) == pytest.approx(2e-3, rel=1e-10)
+    with pytest.raises(SaltusError, match="push"):
+        run(text.replace('force = "force"', 'force = "push"'), tmp_path / "other")
+
+
+def test_periodic_orbits_are_tabulated_and_drawn(tmp_path):
+    outcome = run(ORBITS, tmp_path / "out")
+    rows = rows_of(outcome)
+    assert [row["stability"] for row in rows] == ["saddle", "inverse saddle", "stable focus"]
+    outside = [float(row["largest |multiplier|"]) > 1 for row in rows]
+    assert outside == [True, True, False]
+    assert any(file.suffix == ".png" for file in outcome.files)
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new", "words"),
+    [
+        (BACKBONE, '["0.1 mm", "2 mm"]', "[0.1, 2]", "no unit"),
+        (BACKBONE, "amplitude =", "amplitud =", "amplitude"),
+        (BACKBONE, "damping_ratio", "damping_ration", "damping_ratio"),
+        (BACKBONE, "values =", 'state = "y"\nvalues =', "'y' is unknown to delangre. Known: v, x"),
+        (ORBITS, "periods =", "period =", "periods"),
+        (ORBITS, '"random 200"', '"random many"', "random"),
+    ],
+)
+def test_mistakes_in_backbones_and_orbits(text, old, new, words, tmp_path):
+    assert old in text
+    with pytest.raises(SaltusError, match=words):
+        run(text.replace(old, new), tmp_path / "out")
+
+
+CURVE = """[bifurcation_curve]
+event = "fold"
+near = "17.8 Hz"
+vary = { frequency = ["17 Hz", "18.5 Hz"], force = ["3.5 N", "4.5 N"] }
+"""
+
+
+def test_a_fold_of_the_branches_is_followed_over_two_parameters(tmp_path):
+    outcome = run(STUDY + CURVE, tmp_path / "out")
+    (path,) = (one for one in outcome.files if one.name == "bifurcation-curve.csv")
+    with path.open() as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    force, at = ([float(row[key]) for row in rows] for key in ("force [N]", "frequency [Hz]"))
+    assert min(abs(f - 17.81941952) for f, n in zip(at, force, strict=True) if n == 4.0) < 1e-7
+    assert min(at) >= 17
+    assert max(at) <= 18.5
+    assert any(file.name == "bifurcation-curve.png" for file in outcome.files)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("near =", "neer =", "near"),
+        ('"fold"', '"folds"', "fold"),
+        ('"17.8 Hz"', "17.8", "no unit"),
+        ("near =", 'branches = "man"\nnear =', "no .branches. are called"),
+    ],
+)
+def test_mistakes_in_curves(old, new, words, tmp_path):
+    with pytest.raises(SaltusError, match=words):
+        run(STUDY + CURVE.replace(old, new), tmp_path / "out")

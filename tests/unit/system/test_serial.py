@@ -132,56 +132,51 @@ def test_the_fingerprint_is_that_of_another_process():
         assert run.stdout.strip() == delangre("b").fingerprint()
 
 
-def damaged(change):
-    data = json.loads(json.dumps(nested().to_dict()))
-    change(data)
-    return data
+@pytest.fixture(scope="module")
+def whole():
+    return nested()
 
 
 @pytest.mark.parametrize(
-    ("data", "teaches"),
+    ("change", "teaches"),
     [
-        ([], "isn't a system"),
-        ({}, "isn't a system"),
-        (damaged(lambda d: d.update(format="saltus-system/0")), "saltus-system/0"),
-        (damaged(lambda d: d.pop("nodes")), "damaged"),
-        (damaged(lambda d: d["nodes"].insert(0, ["eval", [], None])), "damaged"),
-        (damaged(lambda d: d["nodes"].insert(0, ["param", [], "unknown"])), "damaged"),
-        (damaged(lambda d: d["nodes"].insert(0, ["add", [1, 2], None])), "wrong operands"),
-        (damaged(lambda d: d["nodes"].insert(0, ["add", [0], None])), "wrong operands"),
-        (damaged(lambda d: d["nodes"].insert(0, ["add", [-1, -1], None])), "wrong operands"),
-        (damaged(lambda d: d["nodes"].append(["select", [0, 1], ["bit", 99]])), None),
-        (damaged(lambda d: d["nodes"].append(["select", [0, 1], ["xor", 1]])), "unknown condition"),
+        (lambda d: d.update(format="saltus-system/0"), "saltus-system/0"),
+        (lambda d: d.pop("nodes"), "damaged"),
+        (lambda d: d["nodes"].insert(0, ["eval", [], None]), "damaged"),
+        (lambda d: d["nodes"].insert(0, ["param", [], "unknown"]), "damaged"),
+        (lambda d: d["nodes"].insert(0, ["add", [1, 2], None]), "wrong operands"),
+        (lambda d: d["nodes"].insert(0, ["add", [0], None]), "wrong operands"),
+        (lambda d: d["nodes"].insert(0, ["add", [-1, -1], None]), "wrong operands"),
+        (lambda d: d["nodes"].append(["select", [0, 1], ["bit", 99]]), None),
+        (lambda d: d["nodes"].append(["select", [0, 1], ["xor", 1]]), "unknown condition"),
         (
-            damaged(
-                lambda d: d["nodes"].append(["select", [0, 1], ["not", ["bit", 0], ["bit", 0]]])
-            ),
+            (lambda d: d["nodes"].append(["select", [0, 1], ["not", ["bit", 0], ["bit", 0]]])),
             "unknown condition",
         ),
-        (damaged(lambda d: d["guards"].clear()), "unknown guard"),
-        (damaged(lambda d: d["guards"].insert(0, d["guards"].pop(1))), "later guard"),
-        (damaged(lambda d: d["guards"][0].__setitem__(2, "zzz")), "unknown state"),
-        (damaged(lambda d: d["field"].pop()), "derivatives"),
-        (damaged(lambda d: d["field"].__setitem__(0, -1)), "stands in no node"),
-        (damaged(lambda d: d["guards"][0].__setitem__(1, -1)), "stands in no node"),
-        (damaged(lambda d: d["guards"][0].__setitem__(3, -1)), "stands in no node"),
+        (lambda d: d["guards"].clear(), "unknown guard"),
+        (lambda d: d["guards"].insert(0, d["guards"].pop(1)), "later guard"),
+        (lambda d: d["guards"][0].__setitem__(2, "zzz"), "unknown state"),
+        (lambda d: d["field"].pop(), "derivatives"),
+        (lambda d: d["field"].__setitem__(0, -1), "stands in no node"),
+        (lambda d: d["guards"][0].__setitem__(1, -1), "stands in no node"),
+        (lambda d: d["guards"][0].__setitem__(3, -1), "stands in no node"),
         (
-            damaged(lambda d: d["guards"][0].__setitem__(0, "a\x1b]0;title\x07")),
+            (lambda d: d["guards"][0].__setitem__(0, "a\x1b]0;title\x07")),
             "no name of a boundary",
         ),
-        (damaged(lambda d: d["guards"][0].__setitem__(0, 5)), "must be text"),
-        (damaged(lambda d: d["units"].update(x="\x1b[31m")), "unit .* can't be read"),
-        (damaged(lambda d: d.update(forced_at="zzz")), "forced_at"),
-        (damaged(lambda d: d["parameters"].__setitem__(0, "import os")), "no name"),
-        (damaged(lambda d: d["parameters"].append("x")), "twice"),
-        (damaged(lambda d: d.update(name='x"""\nopen("mark", "w")\n"""')), "one line"),
-        (damaged(lambda d: d.update(name="\x1b]0;title\x07")), "one line"),
-        (damaged(lambda d: d.update(name=7)), "must be text"),
-        (damaged(lambda d: d.update(description="a\0b")), "control characters"),
-        (damaged(lambda d: d.update(source=["a"])), "must be text"),
-        (damaged(lambda d: d["nodes"].insert(0, ["const", [], 10**400])), "damaged"),
+        (lambda d: d["guards"][0].__setitem__(0, 5), "must be text"),
+        (lambda d: d["units"].update(x="\x1b[31m"), "unit .* can't be read"),
+        (lambda d: d.update(forced_at="zzz"), "forced_at"),
+        (lambda d: d["parameters"].__setitem__(0, "import os"), "no name"),
+        (lambda d: d["parameters"].append("x"), "twice"),
+        (lambda d: d.update(name='x"""\nopen("mark", "w")\n"""'), "one line"),
+        (lambda d: d.update(name="\x1b]0;title\x07"), "one line"),
+        (lambda d: d.update(name=7), "must be text"),
+        (lambda d: d.update(description="a\0b"), "control characters"),
+        (lambda d: d.update(source=["a"]), "must be text"),
+        (lambda d: d["nodes"].insert(0, ["const", [], 10**400]), "damaged"),
         (
-            damaged(
+            (
                 lambda d: d["nodes"].append(
                     [
                         "select",
@@ -192,15 +187,23 @@ def damaged(change):
             ),
             "damaged",
         ),
-        (damaged(lambda d: d["values"].update(gap="a")), "damaged"),
-        (damaged(lambda d: d["values"].update(frequency=-1.0)), "forcing frequency"),
+        (lambda d: d["values"].update(gap="a"), "damaged"),
+        (lambda d: d["values"].update(frequency=-1.0), "forcing frequency"),
     ],
 )
-def test_damaged_data_is_refused(data, teaches):
+def test_damaged_data_is_refused(whole, change, teaches):
+    data = json.loads(json.dumps(whole.to_dict()))
+    change(data)
     if teaches is None:  # a node that nothing uses does no harm
-        assert same(System.from_dict(data), nested())
+        assert same(System.from_dict(data), whole)
         return
     with pytest.raises(SaltusError, match=teaches):
+        System.from_dict(data)
+
+
+@pytest.mark.parametrize("data", [[], {}])
+def test_what_is_no_data_of_a_system_is_refused(data):
+    with pytest.raises(SaltusError, match="isn't a system"):
         System.from_dict(data)
 
 
@@ -226,8 +229,8 @@ STRANGE = [
 
 @pytest.mark.parametrize("name", STRANGE)
 @pytest.mark.parametrize("old", ["x", "gap"])
-def test_a_state_or_parameter_of_a_strange_name_is_refused(name, old):
-    data = json.loads(json.dumps(nested().to_dict()).replace(json.dumps(old), json.dumps(name)))
+def test_a_state_or_parameter_of_a_strange_name_is_refused(whole, name, old):
+    data = json.loads(json.dumps(whole.to_dict()).replace(json.dumps(old), json.dumps(name)))
     with pytest.raises(SaltusError, match="is no name"):
         System.from_dict(data)
 

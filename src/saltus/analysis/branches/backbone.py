@@ -10,7 +10,9 @@ import xarray as xr
 
 from saltus.analysis.branches.arclength import Curve, correct, follow
 from saltus.analysis.branches.branch_table import numbers_of, stacked
+from saltus.analysis.branches.forced_vibration import Force, QuadratureOrbits, small_vibration
 from saltus.analysis.branches.free_vibration import (
+    LONGEST,
     FreeOrbits,
     free_system,
     linear_mode,
@@ -30,6 +32,7 @@ from saltus.results.dataset import schema
 from saltus.system.system import System
 from saltus.units import to_si
 
+Orbits = FreeOrbits | QuadratureOrbits
 #: Vibrations begin at this share of the smallest amplitude.
 BEFORE = 0.9
 #: Largest fictitious damping, in units of the frequency, that is rounding.
@@ -38,9 +41,6 @@ CONSERVED = 1e-7
 STABLE = 1.0 + 1e-6
 #: A state whose amplitude is a smaller share of the largest rests.
 NODE = 1e-9
-#: Periods of small vibrations within which a motion returns: where it rests on a contact, small
-#: vibrations to its other side are slower.
-LONGEST = 12.0
 #: Shortest period, as a share of that of small vibrations.
 SHORTEST = 1e-3
 #: How far behind its last step the end of a range may lie, in units of the scale.
@@ -54,18 +54,22 @@ def backbone(
     *,
     state: str | None = None,
     mode: int = 1,
+    phase: str = "free",
+    force: str = "force",
     values: Mapping[str, Any] | None = None,
     points: int = 400,
     method: Method | None = None,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """Free vibrations without damping over their amplitude: the backbone of the resonances, or a
-    nonlinear normal mode.
+    """The backbone of the resonances over their amplitude: free vibrations without damping
+    (nonlinear normal modes), or forced ones in phase quadrature, damping included.
 
     The family of periodic orbits is followed by pseudo-arclength from small vibrations about rest.
-    Parameters that are zero are taken out of the equations; what then still forces or damps is
-    refused.
+    Free vibrations: parameters that are zero are taken out of the equations; what then still forces
+    or damps is refused. In quadrature the forcing frequency and the amplitude of the force are such
+    that the mean of displacement times force over a period is zero: the displacement's first
+    harmonic lags a harmonic force by a quarter of the period.
 
     Parameters
     ----------
@@ -77,6 +81,10 @@ def backbone(
         Default the first state. A velocity reaches beyond an amplitude that rigid stops bound.
     mode : int
         Which mode of small vibrations to begin with, the slowest first, from 1.
+    phase : {"free", "quadrature"}
+        Free vibrations, or forced ones in quadrature.
+    force : str
+        In quadrature: the parameter that is the amplitude of the force.
     values : mapping
         Values of parameters: the force and all that damps are to be zero, such as ``{"force": 0,
         "damping_ratio": 0}``; ``{"restitution": 1}`` for impacts.
@@ -94,20 +102,22 @@ def backbone(
     Dataset
         Dims ``point``, ``output`` (the states), ``multiplier``. ``backbone_frequency`` [Hz],
         ``point_period`` [s], ``point_output_peak`` and so on of each state, ``point_<state>`` where
-        the vibration passes its rest, ``point_itinerary``, ``point_stable``, multipliers, and
-        ``fictitious_damping`` [1/s], which is rounding. The first and the last point have the
-        amplitudes asked for; attribute ``end`` says ``points`` or ``lost`` otherwise.
+        the vibration passes its rest (in quadrature: at whole forcing periods),
+        ``point_itinerary``, ``point_stable``, multipliers, and ``fictitious_damping`` [1/s], which
+        is rounding; in quadrature ``point_<parameter>`` of the frequency and the force. The first
+        and the last point have the amplitudes asked for; attribute ``end`` says ``points`` or
+        ``lost`` otherwise.
 
     Raises
     ------
     ParameterError, UnitError
-        If an argument can't be used, time or damping is left in the equations, or small vibrations
-        don't lead to the smallest amplitude.
+        If an argument can't be used, time or damping is left in the equations of free vibrations,
+        or small vibrations don't lead to the smallest amplitude.
 
     References
     ----------
     Kerschen et al., Mech. Syst. Signal Process. 23 (2009) 170-194; Munoz-Almaraz et al., Physica D
-    181 (2003) 1-38.
+    181 (2003) 1-38; Peeters et al., Mech. Syst. Signal Process. 25 (2011) 1227-1247 (quadrature).
 
     Examples
     --------
@@ -135,29 +145,80 @@ def backbone(
         )
     low, high = _range(system, state, amplitude)
     points, mode = whole(points, "points", 2), whole(mode, "mode", 1)
-    free, name = free_system(system)
+    if phase not in ("free", "quadrature"):
+        raise ParameterError(f'phase= is "free" or "quadrature", not {shown(phase)}.')
+    measured = system.states.index(state)
+    about = Force.of(system, force, state) if phase == "quadrature" else None
     with reporting(progress) as show:
-        rest = place_of_rest(free)
-        period, shape, column = linear_mode(free, rest, mode)
-        measured = system.states.index(state)
-        sizes = np.abs(shape)
-        if not sizes[measured] > NODE * sizes.max():
-            raise ParameterError(f"{state} is at rest in mode {mode}. Choose another state=.")
-        sizes = np.where(sizes > NODE * sizes.max(), sizes, sizes.max()) / sizes[measured]
-        scale = np.array([[*high * sizes, period, 1 / period]])
-        orbits = FreeOrbits(free, name, scale, method, rest, column, threads)
-        begin = rest + BEFORE * low * shape.real / np.abs(shape[measured])
-        _, swing = orbits.first_return(begin, LONGEST * period)
-        begin = rest + (begin - rest) * BEFORE * low / swing[measured]
-        z = np.array([[*begin, orbits.first_return(begin, LONGEST * period)[0], 0.0]])
-        if not np.isfinite(z).all():
-            raise ParameterError(
-                f"small vibrations of {system.name} in mode {mode} don't return to where they "
-                "began: choose a smaller amplitude to begin with, or another mode=."
-            )
-        peak = _Peak(free, orbits, method, measured)
+        moving, orbits, z = (
+            _free_start(system, (low, high), mode, measured, method, threads)
+            if about is None
+            else _forced_start(system, about, (low, high), mode, measured, method, threads)
+        )
+        peak = _Peak(moving, orbits, method, measured)
         whole_z, end = _family(orbits, z, peak, (low, high), points, show)
-        return _table(system, free, orbits, whole_z, method, end, state, mode)
+        attrs = {"mode": mode, "amplitude_of": state, "end": end, "phase": phase}
+        return _table(system, moving, orbits, whole_z, method, attrs)
+
+
+def _free_start(
+    system: System,
+    limits: tuple[float, float],
+    mode: int,
+    measured: int,
+    method: Method,
+    threads: int | None,
+) -> tuple[System, FreeOrbits, np.ndarray]:
+    """The undamped system, the equations of its vibrations, and a small one float64[1, z]."""
+    low, high = limits
+    free, name = free_system(system)
+    rest = place_of_rest(free)
+    period, shape, column = linear_mode(free, rest, mode)
+    sizes = _relative(system, shape, measured, mode)
+    scale = np.array([[*high * sizes, period, 1 / period]])
+    orbits = FreeOrbits(free, name, scale, method, rest, column, threads)
+    begin = rest + BEFORE * low * shape.real / np.abs(shape[measured])
+    _, swing = orbits.first_return(begin, LONGEST * period)
+    begin = rest + (begin - rest) * BEFORE * low / swing[measured]
+    z = np.array([[*begin, orbits.first_return(begin, LONGEST * period)[0], 0.0]])
+    if not np.isfinite(z).all():
+        raise ParameterError(
+            f"small vibrations of {system.name} in mode {mode} don't return to where they "
+            "began: choose a smaller amplitude to begin with, or another mode=."
+        )
+    return free, orbits, z
+
+
+def _forced_start(
+    system: System,
+    force: Force,
+    limits: tuple[float, float],
+    mode: int,
+    measured: int,
+    method: Method,
+    threads: int | None,
+) -> tuple[System, QuadratureOrbits, np.ndarray]:
+    """The system, the equations of its vibrations in quadrature, and a small one float64[1, z]."""
+    low, high = limits
+    rest, shape, z = small_vibration(system, force, mode, measured, BEFORE * low, method)
+    own = z[-2:]
+    sizes = high * _relative(system, shape, measured, mode)
+    scale = np.array([[*sizes, own[0], own[1] * high / (BEFORE * low)]])
+    drive = np.abs(force.harmonics(system, own[0])[force.row])
+    unit = sizes[force.displacement] * drive * system.period({str(system.forced_at): own[0]})
+    orbits = QuadratureOrbits(system, force, scale, unit, rest, method, threads)
+    return system, orbits, z[None]
+
+
+def _relative(system: System, shape: np.ndarray, measured: int, mode: int) -> np.ndarray:
+    """Amplitudes of the states in units of that of one of them; of those at rest the largest."""
+    sizes = np.abs(shape)
+    if not sizes[measured] > NODE * sizes.max():
+        raise ParameterError(
+            f"{system.states[measured]} is at rest in mode {mode}. Choose another state=."
+        )
+    sizes = np.where(sizes > NODE * sizes.max(), sizes, sizes.max()) / sizes[measured]
+    return np.asarray(sizes)
 
 
 def _range(system: System, state: str, given: Any) -> tuple[float, float]:
@@ -179,17 +240,17 @@ def _range(system: System, state: str, given: Any) -> tuple[float, float]:
 class _Peak:
     """Largest magnitude of a state of orbits float64[r, z]."""
 
-    def __init__(self, free: System, orbits: FreeOrbits, method: Method, state: int) -> None:
-        self.free, self.orbits, self.method, self.state = free, orbits, method, state
+    def __init__(self, moving: System, orbits: Orbits, method: Method, state: int) -> None:
+        self.moving, self.orbits, self.method, self.state = moving, orbits, method, state
 
     def __call__(self, z: np.ndarray) -> np.ndarray:
         pairs = [(self.orbits, one) for one in z]
-        numbers = numbers_of(self.free, pairs, outputs_of(self.free, None), self.method)
+        numbers = numbers_of(self.moving, pairs, outputs_of(self.moving, None), self.method)
         return np.asarray(numbers.peak[:, self.state])
 
 
 def _family(
-    orbits: FreeOrbits,
+    orbits: Orbits,
     z: np.ndarray,
     peak: _Peak,
     limits: tuple[float, float],
@@ -199,7 +260,7 @@ def _family(
     """The orbits between two amplitudes, these included, and why they end."""
     along, reached = np.zeros(z.shape), 0.0
     states = slice(0, orbits.size)
-    along[0, states] = (z[0, states] - orbits.phase[0, 0]) / orbits.scale[0, states]
+    along[0, states] = (z[0, states] - orbits.rest) / orbits.scale[0, states]
     along /= np.linalg.norm(along)
     z = correct(orbits, z, along, np.zeros(1, np.int64)).z
 
@@ -248,24 +309,15 @@ def _family(
 
 def _table(
     system: System,
-    free: System,
-    orbits: FreeOrbits,
+    moving: System,
+    orbits: Orbits,
     z: np.ndarray,
     method: Method,
-    end: str,
-    state: str,
-    mode: int,
+    attrs: dict[str, Any],
 ) -> xr.Dataset:
     """The Dataset of a family."""
-    period, damping = orbits.period(z), z[:, -1]
-    if np.abs(damping * period).max() > CONSERVED:
-        raise ParameterError(
-            f"{system.name} doesn't conserve energy: its vibrations need a damping of "
-            f"{damping[np.argmax(np.abs(damping))]:.3g} /s to close. Set what damps to zero by "
-            'values=, and the restitution of impacts to 1: values={"damping": 0, "restitution": 1}.'
-        )
-    outputs = outputs_of(free, None)
-    numbers = numbers_of(free, [(orbits, one) for one in z], outputs, method)
+    period, outputs = orbits.period(z), outputs_of(moving, None)
+    numbers = numbers_of(moving, [(orbits, one) for one in z], outputs, method)
     rows = np.zeros(len(z), np.int64)
     own = stacked([orbits.multipliers(z, orbits.evaluate(z, rows)[1], rows)], orbits.size)
     by_name = numbers.by_name()
@@ -277,7 +329,6 @@ def _table(
         "point_itinerary": list(numbers.itinerary),
         "point_multiplier_real": own.real,
         "point_multiplier_imag": own.imag,
-        "fictitious_damping": damping,
         "point_<state>": orbits.points(z)[:, 0],
         "output": list(outputs.names),
         "output_units": list(outputs.units),
@@ -285,8 +336,27 @@ def _table(
             f"point_output_{key}": by_name[key] for key in ("maximum", "minimum", "peak", "rms")
         },
     }  # fmt: skip
-    attrs = provenance(system, method, system.values) | {
-        "mode": mode, "amplitude_of": state, "end": end,
-    }  # fmt: skip
+    if isinstance(orbits, FreeOrbits):
+        data["fictitious_damping"] = _conserved(system, z[:, -1], period)
+        about, when = (
+            provenance(system, method, system.values),
+            "where the vibration passes its rest",
+        )
+    else:
+        data["point_<parameter>"] = dict(zip(orbits.names, z[:, -2:].T, strict=True))
+        fixed = {key: one for key, one in system.values.items() if key not in orbits.names}
+        about, when = provenance(system, method, fixed, orbits.names), "at whole forcing periods"
     unit = outputs.units[0] if len(set(outputs.units)) == 1 else ""
-    return build(schema.BACKBONE, subject(system, attrs), data, words={"<output>": unit})
+    words = {"<output>": unit, "<when>": when}
+    return build(schema.BACKBONE, subject(system, about | attrs), data, words=words)
+
+
+def _conserved(system: System, damping: np.ndarray, period: np.ndarray) -> np.ndarray:
+    """The fictitious damping of orbits, which must be rounding."""
+    if np.abs(damping * period).max() > CONSERVED:
+        raise ParameterError(
+            f"{system.name} doesn't conserve energy: its vibrations need a damping of "
+            f"{damping[np.argmax(np.abs(damping))]:.3g} /s to close. Set what damps to zero by "
+            'values=, and the restitution of impacts to 1: values={"damping": 0, "restitution": 1}.'
+        )
+    return damping

@@ -11,10 +11,12 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.branch_table import numbers_of, stacked
+from saltus.analysis.branches.codimension_two import Equations
 from saltus.analysis.branches.curves import BifurcationCurve, trace_curve
+from saltus.analysis.branches.grazing_orbits import GrazingOrbits
 from saltus.analysis.branches.seeds import units
 from saltus.analysis.branches.shooting import PeriodicOrbits
-from saltus.analysis.branches.singular_orbits import MULTIPLIER
+from saltus.analysis.branches.singular_orbits import MULTIPLIER, SingularOrbits
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.outputs import outputs_of
 from saltus.analysis.starts import check_system, range_of
@@ -27,6 +29,7 @@ from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.attractors import padded
 from saltus.results.dataset.schema import event_name, point_name
+from saltus.system.leg import has_legs
 from saltus.system.system import System
 
 
@@ -43,10 +46,12 @@ def bifurcation_curve(
 ) -> xr.Dataset:
     """A bifurcation of periodic orbits followed over two parameters, in both directions.
 
-    Folds, period doublings and Neimark-Sacker bifurcations are followed by pseudo-arclength on
-    equations that define them, so each point is one to rounding. Points of codimension two are
+    Folds, period doublings, Neimark-Sacker bifurcations and grazes are followed by pseudo-arclength
+    on equations that define them, so each point is one to rounding. Points of codimension two are
     located on the way: cusps, resonances, degenerate doublings, and the extrema of a curve of
-    folds, at which closed branches (isolas) are born or join another branch.
+    folds, at which closed branches (isolas) are born or join another branch; on a curve of grazes
+    where the orbit folds or doubles, where a second boundary is touched, and where the square root
+    that an impact brings vanishes.
 
     Parameters
     ----------
@@ -72,13 +77,16 @@ def bifurcation_curve(
     Dataset
         Dims ``point``, ``codim2``, ``multiplier``, ``phase``. On point: ``point_<parameter>`` of
         both, ``point_period`` [s], ``point_peak`` and ``point_rms`` of the first state,
-        ``point_itinerary``, ``point_margin``, multipliers (of a limit cycle without the trivial
-        one), the states at whole forcing periods, ``point_arclength``. On codim2: ``codim2_kind``
-        (``cusp``, ``isola_birth``, ``branches_join``, ``extremum``, ``resonance_1_1`` to
-        ``resonance_1_4``, ``fold_flip``, ``degenerate_doubling``, ``fold_neimark_sacker``,
-        ``flip_neimark_sacker``), ``codim2_extremum`` (the parameter that has one), both parameters,
-        multipliers and states. Attributes ``bifurcation``, ``parameter_x``, ``parameter_y``,
-        ``begin`` and ``end`` (why it ends), ``periods``.
+        ``point_itinerary`` (without the graze), ``point_margin``, ``point_sqrt_coefficient`` (of
+        grazes: what the gap changes by when the orbit returns, over the square root of the depth by
+        which a motion would pass the boundary; 0 at a continuous force), multipliers (of a limit
+        cycle without the trivial one), the states at whole forcing periods, ``point_arclength``. On
+        codim2: ``codim2_kind`` (``cusp``, ``isola_birth``, ``branches_join``, ``extremum``,
+        ``resonance_1_1`` to ``resonance_1_4``, ``fold_flip``, ``degenerate_doubling``,
+        ``fold_neimark_sacker``, ``flip_neimark_sacker``, ``fold_graze``, ``flip_graze``,
+        ``resonant_graze``, ``double_graze``), ``codim2_extremum`` (the parameter that has one),
+        both parameters, multipliers and states. Attributes ``bifurcation``, ``parameter_x``,
+        ``parameter_y``, ``begin`` and ``end`` (why it ends), ``periods``, ``guard`` (grazed).
 
     Raises
     ------
@@ -90,7 +98,8 @@ def bifurcation_curve(
     ----------
     Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria (2000); Kuznetsov, Elements
     of Applied Bifurcation Theory (2004), chapters 9 and 10; Detroux et al., Comput. Methods Appl.
-    Mech. Engrg. 296 (2015) 18 (isolas at extrema of folds).
+    Mech. Engrg. 296 (2015) 18 (isolas at extrema of folds); di Bernardo, Budd, Champneys &
+    Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapter 7 (grazes).
 
     Examples
     --------
@@ -119,20 +128,21 @@ def bifurcation_curve(
                 f"({low:g}, {high:g}) in vary=."
             )
     with reporting(progress) as show:
-        orbits, z = _equations(start, names, limits, method, threads)
-        curve = trace_curve(orbits, start.kind, z, start.multiplier, limits, points, show)
+        orbits, z = _orbits(start, names, limits, method, threads)
+        equations, z = _equations(start, orbits, z)
+        curve = trace_curve(equations, z, limits, points, show)
         if curve is None:
             raise ParameterError(
                 f"no {start.kind.replace('_', ' ')} was found at the event: it may lie on a graze, "
                 "or the event is of other equations."
             )
-        return _table(start, names, limits, curve, method)
+        return _table(start, names, limits, orbits, curve, method)
 
 
 @dataclass(frozen=True)
 class _Start:
     """The orbit of an event, the system with its values, and how far the states of orbits spread
-    along its branch.
+    along its branch; the guard that is grazed, -1 if none is, and when.
     """
 
     system: System
@@ -141,6 +151,8 @@ class _Start:
     period: float
     multiplier: complex
     spread: np.ndarray
+    guard: int
+    phase: float
 
 
 def _ranges(system: System, vary: Any) -> tuple[tuple[str, str], list[tuple[float, float]]]:
@@ -175,11 +187,13 @@ def _start(system: System, event: Any) -> _Start:
             f"of {system.name}."
         )
     kind = str(event["event_kind"].item())
-    if kind not in MULTIPLIER:
+    if kind not in (*MULTIPLIER, "graze"):
         raise ParameterError(
             f"a {kind.replace('_', ' ')} can't be followed in two parameters. "
-            f"{nearest(kind, MULTIPLIER)}"
+            f"{nearest(kind, (*MULTIPLIER, 'graze'))}"
         )
+    guards = [guard.name for guard in system.guards]
+    guard = guards.index(str(event["event_guard"].item())) if kind == "graze" else -1
     name = event.attrs["parameter"]
     known = json.loads(event.attrs["parameters"])
     values = {**known, name: float(event[event_name(name)])}
@@ -192,10 +206,13 @@ def _start(system: System, event: Any) -> _Start:
     along = [event[point_name(state)].values[mine] for state in system.states]
     spread = np.array([np.nanmax(one) - np.nanmin(one) for one in along])
     orbit = orbit[np.isfinite(orbit).all(axis=1)]
-    return _Start(system.with_values(**values), kind, orbit, period, multiplier, spread)
+    return _Start(
+        system.with_values(**values), kind, orbit, period, multiplier, spread, guard,
+        float(event["event_phase"]),
+    )  # fmt: skip
 
 
-def _equations(
+def _orbits(
     start: _Start,
     names: tuple[str, str],
     limits: list[tuple[float, float]],
@@ -216,33 +233,60 @@ def _equations(
     return bare, z
 
 
+def _equations(
+    start: _Start, orbits: PeriodicOrbits, z: np.ndarray
+) -> tuple[Equations, np.ndarray]:
+    """The equations of the bifurcation, and their unknowns."""
+    if start.kind != "graze":
+        return SingularOrbits.of(orbits, start.kind, z, start.multiplier)
+    if not has_legs(orbits.parametric.system):
+        raise ParameterError(
+            f"{start.system.name} switches at instants, or has a remainder or a table of time: its "
+            "grazes can't be followed in two parameters."
+        )
+    found = GrazingOrbits.of(orbits, z, start.guard, start.phase)
+    if found is None:
+        raise ParameterError(
+            "the orbit at the event has a contact that is held: a graze of orbits that stick, rest "
+            "or slide can't be followed in two parameters. Choose another event."
+        )
+    return found
+
+
 def _table(
     start: _Start,
     names: tuple[str, str],
     limits: list[tuple[float, float]],
+    orbits: PeriodicOrbits,
     curve: BifurcationCurve,
     method: Method,
 ) -> xr.Dataset:
     """The Dataset of a curve."""
-    system, orbits, size = start.system, curve.orbits.orbits, len(start.system.states)
-    width, special = orbits.width, curve.special
-    every = [*curve.z[:, :width], *(point.z[:width] for point in special)]
-    numbers = numbers_of(
-        system, [(orbits, z) for z in every[: len(curve.z)]], outputs_of(system, None), method
+    system, size, special, count = (
+        start.system,
+        len(start.system.states),
+        curve.special,
+        len(curve.z),
     )
+    every = curve.equations.orbit(np.array([*curve.z, *(point.z for point in special)]))
+    outputs = outputs_of(system, None)
+    numbers = numbers_of(system, [(orbits, z) for z in every[:count]], outputs, method)
     states = padded([orbits.points(z) for z in every], size)
-    values = np.array([orbits.values(z) for z in every])
+    grazes = curve.equations if isinstance(curve.equations, GrazingOrbits) else None
+    values = orbits.values(every)
     own = stacked([curve.multipliers, *(point.multipliers[None] for point in special)], size)
-    count = len(curve.z)
     data: dict[str, Any] = {
         "point": np.arange(count),
         "point_<parameter>": {name: values[:count, i] for i, name in enumerate(names)},
         "point_arclength": curve.length,
-        "point_period": orbits.period(curve.z[:, :width]),
+        "point_period": orbits.period(every[:count]),
         "point_peak": numbers.peak[:, 0],
         "point_rms": numbers.rms[:, 0],
-        "point_itinerary": list(numbers.itinerary),
+        "point_itinerary": ([grazes.itinerary] * count if grazes else list(numbers.itinerary)),
         "point_margin": numbers.margin,
+        "point_sqrt_coefficient": (
+            grazes.coefficients(curve.z) if grazes else np.full(count, np.nan)
+        ),
         "point_multiplier_real": own[:count].real,
         "point_multiplier_imag": own[:count].imag,
         "point_<state>": states[:count],
@@ -258,7 +302,7 @@ def _table(
     fixed = {key: value for key, value in system.values.items() if key not in names}
     attrs = provenance(system, method, fixed, names) | {
         "bifurcation": start.kind, "periods": orbits.n, "begin": curve.ends[0],
-        "end": curve.ends[1],
+        "end": curve.ends[1], "guard": system.guards[start.guard].name if grazes else "",
     }  # fmt: skip
     for axis, name, (low, high) in zip("xy", names, limits, strict=True):
         attrs |= {f"parameter_{axis}": name, f"{axis}_low": low, f"{axis}_high": high}

@@ -10,9 +10,10 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.resolution import resolve
+from saltus.analysis.branches.rests import Rests
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import outside
-from saltus.analysis.branches.tracing import Branch
+from saltus.analysis.branches.tracing import Branch, has_twin
 from saltus.analysis.dataset_parts import guards_over, provenance, subject
 from saltus.analysis.orbits.orbit_measures import Measures, measure, unknown
 from saltus.analysis.outputs import Outputs
@@ -74,6 +75,10 @@ def values_of(
     begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     multipliers = stacked([branch.multipliers for branch in branches], size)
     event_multipliers = stacked([event.multipliers[None] for _, event in events], size)
+    rests = np.array([isinstance(branch.orbits, Rests) for branch, _ in points], bool)
+    event_rests = np.array([isinstance(branch.orbits, Rests) for branch, _ in at_events], bool)
+    own = _eigenvalues(points, size)
+    event_own = _eigenvalues(at_events, size)
     periods = np.array([branch.orbits.n for branch, _ in points], np.int64)
     states = padded([branch.orbits.points(z) for branch, z in [*points, *at_events]], size)
     return {
@@ -83,14 +88,20 @@ def values_of(
         "point_arclength": np.concatenate([b.length for b in branches] or [np.zeros(0)]),
         "point_stable": np.nanmax(np.abs(multipliers), axis=1, initial=0.0) < 1.0 - MARGINAL,
         "point_unstable_multipliers": outside(multipliers).sum(axis=1),
-        "point_period": np.array([float(branch.orbits.period(z)) for branch, z in points]),
+        "point_period": np.array(
+            [
+                np.nan if rest else float(branch.orbits.period(z))
+                for (branch, z), rest in zip(points, rests, strict=True)
+            ],
+            float,
+        ),
         "point_peak": numbers.peak[:, 0] if len(points) else np.zeros(0),
         "point_rms": numbers.rms[:, 0] if len(points) else np.zeros(0),
         "point_contacts": numbers.contacts * (1 if system.forced_at is None else periods),
         "point_itinerary": list(numbers.itinerary),
         "point_margin": numbers.margin,
-        "point_multiplier_real": multipliers.real,
-        "point_multiplier_imag": multipliers.imag,
+        **_complex("point_multiplier", np.where(rests[:, None], np.nan, multipliers)),
+        **_complex("point_eigenvalue", own),
         "point_<state>": states[: len(points)],
         **{f"point_output_{key}": column for key, column in numbers.by_name().items()},
         **_branches(branches),
@@ -99,26 +110,56 @@ def values_of(
         "event_guard": [" + ".join(system.guards[i].name for i in e.guards) for _, e in events],
         "event_phase": np.array([event.phase for _, event in events]),
         "event_outcome": [event.outcome for _, event in events],
+        "event_sqrt_coefficient": np.array([event.sqrt_coefficient for _, event in events], float),
         "event_branch": np.array([number for number, _ in events], np.int64),
         "event_point": np.array([begins[i] + event.after for i, event in events], np.int64),
         "event_<parameter>": {name: np.array([event.z[-1] for _, event in events], float)},
         "event_peak": event_numbers.peak[:, 0] if len(events) else np.zeros(0),
         "event_rms": event_numbers.rms[:, 0] if len(events) else np.zeros(0),
-        "event_multiplier_real": event_multipliers.real,
-        "event_multiplier_imag": event_multipliers.imag,
+        **_complex("event_multiplier", np.where(event_rests[:, None], np.nan, event_multipliers)),
+        **_complex("event_eigenvalue", event_own),
         "event_<state>": states[len(points) :],
     }
+
+
+def _complex(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    """Real and imaginary parts, both NaN where there is none."""
+    none = np.isnan(values)
+    return {
+        f"{name}_real": np.where(none, np.nan, values.real),
+        f"{name}_imag": np.where(none, np.nan, values.imag),
+    }
+
+
+def _eigenvalues(points: Sequence[tuple[Branch, np.ndarray]], size: int) -> np.ndarray:
+    """Eigenvalues of equilibria [1/s], NaN of orbits, complex128[.., size]."""
+    result = np.full((len(points), size), np.nan + 0j)
+    for row, (branch, z) in zip(result, points, strict=True):
+        if isinstance(branch.orbits, Rests):
+            row[:] = branch.orbits.eigenvalues(z[None], np.array([branch.row]))[0]
+    return result
+
+
+def _kind(branch: Branch) -> str:
+    """What lies on a branch."""
+    if isinstance(branch.orbits, Rests):
+        return "equilibrium"
+    return "limit_cycle" if branch.orbits.free else "periodic"
 
 
 def _branches(branches: Sequence[Branch]) -> dict[str, Any]:
     """What is known of each branch."""
     return {
         "branch": np.arange(len(branches)),
-        "branch_periods": np.array([branch.orbits.n for branch in branches], np.int64),
+        "branch_kind": [_kind(branch) for branch in branches],
+        "branch_periods": np.array(
+            [0 if isinstance(one.orbits, Rests) else one.orbits.n for one in branches], np.int64
+        ),
         "branch_closed": np.array([branch.closed for branch in branches], bool),
         "branch_parent": np.array(
             [-1 if branch.parent is None else branch.parent[0] for branch in branches], np.int64
         ),
+        "branch_twin": np.array([has_twin(branch) for branch in branches], bool),
         "branch_begin": [branch.ends[0] for branch in branches],
         "branch_end": [branch.ends[1] for branch in branches],
         "branch_unexplained": np.array([len(b.unexplained) for b in branches], np.int64),
@@ -129,6 +170,8 @@ def _sampled_peaks(system: System, method: Method, branch: Branch, z: np.ndarray
     """Largest magnitude of the first state of orbits float64[r, z] of a branch, nearly: at samples,
     to say where more orbits are needed.
     """
+    if isinstance(branch.orbits, Rests):
+        return np.abs(z[:, 0])
     n = branch.orbits.n if system.forced_at is not None else 1
     map_ = _map_of(system, method, [(branch.orbits, one) for one in z])
     starts = branch.orbits.points(z)[:, 0]
@@ -168,13 +211,19 @@ def numbers_of(
         return unknown(0, starts.shape[1], len(outputs))
     periods = np.array([orbits.n for orbits, _ in points], np.int64)
     periods = periods if system.forced_at is not None else np.ones_like(periods)
-    return measure(_map_of(system, method, points), starts, periods, outputs=outputs)
+    numbers = measure(_map_of(system, method, points), starts, periods, outputs=outputs)
+    for i, (orbits, z) in enumerate(points):
+        if isinstance(orbits, Rests):
+            numbers.margin[i], numbers.contacts[i] = orbits.margin(z), 0.0
+            numbers.itinerary[i] = ""
+    return numbers
 
 
 def stacked(parts: Sequence[np.ndarray], size: int) -> np.ndarray:
     """Multipliers in one table complex128[.., size], NaN where a trivial one was left out."""
-    if not parts:
-        return np.zeros((0, size), complex)
-    whole = np.concatenate(parts)
-    missing = np.full((len(whole), size - whole.shape[1]), np.nan + 0j)
-    return np.concatenate([whole, missing], axis=1)
+    whole = np.full((sum(map(len, parts)), size), np.nan + 0j)
+    first = 0
+    for part in parts:
+        whole[first : first + len(part), : part.shape[1]] = part
+        first += len(part)
+    return whole

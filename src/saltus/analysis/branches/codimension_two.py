@@ -15,13 +15,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from saltus.analysis.branches.arclength import correct, tangents
+from saltus.analysis.branches.grazing_orbits import GrazingOrbits
 from saltus.analysis.branches.singular_orbits import SingularOrbits
 from saltus.analysis.branches.special_points import zeros
 
+Equations = SingularOrbits | GrazingOrbits
 #: Distance of the orbits whose differences are derivatives of third order, in units of the scale.
 WIDE = 2e-3
 #: Share of the largest value of a test below which a change of its sign is rounding.
 ROUNDING = 1e-7
+#: The multiplier at a cusp is 1 to so much; it is a simple one.
+SIMPLE = 1e-8
 #: Kinds on the curves of each bifurcation, in the order of the tests.
 KINDS = {
     "fold": ("extremum", "extremum", "cusp", "resonance_1_1", "fold_flip"),
@@ -32,6 +36,7 @@ KINDS = {
         "extremum", "extremum", "resonance_1_3", "resonance_1_4", "fold_neimark_sacker",
         "flip_neimark_sacker",
     ),
+    "graze": ("extremum", "extremum", "fold_graze", "flip_graze", "resonant_graze"),
 }  # fmt: skip
 
 
@@ -61,7 +66,7 @@ class CodimensionTwo:
 
 
 def tests(
-    orbits: SingularOrbits,
+    orbits: Equations,
     rows: np.ndarray,
     z: np.ndarray,
     tangent: np.ndarray,
@@ -85,6 +90,10 @@ def tests(
         before.
     """
     one, two = orbits.parameters
+    if isinstance(orbits, GrazingOrbits):
+        own = [np.prod(1.0 - multipliers, axis=1).real, np.prod(1.0 + multipliers, axis=1).real]
+        along = tangent[:, one], tangent[:, two]
+        return np.stack([*along, *own, orbits.coefficients(z)]), np.zeros((len(z), 0))
     mine = derivative[:, : orbits.orbits.n * orbits.orbits.size + orbits.orbits.free]
     along = tangent[:, one], tangent[:, two]
     double = [np.prod(1.0 - multipliers, axis=1).real, np.prod(1.0 + multipliers, axis=1).real]
@@ -153,7 +162,7 @@ def _cubic(
 
 
 def find(
-    orbits: SingularOrbits,
+    orbits: Equations,
     row: int,
     z: np.ndarray,
     tangent: np.ndarray,
@@ -161,7 +170,7 @@ def find(
 ) -> list[CodimensionTwo]:
     """All points of codimension two on a curve float64[p, z], in its order."""
     rows = np.full(len(z), row)
-    own = multipliers(orbits, z, derivative, rows)
+    own = orbits.multipliers(z, derivative, rows)
     values, sides = tests(orbits, rows, z, tangent, derivative, own, None)
     which, after = np.nonzero(_crosses(values))
     if not len(which):
@@ -177,7 +186,7 @@ def find(
         if not len(good):
             return result
         way = tangents(point.derivative[good], tangent[begin[good]])
-        own = multipliers(local, point.z[good], point.derivative[good], event[good])
+        own = local.multipliers(point.z[good], point.derivative[good], event[good])
         tested, _ = tests(
             local, event[good], point.z[good], way, point.derivative[good], own,
             sides[begin[good]],
@@ -193,9 +202,18 @@ def find(
 
     step = (z[after + 1] - z[after]) / orbits.scale[row]
     places = zeros(at, np.einsum("ki,ki->k", step, tangent[after]))
-    found = {i: point for i, point in found.items() if np.isfinite(places[i])}
+    found = {i: point for i, point in found.items() if np.isfinite(places[i]) and _resolved(point)}
     order = sorted(found, key=lambda i: (found[i].after, _ahead(z, tangent, orbits, row, found[i])))
     return [_named(orbits, row, found[i]) for i in order]
+
+
+def _resolved(point: CodimensionTwo) -> bool:
+    """Whether a cusp is more than rounding: next to a graze of a rigid stop the map bends without
+    bound, and its derivatives are noise.
+    """
+    if point.kind != "cusp":
+        return True
+    return bool(np.abs(point.multipliers - 1.0).min() < SIMPLE)
 
 
 def _crosses(values: np.ndarray) -> np.ndarray:
@@ -208,27 +226,19 @@ def _crosses(values: np.ndarray) -> np.ndarray:
 
 
 def _ahead(
-    z: np.ndarray, tangent: np.ndarray, orbits: SingularOrbits, row: int, point: CodimensionTwo
+    z: np.ndarray, tangent: np.ndarray, orbits: Equations, row: int, point: CodimensionTwo
 ) -> float:
     step = (point.z - z[point.after]) / orbits.scale[row]
     return float(step @ tangent[point.after])
 
 
-def multipliers(
-    orbits: SingularOrbits, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray
-) -> np.ndarray:
-    """Floquet multipliers at points of curves, complex128[p, D]."""
-    width = orbits.orbits.width
-    return orbits.orbits.multipliers(z[:, :width], derivative[:, :, :width], rows)
-
-
-def _named(orbits: SingularOrbits, row: int, point: CodimensionTwo) -> CodimensionTwo:
+def _named(orbits: Equations, row: int, point: CodimensionTwo) -> CodimensionTwo:
     """An extremum of folds by what happens to the branches over the other parameter.
 
     There they cross at a point, F restricted to both null directions is a quadratic form, and the
     branches next to it are closed curves around the point if it is definite.
     """
-    if orbits.kind != "fold" or point.kind != "extremum":
+    if not isinstance(orbits, SingularOrbits) or orbits.kind != "fold" or point.kind != "extremum":
         return point
     size, width = orbits.size, orbits.orbits.width
     one = np.array([row])

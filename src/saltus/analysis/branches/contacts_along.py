@@ -5,7 +5,8 @@ rate, the state behind the contact, and their derivatives.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 
@@ -44,6 +45,10 @@ class At:
     by_state: np.ndarray
     by_time: np.ndarray
 
+    def rows(self, which: slice) -> At:
+        """Some of the orbits."""
+        return At(*(getattr(self, one.name)[which] for one in fields(self)))
+
 
 class Jumps:
     """The contacts of a sequence in a system.
@@ -59,26 +64,8 @@ class Jumps:
     """
 
     def __init__(self, system: System, contacts: Sequence[Contact], size: int, mode: int = 0):
-        self._system = system
-        states = [ex.state(name) for name in system.states]
-        self._entries: list[tuple[Expr, ...]] = []
-        for contact in contacts or (None,):
-            gap, after, before = ex.constant(0.0), tuple(states[:size]), mode
-            if contact is not None:
-                guard, before = system.guards[contact.guard], contact.before
-                gap, law = guard.gap, guard.law
-                if law is not None and law.reset and contact.direction == -law.side:
-                    after = law.reset[:size]
-            gap, *left = frozen(system, (gap, *after), before)
-            rates = frozen(system, system.field[:size], before)
-            self._entries.append(
-                (
-                    gap, *gradient(gap, system.states), time_derivative(gap), *rates, *left,
-                    *(slope for one in left for slope in gradient(one, system.states)),
-                    *map(time_derivative, left),
-                )
-            )  # fmt: skip
-        self._size = size
+        self._system, self._size = system, size
+        self._entries = [_entries(system, contact, mode, size) for contact in contacts or (None,)]
 
     def at(self, time: np.ndarray, states: np.ndarray) -> At:
         """What happens at times float64[r, m] in states float64[r, m, E]."""
@@ -97,3 +84,21 @@ class Jumps:
             gap[..., 0], normal, by_time[..., 0], rate, after,
             by_state.reshape(r, m, size, width), after_by_time,
         )  # fmt: skip
+
+
+@lru_cache(maxsize=128)
+def _entries(system: System, contact: Contact | None, mode: int, size: int) -> tuple[Expr, ...]:
+    """What :class:`At` holds of a contact; without one, of a motion in a mode."""
+    gap, after, before = ex.constant(0.0), tuple(map(ex.state, system.states[:size])), mode
+    if contact is not None:
+        guard, before = system.guards[contact.guard], contact.before
+        gap, law = guard.gap, guard.law
+        if law is not None and law.reset and contact.direction == -law.side:
+            after = law.reset[:size]
+    gap, *left = frozen(system, (gap, *after), before)
+    return (
+        gap, *gradient(gap, system.states), time_derivative(gap),
+        *frozen(system, system.field[:size], before), *left,
+        *(slope for one in left for slope in gradient(one, system.states)),
+        *map(time_derivative, left),
+    )  # fmt: skip

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from saltus.analysis.branches.arclength import Curve, follow, tangents
-from saltus.analysis.branches.codimension_two import CodimensionTwo, find, multipliers
-from saltus.analysis.branches.shooting import PeriodicOrbits
+from saltus.analysis.branches.codimension_two import CodimensionTwo, Equations, find
+from saltus.analysis.branches.grazing_orbits import GrazingOrbits
 from saltus.analysis.branches.singular_orbits import COSINES, SingularOrbits
 
 
@@ -19,8 +19,8 @@ class BifurcationCurve:
 
     Attributes
     ----------
-    orbits : SingularOrbits
-        The equations.
+    equations : SingularOrbits or GrazingOrbits
+        Its equations.
     z : float64[p, z]
         Its points.
     length : float64[p]
@@ -29,29 +29,23 @@ class BifurcationCurve:
         Floquet multipliers, without a trivial one.
     ends : (str, str)
         Why it ends at its first and at its last point: see :class:`Curve`; ``resonance_1_1`` and
-        ``resonance_1_2`` where the multipliers of a torus meet.
+        ``resonance_1_2`` where the multipliers of a torus meet; of a graze also
+        ``double_graze``, ``graze_corner`` and ``degenerate_graze``, and ``contacts_change``.
     special : list of CodimensionTwo
         In its order.
     """
 
-    orbits: SingularOrbits
+    equations: Equations
     z: np.ndarray
     length: np.ndarray
     multipliers: np.ndarray
     ends: tuple[str, str]
     special: list[CodimensionTwo] = field(default_factory=list)
 
-    @property
-    def values(self) -> np.ndarray:
-        """The two parameters, float64[p, 2]."""
-        return self.orbits.orbits.values(self.z[:, : self.orbits.orbits.width])
-
 
 def trace_curve(
-    orbits: PeriodicOrbits,
-    kind: str,
+    equations: Equations,
     start: np.ndarray,
-    multiplier: complex,
     limits: Sequence[tuple[float, float]],
     points: int,
     progress: Callable[[float], None] | None = None,
@@ -60,14 +54,10 @@ def trace_curve(
 
     Parameters
     ----------
-    orbits : PeriodicOrbits
+    equations : SingularOrbits or GrazingOrbits
         Over the two parameters; its two rows have the same scale.
-    kind : str
-        Of the bifurcation.
     start : float64[z]
-        The orbit there.
-    multiplier : complex
-        The one on the unit circle.
+        The bifurcation.
     limits : two (float, float)
         Ranges of the parameters.
     points : int
@@ -75,21 +65,15 @@ def trace_curve(
     progress : callable, optional
         Called with the share of them that was reached.
     """
-    singular, rows = SingularOrbits(orbits, kind), np.arange(2)
+    rows = np.arange(2)
     both = np.repeat(start[None], 2, axis=0)
-    orbits.accepted(both, rows)
-    if singular.torus:
-        cosine = np.clip(multiplier.real / abs(multiplier), *COSINES)
-        both = np.append(both, np.full((2, 1), cosine), axis=1)
-    singular.begin(both, rows)
-    derivative = singular.evaluate(both[:1], rows[:1])[1]
+    equations.begin(both, rows)
+    derivative = equations.evaluate(both[:1], rows[:1])[1]
     if not np.isfinite(derivative).all():
         return None
     along = tangents(derivative, np.ones((1, both.shape[1])))[0]
-    bounds = dict(zip(singular.parameters, limits, strict=True))
-    if singular.torus:
-        bounds[orbits.width] = COSINES
-
+    bounds = {**dict(zip(equations.parameters, limits, strict=True)), **equations.bounds}
+    beyond: dict[int, np.ndarray] = {}
     reached = 0
 
     def watch(curve: Curve) -> str:
@@ -97,17 +81,38 @@ def trace_curve(
         reached = max(reached, len(curve.z))
         if progress is not None:
             progress(min(reached / points, 1.0))
-        return ""
+        why = equations.why_virtual(curve.z[-1]) if isinstance(equations, GrazingOrbits) else ""
+        if why:
+            beyond[id(curve)] = curve.z[-1]
+        return why
 
     curves = follow(
-        singular, both, np.stack([along, -along]), bounds, points, ends=watch, group=0 * rows
+        equations, both, np.stack([along, -along]), bounds, points, ends=watch, group=0 * rows
     )
     if not curves[0].z or not curves[1].z:
         return None
-    return _joined(singular, curves)
+    if isinstance(equations, GrazingOrbits):
+        for curve in curves:
+            if curve.end == "contacts_change":
+                _end_at_double(equations, curve, beyond[id(curve)])
+    return _joined(equations, curves)
 
 
-def _joined(singular: SingularOrbits, curves: list[Curve]) -> BifurcationCurve:
+def _end_at_double(equations: GrazingOrbits, curve: Curve, beyond: np.ndarray) -> None:
+    """End a curve of grazes at the second graze behind its last point, if that is why it ends."""
+    z = equations.double(curve.z[-1], beyond)
+    if z is None:
+        return
+    derivative = equations.evaluate(z[None], np.zeros(1, np.int64))[1]
+    apart = np.linalg.norm((z - curve.z[-1]) / equations.scale[0])
+    curve.tangent.append(tangents(derivative, curve.tangent[-1][None])[0])
+    curve.z.append(z)
+    curve.derivative.append(derivative[0])
+    curve.length.append(curve.length[-1] + float(apart))
+    curve.end = "double_graze"
+
+
+def _joined(equations: Equations, curves: list[Curve]) -> BifurcationCurve:
     """One curve from those in both directions."""
     ahead, back = curves
     closed = [row for row, curve in enumerate(curves) if curve.end == "closed"]
@@ -120,17 +125,23 @@ def _joined(singular: SingularOrbits, curves: list[Curve]) -> BifurcationCurve:
             back.derivative[:0:-1] + ahead.derivative,
             [-length for length in back.length[:0:-1]] + ahead.length,
         )
-        ends = (_end(singular, back), _end(singular, ahead))
+        ends = (_end(equations, back), _end(equations, ahead))
     z, tangent, derivative = (np.array(part) for part in (whole.z, whole.tangent, whole.derivative))
     length = np.array(whole.length) - whole.length[0]
-    own = multipliers(singular, z, derivative, np.zeros(len(z), np.int64))
-    special = find(singular, 0, z, tangent, derivative)
-    return BifurcationCurve(singular, z, length, own, ends, special)
+    own = equations.multipliers(z, derivative, np.zeros(len(z), np.int64))
+    special = find(equations, 0, z, tangent, derivative)
+    doubles = [
+        CodimensionTwo("double_graze", place, z[place], own[place])
+        for place, end in zip((0, len(z) - 1), ends, strict=True)
+        if end == "double_graze"
+    ]
+    special = sorted([*special, *doubles], key=lambda point: point.after)
+    return BifurcationCurve(equations, z, length, own, ends, special)
 
 
-def _end(singular: SingularOrbits, curve: Curve) -> str:
+def _end(equations: Equations, curve: Curve) -> str:
     """Why a curve ends."""
-    if not singular.torus or curve.end != "range":
+    if not isinstance(equations, SingularOrbits) or not equations.torus or curve.end != "range":
         return curve.end
     cosine = curve.z[-1][-1]
     if cosine >= COSINES[1]:

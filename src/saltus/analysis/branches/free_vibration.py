@@ -29,6 +29,9 @@ from saltus.system.system import System
 SAMPLES = 1024
 #: Steps of Newton's method to the place of rest, and the last one's share of the largest state.
 MOST_STEPS, CONVERGED = 60, 1e-13
+#: Periods of small vibrations within which a motion returns: where it rests on a contact, small
+#: vibrations to its other side are slower.
+LONGEST = 12.0
 #: A mode vibrates if its decay is smaller than this share of its frequency.
 UNDAMPED = 1e-6
 
@@ -109,20 +112,25 @@ class FreeOrbits(PeriodicOrbits):
     ) -> None:
         super().__init__(system, (name,), 1, scale, method, threads)
         self.phase[:, 0], self.phase[:, 1] = rest, np.eye(self.size)[column]
-        self._rest, self._column = rest[column], column
+        self.rest, self._column = rest, column
 
     def first_return(self, start: np.ndarray, longest: float) -> tuple[float, np.ndarray]:
         """Time after which a motion from float64[D] first passes the place of rest again in the
         same direction, to a sample [s], NaN if it doesn't; and the largest magnitudes float64[D]
         on the way.
         """
-        begin = np.array([[*start, longest, 0.0]])
-        seen = self.map.run(begin, 1, Schedule.even(1, SAMPLES)).samples[0][:, : self.size]
-        above = seen[:, self._column] > self._rest
+        seen = self.sampled(start, longest)
+        above = seen[:, self._column] > self.rest[self._column]
         back = np.flatnonzero(above[1:] & ~above[:-1] & (np.arange(SAMPLES - 1) > 0))
         if not len(back):
             return np.nan, np.full(self.size, np.nan)
         return float((back[0] + 1) / SAMPLES * longest), np.abs(seen[: back[0] + 1]).max(axis=0)
+
+    def sampled(self, start: np.ndarray, time: float) -> np.ndarray:
+        """A motion from float64[D] in equal steps over a time [s], float64[SAMPLES, D]."""
+        begin = np.array([[*start, time, 0.0]])
+        run = self.map.run(begin, 1, Schedule.even(1, SAMPLES))
+        return np.asarray(run.samples[0][:, : self.size])
 
     def accepted(self, z: np.ndarray, rows: np.ndarray) -> None:
         """The condition on the phase stays."""

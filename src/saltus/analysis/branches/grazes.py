@@ -10,6 +10,7 @@ it to rounding. At a corner a leg lasts no time.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import Expr, add, mul
 from saltus.system.leg import frozen
+from saltus.system.system import System
 
 #: Places along a leg at which its gap is looked at for a first guess.
 LOOKS = 200
@@ -58,27 +60,19 @@ class ContactEvent:
     state: np.ndarray
     slope: np.ndarray
 
-    @property
+    @cached_property
     def orbit(self) -> np.ndarray:
         """The orbit by its points at whole periods, float64[z]."""
         return np.asarray(self.legs.orbit(self.z[None])[0])
 
 
-class _Gap:
+class Gap:
     """A gap in one mode, its rate along the flow, and their derivatives."""
 
     def __init__(self, legs: Legs, guard: int, mode: int) -> None:
         self._system, self._size = legs.orbits.parametric.system, legs.size
         system, self.side = self._system, 1 if mode >> guard & 1 else -1
-        gap, *rates = frozen(system, (system.guards[guard].gap, *system.field), mode)
-        rate: Expr = time_derivative(gap)
-        for slope, speed in zip(gradient(gap, system.states), rates, strict=True):
-            rate = add(rate, mul(slope, speed))
-        self._entries = [
-            entry
-            for one in (gap, rate)
-            for entry in (one, *gradient(one, system.states), time_derivative(one))
-        ]
+        self._entries = _entries(system, guard, mode)
 
     def at(self, time: np.ndarray, states: np.ndarray) -> np.ndarray:
         """The gap, its derivatives with respect to states and time, and those of its rate, at times
@@ -88,6 +82,20 @@ class _Gap:
         values = evaluate(self._entries, t=time, states=named, values=self._system.values)
         columns = np.stack(np.broadcast_arrays(time, *values)[1:], axis=-1)
         return columns.reshape(len(time), 2, -1)
+
+
+@lru_cache(maxsize=128)
+def _entries(system: System, guard: int, mode: int) -> tuple[Expr, ...]:
+    """A gap in one mode and its rate, each with its derivatives."""
+    gap, *rates = frozen(system, (system.guards[guard].gap, *system.field), mode)
+    rate: Expr = time_derivative(gap)
+    for slope, speed in zip(gradient(gap, system.states), rates, strict=True):
+        rate = add(rate, mul(slope, speed))
+    return tuple(
+        entry
+        for one in (gap, rate)
+        for entry in (one, *gradient(one, system.states), time_derivative(one))
+    )
 
 
 def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent | None:
@@ -105,14 +113,13 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
         About when, in periods since the orbit's first point.
     """
     place = legs.leg_at(z, phase)
-    gap = _Gap(legs, guard, legs.mode_of(place))
+    gap = Gap(legs, guard, legs.mode_of(place))
     begins = legs.nodes(z[None])[0][0, place]
-    phase = _nearest_turn(legs, z, place, gap, (phase - begins) % legs.n) + begins
+    phase = nearest_turn(legs, z, place, gap, (phase - begins) % legs.n) + begins
     row, scale = np.zeros(1, np.int64), np.append(legs.scale[0], 1.0)
 
     def equations(u: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        residual, derivative = legs.evaluate(u[:, :-1], row)
-        _, value, slopes = _touch(legs, place, gap, u)
+        (residual, derivative), _, value, slopes = touching(legs, place, gap, u, row)
         whole = np.zeros((1, len(scale), len(scale)))
         whole[:, :-2, :-1], whole[:, -2:] = derivative, slopes * scale
         unit = np.abs(whole[:, -2:]).max(axis=2)
@@ -123,43 +130,51 @@ def graze(legs: Legs, z: np.ndarray, guard: int, phase: float) -> ContactEvent |
     u, found = newton(equations, np.append(z, phase)[None], scale[None])
     if not found[0]:
         return None
-    state, _, slopes = _touch(legs, place, gap, u)
+    state, _, slopes = touch(legs, place, gap, u)
     phase = float(u[0, -1]) % legs.n
     return ContactEvent(
         "graze", (guard,), phase, legs, u[0, :-1], place, state[0], slopes[0, 0, :-1]
     )
 
 
-def _touch(
-    legs: Legs, place: int, gap: _Gap, u: np.ndarray
+def touch(
+    legs: Legs, place: int, gap: Gap, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The state on a leg at a time, the gap there and its rate, and their derivatives with respect
     to the orbit and the time: float64[k, D], float64[k, 2], float64[k, 2, z + 1].
     """
-    z, when, size = u[:, :-1], u[:, -1], legs.size
-    first, _, rest = legs.nodes(z)
-    span = np.zeros_like(first)
-    span[:, place] = when - first[:, place]
-    state, by_z, by_time = legs.along(z, legs.at(z), span)
-    own, slopes, order = legs.orbits.own(rest)
-    found = gap.at(when * legs.unit, np.concatenate([state[:, place], own], axis=1))
+    return touching(legs, place, gap, u, np.zeros(len(u), np.int64))[1:]
+
+
+def touching(
+    legs: Legs, place: int, gap: Gap, u: np.ndarray, rows: np.ndarray
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
+    """What :meth:`Legs.evaluate` returns of orbits float64[k, z + 1], whose last entry is a time,
+    and what :func:`touch` does: all flights in one.
+    """
+    z, when, size, k = u[:, :-1], u[:, -1], legs.size, len(u)
+    both = np.concatenate([z, z])  # the legs as they are, and one of them as far as that time
+    first, _, rest = legs.nodes(both)
+    spans, at = legs.spans(first), legs.at(both)
+    spans[k:] = 0.0
+    spans[k:, place] = when - first[k:, place]
+    state, by_z, by_time = legs.along(both, at, spans)
+    closed = legs.closed(z, rows, at.rows(slice(0, k)), state[:k], by_z[:k], by_time[:k])
+    state, by_z, by_time = state[k:, place], by_z[k:, place], by_time[k:, place]
+    own, slopes, order = legs.orbits.own(rest[k:])
+    found = gap.at(when * legs.unit, np.concatenate([state, own], axis=1))
     value, normal, by_clock = found[..., 0], found[..., 1:-1], found[..., -1] * legs.unit
-    rows = normal[..., :size] @ by_z[:, place]
-    rows[..., legs.count * (size + 1) + order] += normal[..., size:] * slopes[:, None]
-    last = (normal[..., :size] @ by_time[:, place, :, None])[..., 0] + by_clock
-    return state[:, place], value, np.concatenate([rows, last[..., None]], axis=2)
+    entries = normal[..., :size] @ by_z
+    entries[..., legs.count * (size + 1) + order] += normal[..., size:] * slopes[:, None]
+    last = (normal[..., :size] @ by_time[..., None])[..., 0] + by_clock
+    return closed, state, value, np.concatenate([entries, last[..., None]], axis=2)
 
 
-def _nearest_turn(legs: Legs, z: np.ndarray, place: int, gap: _Gap, since: float) -> float:
+def nearest_turn(legs: Legs, z: np.ndarray, place: int, gap: Gap, since: float) -> float:
     """When after a contact the motion turns away from the boundary, next to a time [periods]."""
     first, _, rest = legs.nodes(z[None])
-    longest = legs.spans(first)[0, place]
-    spans = np.linspace(0.0, longest, LOOKS)
-    many = np.repeat(z[None], LOOKS, axis=0)
-    wanted = np.zeros((LOOKS, legs.count))
-    wanted[:, place] = spans
-    state = legs.along(many, legs.at(many), wanted)[0][:, place]
-    own = np.repeat(legs.orbits.own(rest)[0], LOOKS, axis=0)
+    spans, state = legs.flight(z, place, LOOKS)
+    own = np.repeat(legs.orbits.own(rest)[0], len(spans), axis=0)
     found = gap.at((first[0, place] + spans) * legs.unit, np.concatenate([state, own], axis=1))
     rate = found[:, 1, 0] * gap.side
     turns = np.flatnonzero((rate[:-1] <= 0) & (rate[1:] > 0))

@@ -16,6 +16,7 @@ import numpy as np
 
 from saltus.analysis.branches.arclength import FIRST, tangents
 from saltus.analysis.branches.contact_sequences import sequences
+from saltus.analysis.branches.grazing_orbits import sqrt_coefficient
 from saltus.analysis.branches.leg_pieces import Piece, follow_legs
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
@@ -89,7 +90,7 @@ class LegBranch(Branch):
         none = np.zeros(0)
         return SpecialPoint(
             event.kind, max(after, 0), event.orbit, none, event.legs.multipliers_at(event.z), none,
-            event.guards, event.phase, outcome,
+            event.guards, event.phase, outcome, sqrt_coefficient(event),
         )  # fmt: skip
 
     def _complete(self) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from saltus.analysis.branches.contact_sequences import ContactSequence, sequences, shift
 from saltus.analysis.branches.contacts_along import At, Jumps
 from saltus.analysis.branches.shooting import PeriodicOrbits, across, multipliers
+from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 from saltus.system.leg import leg
@@ -210,9 +211,20 @@ class Legs:
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`saltus.analysis.branches.arclength.Equations`."""
+        at, spans = self.at(z), self.spans(self.nodes(z)[0])
+        return self.closed(z, rows, at, *self.along(z, at, spans))
+
+    def closed(
+        self,
+        z: np.ndarray,
+        rows: np.ndarray,
+        at: At,
+        ends: np.ndarray,
+        derivative: np.ndarray,
+        by_end: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What :meth:`evaluate` returns, from what :meth:`along` does at the ends of the legs."""
         phase, before, rest = self.nodes(z)
-        at, spans = self.at(z), self.spans(phase)
-        ends, derivative, by_end = self.along(z, at, spans)
         derivative = np.concatenate([derivative, self._of_gaps(at, rest)], axis=2)
         for i in range(self.count):
             there = (i + 1) % self.count * (self.size + 1)
@@ -225,7 +237,7 @@ class Legs:
             slope = np.abs(derivative[:, :, -1] * unit[:, None]).max(axis=2)
         else:  # the first point is at time 0
             residual[:, :, -1], derivative[:, :, -1] = phase, 0.0
-            derivative[:, 0, -1, 0] = slope = np.ones((len(z), 1))
+            derivative[:, 0, -1, 0], slope = 1.0, np.ones((len(z), 1))
         each = np.concatenate([each, slope[..., None]], axis=2)
         residual = (residual / each).reshape(len(z), -1)
         derivative = (derivative / each[..., None]).reshape(*residual.shape, -1) * unit[:, None]
@@ -267,6 +279,18 @@ class Legs:
         own = matrices[..., size:-2] + through[..., size:]
         derivative[..., used + order] = own * slopes[:, None, None]
         return ends, derivative, by_span
+
+    def flight(self, z: np.ndarray, place: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The leg behind a contact of an orbit float64[z], cut into ``count`` equal times: those
+        since the contact [periods], float64[count + 1], and the states, float64[count + 1, D].
+        """
+        phase, _, rest = self.nodes(z[None])
+        span, after = self.spans(phase)[:, [place]], self.at(z[None]).after[:, [place]]
+        start = self._states(after, rest, phase[:, [place]], span)[0]
+        map_ = self._maps[self._modes[place]]
+        schedule = Schedule.even(1, count, beyond=1)
+        states = map_.tangent_samples(start, 1, schedule)[0, :, : self.size]
+        return span[0, 0] * np.linspace(0.0, 1.0, count + 1), states
 
     def _of_gaps(self, at: At, rest: np.ndarray) -> np.ndarray:
         """Derivatives of the gaps at the contacts, float64[r, m, 1, z]."""
@@ -317,9 +341,9 @@ class Legs:
         """
         at, result = self.at(z), []
         for i in range(len(z)):
-            segments = self._segments(at, derivative[i], i, int(rows[i]))
+            segments = self.segments(at, derivative[i], i, int(rows[i]))
             if self.free:
-                segments = across(_product(segments), at.rate[i, 0])[None]
+                segments = across(product(segments), at.rate[i, 0])[None]
             result.append(multipliers(segments))
         return np.array(result)
 
@@ -328,7 +352,7 @@ class Legs:
         row = np.zeros(1, np.int64)
         return np.asarray(self.multipliers(z[None], self.evaluate(z[None], row)[1], row)[0])
 
-    def _segments(self, at: At, derivative: np.ndarray, i: int, row: int) -> np.ndarray:
+    def segments(self, at: At, derivative: np.ndarray, i: int, row: int) -> np.ndarray:
         """The tangent map from each contact to the next one, both before them, float64[m, D, D]."""
         size, m, unit = self.size, self.count, self.scale[row]
         result = np.empty((m, size, size))
@@ -340,12 +364,20 @@ class Legs:
             through, by_time = block[:, 1:], block[:, 0]
             if m == 1:  # the end of the leg is at the same unknowns
                 through, by_time = through + np.eye(size), by_time - at.rate[i, 0] * self.unit
-            if self.contacts:
-                normal, rate = at.normal[i, j, :size], at.rate[i, j] * self.unit
-                closing = normal @ rate + at.gap_by_time[i, j] * self.unit
-                through = through - np.outer(through @ rate + by_time, normal) / closing
-            result[j] = through
+            result[j] = self.behind(at, i, j, through, by_time)
         return result
+
+    def behind(
+        self, at: At, i: int, j: int, through: np.ndarray, by_time: np.ndarray
+    ) -> np.ndarray:
+        """The tangent map from before contact j of orbit i to a place behind it, float64[D, D]:
+        from the derivatives there by the state before the contact and by its time [periods].
+        """
+        if not self.contacts:
+            return through
+        normal, rate = at.normal[i, j, : self.size], at.rate[i, j] * self.unit
+        closing = normal @ rate + at.gap_by_time[i, j] * self.unit
+        return np.asarray(through - np.outer(through @ rate + by_time, normal) / closing)
 
     def speeds(self, z: np.ndarray) -> np.ndarray:
         """Rates of the gaps before the contacts of orbits float64[r, z] in the directions in which
@@ -390,7 +422,7 @@ class Legs:
         return result
 
 
-def _product(segments: np.ndarray) -> np.ndarray:
+def product(segments: np.ndarray) -> np.ndarray:
     """The last times ... times the first."""
     result = np.eye(len(segments[0]))
     for one in segments:

@@ -9,6 +9,7 @@ from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.tracing import Plan, both_ways
 from saltus.flow.methods import Method
 from saltus.system.leg import has_legs
+from saltus.system.symmetry import is_symmetric
 from saltus.system.system import System
 
 
@@ -29,8 +30,9 @@ def plan_of(
     period jumps when a contact crosses the whole period, and has a square root at a graze.
     """
     jumps = any(guard.law is not None and guard.law.reset for guard in system.guards)
+    symmetric = is_symmetric(system, {name: limits})
     return Plan(
-        lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads),
+        lambda n, scale: PeriodicOrbits(system, (name,), n, scale, method, threads, symmetric),
         limits, points, longest, frozenset(switch),
         leg_branches if jumps and has_legs(system) else both_ways,
     )  # fmt: skip

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from saltus.analysis.branches.tracing import Seed
+from saltus.analysis.orbits.all_equilibria import all_equilibria
 from saltus.analysis.orbits.orbit_measures import measure
 from saltus.analysis.orbits.tolerances import RESTS
 from saltus.errors import ParameterError, shown
@@ -17,6 +19,8 @@ from saltus.flow.methods import Method
 from saltus.results.dataset import schema
 from saltus.system.system import System
 
+#: Values of a parameter at which equilibria are looked for, and random starts at each.
+RESTING_VALUES, RESTING_STARTS = 3, 64
 #: Names of what a Dataset knows of its orbits: points, period, limit cycles' time.
 _PREFIX = {
     schema.RESPONSES: "response", schema.ATTRACTORS: "attractor", schema.BASINS: "attractor",
@@ -39,6 +43,8 @@ def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
         If the Dataset is of another system or kind, or over another parameter.
     """
     kind = schema.kind_of(found)
+    if kind == schema.EQUILIBRIA:
+        return []
     if kind not in _PREFIX:
         raise ParameterError(
             "start= takes what sl.frequency_response, sl.bifurcation_diagram, sl.attractors, "
@@ -50,14 +56,91 @@ def seeds_of(system: System, name: str, found: xr.Dataset) -> list[Seed]:
             f"those of {system.name}."
         )
     prefix = _PREFIX[kind]
-    own = f"{prefix}_{name}" if kind != schema.RESPONSES else schema.response_name(name)
-    values = found[own].values if own in found else np.full(found.sizes[prefix], np.nan)
-    values = np.where(np.isfinite(values), values, system.values[name])
+    values = _values(system, name, found, prefix, kind)
     points = np.stack([found[_POINTS[prefix](state)].values for state in system.states], axis=2)
     times = found.get(f"{prefix}_cycle")
     cycles = np.full(len(values), np.nan) if times is None else times.values
-    periods = found[f"{prefix}_period"].values
+    periods = np.where(cycles > 0, 1, found[f"{prefix}_period"].values)
     return list(seeds_at(system, points, periods, cycles, values))
+
+
+def _own_value(system: System, name: str, found: xr.Dataset) -> float:
+    """The value of a parameter at which orbits were found.
+
+    Raises
+    ------
+    ParameterError
+        If the others aren't those of the system.
+    """
+    own = json.loads(found.attrs.get("parameters", "{}"))
+    for other, value in system.values.items():
+        if other != name and own.get(other, value) != value:
+            raise ParameterError(
+                f"start= holds orbits at {other} = {own[other]:g}, but the system that is followed "
+                f"has {other} = {value:g}. Find them for this one, or give it that value."
+            )
+    return float(own.get(name, system.values[name]))
+
+
+def _values(system: System, name: str, found: xr.Dataset, prefix: str, kind: str) -> np.ndarray:
+    """The values of a parameter at what a Dataset holds: its own, else that of them all."""
+    own = f"{prefix}_{name}" if kind != schema.RESPONSES else schema.response_name(name)
+    values = found[own].values if own in found else np.full(found.sizes[prefix], np.nan)
+    return np.where(np.isfinite(values), values, _own_value(system, name, found))
+
+
+def resting_seeds(system: System, name: str, found: xr.Dataset) -> list[Seed]:
+    """The equilibria of a Dataset, off boundaries, as seeds of branches over ``name``."""
+    kind = schema.kind_of(found)
+    names: Callable[[str], str] = schema.equilibrium_name
+    if kind == schema.EQUILIBRIA:
+        prefix = "equilibrium"
+        resting = (found["equilibrium_place"] == "region") & (found["equilibrium_dimension"] == 0)
+    else:
+        prefix = _PREFIX[kind]
+        names = _POINTS[prefix]
+        if f"{prefix}_type" not in found:
+            return []
+        resting = found[f"{prefix}_type"] == "equilibrium"
+    values = _values(system, name, found, prefix, kind)
+    columns = [found[names(one)].values.reshape(len(values), -1)[:, 0] for one in system.states]
+    places, here = np.stack(columns, axis=1), resting.values
+    return rests_at(places[here], values[here])
+
+
+def rests_at(
+    places: np.ndarray, values: np.ndarray, starts: np.ndarray | None = None
+) -> list[Seed]:
+    """Seeds at equilibria float64[k, D] of the parameter's values float64[k]; their common unit is
+    their size, or where it is zero that of starts float64[s, D].
+    """
+    unit = np.abs(places).max(axis=0, initial=0.0)
+    if starts is not None:
+        unit = np.where(unit > 0, unit, np.abs(starts).max(axis=0, initial=0.0))
+    unit = np.where(unit > 0, unit, 1.0)
+    return [Seed(one[None], np.array([v]), unit) for one, v in zip(places, values, strict=True)]
+
+
+def resting_between(
+    system: System, name: str, limits: tuple[float, float], starts: np.ndarray
+) -> list[Seed]:
+    """Seeds at the equilibria that Newton's method finds at some values of the parameter, from
+    starts float64[s, D] and random ones of many sizes.
+    """
+    random = np.random.default_rng(0).uniform(-1.0, 1.0, (RESTING_STARTS, len(system.states)))
+    begin = np.concatenate([starts, np.sign(random) * 10.0 ** (8.0 * np.abs(random) - 4.0)])
+    unit = np.abs(starts).max(axis=0, initial=0.0)
+    unit = np.where(unit > 0, unit, 1.0)
+    places, values = list[np.ndarray](), list[float]()
+    for value in np.linspace(*limits, RESTING_VALUES + 2)[1:-1]:
+        try:
+            found = all_equilibria(system.with_values(**{name: float(value)}), begin, unit)
+        except ParameterError:  # too many modes
+            return []
+        rests = [one.state for one in found if one.place == "region" and not one.dimension]
+        places += rests
+        values += [float(value)] * len(rests)
+    return rests_at(np.reshape(places, (-1, len(system.states))), np.array(values), starts)
 
 
 def seeds_at(

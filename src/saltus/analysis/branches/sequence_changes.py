@@ -17,6 +17,7 @@ from saltus.analysis.branches.contact_sequences import (
     without,
 )
 from saltus.analysis.branches.grazes import ContactEvent, corner, graze
+from saltus.analysis.branches.grazing_orbits import sqrt_coefficient
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import SpecialPoint
@@ -73,7 +74,7 @@ def contact_points(
     return [
         SpecialPoint(
             event.kind, after, place, tangent[after], event.legs.multipliers_at(event.z), matrix,
-            event.guards, event.phase,
+            event.guards, event.phase, sqrt_coefficient=sqrt_coefficient(event),
         )
         for (after, event), place, matrix in zip(found, places, derivative, strict=True)
     ]  # fmt: skip

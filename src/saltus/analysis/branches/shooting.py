@@ -26,6 +26,8 @@ from saltus.system.system import System
 
 #: Samples of a limit cycle in which the nearest to a point is looked for, and steps that locate it.
 SAMPLES, LOCATED = 400, 3
+#: Radius of a limit cycle that is small, in units of the scale.
+SMALL = 0.3
 
 
 class PeriodicOrbits:
@@ -44,6 +46,8 @@ class PeriodicOrbits:
         Forcing periods of the orbits; parts of equal time in a system without forcing.
     scale : float64[k, z]
         Units of the unknowns.
+    symmetric : bool
+        Whether mirror images of orbits are orbits: see system/symmetry.py.
     """
 
     def __init__(
@@ -54,7 +58,9 @@ class PeriodicOrbits:
         scale: np.ndarray,
         method: Method,
         threads: int | None = None,
+        symmetric: bool = False,
     ) -> None:
+        self.symmetric = symmetric
         self.system, self.names, self.n, self.scale = system, tuple(names), n, scale
         self.size, self.free = len(system.states), system.forced_at is None
         self.parametric = parametric(system, self.names)
@@ -169,6 +175,20 @@ class PeriodicOrbits:
             place = (place + float(way @ along) / float(along @ along)) % self.n
         return float(np.abs(way).max())
 
+    def turned(self, z: np.ndarray, before: np.ndarray) -> bool:
+        """Whether a small limit cycle has passed an equilibrium since the one before, so that its
+        flow is reversed.
+        """
+        rates = self._flow(np.stack([z, before])) / self.scale[0, : self.size]
+        return bool(rates[0] @ rates[1] < 0.0 and self.radius(before) < SMALL)
+
+    def radius(self, z: np.ndarray) -> float:
+        """How large the limit cycle float64[z] would be if it were a circle, in units of the
+        scale.
+        """
+        rates = self._flow(z[None])[0] / self.scale[0, : self.size]
+        return float(np.linalg.norm(rates) * self.period(z) / (2.0 * np.pi))
+
     def _flow(self, z: np.ndarray) -> np.ndarray:
         """Rates at the first points, float64[r, D]."""
         values = {
@@ -183,6 +203,17 @@ class PeriodicOrbits:
         rolled = points[:, shifts].reshape(len(z), self.n, self.n * self.size)
         rest = np.repeat(z[:, None, self.n * self.size :], self.n, axis=1)
         return np.concatenate([rolled, rest], axis=2)
+
+    def mirrored(self, z: np.ndarray) -> np.ndarray:
+        """The mirror images -x(t + T/2) of orbits float64[r, z]; of limit cycles -x(t)."""
+        points = self.points(z)
+        if not self.free:
+            starts = self.starts(z).reshape(len(z) * self.n, -1)
+            half = Schedule(np.zeros(1, np.int64), np.full(1, 0.5))
+            seen = self.map.run(starts, 1, half).samples[:, 0, : self.size]
+            points = seen.reshape(points.shape)
+        rest = z[:, self.n * self.size :]
+        return np.concatenate([-points.reshape(len(z), -1), rest], axis=1)
 
     # -- what an orbit is --------------------------------------------------------------------------
     def segments(self, derivative: np.ndarray, row: int) -> np.ndarray:

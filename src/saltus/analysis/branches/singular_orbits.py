@@ -54,13 +54,30 @@ class SingularOrbits:
         """Whether the multipliers are a complex pair."""
         return self.multiplier is None
 
+    @classmethod
+    def of(
+        cls, orbits: PeriodicOrbits, kind: str, z: np.ndarray, multiplier: complex
+    ) -> tuple[SingularOrbits, np.ndarray]:
+        """The equations of a bifurcation and its unknowns, from an orbit float64[z] and its
+        multiplier on the unit circle.
+        """
+        result = cls(orbits, kind)
+        cosine = np.clip(multiplier.real / abs(multiplier), *COSINES)
+        return result, np.append(z, cosine) if result.torus else z
+
+    @property
+    def bounds(self) -> dict[int, tuple[float, float]]:
+        """Ranges of unknowns beside the parameters, by their columns."""
+        return {self.orbits.width: COSINES} if self.torus else {}
+
     @property
     def parameters(self) -> tuple[int, int]:
         """Columns of the two parameters."""
         return self.orbits.width - 2, self.orbits.width - 1
 
     def begin(self, z: np.ndarray, rows: np.ndarray) -> None:
-        """Take the null vectors at float64[r, z] as borders."""
+        """Take the first points float64[r, z] of the curves; the null vectors there are borders."""
+        self.orbits.accepted(z[:, : self.orbits.width], rows)
         _, derivative = self.orbits.evaluate(z[:, : self.orbits.width], rows)
         right, left = self.null_vectors(z, derivative)
         self._border[:, rows] = _real(left), _real(right)
@@ -93,6 +110,15 @@ class SingularOrbits:
         last, first = np.arange(size) + (n - 1) * size, np.arange(size)
         matrix[:, last, first] += (1.0 - mu)[:, None]
         return matrix
+
+    def orbit(self, z: np.ndarray) -> np.ndarray:
+        """The orbits of points float64[r, z], in the unknowns of :class:`PeriodicOrbits`."""
+        return z[:, : self.orbits.width]
+
+    def multipliers(self, z: np.ndarray, derivative: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Floquet multipliers at points float64[r, z], complex128[r, D]."""
+        width = self.orbits.width
+        return self.orbits.multipliers(z[:, :width], derivative[:, :, :width], rows)
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

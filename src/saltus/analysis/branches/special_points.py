@@ -58,6 +58,8 @@ class SpecialPoint:
     outcome : str
         How a branch of orbits with impacts goes on behind a graze: ``persistence`` or
         ``nonsmooth_fold``.
+    sqrt_coefficient : float
+        Of a graze: see grazing_orbits.py.
     """
 
     kind: str
@@ -69,6 +71,7 @@ class SpecialPoint:
     guards: tuple[int, ...] = ()
     phase: float = np.nan
     outcome: str = ""
+    sqrt_coefficient: float = np.nan
 
 
 def tests(

@@ -8,6 +8,7 @@ import functools
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +31,8 @@ SAME = 1e-6
 PASSES = 0.3
 #: Shortest interval that is halved, in units of the scale.
 LEAST = 1e-9
+#: The parameter's share of a tangent that is nothing but rounding.
+STILL = 1e-8
 #: How often an interval is halved in which changes of stability don't add up.
 HALVINGS = 6
 
@@ -84,7 +87,8 @@ class Branch:
         Floquet multipliers, the largest first, without a trivial one.
     ends : (str, str)
         Why it ends at its first and at its last point: see :class:`Curve`; ``period_doubling``
-        where it becomes an orbit of half the period.
+        where it becomes an orbit of half the period, ``hopf`` where a limit cycle shrinks to an
+        equilibrium, ``boundary_equilibrium`` where an equilibrium meets a boundary.
     events : list of SpecialPoint
         In the order of the branch.
     unexplained : list of int
@@ -125,11 +129,22 @@ class Branch:
             self.unexplained = _unexplained(self)
             if not left or not self.unexplained or not len(refine(self, self.unexplained)):
                 break
+        self.unexplained = _unexplained(self, turning=True)
         self.events = _in_order(self, [*self.events, *self._contacts()])
 
     def _contacts(self) -> list[SpecialPoint]:
         """Where the contact sequence changes."""
         return contact_points(self.orbits, self.row, self.z, self.tangent)
+
+    def is_known(self, branches: Sequence[Branch]) -> bool:  # noqa: ARG002
+        """Whether another one has come this way, from elsewhere."""
+        return False
+
+    def children(self, plan: Plan, number: int) -> Iterator[Seed]:
+        """Seeds at its events, and the orbits of half the period at its ends; ``number`` is its
+        own.
+        """
+        return _children(plan, self, number)
 
 
 @dataclass(frozen=True)
@@ -168,7 +183,7 @@ def trace(
 ) -> None:
     """Add all branches that seeds lie on, and those that leave them at their events, to a list.
 
-    Seeds that lie on a branch already followed are not followed again.
+    Seeds that lie on a branch already followed, or on its mirror image, are not followed again.
     """
     waiting, begun = list(seeds), 0
     while waiting:
@@ -182,11 +197,11 @@ def trace(
         for i, branch in zip(fresh, plan.follow(plan, starts, fresh), strict=True):
             if branch is None or _known(starts.z[i], starts.n, branches):
                 continue
-            if _ends_there(wave[i], branches):
+            if _ends_there(wave[i], branches) or branch.is_known(branches):
                 continue
             branches.append(branch)
             branch.find_events()
-            waiting += _children(plan, branch, len(branches) - 1)
+            waiting += branch.children(plan, len(branches) - 1)
         if progress is not None:
             progress(begun / (begun + len(waiting)))
 
@@ -223,7 +238,28 @@ class Starts:
         return cls(seeds, n, point.z, scale, [int(i) for i in np.flatnonzero(point.found)])
 
 
-def both_ways(plan: Plan, starts: Starts, which: Sequence[int]) -> list[Branch | None]:
+def _halved(orbits: PeriodicOrbits, curve: Curve) -> str:
+    """``period_doubling`` if an orbit of 2m periods has just passed one of m periods; ``hopf`` if a
+    limit cycle has shrunk to nothing.
+    """
+    if len(curve.z) < 2:
+        return ""
+    ahead, behind = curve.z[-1], curve.z[-2]
+    if orbits.n % 2 == 0:
+        half = orbits.n // 2
+        apart = [(p[:half] - p[half:]).ravel() for p in map(orbits.points, (ahead, behind))]
+        if apart[0] @ apart[1] < 0.0:
+            return "period_doubling"
+    return "hopf" if orbits.free and orbits.turned(ahead, behind) else ""
+
+
+def both_ways(
+    plan: Plan,
+    starts: Starts,
+    which: Sequence[int],
+    ends: Callable[[Any, Curve], str] = _halved,
+    kind: type[Branch] = Branch,
+) -> list[Branch | None]:
     """The branches of some seeds of one period; None where there is none."""
     if not which:
         return []
@@ -240,27 +276,25 @@ def both_ways(plan: Plan, starts: Starts, which: Sequence[int]) -> list[Branch |
     first = np.array([FIRST if starts.seeds[i].along is None else ASIDE for i in owner])
     curves = follow(
         orbits, starts.z[owner], np.array(sides), {orbits.width - 1: plan.limits}, plan.points,
-        first, ends=functools.partial(_halved, orbits), group=whose,
+        first, ends=functools.partial(ends, orbits), group=whose,
     )  # fmt: skip
+    for curve in curves:
+        shrunk = curve.end == "lost" and orbits.free and len(curve.z) > 1
+        if shrunk and orbits.radius(curve.z[-1]) < ENDING:
+            curve.end = "hopf"
     result = []
     for i in which:
         mine = np.flatnonzero(whose == i)
-        result.append(_joined(orbits, mine, [curves[j] for j in mine], starts.seeds[i]))
+        result.append(_joined(orbits, mine, [curves[j] for j in mine], starts.seeds[i], kind))
     return result
 
 
-def _halved(orbits: PeriodicOrbits, curve: Curve) -> str:
-    """``period_doubling`` if an orbit of 2m periods has just passed one of m periods."""
-    if orbits.n % 2 or len(curve.z) < 2:
-        return ""
-    half = orbits.n // 2
-    ahead, behind = (orbits.points(z) for z in (curve.z[-1], curve.z[-2]))
-    apart = [(points[:half] - points[half:]).ravel() for points in (ahead, behind)]
-    return "period_doubling" if apart[0] @ apart[1] < 0.0 else ""
-
-
 def _joined(
-    orbits: PeriodicOrbits, rows: np.ndarray, curves: list[Curve], seed: Seed
+    orbits: PeriodicOrbits,
+    rows: np.ndarray,
+    curves: list[Curve],
+    seed: Seed,
+    kind: type[Branch],
 ) -> Branch | None:
     """One branch from the curves to both sides."""
     curves = [curve for curve in curves if curve.z]
@@ -268,9 +302,9 @@ def _joined(
         return None
     for row, curve in zip(rows, curves, strict=False):
         if curve.end == "closed":
-            return _of(orbits, int(row), curve, ("closed", "closed"), seed)
+            return _of(orbits, int(row), curve, ("closed", "closed"), seed, kind)
     if len(curves) == 1:
-        return _of(orbits, int(rows[0]), curves[0], ("branch", curves[0].end), seed)
+        return _of(orbits, int(rows[0]), curves[0], ("branch", curves[0].end), seed, kind)
     up, down = curves
     whole = Curve(
         down.z[:0:-1] + up.z,
@@ -278,21 +312,27 @@ def _joined(
         down.derivative[:0:-1] + up.derivative,
         [-length for length in down.length[:0:-1]] + up.length,
     )
-    return _of(orbits, int(rows[0]), whole, (down.end, up.end), seed)
+    return _of(orbits, int(rows[0]), whole, (down.end, up.end), seed, kind)
 
 
 def _of(
-    orbits: PeriodicOrbits, row: int, curve: Curve, ends: tuple[str, str], seed: Seed
+    orbits: PeriodicOrbits,
+    row: int,
+    curve: Curve,
+    ends: tuple[str, str],
+    seed: Seed,
+    kind: type[Branch],
 ) -> Branch:
     z, tangent, derivative = (np.array(one) for one in (curve.z, curve.tangent, curve.derivative))
     length = np.array(curve.length) - curve.length[0]
     own = orbits.multipliers(z, derivative, np.full(len(z), row))
-    return Branch(orbits, row, z, tangent, derivative, length, own, ends, parent=seed.parent)
+    return kind(orbits, row, z, tangent, derivative, length, own, ends, parent=seed.parent)
 
 
 # -- events ----------------------------------------------------------------------------------------
 def _located(branch: Branch) -> list[SpecialPoint]:
     values = tests(branch.tangent, branch.derivative, branch.multipliers, branch.z.shape[1] - 1)
+    values[0, _vertical(branch)] = 0.0
     kinds, after = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
     step = branch.z[after + 1] - branch.z[after]
     length = np.einsum("ki,ki->k", step / branch.scale, branch.tangent[after])
@@ -307,6 +347,15 @@ def _located(branch: Branch) -> list[SpecialPoint]:
     ]
     events = [event for event in events if not _is_vertex(event, events, branch)]
     return _in_order(branch, events)
+
+
+def _vertical(branch: Branch) -> np.ndarray:
+    """Where a branch stays at one value of the parameter, bool[p]: a family of orbits about the
+    centre of a linear system, of which none is isolated and a multiplier is 1.
+    """
+    still = np.abs(branch.tangent[:, -1]) < STILL
+    beside = np.append(still[1:], False) | np.append(False, still[:-1])
+    return still & beside
 
 
 def _in_order(branch: Branch, events: Sequence[SpecialPoint]) -> list[SpecialPoint]:
@@ -339,16 +388,28 @@ def _ahead(branch: Branch, point: SpecialPoint) -> float:
 _CROSSING = {"fold": 1, "branch_point": 1, "period_doubling": 1, "neimark_sacker": 2}
 
 
-def _unexplained(branch: Branch) -> list[int]:
-    """Points after which the count of multipliers outside the circle isn't explained by events."""
+def _unexplained(branch: Branch, turning: bool = False) -> list[int]:
+    """Points after which the count of multipliers outside the circle isn't explained by events;
+    ``turning``: a branch may keep its stability where it turns back at a branch point.
+    """
     count = outside(branch.multipliers).sum(axis=1)
+    vertical = _vertical(branch)
     result = []
     for place, change in enumerate(np.diff(count)):
-        crossings = [_CROSSING.get(e.kind, 0) for e in branch.events if e.after == place]
-        sums = {
-            sum(sign * one for sign, one in zip(signs, crossings, strict=True))
-            for signs in itertools.product((-1, 1), repeat=len(crossings))
-        }
+        if vertical[place] or vertical[place + 1]:
+            continue
+        ways = branch.tangent[max(place - 1, 0) : place + 3, -1]
+        turns = turning and ways.min() < 0 < ways.max()
+        changes = [
+            (-crossing, 0, crossing)
+            if turns and event.kind == "branch_point"
+            else (-crossing, crossing)
+            for event in branch.events
+            if event.after == place
+            or (turns and event.kind == "branch_point" and abs(event.after - place) == 1)
+            for crossing in [_CROSSING.get(event.kind, 0)]
+        ]
+        sums = {sum(one) for one in itertools.product(*changes)}
         if int(change) not in sums:
             result.append(place)
     return result
@@ -394,9 +455,25 @@ def _moved(branch: Branch, event: SpecialPoint, placed: np.ndarray) -> int:
 
 # -- identity --------------------------------------------------------------------------------------
 def branch_of(z: np.ndarray, n: int, branches: Sequence[Branch]) -> int:
-    """The branch on which an orbit of n periods lies, -1 if it is none of these."""
-    there = (i for i, branch in enumerate(branches) if branch.orbits.n == n and _lies_on(z, branch))
+    """The branch on which an orbit of n periods or its mirror image lies, -1 if it is none of
+    these.
+    """
+    mine = [
+        i
+        for i, branch in enumerate(branches)
+        if branch.orbits.n == n and branch.z.shape[1] == len(z)  # equilibria are no limit cycles
+    ]
+    same = [z]
+    if mine and branches[mine[0]].orbits.symmetric:
+        same.append(branches[mine[0]].orbits.mirrored(z[None])[0])
+    there = (i for one in same for i in mine if _lies_on(one, branches[i]))
     return next(there, -1)
+
+
+def has_twin(branch: Branch) -> bool:
+    """Whether the mirror image of a branch is another one."""
+    middle = branch.z[len(branch.z) // 2][None]
+    return branch.orbits.symmetric and not _lies_on(branch.orbits.mirrored(middle)[0], branch)
 
 
 def _known(z: np.ndarray, n: int, branches: Sequence[Branch]) -> bool:
@@ -437,16 +514,19 @@ def _apart(a: np.ndarray, b: np.ndarray, branch: Branch, exact: bool = False) ->
 
 
 def _ends_there(seed: Seed, branches: Sequence[Branch]) -> bool:
-    """Whether the branch that leaves a period doubling is one that was seen to end there."""
+    """Whether the branch that leaves a period doubling or a Hopf point is one that was seen to end
+    there.
+    """
     if seed.along is None:
         return False
     for branch in branches:
-        if branch.orbits.n != len(seed.points):
+        if branch.orbits.n != len(seed.points) or branch.z.shape[1] != len(seed.z):
             continue
         others = branch.orbits.alike(seed.z[None], np.array([branch.row]))[0]
         for place in (0, -1):
             apart = np.linalg.norm((others - branch.z[place]) / branch.scale, axis=1)
-            if branch.ends[place] == "period_doubling" and apart.min() < 3 * ENDING:
+            born = branch.ends[place] in ("period_doubling", "hopf")
+            if born and apart.min() < 3 * ENDING:
                 return True
     return False
 
@@ -467,7 +547,7 @@ def _children(plan: Plan, branch: Branch, number: int) -> Iterator[Seed]:
                 _doubled(branch, event), (number, index),
             )  # fmt: skip
         elif event.kind == "branch_point":
-            aside = _crossing(event)
+            aside = crossing(event)
             for sign in (1.0, -1.0):
                 yield Seed(points, own, unit, sign * aside, (number, index))
     for place, end in zip((0, -1), branch.ends, strict=True):
@@ -494,7 +574,7 @@ def _doubled(branch: Branch, event: SpecialPoint) -> np.ndarray:
     return np.asarray(whole / np.linalg.norm(whole))
 
 
-def _crossing(event: SpecialPoint) -> np.ndarray:
+def crossing(event: SpecialPoint) -> np.ndarray:
     """The direction of the branch that crosses at a branch point."""
     null = np.linalg.svd(event.derivative)[2][-2:]
     rest = null - np.outer(null @ event.tangent, event.tangent)

@@ -11,24 +11,24 @@ sum of Lyapunov exponents can be held against it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from saltus.analysis.dataset_parts import before_jumps
 from saltus.flow.contact_table import ContactTable
 from saltus.flow.engine import Outcome
 from saltus.flow.maps import Stroboscope
 from saltus.kernels import status as st
 from saltus.system.derivatives import gradient, time_derivative
 from saltus.system.evaluate import evaluate
-from saltus.system.expression import Expr, add, constant, depends_on, state, walk
+from saltus.system.expression import Expr, add, depends_on, walk
+from saltus.system.quantity import remembering, with_states
 from saltus.system.system import System
 
-#: Names of states that are added, which no user can write: the integral, where one is needed, and
-#: the states before the last impact or jump.
-_INTEGRAL, _BEFORE = "integral of the divergence", "{} before a jump"
+#: Name of a state that is added where an integral is needed, which no user can write.
+_INTEGRAL = "integral of the divergence"
 
 
 class Divergence:
@@ -44,8 +44,8 @@ class Divergence:
         self._trace = _sum([row[i] for i, row in enumerate(system.jacobian)])
         self._moves = depends_on(self._trace, ("state", "time"))
         self._by_mode = any(node.op == "select" for node in walk(self._trace))
-        self._remembering = _remembering(system)
-        self._extended = _with_states(self._remembering, {_INTEGRAL: self._trace})
+        self._remembering = remembering(system)
+        self._extended = remembering(with_states(system, {_INTEGRAL: self._trace}))
 
     def of_blocks(self, map_: Stroboscope, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Over one block from float64[k, D], each with its row of the map: logarithm of the growth
@@ -59,7 +59,7 @@ class Divergence:
         more = len(system.states) - start.shape[1]
         outcome = map_.of_system(system).run(np.pad(start, ((0, 0), (0, more))), 1, record=0)
         total = (
-            outcome.state[:, -1].copy()
+            outcome.state[:, start.shape[1]].copy()
             if integrated
             else self._constant(map_)
             if constant
@@ -120,7 +120,7 @@ class Divergence:
         """
         system, contacts = self._system, outcome.contacts
         carried, behind = _carried(contacts)
-        here = self._here(map_, contacts, 0)
+        here = self._here(map_, contacts)
         before, after = self._bits(contacts.mode_before), self._bits(contacts.mode_after)
         fields = [evaluate(system.field, bits=bits, **here) for bits in (before, after)]
         logarithm = np.where(contacts.kind == st.HOLD, -np.inf, 0.0)
@@ -151,8 +151,8 @@ class Divergence:
         system, guard = self._system, self._system.guards[g]
         assert guard.law is not None
         size, k = len(system.states), len(contacts)
-        was = self._here(map_, contacts, size) | {"bits": self._bits(contacts.mode_before)}
-        now = self._here(map_, contacts, 0) | {"bits": self._bits(behind)}
+        was = self._here(map_, contacts, before=True) | {"bits": self._bits(contacts.mode_before)}
+        now = self._here(map_, contacts) | {"bits": self._bits(behind)}
 
         def columns(expressions: Sequence[Expr], **where: Any) -> np.ndarray:
             return np.stack(
@@ -171,12 +171,14 @@ class Divergence:
             along = normal[:, None, :size] / closing[:, None, None]
             return np.asarray(np.linalg.slogdet(jacobian + leap[:, :, None] * along)[1])
 
-    def _here(self, map_: Stroboscope, contacts: ContactTable, first: int) -> dict[str, Any]:
-        """Where contacts are, for :func:`evaluate`; the states are columns from ``first`` on."""
-        columns = contacts.state.T[first:]  # more may follow them
+    def _here(
+        self, map_: Stroboscope, contacts: ContactTable, before: bool = False
+    ) -> dict[str, Any]:
+        """Where contacts are, for :func:`evaluate`, with the states after or before them."""
+        columns = before_jumps(self._system, contacts) if before else contacts.state
         return {
             "t": contacts.time,
-            "states": dict(zip(self._system.states, columns, strict=False)),
+            "states": dict(zip(self._system.states, columns.T, strict=False)),
             "values": {name: column[contacts.trajectory] for name, column in map_.values.items()},
         }
 
@@ -192,41 +194,6 @@ def _carried(contacts: ContactTable) -> tuple[np.ndarray, np.ndarray]:
     begins = np.flatnonzero(~carried)
     last = np.append(begins[1:], len(contacts))[: len(begins)] - 1
     return carried, np.repeat(contacts.mode_after[last], np.diff(np.append(begins, len(contacts))))
-
-
-def _with_states(system: System, rates: Mapping[str, Expr]) -> System:
-    """The system with more states, which laws don't touch."""
-    new = [state(name) for name in rates]
-    return replace(
-        system,
-        states=(*system.states, *rates),
-        field=(*system.field, *rates.values()),
-        units={**system.units, **dict.fromkeys(rates, "")},
-        guards=tuple(
-            replace(guard, law=guard.law.extended(new)) if guard.law else guard
-            for guard in system.guards
-        ),
-    )
-
-
-def _remembering(system: System) -> System:
-    """The system with the states before the last impact or jump as further states, if it has any
-    such law.
-    """
-    if not any(guard.law and guard.law.reset for guard in system.guards):
-        return system
-    size = len(system.states)
-    extended = _with_states(system, {_BEFORE.format(name): constant(0.0) for name in system.states})
-    was = tuple(map(state, system.states))
-    return replace(
-        extended,
-        guards=tuple(
-            replace(guard, law=replace(guard.law, reset=(*guard.law.reset[:size], *was)))
-            if guard.law and guard.law.reset
-            else guard
-            for guard in extended.guards
-        ),
-    )
 
 
 def _sum(terms: list[Expr]) -> Expr:

@@ -108,8 +108,10 @@ def lyapunov(
         ``lyapunov_low``, ``lyapunov_high``: of an orbit the effect of rounding; of any other motion
         from batch means whose batches grow until they are independent (Flyvbjerg & Petersen 1989),
         ``independent_batches`` of them, by Student's t; -inf, without an error, of directions
-        of which nothing is left where a contact sticks or rests, and NaN of those that are lost in
-        the rounding of the fastest. ``kind``: ``periodic``, ``quasi_periodic``,
+        of which nothing is left where a contact sticks or rests. A direction that shrinks by more
+        than 1e-12 of the fastest one in a block is lost in its rounding: one alone has what is left
+        of the mean divergence without the others, several are NaN (a shorter ``every`` helps).
+        ``kind``: ``periodic``, ``quasi_periodic``,
         ``chaotic``, ``equilibrium``, ``limit_cycle`` or ``unclear``; ``response_period``: n of nT,
         or 0. ``exponent_sum`` beside ``mean_divergence``, which must agree: the mean trace of the
         Jacobian and what contacts add, found without the tangent. ``near_graze``: 1 if the motion

@@ -88,7 +88,8 @@ def spectrum(
             growth.rates,
             np.argsort(-growth.rates.mean(axis=1), axis=1, kind="stable")[:, None],
             axis=2,
-        )
+        ),
+        growth.volume,
     )
     ends = running_ends(count)
     running = batch_means(np.swapaxes(rates, 1, 2), ends)
@@ -104,8 +105,8 @@ def spectrum(
             _vanish(growth.zeros[i], exponents[i], errors[i], half_width[i])
             continue
         kinds.append((Kind.PERIODIC if forced else Kind.EQUILIBRIUM).word)
-        exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i])
         volume[i], zeros = _volume(flow, i, orbit)
+        exponents[i], errors[i] = _of_orbit(flow, i, orbit, growth.scale[i], volume[i])
         _vanish(zeros, exponents[i], errors[i])
         half_width[i], batches[i] = errors[i], 0
     return Spectrum(
@@ -113,13 +114,16 @@ def spectrum(
     )
 
 
-def _told(rates: np.ndarray) -> np.ndarray:
-    """Rates float64[k, n, D] with NaN for directions that are lost in the rounding of the fastest
-    one.
+def _told(rates: np.ndarray, volume: np.ndarray) -> np.ndarray:
+    """Rates float64[k, n, D] without what rounding has made of directions that are lost in that of
+    the fastest one: one alone grows as volumes float64[k, n] do without the others, of several
+    nothing is known (NaN).
     """
     with np.errstate(invalid="ignore"):
-        lost = ~((rates[:, :, :1] - rates).mean(axis=1, keepdims=True) < LOST)
-    return np.where(lost, np.nan, rates)
+        lost = ~((rates[:, :, :1] - rates).mean(axis=1) < LOST)
+        left = volume - np.where(lost[:, None], 0.0, rates).sum(axis=2)
+    left[lost.sum(axis=1) > 1] = np.nan
+    return np.where(lost[:, None], left[:, :, None], rates)
 
 
 def _vanish(zeros: int, exponents: np.ndarray, *errors: np.ndarray) -> None:
@@ -158,13 +162,13 @@ def _arrives(points: np.ndarray, orbit: Orbit, scale: np.ndarray, noise: float) 
 
 
 def _of_orbit(
-    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray
+    flow: TangentFlow, i: int, orbit: Orbit, scale: np.ndarray, volume: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exponents of an orbit per block, and what the map's own errors make of them (Bauer & Fike:
     times the condition of the eigenvectors).
 
     Multipliers that are lost in the rounding of the largest are found as growth round the orbit,
-    block by block.
+    block by block; one that is lost in a single block, from the mean growth of volumes.
     """
     map_, n = flow.map.rows(np.array([i])), orbit.period
     noise, monodromy = map_.noise, map_.tangent(orbit.points[:1], n)[1][0] * scale / scale[:, None]
@@ -179,6 +183,14 @@ def _of_orbit(
     lost = amplified > AMPLIFIED
     if lost.any():
         exponents[lost], errors[lost] = (part[lost] for part in _round_trips(flow, i, orbit, scale))
+        last = len(exponents) - 1
+        with np.errstate(invalid="ignore"):  # -inf is known: nothing is left there
+            known = np.isneginf(exponents) | (exponents[0] - exponents < LOST)
+        if known[:last].all() and not known[last]:
+            exponents[last] = volume - exponents[:last].sum()
+            errors[last] = errors[:last].sum() + flow.map.noise * (1.0 + abs(volume))
+        else:
+            exponents[~known], errors[~known] = np.nan, np.nan
     return exponents, errors
 
 

@@ -19,7 +19,8 @@ from saltus.flow.engine import Outcome, Schedule
 from saltus.flow.methods import Method, check_method
 from saltus.results.dataset import schema
 from saltus.system.evaluate import evaluate
-from saltus.system.quantity import Quantity, with_integrals
+from saltus.system.expression import walk
+from saltus.system.quantity import Quantity, with_impulses, with_integrals
 from saltus.system.system import System
 
 #: Blocks from whose scatter a standard error is taken: contacts that follow each other are not
@@ -64,7 +65,8 @@ def impact_statistics(
     force : mapping of str to callable, optional
         For guards by name: the force of that contact [N] as a function of (t, states, parameters),
         arguments found by name; it needs to be right in contact only. Its integral from the
-        beginning of a contact to its end is the impulse. ``ODE45`` controls the error of the
+        beginning of a contact to its end is the impulse. Rigid stops need none: theirs is that of
+        their law. ``ODE45`` controls the error of the
         integral too, so its steps may differ from those without.
     contact_side : mapping of str to int, optional
         For guards by name: the sign of the gap in contact. By default it is the side on which the
@@ -80,11 +82,18 @@ def impact_statistics(
         ``speed_bin``, and ``trajectory`` for many. For each guard ``contacts``,
         ``contacts_per_second``, ``contacts_per_period`` (if forced), ``speed_mean``, ``speed_rms``,
         ``speed_max``, ``speed_histogram``, ``duration_mean``, ``duration_min``, ``duration_max``,
-        ``share_in_contact``, with ``force=`` ``impulse_mean``, ``impulse_max``; ``<...>_error`` is
+        ``share_in_contact``, with ``force=`` or a rigid stop ``impulse_mean``, ``impulse_max``;
+        ``<...>_error`` is
         the standard error by the means of 20 blocks (NaN where there are too few; zero for a
         periodic response whose blocks hold whole responses). A contact whose beginning or end isn't
         seen counts in ``share_in_contact``; without an end it has no duration (NaN). Touches
-        without a crossing are no contacts.
+        without a crossing are no contacts. Impacts that come to rest (a chatter) are one contact
+        with the rest that follows: it begins with the first impact from which on each flight is
+        shorter than the one before it, ``contact_impacts`` is how many were met before the
+        infinitely many that are left were summed up (the error is below 1e-8 of their own part),
+        ``contact_impulse_of_impacts`` is that of all of them, and ``contact_impulse`` has that of
+        the force at rest too, which is also the impulse of the guard ``... at rest``. Impulses of a
+        stop are relative to the mass if ``sl.impact`` has no ``inertia``.
 
     Raises
     ------
@@ -121,16 +130,21 @@ def impact_statistics(
         raise ParameterError(f"{system.name} has no guard, so there is no contact to count.")
     forces = _by_guard(system, force or {}, "force")
     sides = contact_sides(system, _by_guard(system, contact_side or {}, "contact_side"))
+    stops = [
+        number for number, guard in enumerate(system.guards)
+        if guard.law and guard.law.mass is not None and number not in forces
+    ]  # fmt: skip
     extended = with_integrals(
         system, {f"impulse_{guard}_": function for guard, function in forces.items()}
     )
+    extended = with_impulses(extended, {guard: f"impulse_{guard}_" for guard in stops})
+    columns = {guard: len(system.states) + i for i, guard in enumerate([*forces, *stops])}
+    columns |= {touchdowns.hold_of(system, guard): columns[guard] for guard in stops}
     seen = stretch(system, start, values, periods, t_end, t_start, transient)
     begin = Schedule(np.array([seen.skipped]), np.zeros(1))
 
     def answer(outcome: Outcome) -> xr.Dataset:
-        found = touchdowns.find(
-            seen, outcome, sides, {guard: len(system.states) + i for i, guard in enumerate(forces)}
-        )
+        found = touchdowns.find(seen, outcome, sides, columns)
         return _dataset(system, method, seen, sides, found, bins, outcome)
 
     result = computed(
@@ -215,10 +229,33 @@ def _dataset(
         "contact_exit_speed": found.exit_speed, "contact_duration": found.end - found.begin,
         "contact_trajectory": found.trajectory,
     }  # fmt: skip
+    if found.impacts.any():
+        columns["contact_impacts"], columns["contact_impulse_of_impacts"] = (
+            found.impacts,
+            found.struck,
+        )
     if found.impulse is not None:
         columns["contact_impulse"] = found.impulse
     columns |= {"contact_side": sides, "speed_low": edges[:-1], "speed_high": edges[1:]}
-    return dataset(schema.IMPACTS, seen, system, method, outcome, columns, each)
+    words = {"<impulse>": _impulse_unit(system)}
+    return dataset(schema.IMPACTS, seen, system, method, outcome, columns, each, words=words)
+
+
+def _impulse_unit(system: System) -> str:
+    """Unit of impulses: that of a velocity where all are relative to the mass."""
+    laws = [
+        (guard.law.mass, guard.law.constraint)
+        for guard in system.guards
+        if guard.law and guard.law.mass is not None and guard.law.constraint is not None
+    ]
+    units = {
+        system.units.get(node.payload, "")
+        for _, velocity in laws
+        for node in walk(velocity)
+        if node.op == "state"
+    }
+    relative = laws and all(mass.op == "const" for mass, _ in laws)
+    return units.pop() if relative and len(units) == 1 else "N*s"
 
 
 def _edges(bins: Any, speed: np.ndarray) -> np.ndarray:

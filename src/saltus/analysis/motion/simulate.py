@@ -25,6 +25,7 @@ from saltus.flow.room import check_room
 from saltus.interrupt import Interrupted
 from saltus.results import build
 from saltus.results.dataset import schema
+from saltus.system.quantity import remembering
 from saltus.system.system import System
 
 #: Samples per forcing period: contacts are exact anyway, this is what a picture needs.
@@ -91,8 +92,9 @@ def simulate(
         Dims ``time``, ``contact``, ``guard``, and ``trajectory`` for many starts or values.
         Variables: each state, ``mode``, ``contact_time``, ``contact_time_error``,
         ``contact_guard``, ``contact_direction``, ``contact_velocity``, ``contact_kind``, ...,
-        ``status``, counters. If the trajectories have forcing periods of their own, samples lie
-        along ``period``.
+        each state at the contact (``contact_x``, behind it where it jumps; ``contact_x_before`` of
+        systems with impacts or jumps), ``status``, counters. If the trajectories have forcing
+        periods of their own, samples lie along ``period``.
 
     Raises
     ------
@@ -117,7 +119,8 @@ def simulate(
     method = check_method(method)
     group = ensemble(system, np.zeros(len(system.states)) if start is None else start, values)
     length = span(system, group, periods, t_end, t_start)
-    plan = _plan(system, group, length, samples, keep)
+    flown = remembering(system)
+    plan = _plan(system, group, length, samples, keep, len(flown.states))
     if not among(time_errors, ("measured", "local")):
         raise ParameterError(
             f'time_errors must be "measured" or "local", not {shown(time_errors)}.'
@@ -126,13 +129,13 @@ def simulate(
     def so_far(outcome: Outcome) -> xr.Dataset:
         return _dataset(system, method, group, length, plan, outcome, measure.local(outcome))
 
-    outcome, request = None, plan.request(group, length)
+    outcome, request = None, plan.request(group, length, len(flown.states))
     with reporting(progress) as show:
         try:
             if time_errors == "measured" and system.guards and method.records_contacts:
-                outcome, errors = measure.measured(system, method, request, threads, show)
+                outcome, errors = measure.measured(flown, method, request, threads, show)
             else:
-                outcome = engine.run(system, method.suited_to(group.size), request, threads, show)
+                outcome = engine.run(flown, method.suited_to(group.size), request, threads, show)
                 errors = measure.local(outcome)
             result = _dataset(system, method, group, length, plan, outcome, errors)
         except KeyboardInterrupt as stop:
@@ -150,15 +153,21 @@ class _Plan:
     schedule: Schedule
     first: int
 
-    def request(self, group: Ensemble, length: Span) -> Request:
+    def request(self, group: Ensemble, length: Span, states: int) -> Request:
+        more = ((0, 0), (0, states - group.start.shape[1]))
         return replace(
-            length.request(group.start, group.parameters, self.schedule, self.first),
+            length.request(np.pad(group.start, more), group.parameters, self.schedule, self.first),
             t_end=length.t_end,
         )
 
 
 def _plan(
-    system: System, group: Ensemble, length: Span, samples: int | None, keep: int | None
+    system: System,
+    group: Ensemble,
+    length: Span,
+    samples: int | None,
+    keep: int | None,
+    states: int,
 ) -> _Plan:
     per = _whole(
         samples, "samples", _per_span(group.size) if system.forced_at is None else PER_PERIOD
@@ -174,7 +183,7 @@ def _plan(
     longest = np.max((length.count + length.phase / length.period) * per)
     count = int(longest + 1e-9) + 1 - first * per
     check_room(
-        count * group.size * (16.0 * len(system.states) + 16.0),
+        count * group.size * (16.0 * states + 16.0),
         f"{group.size} trajectories with {count} samples each",
         "Give keep= (last periods) or fewer samples=, or use sl.stroboscope.",
     )
@@ -230,7 +239,7 @@ def _dataset(
         **dataset_parts.endings(outcome),
         **dataset_parts.minima(outcome),
         "end_time": outcome.time,
-        "end_<state>": outcome.state,
+        "end_<state>": outcome.state[:, : len(system.states)],
     }
     return build(
         schema.TRAJECTORY, subject, values, along={"time": "period"} if own_periods else {}

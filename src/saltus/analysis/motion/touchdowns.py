@@ -12,6 +12,7 @@ from saltus.flow.contact_table import ContactTable
 from saltus.flow.engine import Outcome
 from saltus.kernels import status as st
 from saltus.system.evaluate import evaluate
+from saltus.system.system import System
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,12 @@ class Touchdowns:
     speed, exit_speed : float64[k]
         Magnitude of the gap's rate at both [unit of the gap per second].
     impulse : float64[k] or None
-        Integral of the force from begin to end [N*s]; NaN for a guard without a force.
+        Integral of the force from begin to end [N*s], impacts and rest included; NaN for a guard
+        without a force.
+    struck : float64[k]
+        That of the impacts alone; NaN for other contacts.
+    impacts : int64[k]
+        Impacts that were met one by one: none for a contact with a force.
     spells : mapping of (trajectory, guard) to float64[m, 2]
         Begin and end of all times in contact, cut at the ends of the stretch [s].
     """
@@ -40,6 +46,8 @@ class Touchdowns:
     speed: np.ndarray
     exit_speed: np.ndarray
     impulse: np.ndarray | None
+    struck: np.ndarray
+    impacts: np.ndarray
     spells: Mapping[tuple[int, int], np.ndarray]
 
     def covered(self, trajectory: int, guard: int, borders: np.ndarray) -> np.ndarray:
@@ -56,6 +64,8 @@ def find(
     seen: Stretch, outcome: Outcome, sides: np.ndarray, integrals: Mapping[int, int]
 ) -> Touchdowns:
     """Pair the entries and exits of every trajectory and guard.
+
+    Impacts that come to rest are one contact, from the first one to the end of the rest.
 
     Parameters
     ----------
@@ -80,18 +90,22 @@ def find(
             rows = mine[guard[mine] == g]
             enters = contacts.direction[rows] == side
             sudden = struck[rows]
-            parts.append(rows[sudden, None].repeat(2, axis=1))  # over as it begins
+            parts.append(_strikes(contacts, rows[sudden], hold_of(seen.system, g)))
             rows, enters = rows[~sudden], enters[~sudden]
             parts.append(_pairs(rows, enters))
             end = min(float(seen.begin[i] + seen.duration[i]), float(outcome.time[i]))
             touching = _touching_first(outcome, i, g, int(side), enters)
             spells[i, g] = _spells(time[rows], enters, touching, float(seen.begin[i]), end)
-    pairs = np.concatenate(parts) if parts else np.zeros((0, 2), np.int64)
+    pairs = np.concatenate(parts) if parts else np.zeros((0, 4), np.int64)
     pairs = pairs[np.lexsort((guard[pairs[:, 0]], time[pairs[:, 0]], who[pairs[:, 0]]))]
-    first, final = pairs.T
+    first, final, impacts, last = pairs.T
     ended = final >= 0
     speed = np.abs(contacts.velocity)
-    after = np.where(struck, _rebounds(seen, contacts), speed)
+    after, mass = _rebounds(seen, contacts)
+    after = np.where(struck, after, speed)
+    summed = _summed_up(contacts, mass, speed, after)
+    held = np.where(contacts.kind[first] == st.HOLD, summed[first], 0.0)
+    impulse = _impulses(seen, outcome, first, final, integrals)
     return Touchdowns(
         trajectory=who[first],
         guard=guard[first],
@@ -99,33 +113,103 @@ def find(
         end=np.where(ended, time[final], np.nan),
         speed=speed[first],
         exit_speed=np.where(ended, after[final], np.nan),
-        impulse=_impulses(contacts.state, guard, first, final, integrals) if integrals else None,
+        impulse=impulse + held if integrals else None,
+        struck=_impulses(seen, outcome, first, last, integrals) + summed[last],
+        impacts=impacts,
         spells=spells,
     )
 
 
-def _rebounds(seen: Stretch, contacts: ContactTable) -> np.ndarray:
-    """Speed at which an impact's guard is left, float64[c]; zero for other contacts."""
-    system, speed = seen.system, np.zeros(len(contacts))
+def _rebounds(seen: Stretch, contacts: ContactTable) -> tuple[np.ndarray, np.ndarray]:
+    """Speed at which an impact's guard is left, and its impulse for each unit of the change of
+    speed, float64[c]; zero for other contacts.
+    """
+    system, speed, mass = seen.system, np.zeros(len(contacts)), np.zeros(len(contacts))
     values = dict(zip(system.values, seen.group.parameters.T, strict=True))
     if len(seen.group.parameters) > 1:
         values = {name: column[contacts.trajectory] for name, column in values.items()}
     states = dict(zip(system.states, contacts.state.T, strict=False))
     bits = [(contacts.mode_after >> i) & 1 == 1 for i in range(len(system.guards))]
     for g, guard in enumerate(system.guards):
-        if guard.law and guard.law.kind == "impact" and guard.law.constraint is not None:
-            (closing,) = evaluate(
-                [guard.law.constraint], t=contacts.time, states=states, values=values, bits=bits
-            )
-            speed = np.where(contacts.guard == g, np.abs(closing), speed)
-    return speed
+        if guard.law and guard.law.mass is not None and guard.law.constraint is not None:
+            wanted = [guard.law.constraint, guard.law.mass]
+            found = evaluate(wanted, t=contacts.time, states=states, values=values, bits=bits)
+            speed = np.where(contacts.guard == g, np.abs(found[0]), speed)
+            mass = np.where(contacts.guard == g, found[1], mass)
+    return speed, mass
+
+
+def _summed_up(
+    contacts: ContactTable, mass: np.ndarray, speed: np.ndarray, after: np.ndarray
+) -> np.ndarray:
+    """In the row of the last impact of a chatter that was followed, the impulse of those that were
+    not, ``m v (1 + e)/(1 - e)`` from a rebound v; in the row behind it, where the rest begins,
+    minus the integral of the force at rest for that long, ``2 m v/(1 - e)``: float64[c].
+    """
+    result = np.zeros(len(contacts))
+    last = np.flatnonzero(contacts.chatters[:-1] & (contacts.kind[1:] == st.HOLD))
+    last = last[after[last] > 0]
+    momentum, lost = mass[last] * after[last], 1.0 - after[last] / speed[last]
+    result[last] = momentum * (2.0 - lost) / lost
+    result[last + 1] = -2.0 * momentum / lost
+    return result
 
 
 def _pairs(rows: np.ndarray, enters: np.ndarray) -> np.ndarray:
-    """Rows of each entry and of the exit after it (-1: none), int64[k, 2]."""
+    """Rows of each entry and of the exit after it (-1: none), and that there are no
+    impacts, int64[k, 4].
+    """
     at = np.flatnonzero(enters)
     following = np.append(rows, -1)
-    return np.stack([rows[at], following[at + 1]], axis=1)
+    return np.stack([rows[at], following[at + 1], 0 * at, 0 * at - 1], axis=1)
+
+
+def hold_of(system: System, guard: int) -> int:
+    """The hold guard of a stop; -1 for any other guard."""
+    law = system.guards[guard].law
+    return law.partner if law is not None and law.kind == "impact" else -1
+
+
+def _strikes(contacts: ContactTable, rows: np.ndarray, hold: int) -> np.ndarray:
+    """Rows of the first impact of each contact of a stop and of its end (-1: none), the number of
+    impacts, and the row of the last one, int64[k, 4].
+
+    An impact is over as it begins. Those that come to rest are one contact, as far back as each
+    flight is shorter than the one before it; it ends with the rest.
+    """
+    result: list[tuple[int, int, int, int]] = []
+    rests = contacts.chatters[rows]
+    begin = 0
+    while begin < len(rows):
+        run = begin
+        while rests[run] and run + 1 < len(rows) and rows[run + 1] == rows[run] + 1:
+            run += 1
+        if not rests[begin]:
+            result.append(_single(rows[begin]))
+            begin += 1
+            continue
+        flights = np.diff(contacts.time[rows[begin : run + 1]])
+        longer = np.flatnonzero(flights[1:] >= flights[:-1])
+        first = begin + (int(longer[-1]) + 1 if len(longer) else 0)
+        result += map(_single, rows[begin:first])
+        end = _released(contacts, int(rows[run]), hold)
+        result.append((int(rows[first]), end, run + 1 - first, int(rows[run])))
+        begin = run + 1
+    return np.array(result, np.int64).reshape(-1, 4)
+
+
+def _single(row: int) -> tuple[int, int, int, int]:
+    return int(row), int(row), 1, int(row)
+
+
+def _released(contacts: ContactTable, row: int, hold: int) -> int:
+    """The row in which the rest behind the last impact of a chatter ends, -1 if it doesn't."""
+    later = np.flatnonzero(
+        (contacts.trajectory[row:] == contacts.trajectory[row])
+        & (contacts.guard[row:] == hold)
+        & (contacts.kind[row:] == st.RELEASE)
+    )
+    return row + int(later[0]) if len(later) else -1
 
 
 def _touching_first(outcome: Outcome, i: int, g: int, side: int, enters: np.ndarray) -> bool:
@@ -151,16 +235,23 @@ def _spells(
 
 
 def _impulses(
-    states: np.ndarray,
-    guard: np.ndarray,
+    seen: Stretch,
+    outcome: Outcome,
     first: np.ndarray,
     final: np.ndarray,
     integrals: Mapping[int, int],
 ) -> np.ndarray:
-    """Difference of the integral of the force between the two ends of each contact."""
-    impulse = np.full(len(first), np.nan)
+    """Difference of the integral of the force between the two ends of each contact; of a stop, from
+    before its first impact.
+    """
+    contacts, impulse = outcome.contacts, np.full(len(first), np.nan)
     for g, number in integrals.items():
-        rows = (guard[first] == g) & (final >= 0)
-        column = states[:, number]
-        impulse[rows] = column[final[rows]] - column[first[rows]]
+        rows = (contacts.guard[first] == g) & (final >= 0)
+        column, ahead = contacts.state[:, number], first[rows]
+        begins = column[ahead]
+        if hold_of(seen.system, g) >= 0:
+            who = contacts.trajectory[ahead]
+            earlier = (ahead > 0) & (contacts.trajectory[ahead - 1] == who)
+            begins = np.where(earlier, column[ahead - 1], outcome.samples[who, 0, number])
+        impulse[rows] = column[final[rows]] - begins
     return impulse

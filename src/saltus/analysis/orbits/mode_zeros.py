@@ -31,7 +31,8 @@ MANY = 32
 ASIDE = 0.1
 #: Longest step of Newton's method, in units of the scale.
 LONGEST_STEP = 1e8
-#: Distance of equal zeros, and size of a residual, relative to the states and to the scale.
+#: Distance of equal zeros, relative to the states and to the scale; size of a residual, relative to
+#: the terms of its linear part.
 SAME, RESIDUAL = 1e-7, 1e-9
 #: States below this share of the scale may be zeros but for rounding.
 ROUNDED = 1e-12
@@ -120,9 +121,10 @@ class Piece:
         )  # fmt: skip
         x = x[arrived]
         residual, derivative = self._equilibrated(entries, slopes, x)
-        size = 1.0 + np.abs(x / self.scale).max(axis=1, initial=0.0)
-        with np.errstate(invalid="ignore"):
-            good = np.abs(residual).max(axis=1, initial=0.0) <= RESIDUAL * size
+        with np.errstate(invalid="ignore", over="ignore"):
+            reach = 1.0 + np.abs(x / self.scale)
+            terms = np.einsum("kij,kj->ki", np.abs(derivative), reach)
+            good = (np.abs(residual) <= RESIDUAL * np.maximum(terms, 1.0)).all(axis=1)
         return np.asarray(x[good & np.isfinite(derivative).all(axis=(1, 2))])
 
     def _equilibrated(

@@ -1,5 +1,5 @@
-"""`branches`: all branches of periodic orbits over a parameter, stable or not, and their
-bifurcations.
+"""`branches`: all branches of periodic orbits and equilibria over a parameter, stable or not, and
+their bifurcations.
 """
 
 from __future__ import annotations
@@ -13,11 +13,13 @@ import xarray as xr
 
 from saltus.analysis.branches.branch_table import table_of
 from saltus.analysis.branches.plans import plan_of
-from saltus.analysis.branches.seeds import scaled, seeds_of
+from saltus.analysis.branches.rest_branches import trace_rests
+from saltus.analysis.branches.seeds import resting_between, resting_seeds, scaled, seeds_of
 from saltus.analysis.branches.tracing import Branch, Seed, trace
+from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.outputs import outputs_of
 from saltus.analysis.responses.continued import LONGEST_DOUBLED, POINTS, SWITCHES, seeds_of_grid
-from saltus.analysis.responses.grid import grid_of
+from saltus.analysis.responses.grid import Grid, grid_of
 from saltus.analysis.responses.responses import find
 from saltus.analysis.starts import check_system, range_of, single
 from saltus.analysis.verb import verb
@@ -60,16 +62,23 @@ def branches(
     counted in ``branch_unexplained``. Orbits with impacts are followed from contact to contact,
     through the grazes at which an impact appears or vanishes.
 
+    Of a system without forcing branches of equilibria are followed too, with their eigenvalues,
+    one branch in each mode, from mode to mode through boundary equilibria, and the limit cycles
+    that are born at their Hopf points. Equilibria that a contact holds aren't followed.
+
     Parameters
     ----------
     system : System
-        Forced, or without forcing: then its limit cycles are followed, with their period.
+        Forced, or without forcing: then its equilibria are followed, and its limit cycles, with
+        their period.
     vary : mapping
         One parameter and its range, such as ``{"frequency": ("2 Hz", "30 Hz")}``.
     start : Dataset, or starts
         What :func:`saltus.frequency_response`, :func:`saltus.bifurcation_diagram`,
         :func:`saltus.attractors` or :func:`saltus.basins` returned: each of its periodic orbits is
-        followed. Or starts as for these: they are run at ``at`` values of the parameter first.
+        followed, and each equilibrium, also of :func:`saltus.equilibria`. Or starts as for these:
+        they are run at ``at`` values of the parameter first, and are where Newton's method looks
+        for equilibria.
         Default: at rest.
     box : mapping, optional
         Range (low, high) of each state for random starts: ``start="random 20"``.
@@ -108,13 +117,20 @@ def branches(
         ``point_contacts``, ``point_itinerary``, ``point_margin``, multipliers (of a limit cycle
         without the trivial one), the states at whole forcing periods, ``point_arclength``, and
         ``point_output_maximum`` and so on of each state and output. On branch:
-        ``branch_periods``, ``branch_closed``, ``branch_parent``, ``branch_begin``, ``branch_end``.
-        On event: ``event_kind`` (``fold``, ``period_doubling``, ``branch_point``,
-        ``neimark_sacker``; ``graze``: a contact appears or vanishes; ``corner``: two contacts come
-        at once), ``event_<parameter>``, its states and multipliers, ``event_guard`` and
-        ``event_phase`` of a graze or corner, and of a graze of orbits with impacts
+        ``branch_kind`` (``periodic``, ``limit_cycle``, ``equilibrium``; these have
+        ``point_eigenvalue_real`` and ``_imag`` [1/s] in place of multipliers and a period),
+        ``branch_periods``, ``branch_closed``, ``branch_parent``, ``branch_begin``, ``branch_end``,
+        ``branch_twin``: whether its mirror image, in symmetric equations, is a branch of its own,
+        which isn't listed. On event: ``event_kind`` (``fold``, ``period_doubling``,
+        ``branch_point``, ``neimark_sacker``; ``hopf`` and ``boundary_equilibrium`` of equilibria;
+        ``graze``: a contact appears or vanishes; ``corner``: two contacts come at once),
+        ``event_<parameter>``, its states and multipliers, ``event_guard`` and ``event_phase`` of a
+        graze or corner, ``event_sqrt_coefficient`` of a graze (see
+        :func:`saltus.bifurcation_curve`), and of a graze of orbits with impacts
         ``event_outcome``: ``persistence``, where orbits with the impact go on from those without
-        it, or ``nonsmooth_fold``, where both lie on one side.
+        it, or ``nonsmooth_fold``, where both lie on one side; the same of equilibria on both sides
+        of a boundary; of a Hopf point ``supercritical`` (stable cycles are born), ``subcritical``,
+        or empty where the linear part doesn't tell.
 
     Raises
     ------
@@ -156,22 +172,28 @@ def branches(
     done = list[Branch]()
     with reporting(progress) as show:
         try:
+            rests: list[Seed] = []
             if isinstance(start, xr.Dataset):
                 begins = seeds_of(system, name, start)
+                rests = [] if system.forced_at else resting_seeds(system, name, start)
             else:
                 places = np.linspace(*limits, whole(at, "at", 1) + 2)[1:-1]
-                begins = _found_at(
-                    system, name, places, start, box, seed, every, method, periods, threads
-                )
+                grid = grid_of(system, {name: places}, start, box, None, seed, None, every)
+                if autonomous(system):
+                    rests = resting_between(system, name, limits, grid.starts)
+                begins = _found_in(grid, method, periods, threads)
             begins = scaled(system, name, _inside(begins, limits), method)
-            if not begins:
+            rests = _inside(rests, limits)
+            if not begins and not rests:
                 raise ParameterError(
                     f"no periodic orbit of {system.name} is known between {limits[0]:g} and "
                     f'{limits[1]:g}: give other starts, more of them (start="random 20" with '
                     "box=), or longer runs (periods=)."
                 )
             plan = plan_of(system, name, limits, method, threads, points, longest, chosen)
-            trace(plan, begins, done, stage(show, 0.0, 0.9))
+            born = trace_rests(plan, system, name, rests, done) if rests else []
+            born = born if "hopf" in chosen else []
+            trace(plan, [*born, *begins], done, stage(show, 0.0, 0.9))
         except KeyboardInterrupt:
             partial = functools.partial(table_of, system, name, limits, done, wanted, method)
             raise Interrupted(partial) from None
@@ -202,20 +224,8 @@ def _inside(seeds: list[Seed], limits: tuple[float, float]) -> list[Seed]:
     return [seed for seed in seeds if limits[0] <= seed.own[-1] <= limits[1]]
 
 
-def _found_at(
-    system: System,
-    name: str,
-    values: np.ndarray,
-    start: Any,
-    box: Mapping[str, Any] | None,
-    seed: int,
-    every: Any,
-    method: Method,
-    periods: int,
-    threads: int | None,
-) -> list[Seed]:
+def _found_in(grid: Grid, method: Method, periods: int, threads: int | None) -> list[Seed]:
     """Seeds from the attractors that starts lead to at some values of the parameter."""
-    grid = grid_of(system, {name: values}, start, box, None, seed, None, every)
     found = find(grid, method, periods, threads, None)
     if not found.complete:
         raise KeyboardInterrupt

@@ -22,7 +22,7 @@ from saltus.flow.methods import Method
 #: points.
 LONGEST_DOUBLED, POINTS = 2, 1000
 #: Events at which the branches that leave are followed.
-SWITCHES = ("period_doubling", "branch_point")
+SWITCHES = ("period_doubling", "branch_point", "hopf")
 
 
 def check_continued(unstable: bool, grid: Grid, method: Method) -> None:

@@ -11,7 +11,7 @@ _OUTPUT = ("point", "output")
 #: that in ``output_units``.
 BACKBONE_VARIABLES = {
     "point": Variable(_POINT, "1", "point of the backbone", "i8", coord=True),
-    "backbone_frequency": Variable(_POINT, "Hz", "frequency of free vibration"),
+    "backbone_frequency": Variable(_POINT, "Hz", "frequency of the vibration"),
     "point_period": Variable(_POINT, "s", "period of the orbit"),
     "point_stable": Variable(_POINT, "1", "whether the vibration is stable", "i1"),
     "point_itinerary": Variable(
@@ -24,7 +24,8 @@ BACKBONE_VARIABLES = {
         ("point", "multiplier"), "1", "Floquet multiplier, imaginary part"
     ),
     "fictitious_damping": Variable(_POINT, "1/s", "damping that closes the orbit: rounding"),
-    "point_<state>": Variable(_POINT, "<state>", "<state> where the vibration passes its rest"),
+    "point_<parameter>": Variable(_POINT, "<parameter>", "<parameter> in quadrature"),
+    "point_<state>": Variable(_POINT, "<state>", "<state> <when>"),
     "output": Variable(("output",), "", "output: a state", "str", coord=True),
     "output_units": Variable(("output",), "", "unit of the output", "str", coord=True),
     "point_output_maximum": Variable(_OUTPUT, "<output>", "largest value"),

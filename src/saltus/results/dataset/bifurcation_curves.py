@@ -6,9 +6,14 @@ from saltus.results.dataset.variable import Variable
 
 _POINT = ("point",)
 _CODIM2 = ("codim2",)
+#: What a graze does to the motions behind it.
+SQRT_COEFFICIENT = (
+    "change of the grazed gap when the orbit returns, over the square root of the depth by which a "
+    "motion would pass the boundary"
+)
 
 #: Variables of what ``bifurcation_curve`` returns. ``<first>``: the unit of the first state;
-#: ``<gap>``: that of the gaps.
+#: ``<gap>``: that of the gaps; ``<root gap>``: of their square roots.
 CURVE_VARIABLES = {
     "point": Variable(_POINT, "1", "point of the curve", "i8", coord=True),
     "point_<parameter>": Variable(_POINT, "<parameter>", "<parameter>"),
@@ -24,6 +29,7 @@ CURVE_VARIABLES = {
     "point_margin": Variable(
         _POINT, "<gap>", "smallest distance by which the orbit misses or overshoots a boundary"
     ),
+    "point_sqrt_coefficient": Variable(_POINT, "<root gap>", SQRT_COEFFICIENT),
     "point_multiplier_real": Variable(
         ("point", "multiplier"), "1", "Floquet multiplier, real part"
     ),

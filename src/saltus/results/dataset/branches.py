@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from saltus.results.dataset.bifurcation_curves import SQRT_COEFFICIENT
 from saltus.results.dataset.variable import GUARDS, Variable
 
 _POINT = ("point",)
@@ -15,6 +16,8 @@ BRANCH_ENDS = {
     "range": "the end of the range",
     "closed": "closed: an isola",
     "branch": "where it leaves another branch",
+    "hopf": "where a limit cycle shrinks to an equilibrium",
+    "boundary_equilibrium": "where an equilibrium meets a boundary",
     "period_doubling": "where it becomes an orbit of half the period",
     "points": "as many points as were asked for",
     "lost": "no step leads on, however short",
@@ -34,9 +37,12 @@ BRANCHES_VARIABLES = {
     ),
     "point_stable": Variable(_POINT, "1", "whether the orbit attracts", "i1"),
     "point_unstable_multipliers": Variable(
-        _POINT, "1", "Floquet multipliers outside the unit circle", "i4"
+        _POINT,
+        "1",
+        "Floquet multipliers outside the unit circle; eigenvalues of positive real part",
+        "i4",
     ),
-    "point_period": Variable(_POINT, "s", "period of the orbit"),
+    "point_period": Variable(_POINT, "s", "period of the orbit; NaN of an equilibrium"),
     "point_peak": Variable(_POINT, "<first>", "largest magnitude of the first state"),
     "point_rms": Variable(_POINT, "<first>", "root mean square of the first state"),
     "point_contacts": Variable(_POINT, "1", "contacts in one period of the orbit"),
@@ -48,6 +54,12 @@ BRANCHES_VARIABLES = {
     ),
     "point_multiplier_real": Variable(_MULTIPLIER, "1", "Floquet multiplier, real part"),
     "point_multiplier_imag": Variable(_MULTIPLIER, "1", "Floquet multiplier, imaginary part"),
+    "point_eigenvalue_real": Variable(
+        _MULTIPLIER, "1/s", "eigenvalue of an equilibrium, real part"
+    ),
+    "point_eigenvalue_imag": Variable(
+        _MULTIPLIER, "1/s", "eigenvalue of an equilibrium, imaginary part"
+    ),
     "point_<state>": Variable(("point", "orbit_point"), "<state>", "<state> <when>"),
     "output": Variable(
         ("output",), "", "output: a state, or a function of the motion", "str", coord=True
@@ -71,12 +83,21 @@ BRANCHES_VARIABLES = {
         "phase of the first harmonic A cos(2 pi f t + phase), t the time of the equations",
     ),
     "branch": Variable(_BRANCH, "1", "branch", "i8", coord=True),
+    "branch_kind": Variable(
+        _BRANCH, "", "what lies on it: periodic, limit_cycle, equilibrium", "str"
+    ),
     "branch_periods": Variable(
-        _BRANCH, "1", "period of its orbits in forcing periods; 1 without forcing", "i8"
+        _BRANCH,
+        "1",
+        "period of its orbits in forcing periods; without forcing 1, of equilibria 0",
+        "i8",
     ),
     "branch_closed": Variable(_BRANCH, "1", "whether it returns to where it began", "i1"),
     "branch_parent": Variable(
         _BRANCH, "1", "branch that it leaves at its first point, -1 if none", "i8"
+    ),
+    "branch_twin": Variable(
+        _BRANCH, "1", "whether its mirror image is a branch of its own, which isn't listed", "i1"
     ),
     "branch_begin": Variable(_BRANCH, "", "why it ends at its first point", "str"),
     "branch_end": Variable(_BRANCH, "", "why it ends at its last point", "str"),
@@ -92,8 +113,12 @@ BRANCHES_VARIABLES = {
         _EVENT, "1", "when it is grazed, in forcing periods since the orbit's first point"
     ),
     "event_outcome": Variable(
-        _EVENT, "", "how a branch of orbits with impacts goes on behind a graze", "str"
+        _EVENT,
+        "",
+        "how a branch goes on behind a graze or a boundary; what is born at a Hopf point",
+        "str",
     ),
+    "event_sqrt_coefficient": Variable(_EVENT, "<root gap>", SQRT_COEFFICIENT),
     "event_branch": Variable(_EVENT, "1", "branch on which it lies", "i8"),
     "event_point": Variable(_EVENT, "1", "point of the branch that comes before it", "i8"),
     "event_<parameter>": Variable(_EVENT, "<parameter>", "<parameter>"),
@@ -104,6 +129,12 @@ BRANCHES_VARIABLES = {
     ),
     "event_multiplier_imag": Variable(
         ("event", "multiplier"), "1", "Floquet multiplier, imaginary part"
+    ),
+    "event_eigenvalue_real": Variable(
+        ("event", "multiplier"), "1/s", "eigenvalue of an equilibrium, real part"
+    ),
+    "event_eigenvalue_imag": Variable(
+        ("event", "multiplier"), "1/s", "eigenvalue of an equilibrium, imaginary part"
     ),
     "event_<state>": Variable(("event", "orbit_point"), "<state>", "<state> <when>"),
     **GUARDS,

@@ -28,7 +28,8 @@ _TWICE = (
 )
 #: Where a name of the system would collide with one of the table, another is taken.
 _NAMES = {
-    "contact_<state>": schema.contact_name, "attractor_<state>": schema.attractor_name,
+    "contact_<state>": schema.contact_name, "contact_<state>_before": schema.before_name,
+    "attractor_<state>": schema.attractor_name,
     "start_<state>": schema.start_name, "orbit_<state>": schema.orbit_name,
     "response_<state>": schema.response_name, "response_<parameter>": schema.response_name,
     "equilibrium_<state>": schema.equilibrium_name,
@@ -201,7 +202,10 @@ class _Building:
             subject.guards.units_among(subject.units) if subject.guards else ()
         )
         first = subject.units.get(subject.states[0], "") if subject.states else ""
-        self.words = {"<gap>": gap, "<gap rate>": schema.rate_unit(gap), "<first>": first, **words}
+        self.words = {
+            "<gap>": gap, "<gap rate>": schema.rate_unit(gap), "<root gap>": schema.root_unit(gap),
+            "<first>": first, **words,
+        }  # fmt: skip
         self.data: dict[str, xr.Variable] = {}
         self.coords: dict[str, xr.Variable] = {}
 

@@ -96,7 +96,13 @@ IMPACTS_VARIABLES = {
     "contact_duration": Variable(
         ("contact",), "s", "time from the beginning of the contact to its end"
     ),
-    "contact_impulse": Variable(("contact",), "N*s", "impulse of the contact force"),
+    "contact_impacts": Variable(
+        ("contact",), "1", "impacts that were met in the contact, one by one", "i8"
+    ),
+    "contact_impulse_of_impacts": Variable(
+        ("contact",), "<impulse>", "impulse of the impacts of the contact, without that at rest"
+    ),
+    "contact_impulse": Variable(("contact",), "<impulse>", "impulse of the contact force"),
     "contact_trajectory": Variable(
         ("contact",), "1", "trajectory that the contact belongs to", "i8"
     ),
@@ -133,12 +139,12 @@ IMPACTS_VARIABLES = {
     "share_in_contact_error": Variable(
         ("trajectory", "guard"), "1", "standard error of the share of the time in contact"
     ),
-    "impulse_mean": Variable(("trajectory", "guard"), "N*s", "mean impulse of a contact"),
+    "impulse_mean": Variable(("trajectory", "guard"), "<impulse>", "mean impulse of a contact"),
     "impulse_mean_error": Variable(
-        ("trajectory", "guard"), "N*s", "standard error of the mean impulse of a contact"
+        ("trajectory", "guard"), "<impulse>", "standard error of the mean impulse of a contact"
     ),
     "impulse_max": Variable(
-        ("trajectory", "guard"), "N*s", "largest magnitude of the impulse of a contact"
+        ("trajectory", "guard"), "<impulse>", "largest magnitude of the impulse of a contact"
     ),
     **_ENDS,
     **GUARDS,

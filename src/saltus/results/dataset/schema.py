@@ -97,6 +97,12 @@ def contact_name(state: str) -> str:
     return f"contact_state_{state}" if name in TRAJECTORY_VARIABLES else name
 
 
+def before_name(state: str) -> str:
+    """Name of the variable that holds a state before the contacts: ``contact_x_before``."""
+    name = f"contact_{state}_before"
+    return f"contact_state_{state}_before" if name in TRAJECTORY_VARIABLES else name
+
+
 def attractor_name(state: str) -> str:
     """Name of the variable that holds the points of the attractors: ``attractor_x``;
     ``attractor_state_type`` where the name is taken.
@@ -171,6 +177,13 @@ def rate_unit(unit: str) -> str:
     if not unit or unit.endswith("/s"):
         return f"{unit}^2" if unit else ""
     return f"{unit}/s"
+
+
+def root_unit(unit: str) -> str:
+    """Unit of a square root: ``m`` gives ``m^0.5``; an unknown one stays unknown."""
+    if unit in ("", "1"):
+        return unit
+    return f"({unit})^0.5" if "/" in unit or "^" in unit else f"{unit}^0.5"
 
 
 def kind_of(ds: Any) -> str:

@@ -40,7 +40,10 @@ TRAJECTORY_VARIABLES = {
     "contact_mode_after": Variable(_CONTACT, "1", "mode after the contact", "i8"),
     "contact_steps": Variable(_CONTACT, "1", "accepted steps from the start to the contact", "i8"),
     "contact_trajectory": Variable(_CONTACT, "1", "trajectory that the contact belongs to", "i8"),
-    "contact_<state>": Variable(_CONTACT, "<state>", "<state> at the contact"),
+    "contact_<state>": Variable(
+        _CONTACT, "<state>", "<state> at the contact; behind it where it jumps"
+    ),
+    "contact_<state>_before": Variable(_CONTACT, "<state>", "<state> before the contact"),
     "status": STATUS,
     **COUNTERS,
     **MINIMA,

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from saltus.errors import ParameterError, StudyError, TraceError, UnitError, nearest
 from saltus.study.answers import basins, simulate
-from saltus.study.answers.branches import Branches
+from saltus.study.answers.branches import Backbone, Branches
+from saltus.study.answers.curves import Curve
 from saltus.study.answers.lyapunov import Exponents
 from saltus.study.answers.motions import Balance, Lines, Section, Statistics
+from saltus.study.answers.orbits import Orbits
 from saltus.study.answers.question import OneVerb, Question
 from saltus.study.answers.responses import Diagram, Response
 from saltus.study.setting.inputs import Inputs
@@ -28,7 +30,10 @@ if TYPE_CHECKING:
     from saltus.system import System
 
 #: Tables that one question answers.
-_KINDS = (Section, Lines, Statistics, Balance, Exponents, Response, Diagram, Branches)
+_KINDS = (
+    Section, Lines, Statistics, Balance, Exponents, Response, Diagram, Orbits, Branches, Curve,
+    Backbone,
+)  # fmt: skip
 _ONE: dict[str, type[OneVerb]] = {one.place: one for one in _KINDS}
 #: Tables that may be several questions.
 _SEVERAL: dict[str, Callable[[Any, Setting], list[Question]]] = {
@@ -160,6 +165,8 @@ def questions_of(
             asked += (
                 [_ONE[name](table, setting)] if name in _ONE else _SEVERAL[name](table, setting)
             )
+    for question in asked:
+        question.join(asked)
     stems = [stem for question in asked for stem in question.stems]
     twice = sorted({stem for stem in stems if stems.count(stem) > 1})
     if twice:

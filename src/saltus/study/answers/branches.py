@@ -1,4 +1,6 @@
-"""[branches]: periodic orbits over a parameter, stable or not, and their bifurcations."""
+"""[branches]: periodic orbits over a parameter, stable or not, and their bifurcations; [backbone]:
+the vibrations that resonances follow.
+"""
 
 from __future__ import annotations
 
@@ -9,15 +11,19 @@ import numpy as np
 from saltus.results.dataset.schema import event_name, period_text, point_name, states_of
 from saltus.results.wording import unit_of
 from saltus.study.answers.question import Answers, OneVerb, first_figure
-from saltus.study.table import ROWS, quantity, table, words
+from saltus.study.setting import quantities
+from saltus.study.table import ROWS, number, quantity, table, words
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from saltus.study.setting.setting import Setting
     from saltus.study.table import TextTable
 
 #: Digits of the parameter at a bifurcation.
 DIGITS = 10
+#: Why a backbone may end before the amplitude asked for.
+ENDS = ("points", "lost")
 
 
 class Branches(OneVerb):
@@ -35,6 +41,49 @@ class Branches(OneVerb):
         from saltus import plot
 
         axes = plot.branches(ds)
+        axes.set_title(self.title, loc="left")
+        return {"": first_figure(axes)}
+
+
+class Backbone(OneVerb):
+    """The backbone of resonances over their amplitude."""
+
+    place, function = "backbone", "backbone"
+
+    def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
+        """The amplitude is in the unit of its state."""
+        state = table.state or self.system.states[0]
+        place = f"{self.place}.amplitude"
+        self.arguments["amplitude"] = tuple(
+            quantities.states(self.system, {state: one}, place)[state] for one in table.amplitude
+        )
+
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
+        """A row for each point; on the screen some of them."""
+        state, count = ds.attrs["amplitude_of"], ds.sizes["point"]
+        one = ds.sel(output=state)
+        columns = [
+            quantity(
+                f"peak |{state}|", one["point_output_peak"].values, str(one.output_units.item()), 6
+            ),
+            quantity("frequency", ds["backbone_frequency"].values, "Hz", DIGITS),
+            words("stable", ["yes" if stable else "no" for stable in ds["point_stable"].values]),
+            words("contacts", ds["point_itinerary"].values),
+        ]
+        if "fictitious_damping" in ds:
+            columns.append(
+                number("fictitious damping", ds["fictitious_damping"].values, ".1e", "1/s")
+            )
+        shown = np.unique(np.linspace(0, count - 1, ROWS).astype(int)).tolist()
+        end = ds.attrs["end"]
+        lost = (f"It ends before the amplitude asked for: {end}.",) if end in ENDS else ()
+        return [table(self.title, columns, (f"{count} points.", *lost), shown)]
+
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """Amplitude over frequency."""
+        from saltus import plot
+
+        axes = plot.backbone(ds)
         axes.set_title(self.title, loc="left")
         return {"": first_figure(axes)}
 

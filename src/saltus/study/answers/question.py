@@ -71,6 +71,10 @@ class Question(ABC):
         """
         return None
 
+    def join(self, asked: Sequence[Question]) -> None:  # noqa: ARG002
+        """Find the questions whose answers it takes. Raises StudyError if there are none."""
+        return
+
     @abstractmethod
     def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:
         """The answer."""

@@ -120,3 +120,30 @@ OF_BRANCHES = OF_RESPONSES | {
         default=["period_doubling", "branch_point"],
     ),
 }  # fmt: skip
+#: Orbits, stable or not, that are found from many starts.
+OF_ORBITS = OF_RESPONSES | {
+    "start": Kind(Starts, (*KINDS["start"].examples, "random 1000"),
+        'Where to begin: every state, lists making a batch; or "random 1000" with box.',
+        convert="start"),
+    "periods": whole(3, most=MOST_PERIODS),
+}  # fmt: skip
+#: Curves begin at an event of the study's branches, named by its kind.
+OF_CURVES = OF_RESPONSES | {
+    "event": Kind(Literal["fold", "period_doubling", "neimark_sacker", "graze"], ("fold",),
+        "Kind of the bifurcation of [branches] at which it begins."),
+    "vary": Kind(dict[str, Interval],
+        ({"frequency": ["12 Hz", "22 Hz"], "force": ["1 N", "6 N"]},),
+        "Two parameters and their ranges.", convert="ranges"),
+    "points": whole(400),
+}  # fmt: skip
+#: Backbones go over a range of amplitudes; parameters that are zero are taken out.
+OF_BACKBONES = OF_RESPONSES | {
+    "amplitude": Kind(Interval, (["0.1 mm", "5 mm"],)),
+    "state": Kind(examples=("x",)),
+    "force": Kind(examples=("force",)),
+    "values": Kind(dict[str, Quantity], ({"force": "0 N", "damping_ratio": 0},),
+        "Values of parameters: of free vibrations the force and all that damps are zero.", {},
+        convert="values"),
+    "mode": whole(1),
+    "points": whole(400),
+}  # fmt: skip

@@ -9,7 +9,15 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from saltus.fence import MOST_COUNT, MOST_PERIODS
-from saltus.study.tables.kinds import KINDS, OF_BRANCHES, OF_RESPONSES, whole
+from saltus.study.tables.kinds import (
+    KINDS,
+    OF_BACKBONES,
+    OF_BRANCHES,
+    OF_CURVES,
+    OF_ORBITS,
+    OF_RESPONSES,
+    whole,
+)
 from saltus.study.tables.methods import Method
 from saltus.study.tables.parts import FileTitle, Quantity, Range, Table
 from saltus.study.tables.signature import Asked, Generated, table
@@ -105,7 +113,23 @@ BifurcationDiagram = table(
     base=Varied,
     called="Bifurcation diagram",
 )
+PeriodicOrbits = table("periodic_orbits", ["periodic_orbits"], OF_ORBITS, called="Periodic orbits")
 Branches = table("branches", ["branches"], OF_BRANCHES, called="Branches of periodic orbits")
+BifurcationCurve = table(
+    "bifurcation_curve",
+    ["bifurcation_curve"],
+    OF_CURVES,
+    called="Bifurcation curve",
+    branches=(
+        str | None,
+        Field(None, description="Name of the [branches], of several.", examples=["main"]),
+    ),
+    near=(
+        Quantity | None,
+        Field(None, description="Value of the branches' parameter near it.", examples=["17.8 Hz"]),
+    ),
+)
+Backbone = table("backbone", ["backbone"], OF_BACKBONES, called="Backbone")
 
 
 # -- basins ----------------------------------------------------------------------------------------

@@ -11,7 +11,9 @@ from saltus.study.tables.parts import Header, Named, SystemTable, Table, distinc
 from saltus.study.tables.questions import (
     REFERENCE,
     RUN,
+    Backbone,
     Basins,
+    BifurcationCurve,
     BifurcationDiagram,
     Branches,
     Compare,
@@ -19,6 +21,7 @@ from saltus.study.tables.questions import (
     FrequencyResponse,
     Impacts,
     Lyapunov,
+    PeriodicOrbits,
     Poincare,
     Simulate,
     Spectrum,
@@ -29,7 +32,8 @@ QUESTIONS: dict[str, type[Table]] = {
     "simulate": Simulate, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts,
     "energy": Energy, "lyapunov": Lyapunov,
     "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram,
-    "branches": Branches,
+    "periodic_orbits": PeriodicOrbits, "branches": Branches,
+    "bifurcation_curve": BifurcationCurve, "backbone": Backbone,
     "basins": Basins,
 }  # fmt: skip
 #: Those that may be asked several times, as arrays of tables.
@@ -51,7 +55,10 @@ class Study(Table):
     lyapunov: one_or_many(Lyapunov) = Field(default_factory=list)  # type: ignore[valid-type]
     frequency_response: one_or_many(FrequencyResponse) = Field(default_factory=list)  # type: ignore[valid-type]
     bifurcation_diagram: one_or_many(BifurcationDiagram) = Field(default_factory=list)  # type: ignore[valid-type]
+    periodic_orbits: one_or_many(PeriodicOrbits) = Field(default_factory=list)  # type: ignore[valid-type]
     branches: one_or_many(Branches) = Field(default_factory=list)  # type: ignore[valid-type]
+    bifurcation_curve: one_or_many(BifurcationCurve) = Field(default_factory=list)  # type: ignore[valid-type]
+    backbone: one_or_many(Backbone) = Field(default_factory=list)  # type: ignore[valid-type]
     basins: Basins | None = None
 
     @model_validator(mode="after")

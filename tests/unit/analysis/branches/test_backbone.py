@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
+from scipy.optimize import root
 from scipy.special import ellipk
 
 import saltus as sl
@@ -18,6 +19,11 @@ FREE = {"force": 0, "damping_ratio": 0}
 @sl.system(states="x v")
 def duffing(t, x, v, *, cubic=1.0):
     return v, -x - cubic * x**3
+
+
+@sl.system(states="x v", forced_at="omega", units={"omega": "rad/s"})
+def forced(t, x, v, *, c=0.2, cubic=0.0, force=1.0, omega=1.0):
+    return v, force * sl.cos(omega * t + 0.3) - c * v - 4 * x - cubic * x**3
 
 
 @sl.system(states="x v")
@@ -57,23 +63,31 @@ def by_energy(case, high):
     return 1 / (2 * sum(parts))
 
 
-@pytest.mark.parametrize(("case", "high"), [("a", 2e-3), ("c", 3e-3)])
-def test_the_backbone_of_the_rig_by_its_energy(case, high):
+@pytest.mark.parametrize(
+    ("case", "high", "known"), [("a", 2e-3, 11.42066832049569), ("c", 3e-3, 12.47324906943082)]
+)
+def test_the_backbone_of_the_rig_by_its_energy(case, high, known):
+    """``known``: an independent quadrature of the energy, to its last digits."""
     spine = sl.backbone(sl.models.delangre(case), ("0.1 mm", high), values=FREE)
     assert spine.attrs["end"] == "range"
     assert spine.point_output_maximum.values[-1, 0] == pytest.approx(high, rel=1e-12)
     assert spine.point_output_peak.values[0, 0] == pytest.approx(1e-4, rel=1e-12)
     assert spine.backbone_frequency.values[-1] == pytest.approx(by_energy(case, high), rel=1e-8)
+    assert spine.backbone_frequency.values[-1] == pytest.approx(known, rel=1e-13)
     assert np.abs(spine.fictitious_damping).max() < 1e-9
 
 
-def test_the_backbone_of_a_duffing_oscillator():
+@pytest.mark.parametrize("cubic", [0.1, 1.0])
+def test_the_backbone_of_a_duffing_oscillator(cubic):
     """pi sqrt(1 + g A^2) / (2 K(m)), m = g A^2 / (2 (1 + g A^2))."""
-    spine = sl.backbone(duffing, (0.01, 1.0))
+    spine = sl.backbone(duffing, (0.01, 1.0), values={"cubic": cubic})
     a = spine.point_output_peak.values[:, 0]
-    stiff = 1 + a**2
-    exact = np.pi * np.sqrt(stiff) / (2 * ellipk(a**2 / (2 * stiff))) / (2 * np.pi)
+    stiff = 1 + cubic * a**2
+    exact = np.pi * np.sqrt(stiff) / (2 * ellipk(cubic * a**2 / (2 * stiff))) / (2 * np.pi)
     np.testing.assert_allclose(spine.backbone_frequency, exact, rtol=1e-11)
+    # the same at A = 1, rad/s, from 40 digits
+    known = {0.1: 1.0367169070746336, 1.0: 1.3177760649655266}[cubic]
+    assert 2 * np.pi * spine.backbone_frequency.values[-1] == pytest.approx(known, rel=1e-14)
 
 
 def test_the_backbones_of_rigid_stops():
@@ -107,6 +121,65 @@ def test_a_nonlinear_normal_mode_closes_in_another_solver(mode):
     np.testing.assert_allclose(end, start, atol=1e-9)
 
 
+# -- phase quadrature ------------------------------------------------------------------------------
+def test_a_linear_oscillator_is_in_quadrature_at_its_natural_frequency():
+    """The force is that of the damping alone."""
+    spine = sl.backbone(forced, (0.01, 2.0), phase="quadrature")
+    peak = spine.point_output_peak.sel(output="x").values
+    assert (peak[0], peak[-1]) == pytest.approx((0.01, 2.0), rel=1e-12)
+    np.testing.assert_allclose(spine.point_omega, 2.0, rtol=1e-14)
+    np.testing.assert_allclose(spine.point_force, 0.2 * 2.0 * peak, rtol=1e-13)
+    assert spine.point_stable.values.all()
+
+
+def test_a_duffing_oscillator_in_quadrature_by_scipy():
+    spine = sl.backbone(forced.with_values(cubic=1.0), (0.05, 2.0), phase="quadrature")
+    last = spine.isel(point=-1)
+
+    def defining(u):
+        x, v, omega, force = u
+
+        def rates(t, y):
+            drive = np.cos(omega * t + 0.3)
+            return [y[1], force * drive - 0.2 * y[1] - 4 * y[0] - y[0] ** 3, y[0] * drive]
+
+        period = 2 * np.pi / omega
+        run = solve_ivp(
+            rates, (0, period), [x, v, 0.0], method="DOP853", rtol=1e-12, atol=1e-13,
+            events=lambda t, y: y[1],
+        )  # fmt: skip
+        top = max(state[0] for state in run.y_events[0])
+        return [run.y[0, -1] - x, run.y[1, -1] - v, run.y[2, -1], top - 2.0]
+
+    known = [last[f"point_{name}"].item() for name in ("x", "v", "omega", "force")]
+    other = root(defining, np.array(known) * (1 + 1e-4), tol=1e-11)
+    np.testing.assert_allclose(known, other.x, rtol=1e-8, atol=1e-8)
+
+
+def test_the_rig_in_quadrature_goes_over_into_free_vibration():
+    """The frequencies differ by the square of the damping. The rig rests on its lower stop."""
+    rig = sl.models.delangre("b").with_values(damping_ratio=4e-3)
+    spine = sl.backbone(rig, ("0.3 mm", "1 mm"), phase="quadrature", points=200)
+    assert spine.attrs["end"] == "range"
+    high = spine.point_output_maximum.values[-1, 0]
+    assert spine.backbone_frequency.values[-1] == pytest.approx(by_energy("b", high), rel=4e-3**2)
+
+
+def test_what_has_no_quadrature_is_said_in_a_sentence():
+    wrong = {
+        "isn't forced": (duffing, {}),
+        "no parameter 'forces'": (forced, {"force": "forces"}),
+        "isn't the amplitude of a force": (forced, {"force": "c"}),
+        "1 modes of small": (forced, {"mode": 2}),
+    }
+    for message, (system, more) in wrong.items():
+        with pytest.raises(ParameterError, match=message):
+            sl.backbone(system, (0.1, 1.0), phase="quadrature", **more)
+    with pytest.raises(ParameterError, match='phase= is "free" or "quadrature"'):
+        sl.backbone(forced, (0.1, 1.0), phase="90 degrees")
+
+
+# -- the verb --------------------------------------------------------------------------------------
 def test_what_has_no_backbone_is_said_in_a_sentence():
     rig = sl.models.delangre("a")
     wrong = {

@@ -116,4 +116,4 @@ def test_orbits_without_contact_end_at_the_graze_of_the_closed_form():
     found = sl.branches(STOP, {"force": (0.3, 0.5)}, start, at=1, progress=False)
     grazes = found.event_force.values[found.event_kind.values == "graze"]
     exact = float(value("laws_impact", "I03g"))
-    assert np.abs(grazes - exact).min() < 4e-16
+    assert np.abs(grazes - exact).min() < 1e-14  # rounding of the flow over a period

@@ -93,6 +93,8 @@ def test_boundaries_may_differ_between_trajectories():
 def test_a_state_called_velocity_keeps_both_variables():
     assert schema.contact_name("x") == "contact_x"
     assert schema.contact_name("velocity") == "contact_state_velocity"
+    assert schema.before_name("x") == "contact_x_before"
+    assert schema.before_name("mode") == "contact_state_mode_before"
     x = np.zeros((1, 49))
     run = sine_run(
         states=("x", "velocity"),

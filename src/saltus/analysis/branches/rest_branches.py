@@ -1,0 +1,267 @@
+"""Branches of equilibria: followed in each mode, from mode to mode through boundary equilibria, and
+on to the limit cycles that are born at their Hopf points.
+
+At a boundary equilibrium a branch of one mode ends and one of another begins: on the other side of
+the parameter, *persistence*, or on the same one, a *nonsmooth fold*. di Bernardo, Budd, Champneys &
+Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapter 5.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from saltus.analysis.branches.arclength import ENDING, Curve, tangents
+from saltus.analysis.branches.rests import Rests
+from saltus.analysis.branches.special_points import SpecialPoint
+from saltus.analysis.branches.tracing import (
+    Branch,
+    Plan,
+    Seed,
+    both_ways,
+    branch_of,
+    crossing,
+    refine,
+    trace,
+)
+from saltus.analysis.orbits.special_equilibria import (
+    SpecialEquilibrium,
+    boundary_equilibrium,
+    fold_point,
+    hopf_point,
+)
+from saltus.system.system import System
+
+#: Newton's method on a defining system finds the point that was bracketed, within this distance in
+#: units of the scale.
+SAME = 1e-5
+#: Rates that vanish on one side of a boundary and are smaller than this on the other, in units of
+#: their derivatives, vanish there too.
+CONTINUOUS = 1e-9
+#: A Lyapunov coefficient smaller than this, in units of the frequency, has no sign.
+NEUTRAL = 1e-9
+#: Most states of a system whose third derivatives are written down.
+MOST_STATES = 8
+#: How often the interval around a change of stability is halved.
+CLOSER = 6
+#: Two events nearer than this, in units of the scale, are one.
+ONE = 1e-8
+
+
+@dataclass
+class RestBranch(Branch):
+    """A branch of equilibria in one mode.
+
+    Attributes
+    ----------
+    borders : tuple of SpecialPoint or None
+        The boundary equilibria at its first and at its last point.
+    beyond : tuple of float64[z] or None
+        The direction in which the branch in the mode behind each begins, in units of the scale.
+    """
+
+    orbits: Rests  # type: ignore[assignment]
+    borders: list[SpecialPoint | None] = field(default_factory=lambda: [None, None])
+    beyond: list[np.ndarray | None] = field(default_factory=lambda: [None, None])
+
+    def find_events(self) -> None:
+        """Locate what happens along the branch; see :class:`Branch`."""
+        self._end()
+        super().find_events()
+        self.events = [_finished(self, event) for event in self.events]
+        for _ in range(CLOSER):  # so that a picture shows where stability changes
+            at = {event.after for event in self.events if event.kind in ("fold", "hopf")}
+            refine(self, sorted(at))
+
+    def _contacts(self) -> list[SpecialPoint]:
+        """The boundary equilibria at the ends."""
+        places = (0, max(len(self.z) - 2, 0))
+        return [
+            replace(border, after=place)
+            for border, place in zip(self.borders, places, strict=True)
+            if border is not None
+        ]
+
+    def _end(self) -> None:
+        """Put the boundary equilibria in the place of the ends that lie beside them."""
+        for side, place in ((0, 0), (1, -1)):
+            if self.ends[side] == "boundary_equilibrium" and self.borders[side] is None:
+                _meet_boundary(self, side, place)
+
+    def is_known(self, branches: Sequence[Branch]) -> bool:
+        """See :class:`Branch`: a branch that crosses another may have been followed through there,
+        which can't be told from where they cross.
+        """
+        return branch_of(self.z[len(self.z) // 2], 1, branches) >= 0
+
+    def children(self, plan: Plan, number: int) -> Iterator[Seed]:
+        """Seeds of the branches of equilibria that leave it; see :class:`Branch`."""
+        unit, size = self.scale[: self.orbits.size], self.orbits.size
+        for index, event in enumerate(self.events):
+            points, own = event.z[None, :size], event.z[size:]
+            if event.kind == "branch_point" and event.kind in plan.switch:
+                for sign in (1.0, -1.0):
+                    yield Seed(points, own, unit, sign * crossing(event), (number, index))
+            if event.kind != "boundary_equilibrium":
+                continue
+            for border, beyond in zip(self.borders, self.beyond, strict=True):
+                if border is not None and beyond is not None and (border.z == event.z).all():
+                    yield Seed(points, own, unit, beyond, (number, index))
+
+
+def trace_rests(
+    plan: Plan, system: System, name: str, seeds: Sequence[Seed], branches: list[Branch]
+) -> list[Seed]:
+    """Add the branches of equilibria that seeds lie on, and those that leave them, to a list.
+
+    Parameters
+    ----------
+    plan : Plan
+        Of the limit cycles.
+    system : System
+        Without forcing.
+    name : str
+        The parameter.
+    seeds : sequence of Seed
+        Equilibria.
+    branches : list of Branch
+        What is found is added to it.
+
+    Returns
+    -------
+    list of Seed
+        Of the limit cycles that are born at Hopf points.
+    """
+    follow = functools.partial(both_ways, ends=_left, kind=RestBranch)
+
+    def make(_: int, scale: np.ndarray) -> Any:
+        return Rests(system, name, scale)
+
+    mine = replace(plan, make=make, follow=follow)
+    trace(mine, seeds, branches)
+    rests = [(i, one) for i, one in enumerate(branches) if isinstance(one, RestBranch)]
+    known: list[SpecialPoint] = []
+    for _, branch in rests:
+        branch.events = [event for event in branch.events if not _told(branch, event, known)]
+        known += [event for event in branch.events if event.kind == "boundary_equilibrium"]
+    return [
+        _born(branch, event, (number, index))
+        for number, branch in rests
+        for index, event in enumerate(branch.events)
+        if event.kind == "hopf"
+    ]
+
+
+def _left(orbits: Rests, curve: Curve) -> str:
+    """``boundary_equilibrium`` if a curve has just left its mode."""
+    ends = orbits.sides(np.stack([curve.z[0], curve.z[-1]]))
+    return "boundary_equilibrium" if (ends[0] != ends[1]).any() else ""
+
+
+def _told(branch: RestBranch, event: SpecialPoint, known: Sequence[SpecialPoint]) -> bool:
+    """Whether a boundary equilibrium is the end of a branch that came from its other side."""
+    return event.kind == "boundary_equilibrium" and any(
+        np.abs((event.z - other.z) / branch.scale).max() < ONE for other in known
+    )
+
+
+# -- Hopf points and folds -------------------------------------------------------------------------
+def _finished(branch: RestBranch, event: SpecialPoint) -> SpecialPoint:
+    """An event by the name that it has of equilibria, solved for by its defining system."""
+    if event.kind not in ("fold", "neimark_sacker"):
+        return event
+    orbits, outcome = branch.orbits, ""
+    size = orbits.size
+    if event.kind == "neimark_sacker":
+        event = replace(event, kind="hopf")
+    if size > MOST_STATES:
+        return event
+    solve = hopf_point if event.kind == "hopf" else fold_point
+    found = _solved(branch, event.z, solve)
+    if found is None:
+        return event
+    if event.kind == "hopf" and abs(found.coefficient) > NEUTRAL * found.frequency:
+        outcome = "supercritical" if found.coefficient < 0 else "subcritical"
+    return replace(event, z=np.append(found.state, found.value), outcome=outcome)
+
+
+def _solved(
+    branch: RestBranch, z: np.ndarray, solve: Callable[..., SpecialEquilibrium | None]
+) -> SpecialEquilibrium | None:
+    """The special equilibrium at the unknowns float64[z]; None where another one is found."""
+    orbits, size = branch.orbits, branch.orbits.size
+    system = orbits.system.with_values(**{orbits.names[0]: float(z[-1])})
+    found = solve(system, orbits.names[0], z[:size], branch.scale[:size])
+    if found is None:
+        return None
+    apart = np.abs((np.append(found.state, found.value) - z) / branch.scale).max()
+    return found if apart < SAME else None
+
+
+def _born(branch: RestBranch, event: SpecialPoint, parent: tuple[int, int]) -> Seed:
+    """The limit cycle that is born at a Hopf point."""
+    orbits, size, unit = branch.orbits, branch.orbits.size, branch.scale
+    matrix = orbits.jacobian(event.z[None], orbits.modes[[branch.row]])[0, :, :size]
+    values, vectors = np.linalg.eig(matrix * unit[:size] / unit[:size, None])
+    here = int(np.argmin(np.where(values.imag > 0, np.abs(values.real), np.inf)))
+    vector = vectors[:, here]
+    turned = vector * np.exp(-0.5j * np.angle((vector * vector).sum()))
+    way = np.concatenate([turned.real / np.linalg.norm(turned.real), [0.0, 0.0]])
+    own = np.array([2.0 * np.pi / values[here].imag, event.z[-1]])
+    return Seed(event.z[None, :size], own, unit[:size], way, parent)
+
+
+# -- boundaries ------------------------------------------------------------------------------------
+def _meet_boundary(branch: RestBranch, side: int, place: int) -> None:
+    """Put the boundary equilibrium before the first or behind the last point of a branch."""
+    orbits, row, z = branch.orbits, branch.row, branch.z[place]
+    out = branch.tangent[place] * (1.0 if side else -1.0)
+    gaps, slopes = orbits.gaps(z, row)
+    with np.errstate(all="ignore"):
+        far = -gaps / (slopes @ out)
+    guard = int(np.argmin(np.where(far > 0, far, np.inf)))
+    system = orbits.system.with_values(**{orbits.names[0]: float(z[-1])})
+    size, unit = orbits.size, branch.scale
+    found = boundary_equilibrium(system, orbits.names[0], guard, z[:size], unit[:size])
+    if found is None:
+        return
+    end, one = np.append(found.state, found.value), np.array([row])
+    apart = float(np.linalg.norm((end - z) / unit))
+    if apart > 4 * ENDING:
+        return
+    derivative = orbits.evaluate(end[None], one)[1]
+    tangent = tangents(derivative, out[None])[0]
+    outcome, branch.beyond[side] = _behind(branch, end, guard, tangent)
+    own = orbits.multipliers(end[None], derivative, one)
+    tangent = tangent if side else -tangent
+    branch.borders[side] = SpecialPoint(
+        "boundary_equilibrium", 0, end, tangent, own[0], derivative[0], (guard,), np.nan, outcome
+    )
+    at = len(branch.z) if side else 0
+    length = branch.length[place] + (apart if side else -apart)
+    new = {"z": end, "tangent": tangent, "derivative": derivative[0], "length": length}
+    for name, value in {**new, "multipliers": own[0]}.items():
+        setattr(branch, name, np.insert(getattr(branch, name), at, value, axis=0))
+    branch.length = branch.length - branch.length[0]
+
+
+def _behind(
+    branch: RestBranch, z: np.ndarray, guard: int, out: np.ndarray
+) -> tuple[str, np.ndarray | None]:
+    """How the equilibria go on behind a boundary, and in which direction, in units of the scale."""
+    if branch.orbits.system.guards[guard].law is not None:
+        return "", None
+    other, one = branch.orbits.across(z, branch.row, guard), np.array([0])
+    residual, derivative = other.evaluate(z[None], one)
+    if not np.isfinite(derivative).all() or np.abs(residual).max() > CONTINUOUS:
+        return "", None
+    way = tangents(derivative, out[None])[0]
+    opens = other.gaps(z, 0)[1][guard] @ way
+    if (opens > 0) != other.modes[0, guard]:
+        way = -way
+    outcome = "persistence" if way[-1] * out[-1] > 0 else "nonsmooth_fold"
+    return outcome, way

@@ -1,0 +1,118 @@
+"""[bifurcation_curve]: a bifurcation of the study's branches over two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from saltus.errors import StudyError, nearest, shown
+from saltus.results.dataset.schema import event_name, point_name
+from saltus.results.provenance import to_json
+from saltus.results.wording import unit_of
+from saltus.study.answers.branches import DIGITS, Branches
+from saltus.study.answers.question import Answers, OneVerb, Question, Show, first_figure
+from saltus.study.setting import quantities
+from saltus.study.table import ROWS, quantity, table, words
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from saltus.study.setting.setting import Setting
+    from saltus.study.table import TextTable
+
+
+class Curve(OneVerb):
+    """A curve of bifurcations."""
+
+    place, function = "bifurcation_curve", "bifurcation_curve"
+
+    def check(self, table: Any, setting: Setting) -> None:  # noqa: ARG002
+        """Which event of which branches."""
+        self.kind, self.near, self.of = table.event, table.near, table.branches
+
+    def join(self, asked: Sequence[Question]) -> None:
+        """Find the branches among the questions of the study."""
+        known = {one.title: one for one in asked if isinstance(one, Branches)}
+        if not known:
+            raise StudyError(
+                f"[{self.place}] begins at a bifurcation of branches. Give the study a table "
+                "[branches]."
+            )
+        if self.of is None and len(known) > 1:
+            raise StudyError(
+                f"[{self.place}] needs the name of one of {len(known)} [[branches]]: branches = "
+                f'"{next(iter(known))}".'
+            )
+        if self.of is not None and self.of not in known:
+            raise StudyError(
+                f"[{self.place}] no [branches] are called {shown(self.of)}. "
+                f"{nearest(self.of, known)}"
+            )
+        branches = known[self.of or next(iter(known))]
+        self.needs = (branches.stem,)
+        self.parent = to_json(branches.identity())
+        (name,) = branches.arguments["vary"]
+        if self.near is not None:
+            place = f"{self.place}.near"
+            self.near = quantities.parameters(self.system, {name: self.near}, place)[name]
+
+    def identity(self) -> dict[str, str]:
+        """Also of the branches at which it begins."""
+        return super().identity() | {"near": to_json(self.near), "branches": self.parent}
+
+    def compute(self, found: Answers, threads: int | None, progress: Show) -> xr.Dataset:
+        """Follow the bifurcation that was meant."""
+        self.arguments["event"] = self._event(found[self.needs[0]])
+        try:
+            return super().compute(found, threads, progress)
+        finally:
+            self.arguments["event"] = self.kind
+
+    def _event(self, ds: xr.Dataset) -> xr.Dataset:
+        """The event of that kind which is nearest to a value, or the only one."""
+        here = np.flatnonzero(ds["event_kind"].values == self.kind)
+        at = ds[event_name(ds.attrs["parameter"])].values[here]
+        if not len(here) or (self.near is None and len(here) > 1):
+            parameter = ds.attrs["parameter"].replace("_", " ")
+            many = f"{len(here)} events" if len(here) else "no event"
+            raise StudyError(
+                f"[{self.place}] the branches have {many} of the kind {self.kind!r}."
+                + (f" Say near which {parameter}: near = ..." if len(here) else "")
+            )
+        nearest_one = 0 if self.near is None else int(np.argmin(np.abs(at - self.near)))
+        return ds.isel(event=int(here[nearest_one]))
+
+    def rows(self, ds: xr.Dataset, found: Answers) -> list[TextTable]:  # noqa: ARG002
+        """Points of codimension two, after some points of the curve."""
+        names = (ds.attrs["parameter_x"], ds.attrs["parameter_y"])
+        along = [
+            quantity(name.replace("_", " "), ds[point_name(name)].values,
+                     unit_of(ds[point_name(name)]), DIGITS)
+            for name in names
+        ]  # fmt: skip
+        along.append(words("contacts", ds["point_itinerary"].values))
+        count = ds.sizes["point"]
+        shown_rows = np.unique(np.linspace(0, count - 1, ROWS).astype(int)).tolist()
+        kind = ds.attrs["bifurcation"].replace("_", " ")
+        note = f"{kind}: {count} points; it ends with {ds.attrs['begin']} and {ds.attrs['end']}."
+        tables = [table(self.title, along, (note,), shown_rows)]
+        if ds.sizes["codim2"]:
+            special = [words("point", [one.replace("_", " ") for one in ds["codim2_kind"].values])]
+            special += [
+                quantity(name.replace("_", " "), ds[f"codim2_{name}"].values,
+                         unit_of(ds[f"codim2_{name}"]), DIGITS)
+                for name in names
+            ]  # fmt: skip
+            rows = list(range(min(ds.sizes["codim2"], ROWS)))
+            tables.append(table(f"{self.title}: codimension two", special, (), rows))
+        return tables
+
+    def pictures(self, ds: xr.Dataset) -> dict[str, Any]:
+        """The curve in the plane of both parameters."""
+        from saltus import plot
+
+        axes = plot.bifurcation_curves(ds)
+        axes.set_title(self.title, loc="left")
+        return {"": first_figure(axes)}
