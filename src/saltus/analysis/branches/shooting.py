@@ -65,8 +65,9 @@ class PeriodicOrbits:
         self.size, self.free = len(system.states), system.forced_at is None
         self.parametric = parametric(system, self.names)
         self._turns = system.period({system.forced_at: 1.0}) if system.forced_at else 1.0
+        few = method.suited_to(1)  # tangents make many states: wide lanes don't pay
         self.map = Stroboscope(
-            self.parametric.system, method, every=1.0 if self.parametric.timed else None,
+            self.parametric.system, few, every=1.0 if self.parametric.timed else None,
             threads=threads,
         )  # fmt: skip
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
