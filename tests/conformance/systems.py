@@ -33,6 +33,22 @@ def lab(
     ) - spring * x - damping * v - cubic * x**3 - contact
 
 
+@sl.system(states="a b c u v w")
+def pinched(t, a, b, c, u, v, w, *, middle=1.0, restitution=1.0):
+    """Two balls on both sides of a third, all on one line."""
+    return (
+        u, v, w, 0.0, 0.0, 0.0,
+        sl.impact(a < b, u - v, restitution=restitution, inertia=(1.0, middle)),
+        sl.impact(b < c, v - w, restitution=restitution, inertia=(middle, 1.0)),
+    )  # fmt: skip
+
+
+@sl.system(states="x v")
+def ball_of_clay(t, x, v, *, slope=1.0):
+    """It falls on a stop at 0, with a restitution that depends on the speed."""
+    return v, -1.0, sl.impact(x > 0, -v, restitution=0.5 + slope * v)
+
+
 @sl.system(states="x v a j")
 def quartic(t, x, v, a, j, *, snap=24.0, push=0.0, lacunary=0.0):
     """x is a polynomial of degree 4 in time: gaps of any shape, exact in a single step of any

@@ -16,7 +16,8 @@ import pytest
 from scipy.optimize import brentq
 
 import saltus as sl
-from conformance.systems import bits, lab
+from conformance.systems import ball_of_clay, bits, lab, pinched
+from saltus.errors import SaltusWarning
 from saltus.flow import engine
 from saltus.flow.methods import METHODS
 from saltus.study.setting.setting import method_of
@@ -154,6 +155,69 @@ def test_impacts_that_accumulate_are_completed_or_named(method):
         assert (str(run.status.values), float(run.end_x)) == ("ok", 0.0)
     else:
         assert str(run.status.values) in ("budget_events", "turned")
+
+
+#: Both balls of `pinched` meet the third at 1, with the speed 1.
+BOTH_SIDES = (-1.0, 0.0, 1.0, 1.0, 0.0, -1.0)
+
+
+def of_pinched(method, start=BOTH_SIDES, **values):
+    """Status, end and velocities there of a run of 2 s."""
+    run = sl.simulate(
+        pinched.with_values(**values), start, t_end=2.0, samples=1, method=method,
+        time_errors="local",
+    )  # fmt: skip
+    return str(run.status.values), float(run.end_time), [float(run[f"end_{n}"]) for n in "uvw"]
+
+
+@every
+def test_impacts_at_one_instant_whose_order_matters_end_a_trajectory(method):
+    """Equal elastic balls exchange velocities, in any order; three of masses 1, 3, 1 end as -0.5,
+    -0.25, 1.25 or as the mirror of it, and with e = 0.5 the orders differ too.
+    """
+    assert of_pinched(method) == ("ok", 2.0, [-1.0, 0.0, 1.0])
+    for values in ({"middle": 3.0}, {"restitution": 0.5}):
+        with pytest.warns(SaltusWarning, match="depends on which is taken first"):
+            status, end, velocities = of_pinched(method, **values)
+        assert (status, velocities) == ("ambiguous_impact", [1.0, 0.0, -1.0])
+        assert end == pytest.approx(1.0, abs=1e-12 if method.records_contacts else 0.21)
+
+
+@pytest.mark.parametrize(
+    "method", [one for one in EVERY if one.records_contacts], ids=lambda one: one.label
+)
+def test_one_of_two_impacts_a_little_later_is_no_question(method):
+    for sign in (-1, 1):
+        moved = (-1.0 + 1e-9 * sign, *BOTH_SIDES[1:])
+        status, _, velocities = of_pinched(method, moved, middle=3.0)
+        assert status == "ok"
+        first = [-0.5, -0.25, 1.25] if sign > 0 else [-1.25, 0.25, 0.5]
+        assert velocities == pytest.approx(first, abs=1e-12)
+
+
+@every
+def test_a_restitution_that_leaves_its_bounds_ends_a_trajectory(method):
+    """Of 0.5 + v or 0.5 - v: at -sqrt(2) it is negative or above 1, at -0.1 it is 0.4 or 0.6. At
+    the start it is an initial condition.
+    """
+
+    def run(slope, start, t_end):
+        return sl.simulate(
+            ball_of_clay.with_values(slope=slope), start, t_end=t_end, samples=1, method=method,
+            time_errors="local",
+        )  # fmt: skip
+
+    for slope in (1.0, -1.0):
+        for start in ((1.0, 0.0), (0.0, -math.sqrt(2.0))):
+            with pytest.warns(SaltusWarning, match=r"outside \[0, 1\]"):
+                found = run(slope, start, 3.0)
+            assert str(found.status.values) == "invalid_restitution"
+            assert int(found.events) == 0
+            off = 3.0 * method.noise if method.records_contacts else 0.31
+            assert float(found.end_v) == pytest.approx(-math.sqrt(2.0), abs=off)
+        if method.records_contacts:
+            found = run(slope, (0.005, 0.0), 0.11)
+            assert found.contact_v.values == pytest.approx([0.05 - slope * 0.01], rel=0.03)
 
 
 @sl.system(states="v")

@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import brentq
 
 import saltus as sl
+from conformance.systems import ball_of_clay, pinched
 from saltus.errors import ParameterError, SaltusWarning
 
 
@@ -206,15 +207,6 @@ def test_a_row_of_balls_that_touch_hands_its_momentum_on():
     assert str(run.status.values) == "ok"
 
 
-@sl.system(states="a b c u v w")
-def pinched(t, a, b, c, u, v, w, *, middle=1.0, restitution=1.0):
-    return (
-        u, v, w, 0.0, 0.0, 0.0,
-        sl.impact(a < b, u - v, restitution=restitution, inertia=(1.0, middle)),
-        sl.impact(b < c, v - w, restitution=restitution, inertia=(middle, 1.0)),
-    )  # fmt: skip
-
-
 def test_balls_that_strike_one_from_both_sides_at_once():
     """Equal elastic ones exchange velocities, in any order; three of masses 1, 3, 1 end as -0.5,
     -0.25, 1.25 or as the mirror of it, and with e = 0.5 the orders differ too.
@@ -283,11 +275,6 @@ def test_impacts_at_the_very_end_have_an_order_too():
 
 def test_a_restitution_that_leaves_its_bounds_on_the_way():
     """Of 0.5 + v: at -sqrt(2) it is negative; at -0.1 it is 0.4."""
-
-    @sl.system(states="x v")
-    def ball_of_clay(t, x, v, *, slope=1.0):
-        return v, -1.0, sl.impact(x > 0, -v, restitution=0.5 + slope * v)
-
     for slope in (1.0, -1.0):
         with pytest.warns(SaltusWarning, match=r"outside \[0, 1\]"):
             run = sl.simulate(ball_of_clay.with_values(slope=slope), (1.0, 0.0), t_end=3.0)

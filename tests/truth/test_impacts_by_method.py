@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import saltus as sl
+from conformance.systems import ball_of_clay, pinched
 from saltus.errors import ParameterError, SaltusWarning
 from saltus.flow import engine
 from saltus.flow.maps import Stroboscope
@@ -304,6 +305,80 @@ def test_a_row_of_balls_that_touch_hands_its_momentum_on(method):
     np.testing.assert_allclose(times(found, "impact"), [1.0, 1.0], rtol=0, atol=1e-12)
     assert [float(found[f"end_{name}"]) for name in "uvw"] == [0.0, 0.0, 1.0]
     assert str(found.status.values) == "ok"
+
+
+# -- several at one instant, and restitutions that the equation gives -----------------------------
+@pytest.mark.nojit
+@every
+def test_impacts_at_one_instant_have_an_order_or_end_the_trajectory(method):
+    """Of masses 1, 1, 1 all orders exchange the velocities; of 1, 3, 1 and with e = 0.5 they lead
+    to different states. Met on the way, and as an initial condition.
+    """
+    for apart, meets in ((0.01, 0.01), (0.0, 0.0)):
+        start = (-apart, 0.0, apart, 1.0, 0.0, -1.0)
+        found = run(pinched, start, method, 0.015, samples=1)
+        assert [float(found[f"end_{name}"]) for name in "uvw"] == [-1.0, 0.0, 1.0]
+        for values in ({"middle": 3.0}, {"restitution": 0.5}):
+            with pytest.warns(SaltusWarning, match="depends on which is taken first"):
+                found = run(pinched.with_values(**values), start, method, 0.015, samples=1)
+            assert str(found.status.values) == "ambiguous_impact"
+            assert [float(found[f"end_{name}"]) for name in "uvw"] == [1.0, 0.0, -1.0]
+            assert int(found.events) == 0
+            late = 0.0021 if method in NOT_LOCATED else 1e-12
+            assert float(found.end_time) == pytest.approx(meets, abs=late)
+
+
+@located
+def test_one_of_two_impacts_a_little_later_has_its_own_outcome(method):
+    """Masses 1, 3, 1; the third comes 1e-9 s behind the first, or before it."""
+    for later, exact in ((1e-9, [-0.5, -0.25, 1.25]), (-1e-9, [-1.25, 0.25, 0.5])):
+        start = (-0.01, 0.0, 0.01 + later, 1.0, 0.0, -1.0)
+        found = run(pinched.with_values(middle=3.0), start, method, 0.02, samples=1)
+        assert str(found.status.values) == "ok"
+        assert [float(found[f"end_{n}"]) for n in "uvw"] == pytest.approx(exact, abs=1e-12)
+
+
+@every
+def test_impacts_that_have_nothing_to_do_with_each_other_may_coincide(method):
+    @sl.system(states="x y v w")
+    def two(t, x, y, v, w):
+        return (
+            v, w, -1.0, -1.0,
+            sl.impact(x > 0, -v, restitution=0.5), sl.impact(y > 0, -w, restitution=0.9),
+        )  # fmt: skip
+
+    found = run(two, (0.5, 0.5, 0.0, 0.0), method, 1.25, samples=1)
+    assert str(found.status.values) == "ok"
+    late = 0.1 if method in NOT_LOCATED else 1e-6
+    assert times(found, "impact") == pytest.approx([1.0, 1.0], abs=late)
+    assert float(found.end_v) == pytest.approx(0.5 - 0.25, abs=2 * late)
+    assert float(found.end_w) == pytest.approx(0.9 - 0.25, abs=2 * late)
+
+
+@pytest.mark.nojit
+@every
+def test_an_impossible_restitution_is_named_at_the_impact(method):
+    """Of 0.5 + v: at -1 it is -0.5, at -0.1 it is 0.4. On the way and as an initial condition."""
+    start = {"x": [0.01, 0.0], "v": [-1.0, -1.0]}
+    with pytest.warns(SaltusWarning, match=r"outside \[0, 1\]"):
+        found = run(ball_of_clay, start, method, 0.03, samples=1)
+    assert found["status"].values.tolist() == ["invalid_restitution"] * 2
+    assert found["events"].values.tolist() == [0, 0]
+    late = 0.004 if method in NOT_LOCATED else 1e-6
+    assert found["end_time"].values == pytest.approx([math.sqrt(1.02) - 1.0, 0.0], abs=late)
+    assert found["end_x"].values == pytest.approx([0.0, 0.0], abs=late)
+    found = run(ball_of_clay, (0.0, -0.1), method, 0.03, samples=1)
+    assert float(found.end_v) == pytest.approx(0.04 - 0.03, abs=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore::saltus.errors.SaltusWarning")
+@every
+def test_what_ends_a_trajectory_is_the_same_in_any_pieces(method, monkeypatch):
+    start = {"x": np.array([0.02, 0.005, 0.3, 0.0]), "v": np.array([-0.1, -0.2, 0.5, -1.0])}
+    whole = run(ball_of_clay, start, method, 2.0, samples=7)
+    assert whole["status"].values.tolist()[2:] == ["invalid_restitution"] * 2
+    monkeypatch.setattr(engine, "SLICE", 7)
+    assert whole.equals(run(ball_of_clay, start, method, 2.0, samples=7, threads=1))
 
 
 # -- impacts that accumulate -----------------------------------------------------------------------

@@ -73,7 +73,7 @@ TAYLOR = Interface(
     arguments=BATCH + _TAYLOR_WORK,
     layout="taylor_layout",
     templates=("clocks", "taylor_singular", "taylor_crossings", "taylor_step", "taylor_contacts",
-        "taylor_laws", "taylor_together", "taylor_lanes"),
+        "impacts", "taylor_laws", "taylor_together", "taylor_lanes"),
     sizes=(
         "NSTATES", "NGUARDS", "ORDER", "NCONST", "NTURNS", "CLOCK_ROW", "GAP_ROW", "SCALE_ROW",
         "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
@@ -137,9 +137,10 @@ def _one_by_one(
         entry="propagate",
         arguments=(*BATCH, _F1),
         layout="steps_layout",
-        templates=(*templates, "steps_laws", "trajectory"),
+        templates=(*templates, "impacts", "steps_laws", "trajectory"),
         sizes=(
             "NSTATES",
+            "NMOVED",
             "NGUARDS",
             "NCONST",
             "NDRIVE",

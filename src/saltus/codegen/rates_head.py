@@ -15,7 +15,13 @@ from saltus.codegen.clocks import Clocks
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.saltation import jump_function, reset_function
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
-from saltus.codegen.taylor_head import bits_of, evaluation_order, tables, tables_of_laws
+from saltus.codegen.taylor_head import (
+    bits_of,
+    count_moved,
+    evaluation_order,
+    tables,
+    tables_of_laws,
+)
 from saltus.errors import ParameterError
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
@@ -169,7 +175,8 @@ def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool =
         value = prepare.value(node)
         prepare.lines.append(f"c[{i}] = {value}")
     sizes: dict[str, Constant] = dict(
-        NSTATES=len(system.states), NGUARDS=len(gaps), NCONST=len(stages.constants.nodes),
+        NSTATES=len(system.states), NMOVED=count_moved(system), NGUARDS=len(gaps),
+        NCONST=len(stages.constants.nodes),
         NDRIVE=len(stages.drives.nodes),
         TANGENT=system.tangent_of is not None,
         GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),

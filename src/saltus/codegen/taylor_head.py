@@ -142,7 +142,7 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
     builder, constants = SeriesBuilder(clocks), Constants()
     aside = set_aside(system.field, system.guards)
     own, column = (system.tangent_of or system).states, first_column(system)
-    moved = len([name for name in own if not is_remembered(name)])
+    moved = count_moved(system)
     written = (*range(len(own)), *column)
     fields = tuple(builder.form(aside.field[i]) for i in written)
     code = JetCode(
@@ -197,6 +197,14 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         f"@inner\ndef rates(y, side, c, clock, work):\n{indented(rates)}\n",
     ]
     return Head(constants_of_head, "\n".join(functions))
+
+
+def count_moved(system: System) -> int:
+    """How many states of a system move by its equation: those before a tangent and before what is
+    remembered.
+    """
+    own = (system.tangent_of or system).states
+    return len([name for name in own if not is_remembered(name)])
 
 
 def tables_of_laws(system: System) -> dict[str, list]:

@@ -9,7 +9,16 @@ Symbols
 g, m guards; t_hit the time of the contact; t_leg that of the contact before. Times in s.
 """
 
-from saltus.kernels.status import CROSSING, IMPACT, IMPACT_LAW, JUMP_LAW, SURFACE_LAW
+from saltus.kernels.status import (
+    CROSSING,
+    IMPACT,
+    IMPACT_LAW,
+    INVALID_RESTITUTION,
+    JUMP_LAW,
+    OK,
+    RUNNING,
+    SURFACE_LAW,
+)
 
 #: Flights in a row that are too short to be told, after which impacts count as accumulating.
 MOST_AT_ONCE = 20
@@ -61,14 +70,50 @@ def strike_all(i, t_hit, batch, work):
     """The jumps of the state in NEXT: of the gaps that close at t_hit, and of those beyond whose
     boundaries another one has carried it. Needs q at t_hit in Q.
     """
+    have_an_order(i, t_hit, standing(i, t_hit, batch, work), NEXT, batch, work)
     struck = 0
     for _ in range(NGUARDS):
         for g in range(NGUARDS):
-            if not struck >> g & 1 and (
-                strikes(work, g) or (struck != 0 and carried_past(i, g, t_hit, batch, work))
+            runs = batch.status[i] == RUNNING
+            if (
+                runs
+                and not struck >> g & 1
+                and (strikes(work, g) or (struck != 0 and carried_past(i, g, t_hit, batch, work)))
             ):
                 struck |= 1 << g
                 strike(i, g, t_hit, True, batch, work)
+
+
+@kernel
+def standing(i, t_hit, batch, work):
+    """Bits of the stops at which the state in NEXT is: it lies beyond them, or neither rounding nor
+    the time within which contacts can't be told apart tells it from them.
+    """
+    gap_roundings(i, t_hit, BEFORE, batch, work)
+    gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
+    stops, strikes_one = 0, False
+    for g in range(NGUARDS):
+        near = at_once(i, t_hit, batch) * abs(work[RATE + g]) + FLAT * work[BEFORE + g]
+        stands = LAW[g] == IMPACT_LAW and work[AT_NEXT + g] * LAW_SIDE[g] <= near
+        stops |= (1 if stands else 0) << g
+        strikes_one |= LAW[g] == IMPACT_LAW and strikes(work, g)
+    return stops if strikes_one else 0
+
+
+@kernel
+def have_an_order(i, time, stops, state, batch, work):
+    """End the trajectory where impacts of one instant have no order, or an impossible one. Needs q
+    in Q.
+    """
+    if stops & (stops - 1) == 0:
+        return
+    for j in range(NSTATES):
+        work[TOGETHER + j] = work[state + j]
+    rows, told = part(work, TOGETHER, 5 * NSTATES), part(work, TOLD, 2)
+    p, h = batch.param[i * batch.stride], part(work, H, HELD * NCLOCKS)
+    outcome = order_of_impacts(time, rows, p, h, batch.mode[i], stops, told)
+    if outcome != OK:
+        batch.status[i] = outcome
 
 
 @inner
@@ -85,6 +130,9 @@ def strike(i, g, t_hit, told, batch, work):
     """
     before = batch.mode[i]
     after = leap(i, g, t_hit, NEXT, batch, work)
+    if not is_possible(g, part(work, TOLD, 2)):
+        batch.status[i] = INVALID_RESTITUTION
+        return
     work[LATE] = abs(work[BEFORE + g] / work[RATE + g]) if work[RATE + g] != 0.0 else 0.0
     if not work[TOLD + 1] > 0.0:
         gaps_at(t_hit, NEXT, Q, AT_NEXT, work)
@@ -173,11 +221,14 @@ def face(i, at, batch, work):
 @kernel
 def strike_at_start(i, t, t_end, batch, work):
     """Impacts of a state that starts on a stop: initial conditions, which no table tells."""
-    struck = False
+    struck, stops = False, 0
     for g in range(NGUARDS):
         work[LEFT + g], work[RIGHT + g] = 0.0, 0.0
+        on_stop = LAW[g] == IMPACT_LAW and abs(work[AT_NODE + g]) <= SMALLEST
+        stops |= (1 if on_stop else 0) << g
+    have_an_order(i, t, stops, NODE, batch, work)
     for g in range(NGUARDS):
-        if LAW[g] == IMPACT_LAW and abs(work[AT_NODE + g]) <= SMALLEST:
+        if stops >> g & 1 and batch.status[i] == RUNNING:
             for j in range(NSTATES):
                 work[NEXT + j] = work[NODE + j]
             strike(i, g, t, False, batch, work)

@@ -10,10 +10,11 @@ from saltus.kernels.clocks_layout import HELD, NUMBERS
 # keeps them in registers (measured: a few per cent). Where its parts start: vectors of states - the
 # ROWS of the method, the first of them the rate at the start of the step and the last the rate at
 # its end; the states there, a point between them, the error estimate divided by h, zeros, a rate
-# behind a jump of the state -
+# behind a jump of the state; where there are laws, five states at TOGETHER (see impacts.py) -
 K1, K_END = 0, NSTATES * (ROWS - 1)
-VECTORS, GAPS, DRIVES = ROWS + 6, 9, 2
-NODE, NEXT, POINT, ERROR, REST, BEHIND = (NSTATES * (ROWS + row) for row in range(6))
+VECTORS, GAPS, DRIVES = ROWS + (11 if LAWS else 6), 9, 2
+NODE, NEXT, POINT, ERROR, REST, BEHIND, TOGETHER = (NSTATES * (ROWS + row) for row in range(7))
+TRIED, AT_FIRST, BY_GUARDS, WAY = (NSTATES * row for row in range(1, 5))
 # gaps - at the ends of the step, the three of the root finder, their rates at a contact and those
 # of a state at rest, before a jump of the state, their rates behind it -
 AT_NODE, AT_NEXT, LEFT, RIGHT, TRY, RATE, RATE_AT_REST, BEFORE, RATE_BEHIND = (

@@ -123,7 +123,7 @@ def strike(lanes, lane, batch, g, rate, slow):
     now, parameters = time_of_law(lanes, lane, batch), batch.param[who * batch.stride]
     reset(now, slow.state, parameters, slow.held, mode, mode, g, slow.out)
     restitution, closing = slow.out[0], slow.out[1]
-    if LAW[g] == IMPACT_LAW and closing > 0.0 and not is_restitution(restitution):
+    if not is_possible(g, slow.out):
         lanes.memo[lane, FAULT] = INVALID_RESTITUTION
         return
     if closing > 0.0:

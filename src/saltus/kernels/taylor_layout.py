@@ -101,15 +101,12 @@ WATCHED = NGUARDS + NSINGULAR
 #: Part of a friction force by which the force needed exceeds it where slip begins, below which that
 #: is rounding.
 SLOW_START = 1.0e-9
-#: Part of the closing velocity of an impact by which the constraint of another contact changes, if
-#: it changes at all.
-FELT = 1.0e-9
 #: Part of the first closing velocity at which impacts of one instant, each caused by the one
-#: before, have come to an end for a comparison of orders, and for good; the most of them; landings
-#: at one instant before the rest of them is taken at once.
-ENDED, CLOSED, MOST_IMPACTS, MOST_STRIKES = 1.0e-12, 1.0e-16, 50_000, 50
-#: By how much rounding may carry a coefficient of restitution out of [0, 1].
-RESTITUTION_ROUNDING = 1.0e-12
+#: before, have come to an end for good; landings at one instant before the rest of them is taken at
+#: once.
+CLOSED, MOST_STRIKES = 1.0e-16, 50
+#: Rows of `slow.state` behind the state, where there are laws (see impacts.py).
+TRIED, AT_FIRST, BY_GUARDS, WAY = (NSTATES * row for row in range(1, 5))
 #: Part that friction leaves of what the force of a contact does, at which a contact is given up
 #: rather than released.
 PARADOX = 1.0e-9
@@ -202,7 +199,7 @@ def workspace():
     slow = Slow(
         q=np.zeros(ORDER + 1), b=np.zeros((DEEPEST + 2, ORDER + 1)),
         bounds=np.zeros((DEEPEST + 2, 2)), rates=np.zeros(ORDER + 1),
-        out=np.zeros(2), gaps=np.zeros(4 * guards), state=np.zeros(NSTATES),
+        out=np.zeros(2), gaps=np.zeros(4 * guards), state=np.zeros((5 if LAWS else 1) * NSTATES),
         touches=np.zeros((MOST_TOUCHES, 2)),
         held=np.zeros(HELD * NCLOCKS), numbers=np.zeros((NUMBERS + 1) * NCLOCKS),
     )  # fmt: skip

@@ -356,7 +356,9 @@ def put_back(i, t, t_leg, status, batch, work):
 
 @inner
 def status_at(i, t, t_end, batch):
-    """Status of a trajectory at a node."""
+    """Status of a trajectory at a node; a law of contact may have ended it."""
+    if LAWS and batch.status[i] != RUNNING:
+        return batch.status[i]
     if t >= t_end:
         return OK
     if batch.counters[i, EVENTS] > batch.options[i, MAX_EVENTS]:

@@ -21,7 +21,9 @@ REFERENCE = Path(__file__).parents[2] / "reference"
 # The rig of de Langre et al., p = m zeta f_n alpha K_c j_1 j_2 p f, summed in the order of the
 # paper's equation (3): v' = -2 zeta wn v - wn^2 x - alpha/m x^3 - K_c/m (x beyond the gap) + p_eff
 # cos(w t)/m. Two of Table 2's digits depend on it.
-RIG_SIZES = dict(NSTATES=2, NGUARDS=2, NCONST=9, NDRIVE=1, GAPS_IN_TIME=False, TANGENT=False)
+RIG_SIZES = dict(
+    NSTATES=2, NMOVED=2, NGUARDS=2, NCONST=9, NDRIVE=1, GAPS_IN_TIME=False, TANGENT=False
+)
 RIG = """
 @kernel
 def prepare(p, c):
@@ -54,7 +56,9 @@ def gap_rates(t, y, dy, c, q, h, out):
     out[0], out[1] = dy[0], dy[0]
 """
 # x' = a + b x^2 with boundaries at s_0 and at s_1 + r t; p = a b s_0 s_1 r.
-RAMP_SIZES = dict(NSTATES=1, NGUARDS=2, NCONST=5, NDRIVE=1, GAPS_IN_TIME=True, TANGENT=False)
+RAMP_SIZES = dict(
+    NSTATES=1, NMOVED=1, NGUARDS=2, NCONST=5, NDRIVE=1, GAPS_IN_TIME=True, TANGENT=False
+)
 RAMP = """
 @kernel
 def prepare(p, c):

@@ -65,8 +65,9 @@ class PeriodicOrbits:
         self.size, self.free = len(system.states), system.forced_at is None
         self.parametric = parametric(system, self.names)
         self._turns = system.period({system.forced_at: 1.0}) if system.forced_at else 1.0
+        few = method.suited_to(1)  # tangents make many states: wide lanes don't pay
         self.map = Stroboscope(
-            self.parametric.system, method, every=1.0 if self.parametric.timed else None,
+            self.parametric.system, few, every=1.0 if self.parametric.timed else None,
             threads=threads,
         )  # fmt: skip
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
@@ -99,36 +100,39 @@ class PeriodicOrbits:
         beside the points float64[r, e], the derivative of each with respect to its unknown, both
         float64[r, e], and which unknown that is, int64[e].
         """
-        values, slopes, order = rest.copy(), np.ones_like(rest), np.arange(rest.shape[1])
-        if self.system.forced_at in self.names:
-            j = self.names.index(self.system.forced_at)
-            slopes[:, j] = -self._turns / values[:, j] ** 2
-            values[:, j] = self._turns / values[:, j]
-            order = np.array([j, *(i for i in order if i != j)])
-        return values[:, order], slopes[:, order], order
+        if self.system.forced_at not in self.names:
+            return rest, np.ones_like(rest), np.arange(rest.shape[1])
+        j = self.names.index(self.system.forced_at)
+        order = np.array([j, *range(j), *range(j + 1, rest.shape[1])])
+        values, slopes = rest[:, order], np.ones_like(rest)
+        values[:, 0] = self._turns / rest[:, j]
+        slopes[:, 0] = -self._turns / rest[:, j] ** 2
+        return values, slopes, order
 
     def starts(self, z: np.ndarray) -> np.ndarray:
         """The points as states of the parametric system, float64[r, n, E]."""
-        own = self.own(z[:, self.n * self.size :])[0]
+        return self._with_own(z, self.own(z[:, self.n * self.size :])[0])
+
+    def _with_own(self, z: np.ndarray, own: np.ndarray) -> np.ndarray:
         return np.concatenate([self.points(z), np.repeat(own[:, None], self.n, axis=1)], axis=2)
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`saltus.analysis.branches.arclength.Equations`."""
         r, n, size = len(z), self.n, self.size
-        points, start = self.points(z), self.starts(z)
-        _, slopes, order = self.own(z[:, n * size :])
+        own, slopes, order = self.own(z[:, n * size :])
+        points, start = self.points(z), self._with_own(z, own)
         ends, matrices = self.map.tangent(start.reshape(r * n, -1), 1)
         ends = ends.reshape(r, n, -1)[:, :, :size]
         matrices = matrices.reshape(r, n, start.shape[2], start.shape[2])[:, :, :size]
         residual = ends - np.roll(points, -1, axis=1)
         derivative = np.zeros((r, n, size, z.shape[1]))
-        for i in range(n):
-            derivative[:, i, :, i * size : (i + 1) * size] = matrices[:, i, :, :size]
-            j = (i + 1) % n * size
-            derivative[:, i, :, j : j + size] -= np.eye(size)
-        by_own = matrices[..., size:] * slopes[:, None, None]
-        derivative[..., n * size + order] = by_own
+        shots, each = np.arange(n), np.arange(size)
+        by_points = derivative[..., : n * size].reshape(r, n, size, n, size)
+        by_points[:, shots, :, shots] = np.moveaxis(matrices[..., :size], 1, 0)
+        by_points[:, shots[:, None], each, (shots[:, None] + 1) % n, each] -= 1.0
+        derivative[..., : n * size] = by_points.reshape(r, n, size, n * size)
+        derivative[..., n * size + order] = matrices[..., size:] * slopes[:, None, None]
         unit = self.scale[rows]
         each = unit[:, : n * size].reshape(r, n, size)
         residual = (residual / each).reshape(r, -1)
