@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import threading
 import time
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from saltus import cache
 from saltus.codegen import machine, templates
 from saltus.codegen.building import Order, built
 from saltus.codegen.head import Constant, Head
-from saltus.codegen.interface import Interface
+from saltus.codegen.interface import BATCH, Interface
 from saltus.codegen.lane_ir import constants_ir, equation_ir
 
 GENERIC, FULL = TIERS = ("generic", "full")
@@ -54,6 +55,16 @@ class Call:
             (None if kind == "int64" else _DTYPES[kind.partition("[")[0]], kind.count(",") + 1)
             for kind in arguments
         ]
+        # of each argument the one number that a shape doesn't say: its value, or where it lies
+        places, used = [], 0
+        for dtype, axes in self._kinds:
+            places.append(used if dtype is None else used + 4)
+            used += 1 if dtype is None else 5 + 2 * axes
+        self._places = np.array(places, np.int64)
+        self._shaped = lru_cache(maxsize=64)(self._of_shapes)
+
+    def __len__(self) -> int:
+        return len(self._kinds)
 
     def block(self, values: tuple) -> np.ndarray:
         """The arguments as the function reads them. int64[m].
@@ -63,23 +74,31 @@ class Call:
         TypeError
             If an array isn't of its type, or isn't contiguous.
         """
-        return np.array(self.numbers(values, 0), np.int64)
-
-    def numbers(self, values: tuple, first: int) -> list[int]:
-        """Those of some arguments that follow each other, the first of which has this place."""
-        numbers: list[int] = []
-        kinds = self._kinds[first : first + len(values)]
-        for value, (dtype, dimensions) in zip(values, kinds, strict=True):
+        numbers = []
+        for value, (dtype, axes) in zip(values, self._kinds, strict=True):
             if dtype is None:
                 numbers.append(int(value))
-            elif value.dtype != dtype or value.ndim != dimensions or not value.flags.c_contiguous:
+            elif value.dtype != dtype or value.ndim != axes or not value.flags.c_contiguous:
                 raise TypeError(
-                    f"a kernel takes a contiguous array of {dtype} with {dimensions} "
+                    f"a kernel takes a contiguous array of {dtype} with {axes} "
                     f"axes, not of {value.dtype} {value.shape}."
                 )
             else:
-                numbers += (0, 0, value.size, 8, _address(value), *value.shape, *value.strides)
-        return numbers
+                numbers.append(_address(value))
+        block = self._shaped(tuple([getattr(value, "shape", ()) for value in values])).copy()
+        block[self._places] = numbers
+        return block
+
+    def _of_shapes(self, shapes: tuple[tuple[int, ...], ...]) -> np.ndarray:
+        """The block of arrays of some shapes, but for where they lie."""
+        numbers: list[int] = []
+        for shape, (dtype, _) in zip(shapes, self._kinds, strict=True):
+            if dtype is None:
+                numbers.append(0)
+            else:
+                strides = [8 * math.prod(shape[i + 1 :]) for i in range(len(shape))]
+                numbers += (0, 0, math.prod(shape), 8, 0, *shape, *strides)
+        return np.array(numbers, np.int64)
 
 
 def _address(array: np.ndarray) -> int:
@@ -122,7 +141,8 @@ class Kernels:
         self._constants = _open_constants(interface, head.constants, self._layout)
         self._functions = head.functions
         self._lanes = int(head.constants.get("LANES", 1))  # type: ignore[arg-type]
-        self._call = Call(interface.arguments)
+        self._call = Call(interface.arguments[: len(BATCH)])
+        self._own = Call(interface.arguments[len(BATCH) :])
         self._worked, self._asked = 0.0, threading.Lock()
         self._memory = threading.local()
         self._kept: list[machine.Loaded] = []  # what has been called once may be running
@@ -145,8 +165,7 @@ class Kernels:
         memory = self._memory
         if not hasattr(memory, "arrays"):
             memory.arrays = self._layout["workspace"]()
-            first = len(self.interface.arguments) - len(memory.arrays)
-            memory.numbers = self._call.numbers(memory.arrays, first)
+            memory.block = self._own.block(memory.arrays)
         return memory.arrays
 
     def propagate(self, *values: Any) -> int:
@@ -167,11 +186,11 @@ class Kernels:
 
     def _block(self, values: tuple) -> np.ndarray:
         """The arguments of a call; where those of the workspace lie is known."""
-        own = getattr(self._memory, "arrays", ())
-        rest = len(values) - len(own)
-        if not own or any(a is not b for a, b in zip(values[rest:], own, strict=True)):
-            return self._call.block(values)
-        return np.array(self._call.numbers(values[:rest], 0) + self._memory.numbers, np.int64)
+        rest = len(values) - len(self._own)
+        given, own = values[rest:], getattr(self._memory, "arrays", ())
+        known = len(own) > 0 and all(a is b for a, b in zip(given, own, strict=True))
+        behind = self._memory.block if known else self._own.block(given)
+        return np.concatenate([self._call.block(values[:rest]), behind])
 
     def exchange(self, tier: str) -> None:
         """Go on with another tier, made here if it isn't on disk. The next call uses it; a call

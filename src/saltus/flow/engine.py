@@ -121,15 +121,11 @@ class Request:
         above.
         """
         n = len(start)
-        length, ends = (
-            np.broadcast_to(np.asarray(period, float), n).copy(),
-            np.broadcast_to(np.asarray(count, np.int64), n).copy(),
-        )
         return cls(
             start=start,
             parameters=parameters,
-            period=length,
-            end_count=ends,
+            period=np.full(n, period, float),
+            end_count=np.full(n, count, np.int64),
             end_phase=np.zeros(n),
             **more,
         )
@@ -250,7 +246,8 @@ def options_of(method: Method, periods: float, count: int, checks: int = 0) -> n
     """The numbers of a method as its kernels read them, for ``count`` trajectories, the last
     ``checks`` of them checks.
     """
-    options = np.tile(method.numbers(periods), (count, 1))
+    numbers = method.numbers(periods)
+    options = np.full((count, len(numbers)), numbers)
     if checks:
         options[-checks:] = method.companion().numbers(periods)
     return options

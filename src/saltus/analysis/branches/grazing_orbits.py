@@ -214,6 +214,12 @@ class GrazingOrbits:
         return u[0, :-1] if found[0] and near else None
 
     # -- normal form -------------------------------------------------------------------------------
+    def is_smooth(self, event: ContactEvent) -> bool:
+        """Whether a graze has no square root, since the force begins at zero."""
+        own = self.legs.orbits.own(self.legs.nodes(event.z[None])[2])[0]
+        full, when = np.append(event.state, own[0]), event.phase * self.legs.unit
+        return self._law.is_continuous(np.array([when]), full[None])
+
     def coefficients(self, z: np.ndarray) -> np.ndarray:
         """The coefficients s of the square root at points float64[r, z], float64[r]."""
         legs, place = self.legs, self.place
@@ -266,6 +272,8 @@ def sqrt_coefficient(event: ContactEvent) -> float:
     if event.kind != "graze":
         return np.nan
     orbits = GrazingOrbits(event.legs, event.guards[0], event.place)
+    if orbits.is_smooth(event):
+        return 0.0
     first = event.legs.nodes(event.z[None])[0][0, event.place]
     when = first + (event.phase - first) % event.legs.n
     return float(orbits.coefficients(np.append(event.z, when)[None])[0])
@@ -309,18 +317,31 @@ class _Law:
         size, r = self._size, len(time)
         if not self.known:
             return np.full((r, size), np.nan)
-        named = dict(zip(self._system.states, states.T, strict=True))
-        values = evaluate(self._entries, t=time, states=named, values=self._system.values)
-        columns = np.stack(np.broadcast_arrays(time, *values)[1:], axis=-1)
+        columns = self._columns(time, states)
         if self.impact:
             jump = columns.reshape(r, size, size) - np.eye(size)
             along = normals[:, 1] / (normals[:, 1] ** 2).sum(axis=1)[:, None]
             return np.asarray(-self._side * np.einsum("rij,rj->ri", jump, along))
-        change = columns[:, size:] - columns[:, :size]
-        small = np.abs(change) <= CONTINUOUS * np.abs(columns[:, :size]).max(axis=1)[:, None]
-        change = np.where(small, 0.0, change)
+        change = self._change(columns)
         faster, beyond = np.einsum("rki,ri->kr", normals, change) * self._side
         beyond = np.where(faster == 0, rise + beyond, np.nan)  # else the speed itself changes
         with np.errstate(divide="ignore", invalid="ignore"):
             kick = change * (2.0 / beyond)[:, None]
         return np.where(beyond[:, None] > 0, kick, np.nan)
+
+    def is_continuous(self, time: np.ndarray, states: np.ndarray) -> bool:
+        """Whether no rate changes at the boundary, at times float64[r] in states float64[r, E]."""
+        return not self.impact and not self._change(self._columns(time, states)).any()
+
+    def _change(self, columns: np.ndarray) -> np.ndarray:
+        """By how much the rates differ beyond the boundary, float64[r, D]."""
+        here, beyond = np.split(columns, 2, axis=1)
+        change = beyond - here
+        small = np.abs(change) <= CONTINUOUS * np.abs(here).max(axis=1)[:, None]
+        return np.where(small, 0.0, change)
+
+    def _columns(self, time: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """The entries, float64[r, ...]."""
+        named = dict(zip(self._system.states, states.T, strict=True))
+        values = evaluate(self._entries, t=time, states=named, values=self._system.values)
+        return np.stack(np.broadcast_arrays(time, *values)[1:], axis=-1)

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from saltus.analysis.orbits.equilibria import field_of
-from saltus.analysis.orbits.newton import leading_first
+from saltus.analysis.orbits.floquet import across, multipliers
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -65,8 +65,9 @@ class PeriodicOrbits:
         self.size, self.free = len(system.states), system.forced_at is None
         self.parametric = parametric(system, self.names)
         self._turns = system.period({system.forced_at: 1.0}) if system.forced_at else 1.0
+        few = method.suited_to(1)  # tangents make many states: wide lanes don't pay
         self.map = Stroboscope(
-            self.parametric.system, method, every=1.0 if self.parametric.timed else None,
+            self.parametric.system, few, every=1.0 if self.parametric.timed else None,
             threads=threads,
         )  # fmt: skip
         self.phase = np.full((len(scale), 2, self.size), np.nan)  # point and direction
@@ -99,36 +100,39 @@ class PeriodicOrbits:
         beside the points float64[r, e], the derivative of each with respect to its unknown, both
         float64[r, e], and which unknown that is, int64[e].
         """
-        values, slopes, order = rest.copy(), np.ones_like(rest), np.arange(rest.shape[1])
-        if self.system.forced_at in self.names:
-            j = self.names.index(self.system.forced_at)
-            slopes[:, j] = -self._turns / values[:, j] ** 2
-            values[:, j] = self._turns / values[:, j]
-            order = np.array([j, *(i for i in order if i != j)])
-        return values[:, order], slopes[:, order], order
+        if self.system.forced_at not in self.names:
+            return rest, np.ones_like(rest), np.arange(rest.shape[1])
+        j = self.names.index(self.system.forced_at)
+        order = np.array([j, *range(j), *range(j + 1, rest.shape[1])])
+        values, slopes = rest[:, order], np.ones_like(rest)
+        values[:, 0] = self._turns / rest[:, j]
+        slopes[:, 0] = -self._turns / rest[:, j] ** 2
+        return values, slopes, order
 
     def starts(self, z: np.ndarray) -> np.ndarray:
         """The points as states of the parametric system, float64[r, n, E]."""
-        own = self.own(z[:, self.n * self.size :])[0]
+        return self._with_own(z, self.own(z[:, self.n * self.size :])[0])
+
+    def _with_own(self, z: np.ndarray, own: np.ndarray) -> np.ndarray:
         return np.concatenate([self.points(z), np.repeat(own[:, None], self.n, axis=1)], axis=2)
 
     # -- equations ---------------------------------------------------------------------------------
     def evaluate(self, z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`saltus.analysis.branches.arclength.Equations`."""
         r, n, size = len(z), self.n, self.size
-        points, start = self.points(z), self.starts(z)
-        _, slopes, order = self.own(z[:, n * size :])
+        own, slopes, order = self.own(z[:, n * size :])
+        points, start = self.points(z), self._with_own(z, own)
         ends, matrices = self.map.tangent(start.reshape(r * n, -1), 1)
         ends = ends.reshape(r, n, -1)[:, :, :size]
         matrices = matrices.reshape(r, n, start.shape[2], start.shape[2])[:, :, :size]
         residual = ends - np.roll(points, -1, axis=1)
         derivative = np.zeros((r, n, size, z.shape[1]))
-        for i in range(n):
-            derivative[:, i, :, i * size : (i + 1) * size] = matrices[:, i, :, :size]
-            j = (i + 1) % n * size
-            derivative[:, i, :, j : j + size] -= np.eye(size)
-        by_own = matrices[..., size:] * slopes[:, None, None]
-        derivative[..., n * size + order] = by_own
+        shots, each = np.arange(n), np.arange(size)
+        by_points = derivative[..., : n * size].reshape(r, n, size, n, size)
+        by_points[:, shots, :, shots] = np.moveaxis(matrices[..., :size], 1, 0)
+        by_points[:, shots[:, None], each, (shots[:, None] + 1) % n, each] -= 1.0
+        derivative[..., : n * size] = by_points.reshape(r, n, size, n * size)
+        derivative[..., n * size + order] = matrices[..., size:] * slopes[:, None, None]
         unit = self.scale[rows]
         each = unit[:, : n * size].reshape(r, n, size)
         residual = (residual / each).reshape(r, -1)
@@ -239,45 +243,3 @@ class PeriodicOrbits:
                 segments = across(whole, flows[i])[None]
             result.append(multipliers(segments))
         return np.array(result)
-
-
-def across(matrix: np.ndarray, flow: np.ndarray) -> np.ndarray:
-    """The tangent map across the flow, float64[D - 1, D - 1]."""
-    frame = np.linalg.qr(np.concatenate([flow[:, None], np.eye(len(flow))], axis=1))[0]
-    rest = frame[:, 1 : len(flow)]
-    return np.asarray(rest.T @ matrix @ rest)
-
-
-def multipliers(segments: np.ndarray) -> np.ndarray:
-    """Floquet multipliers of float64[n, D, D], the largest first, complex128[D].
-
-    Eigenvalues of the cyclic block matrix are their n-th roots: the product isn't multiplied out,
-    so that small ones keep their digits. Kressner, Numerical Methods for General and Structured
-    Eigenvalue Problems (2005), section 3.
-    """
-    n, size = segments.shape[:2]
-    if n == 1:
-        return leading_first(segments)[0]
-    if not np.isfinite(segments).all():
-        return np.full(size, np.nan + 0j)
-    cyclic = np.zeros((n * size, n * size))
-    for i in range(n):
-        j = (i + 1) % n
-        cyclic[j * size : (j + 1) * size, i * size : (i + 1) * size] = segments[i]
-    roots = np.linalg.eigvals(cyclic)
-    powers = roots**n
-    order = np.argsort(-np.abs(powers))
-    return _grouped(powers[order], n)
-
-
-def _grouped(powers: np.ndarray, n: int) -> np.ndarray:
-    """One of each n equal values."""
-    left, result = list(powers), []
-    while left:
-        first = left[0]
-        nearest = sorted(range(len(left)), key=lambda i: abs(left[i] - first))[:n]
-        mean = np.mean([left[i] for i in nearest])
-        result.append(mean if abs(mean.imag) > 1e-9 * abs(mean) else complex(mean.real))
-        left = [value for i, value in enumerate(left) if i not in set(nearest)]
-    values = np.array(result)
-    return values[np.lexsort((-values.imag, -np.round(np.abs(values), 12)))]
