@@ -102,6 +102,10 @@ def numbers_of_clocks(p, n):
 @kernel
 def reset(t, y, p, h, before, after, g, out):
     pass
+
+@kernel
+def levels(t, y, p, h, mode, out):
+    pass
 """
 B4 = {
     "mass": 3.0,
