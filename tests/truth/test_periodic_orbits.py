@@ -123,8 +123,18 @@ def test_the_mirror_image_of_an_orbit_is_one(ueda):
     assert (first[::2] == first[1::2]).all()
 
 
-def test_only_a_forced_system_and_an_exact_method_are_taken():
-    with pytest.raises(sl.SaltusError, match="no forcing period"):
-        sl.periodic_orbits(sl.models.double_scroll(), (0.1, 0.0, 0.0))
+@sl.system(states="x v")
+def pushed_once(t, x, v):
+    """A pulse of force at t = 3."""
+    return v, sl.exp(-((t - 3) ** 2)) - x - 0.1 * v
+
+
+def test_refusals():
+    with pytest.raises(sl.SaltusError, match="depends on time, without a forcing period"):
+        sl.periodic_orbits(pushed_once, (0.1, 0.0))
+    with pytest.raises(sl.SaltusError, match=r"is forced: .* Give periods="):
+        sl.periodic_orbits(duffing, (0.0, 0.0), period="1 s")
+    with pytest.raises(sl.SaltusError, match=r"found by sl\.periodic_orbits"):
+        sl.edge_orbit(sl.models.double_scroll(), (0.1, 0.0, 0.0), (0.2, 0.0, 0.0))
     with pytest.raises(sl.SaltusError, match="errors of ODE45"):
         sl.periodic_orbits(duffing, (0.0, 0.0), method=sl.ODE45())

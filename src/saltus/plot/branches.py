@@ -22,13 +22,13 @@ from saltus.results.dataset.schema import event_name, point_name, states_of
 
 Quantity = Literal[
     "peak", "rms", "maximum", "minimum", "peak_to_peak", "mean", "rms_about_mean", "amplitude",
-    "phase", "period",
+    "phase", "period", "frequency",
 ]  # fmt: skip
 _LABELS = {
     "peak": "peak |{}|", "rms": "rms of {}", "maximum": "largest {}", "minimum": "smallest {}",
     "peak_to_peak": "peak to peak of {}", "mean": "mean of {}",
     "rms_about_mean": "rms of {} about its mean", "amplitude": "first harmonic of {}",
-    "phase": "phase of {}", "period": "period",
+    "phase": "phase of {}", "period": "period", "frequency": "frequency",
 }  # fmt: skip
 #: Name and marker of the bifurcations.
 MARKS = {
@@ -63,7 +63,7 @@ def branches(
     quantity : str
         ``"peak"`` (largest magnitude), ``"rms"``, ``"maximum"``, ``"minimum"``,
         ``"peak_to_peak"``, ``"mean"``, ``"rms_about_mean"``; ``"amplitude"`` or ``"phase"`` of the
-        first harmonic; ``"period"`` of the orbit.
+        first harmonic; ``"period"`` of the orbit, or ``"frequency"``, its inverse.
     output : str, optional
         A state, or an output that was asked for; default the first state.
     events : bool
@@ -110,6 +110,8 @@ def _values(ds: xr.Dataset, quantity: str, output: str | None) -> tuple[np.ndarr
     first = states_of(ds)[0]
     if quantity == "period":
         return ds["point_period"].values, "s", ""
+    if quantity == "frequency":
+        return 1.0 / ds["point_period"].values, "Hz", ""
     known = ds["output"].values.tolist()
     name = first if output is None else output
     if name not in known:

@@ -217,8 +217,9 @@ def _orbits(ds: xr.Dataset) -> list[str]:
         real, imag = (
             float(np.ravel(one[f"orbit_multiplier_{part}"].values)[0]) for part in ("real", "imag")
         )
+        cycle = f" of {float(one['orbit_cycle']):.8g} s" if "orbit_cycle" in one else ""
         lines.append(
-            f"  {i}: {kind_text(str(one['orbit_type'].item()), int(one['orbit_period']))}, "
+            f"  {i}: {kind_text(str(one['orbit_type'].item()), int(one['orbit_period']))}{cycle}, "
             f"{one['orbit_stability'].item()}, {size}, "
             f"largest multiplier {np.hypot(real, imag):.4g}"
         )
@@ -226,11 +227,12 @@ def _orbits(ds: xr.Dataset) -> list[str]:
         lines.append(f"  and {ds.sizes['orbit'] - _ORBITS} more")
     for i in range(ds.sizes.get("search_period", 0)):
         one = ds.isel(search_period=i)
+        share = float(one["search_unseen"])
+        unseen = f", about {share:.1%} of them to one that isn't known" if share == share else ""
         lines.append(
-            f"search   {period_text(int(one['search_period']))}: {int(one['search_converged'])} of "
-            f"{ds.attrs.get('starts', '?')} starts led to an orbit, about "
-            f"{float(one['search_unseen']):.1%} of them to one that isn't known; deflation found "
-            f"{int(one['search_deflated'])} more"
+            f"search   {period_text(int(one['search_period']), 'limit cycles')}: "
+            f"{int(one['search_converged'])} of {ds.attrs.get('starts', '?')} starts led to an "
+            f"orbit{unseen}; deflation found {int(one['search_deflated'])} more"
         )
     return lines
 

@@ -449,3 +449,7 @@ def test_lines_of_stable_orbits_end_where_stability_does():
     dashed = next(line for gid, line in lines.items() if (gid or "").startswith("unstable"))
     assert np.nanmax(solid.get_xdata()) == pytest.approx(doubled / 1e3)
     assert np.nanmin(dashed.get_xdata()) == pytest.approx(doubled / 1e3)
+    axes = sl.plot.branches(found, quantity="frequency")
+    assert axes.get_ylabel() == "frequency [Hz]"
+    heights = np.concatenate([line.get_ydata() for line in axes.lines if line.get_gid()])
+    assert heights[np.isfinite(heights)] == pytest.approx(17.0)

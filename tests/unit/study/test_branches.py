@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 
+import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from saltus.errors import SaltusError
 from saltus.study.run.running import Resources
@@ -81,6 +83,19 @@ start = "random 200"
 box = { x = ["-5 mm", "5 mm"], v = ["-1 m/s", "1 m/s"] }
 periods = 1
 """
+LIMIT_CYCLES = """
+[study]
+name = "Cycles"
+[system]
+mu = 1.0
+[system.rates]
+x = "v"
+v = "mu*(1 - x**2)*v - x"
+[periodic_orbits]
+start = "random 8"
+box = { x = [-3, 3], v = [-3, 3] }
+period = ["2 s", "20 s"]
+"""
 
 
 def rows_of(outcome):
@@ -116,6 +131,22 @@ def test_periodic_orbits_are_tabulated_and_drawn(tmp_path):
     assert any(file.suffix == ".png" for file in outcome.files)
 
 
+def test_limit_cycles_are_tabulated_with_their_period(tmp_path):
+    """Van der Pol's oscillator, its period by SciPy."""
+    (row,) = rows_of(run(LIMIT_CYCLES, tmp_path / "out"))
+    assert row["stability"] == "stable node"
+
+    def peak(_, y):
+        return y[1]
+
+    peak.direction = -1
+    own = solve_ivp(
+        lambda _, y: [y[1], (1 - y[0] ** 2) * y[1] - y[0]],
+        (0, 60), [2.0, 0.0], "DOP853", events=peak, rtol=1e-11, atol=1e-12,
+    )  # fmt: skip
+    assert float(row["period [s]"]) == pytest.approx(np.diff(own.t_events[0])[-1], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("text", "old", "new", "words"),
     [
@@ -123,7 +154,9 @@ def test_periodic_orbits_are_tabulated_and_drawn(tmp_path):
         (BACKBONE, "amplitude =", "amplitud =", "amplitude"),
         (BACKBONE, "damping_ratio", "damping_ration", "damping_ratio"),
         (BACKBONE, "values =", 'state = "y"\nvalues =', "'y' is unknown to delangre. Known: v, x"),
-        (ORBITS, "periods =", "period =", "periods"),
+        (ORBITS, "periods =", "perods =", "periods"),
+        (ORBITS, "periods = 1", 'period = "1 s"', "is forced"),
+        (LIMIT_CYCLES, '"2 s", "20 s"', "2, 20", "no unit"),
         (ORBITS, '"random 200"', '"random many"', "random"),
     ],
 )

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from saltus.analysis.basins.attractors import spread
-from saltus.analysis.basins.periodic_orbits import check_forced, exact_method, orbits_dataset
+from saltus.analysis.basins.periodic_orbits import exact_method, orbits_dataset
 from saltus.analysis.dataset_parts import provenance
 from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.edge import MOST, Edge, follow_edge
@@ -93,7 +93,7 @@ def edge_orbit(
     check_system(system)
     ends = np.concatenate([_one(system, "a", a), _one(system, "b", b)])
     periods, method = whole(periods, "periods"), exact_method(method)
-    check_forced(system)
+    _check_forced(system)
     map_ = Stroboscope(system, method, threads=threads)
     scale = spread(map_, ends)
     with reporting(progress) as show:
@@ -109,6 +109,15 @@ def edge_orbit(
         "edge_periods": edge.iterates,
     }
     return orbits_dataset(system, attrs, table, {})
+
+
+def _check_forced(system: System) -> None:
+    """Raises ParameterError for a system without a forcing period."""
+    if system.forced_at is None:
+        raise ParameterError(
+            f"{system.name} has no forcing period. Its limit cycles, those between two basins too, "
+            f"are found by sl.periodic_orbits, and its equilibria by sl.equilibria."
+        )
 
 
 def _one(system: System, name: str, start: Any) -> np.ndarray:

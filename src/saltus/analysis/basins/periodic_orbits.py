@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,13 +10,16 @@ import xarray as xr
 
 from saltus.analysis.basins.attractors import spread
 from saltus.analysis.dataset_parts import provenance, subject
-from saltus.analysis.orbits.all_orbits import OrbitSet, all_orbits
-from saltus.analysis.orbits.orbit_table import table_of
+from saltus.analysis.orbits.all_cycles import all_cycles
+from saltus.analysis.orbits.all_orbits import Search, all_orbits
+from saltus.analysis.orbits.equilibria import autonomous
+from saltus.analysis.orbits.orbit_table import table_of, table_of_cycles
 from saltus.analysis.orbits.tolerances import LONGEST
+from saltus.analysis.orbits.turns import looks_every
 from saltus.analysis.random_starts import random_starts
 from saltus.analysis.starts import check_system, ensemble
 from saltus.analysis.verb import verb
-from saltus.errors import ParameterError
+from saltus.errors import ParameterError, shown
 from saltus.flow.counts import whole
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
@@ -26,6 +29,7 @@ from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.orbits import OrbitTable
 from saltus.system.system import System
+from saltus.units import to_si
 
 
 @verb
@@ -35,13 +39,14 @@ def periodic_orbits(
     *,
     box: Mapping[str, Any] | None = None,
     periods: int = 3,
+    period: Any = None,
     method: Method | None = None,
     seed: int = 1,
     threads: int | None = None,
     progress: bool | Callable[[float], None] | None = None,
 ) -> xr.Dataset:
-    """The periodic orbits of a forced system, stable and unstable, with periods up to a number of
-    forcing periods.
+    """The periodic orbits of a system, stable and unstable: of a forced one those with periods up
+    to a number of forcing periods, of one without forcing its limit cycles.
 
     Newton's method is started from many states, for each period at once in all of them, with the
     points of an orbit at whole forcing periods as unknowns (multiple shooting), steps that are
@@ -50,16 +55,25 @@ def periodic_orbits(
     found; also from beside known orbits, where a fold leaves the second of a pair. No search of
     this kind finds every orbit for sure. What is said of those that it missed: ``search_unseen``.
 
+    Without forcing, the period is one more unknown. Close returns of the motions from the starts,
+    at once and after some turns, are first guesses of a state and a period: a motion on a chaotic
+    set passes near its unstable cycles. A cycle is one whatever its phase, for deflation too.
+    Cycles that lie side by side in families, as where energy is conserved, aren't found.
+
     Parameters
     ----------
     system : System
-        A forced system.
+        Forced; or nothing in it depends on time.
     start : sequence, mapping, array or str
         Where to begin, as for :func:`saltus.simulate`, one or many; ``"random 1000"`` with ``box``.
     box : mapping, optional
         Range (low, high) of each state for random starts. Orbits may leave it.
     periods : int
-        Longest period looked for [forcing periods].
+        Longest period looked for [forcing periods; about a turn of the motion each, in a system
+        without forcing].
+    period : float, str or pair of them, optional
+        Of a system without forcing, in place of ``periods``: the range of periods looked for,
+        ``("1 s", "5 s")``, or a first guess, which stands for half to twice of it.
     method : Method
         Default :class:`saltus.Taylor`; another one has errors that keep unstable orbits from
         closing.
@@ -73,13 +87,16 @@ def periodic_orbits(
     Returns
     -------
     Dataset
-        Dim ``orbit``, each once, by period: ``orbit_period`` (the n of nT, the least),
+        Dim ``orbit``, each once, by period: ``orbit_period`` (the n of nT, the least; 0 of limit
+        cycles, whose period is ``orbit_cycle`` [s]),
         ``orbit_stable``, ``orbit_stability`` (``stable node``, ``stable focus``, ``saddle``,
         ``inverse saddle``, ``unstable node``, ``unstable focus``, ``marginal``),
         ``orbit_unstable_directions``, ``orbit_found`` (starts that led to it; 0 if only deflation
         did), ``orbit_mismatch``, and as of attractors ``orbit_contacts``, ``orbit_itinerary``,
         ``orbit_peak``, ``orbit_rms``, ``orbit_margin``, multipliers, ``orbit_exponent`` [1/s] and
-        its states at whole periods, dims (orbit, phase). Dim ``search_period``, a search each:
+        its states at whole periods, dims (orbit, phase); of a limit cycle in equal steps of its
+        period, and the multipliers are those beside the trivial 1. Dim ``search_period``, a search
+        each (of limit cycles one, 0):
         ``search_converged`` of the starts led to an orbit, ``search_found_once`` orbits were found
         by one start only, ``search_unseen`` is their ratio: the share of converging starts whose
         orbit isn't known yet, as Good and Turing estimate it; ``search_deflated`` orbits were found
@@ -95,7 +112,8 @@ def periodic_orbits(
     References
     ----------
     Parker & Chua, Practical Numerical Algorithms for Chaotic Systems (1989), chapter 5; Deuflhard,
-    Newton Methods for Nonlinear Problems (2004), chapter 3; Farrell, Birkisson & Funke, SIAM J.
+    Newton Methods for Nonlinear Problems (2004), chapter 3; Auerbach, Cvitanovic, Eckmann,
+    Gunaratne & Procaccia, Phys. Rev. Lett. 58 (1987) 2387-2389; Farrell, Birkisson & Funke, SIAM J.
     Sci. Comput. 37 (2015) A2026-A2045; Good, Biometrika 40 (1953) 237-264.
 
     Examples
@@ -115,20 +133,57 @@ def periodic_orbits(
         else _given(system, start, box)
     )
     method = exact_method(method)
-    check_forced(system)
     size = len(system.states)
     check_room(len(states) * periods * size * 400.0, f"{len(states)} starts", "Take fewer.")
+    attrs = provenance(system, method, system.values) | {"starts": len(states), "seed": seed}
+    if system.forced_at is None:
+        turn = _turn(system, states)
+        limits, guess = _range(period, (0.0, (periods + 0.5) * turn))
+        looks = Stroboscope(system, method, every=turn, threads=threads)
+        with reporting(progress) as show:
+            cycles = all_cycles(looks, states, limits, guess or turn, show)
+            table = table_of_cycles(looks, cycles.cycles, cycles.found)
+        attrs |= {"shortest_period": limits[0], "longest_period": limits[1]}
+        return orbits_dataset(system, attrs, table, searches([cycles.search]))
+    if period is not None:
+        raise ParameterError(
+            f"{system.name} is forced: its orbits last whole forcing periods. Give periods=, the "
+            f"longest of them, in place of period=."
+        )
     map_ = Stroboscope(system, method, threads=threads)
     scale = spread(map_, states)
     with reporting(progress) as show:
         found = all_orbits(map_, states, periods, scale, show)
         table = table_of(map_, found.orbits, found.found)
-    attrs = provenance(system, method, system.values) | {
-        "periods": periods,
-        "starts": len(states),
-        "seed": seed,
-    }
-    return orbits_dataset(system, attrs, table, searches(found))
+    return orbits_dataset(system, attrs | {"periods": periods}, table, searches(found.searches))
+
+
+def _turn(system: System, states: np.ndarray) -> float:
+    """About a turn of the motions of a system without forcing [s]."""
+    if not autonomous(system):
+        raise ParameterError(
+            f"{system.name} depends on time, without a forcing period: none of its motions need "
+            f"repeat. Name the parameter that forces it: forced_at=."
+        )
+    every = looks_every(system, None, states)
+    assert every is not None
+    return every
+
+
+def _range(period: Any, default: tuple[float, float]) -> tuple[tuple[float, float], float | None]:
+    """Shortest and longest period, and a first guess, if there is one [s]."""
+    if period is None:
+        return default, None
+    pair = isinstance(period, (tuple, list)) and len(period) == 2
+    ends = [to_si(one, "s", "period") for one in (period if pair else (period,))]
+    if not (np.isfinite(ends).all() and ends[-1] > 0 and (not pair or 0 <= ends[0] < ends[1])):
+        raise ParameterError(
+            f"period must be a positive time or an ascending range of them, such as "
+            f'period=("1 s", "5 s"), not {shown(period)}.'
+        )
+    if pair:
+        return (ends[0], ends[1]), None
+    return (0.5 * ends[0], 2.0 * ends[0]), ends[0]
 
 
 def exact_method(method: Method | None) -> Method:
@@ -142,15 +197,6 @@ def exact_method(method: Method | None) -> Method:
     return method
 
 
-def check_forced(system: System) -> None:
-    """Raises ParameterError for a system without a forcing period."""
-    if system.forced_at is None:
-        raise ParameterError(
-            f"{system.name} has no forcing period. Its attracting limit cycles are found by "
-            f"sl.attractors, and its equilibria by sl.equilibria."
-        )
-
-
 def _given(system: System, start: Any, box: Any) -> np.ndarray:
     """The starts that were given, float64[k, D]."""
     if box is not None:
@@ -158,12 +204,12 @@ def _given(system: System, start: Any, box: Any) -> np.ndarray:
     return ensemble(system, start, None).start
 
 
-def searches(found: OrbitSet) -> dict[str, Any]:
+def searches(each: Sequence[Search]) -> dict[str, Any]:
     """What the searches came to, by the names of the variables."""
     return {
-        "search_period": [one.period for one in found.searches],
+        "search_period": [one.period for one in each],
         **{
-            f"search_{name}": [getattr(one, name) for one in found.searches]
+            f"search_{name}": [getattr(one, name) for one in each]
             for name in ("converged", "found_once", "unseen", "deflated", "exhausted")
         },
     }

@@ -14,10 +14,10 @@ from saltus.analysis.branches.branch_table import numbers_of, stacked
 from saltus.analysis.branches.codimension_two import Equations
 from saltus.analysis.branches.curves import BifurcationCurve, trace_curve
 from saltus.analysis.branches.grazing_orbits import GrazingOrbits
-from saltus.analysis.branches.seeds import units
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.singular_orbits import MULTIPLIER, SingularOrbits
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.orbits.cycles import units
 from saltus.analysis.outputs import outputs_of
 from saltus.analysis.starts import check_system, range_of
 from saltus.analysis.verb import verb

@@ -11,8 +11,8 @@ import xarray as xr
 
 from saltus.analysis.branches.tracing import Seed
 from saltus.analysis.orbits.all_equilibria import all_equilibria
+from saltus.analysis.orbits.cycles import units
 from saltus.analysis.orbits.orbit_measures import measure
-from saltus.analysis.orbits.tolerances import RESTS
 from saltus.errors import ParameterError, shown
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -163,12 +163,6 @@ def seeds_at(
 def _ranges(points: np.ndarray) -> np.ndarray:
     """Range of each state, its size where it rests."""
     return units(points.max(axis=0), points.min(axis=0))
-
-
-def units(high: np.ndarray, low: np.ndarray) -> np.ndarray:
-    """Units of states between bounds: their range, their size where they rest."""
-    ranges, sizes = high - low, np.maximum(np.abs(high), np.abs(low))
-    return np.where(ranges > RESTS * sizes, ranges, np.where(sizes > 0, sizes, 1.0))
 
 
 def scaled(system: System, name: str, seeds: list[Seed], method: Method) -> list[Seed]:

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from saltus.analysis.orbits.equilibria import field_of
-from saltus.analysis.orbits.newton import leading_first
+from saltus.analysis.orbits.floquet import across, multipliers
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method
@@ -243,45 +243,3 @@ class PeriodicOrbits:
                 segments = across(whole, flows[i])[None]
             result.append(multipliers(segments))
         return np.array(result)
-
-
-def across(matrix: np.ndarray, flow: np.ndarray) -> np.ndarray:
-    """The tangent map across the flow, float64[D - 1, D - 1]."""
-    frame = np.linalg.qr(np.concatenate([flow[:, None], np.eye(len(flow))], axis=1))[0]
-    rest = frame[:, 1 : len(flow)]
-    return np.asarray(rest.T @ matrix @ rest)
-
-
-def multipliers(segments: np.ndarray) -> np.ndarray:
-    """Floquet multipliers of float64[n, D, D], the largest first, complex128[D].
-
-    Eigenvalues of the cyclic block matrix are their n-th roots: the product isn't multiplied out,
-    so that small ones keep their digits. Kressner, Numerical Methods for General and Structured
-    Eigenvalue Problems (2005), section 3.
-    """
-    n, size = segments.shape[:2]
-    if n == 1:
-        return leading_first(segments)[0]
-    if not np.isfinite(segments).all():
-        return np.full(size, np.nan + 0j)
-    cyclic = np.zeros((n * size, n * size))
-    for i in range(n):
-        j = (i + 1) % n
-        cyclic[j * size : (j + 1) * size, i * size : (i + 1) * size] = segments[i]
-    roots = np.linalg.eigvals(cyclic)
-    powers = roots**n
-    order = np.argsort(-np.abs(powers))
-    return _grouped(powers[order], n)
-
-
-def _grouped(powers: np.ndarray, n: int) -> np.ndarray:
-    """One of each n equal values."""
-    left, result = list(powers), []
-    while left:
-        first = left[0]
-        nearest = sorted(range(len(left)), key=lambda i: abs(left[i] - first))[:n]
-        mean = np.mean([left[i] for i in nearest])
-        result.append(mean if abs(mean.imag) > 1e-9 * abs(mean) else complex(mean.real))
-        left = [value for i, value in enumerate(left) if i not in set(nearest)]
-    values = np.array(result)
-    return values[np.lexsort((-values.imag, -np.round(np.abs(values), 12)))]

@@ -258,15 +258,27 @@ def shooting(map_: Map, points: np.ndarray, scale: np.ndarray) -> tuple[np.ndarr
     float64[k, n D, n D]; in units of the scale.
     """
     k, n, size = points.shape
-    each = points.reshape(-1, size)
-    end, matrix = map_.rows(np.zeros(len(each), np.int64)).tangent(each, 1)
-    residual = (end.reshape(points.shape) - np.roll(points, -1, axis=1)) / scale
-    matrix = (matrix * scale / scale[:, None]).reshape(k, n, size, size)
+    rows = map_.rows(np.zeros(k * n, np.int64))
+    residual, derivative, _ = chained(rows, points, np.broadcast_to(scale, (k, size)))
+    return residual, derivative
+
+
+def chained(
+    map_: Map, points: np.ndarray, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same by a map with k n rows, in units float64[k, D]; and the images of the points,
+    float64[k, n, D].
+    """
+    k, n, size = points.shape
+    end, matrix = map_.tangent(points.reshape(-1, size), 1)
+    end, unit = end.reshape(points.shape), scale[:, None]
+    residual = (end - np.roll(points, -1, axis=1)) / unit
+    matrix = matrix.reshape(k, n, size, size) * unit[..., None, :] / unit[..., None]
     derivative = np.zeros((k, n, size, n, size))
     at = np.arange(n)
     derivative[:, at, :, at, :] = np.moveaxis(matrix, 1, 0)
     derivative[:, at, :, (at + 1) % n, :] -= np.eye(size)
-    return residual.reshape(k, n * size), derivative.reshape(k, n * size, n * size)
+    return residual.reshape(k, n * size), derivative.reshape(k, n * size, n * size), end
 
 
 # -- one orbit -------------------------------------------------------------------------------------

@@ -11,11 +11,13 @@ trivial one.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 
 from saltus.analysis.orbits.equilibria import field_of, jacobian_of
+from saltus.analysis.orbits.floquet import across
 from saltus.analysis.orbits.newton import leading_first, newton
 from saltus.analysis.orbits.orbits import OrbitBatch
 from saltus.analysis.orbits.tolerances import AMPLIFIED, BESIDE, CONVERGED, LONGEST, RESTS, ROUNDING
@@ -65,6 +67,12 @@ class Returns:
     scale: np.ndarray
 
 
+def units(high: np.ndarray, low: np.ndarray) -> np.ndarray:
+    """Units of states between bounds: their range, their size where they rest."""
+    ranges, sizes = high - low, np.maximum(np.abs(high), np.abs(low))
+    return np.where(ranges > RESTS * sizes, ranges, np.where(sizes > 0, sizes, 1.0))
+
+
 # -- the first guess -------------------------------------------------------------------------------
 def returns(map_: Stroboscope, start: np.ndarray, window: float) -> Returns:
     """The near returns of motions from float64[k, D], looked for over some ``window`` [s]: a finer
@@ -111,44 +119,87 @@ def directions(
     return across, scale, (samples, rates)
 
 
+def _crossings(
+    start: np.ndarray,
+    across: np.ndarray,
+    scale: np.ndarray,
+    samples: np.ndarray,
+    step: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where motions cross the plane across the flow at their start, with the flow.
+
+    Parameters
+    ----------
+    start, across, scale
+        As :func:`directions` has them.
+    samples, step : float64[k, SAMPLES, D]
+        Samples of the motions, and what their rates make from one to the next.
+
+    Returns
+    -------
+    time, apart : float64[k, SAMPLES - 2]
+        Time in samples, and the distance from the start in units of the scale: inf in an interval
+        without a crossing.
+    rises : bool[k, SAMPLES - 2]
+        Which intervals have one.
+    """
+    offset, ahead = (samples - start[:, None]) / scale[:, None], step / scale[:, None]
+    height = np.einsum("kij,kj->ki", offset, across[:, 0])
+    share = height[:, 1:-1] / (height[:, 1:-1] - height[:, 2:])
+    rises = (height[:, 1:-1] < 0) & (height[:, 2:] >= 0)
+    at = _cubic(offset[:, 1:-1], offset[:, 2:], ahead[:, 1:-1], ahead[:, 2:], share)
+    apart = np.where(rises, np.abs(at).max(axis=2), np.inf)
+    time = 1 + np.arange(share.shape[1]) + np.where(np.isfinite(share), share, 0.0)
+    return time, np.where(np.isfinite(apart), apart, np.inf), rises
+
+
+def _first_of_the_nearest(time: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of the crossings float64[k, m] of k motions: time and distance of the first one that is
+    nearly as near as the nearest.
+    """
+    best, rows = apart.min(axis=1), np.arange(len(apart))
+    first = np.argmax(apart <= np.maximum(4.0 * best, SAMPLED)[:, None], axis=1)
+    return time[rows, first], np.where(np.isfinite(best), apart[rows, first], np.inf)
+
+
 def _seen(map_: Stroboscope, start: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, ...]:
     """From samples over a window each: time and distance of the return, range of the states,
     whether samples follow the motion, turns.
     """
     across, scale, (samples, rates) = directions(map_, start, length)
-    k = len(start)
+    step = (length / SAMPLES)[:, None, None]
     with np.errstate(all="ignore"):
         turns = np.einsum("kij,kij->ki", across[:, 1:], across[:, :-1])
         followed = (turns > TURN).mean(axis=1) >= FOLLOWED
-        offset = (samples - start[:, None]) / scale[:, None]
-        height = np.einsum("kij,kj->ki", offset, across[:, 0])
-        share = height[:, 1:-1] / (height[:, 1:-1] - height[:, 2:])
-        rises = (height[:, 1:-1] < 0) & (height[:, 2:] >= 0)
-        step = (length / SAMPLES)[:, None, None]
-        at = _cubic(
-            offset[:, 1:-1],
-            offset[:, 2:],
-            step * rates[:, 1:-1] / scale[:, None],
-            step * rates[:, 2:] / scale[:, None],
-            share,
-        )
-        apart = np.where(rises, np.abs(at).max(axis=2), np.inf)
-    apart = np.where(np.isfinite(apart), apart, np.inf)
-    best = apart.min(axis=1)
-    first = np.argmax(apart <= np.maximum(4.0 * best, SAMPLED)[:, None], axis=1)
-    rows = np.arange(k)
-    time = (
-        (1 + first + np.where(np.isfinite(share[rows, first]), share[rows, first], 0.0))
-        * length
-        / SAMPLES
-    )
-    return (
-        time,
-        np.where(np.isfinite(best), apart[rows, first], np.inf),
-        scale,
-        followed,
-        rises.sum(axis=1),
-    )
+        time, apart, rises = _crossings(start, across, scale, samples, step * rates)
+    time, apart = _first_of_the_nearest(time, apart)
+    return time * length / SAMPLES, apart, scale, followed, rises.sum(axis=1)
+
+
+def close_returns(map_: Stroboscope, start: np.ndarray, edges: np.ndarray) -> list[Returns]:
+    """The nearest returns of motions from float64[k, D] in each of some windows of time, which meet
+    at the edges float64[m + 1] [s].
+
+    Distances are in units of the motion up to the return, so that a slow spiral isn't nearer than a
+    loop that almost closes; ``scale`` is the range of each state up to there.
+    """
+    longest, rows = edges[-1], np.arange(len(start))
+    across, scale, (samples, rates) = directions(map_, start, np.full(len(start), longest))
+    with np.errstate(all="ignore"):
+        time, apart, _ = _crossings(start, across, scale, samples, longest / SAMPLES * rates)
+        high, low = (extreme.accumulate(samples, axis=1) for extreme in (np.maximum, np.minimum))
+        ranges = high - low
+        apart = apart / (ranges / scale[:, None]).max(axis=2)[:, 1:-1]
+        apart = np.where(apart < np.inf, apart, np.inf)
+        moves = np.isfinite(ranges) & (ranges > RESTS * np.abs(start)[:, None])
+    result = []
+    for low_edge, high_edge in itertools.pairwise(edges * (SAMPLES / longest)):
+        inside = (time >= low_edge) & (time <= high_edge)
+        when, far = _first_of_the_nearest(time, np.where(inside, apart, np.inf))
+        at = rows, when.astype(int)
+        when = np.where(np.isfinite(far), when * (longest / SAMPLES), np.nan)
+        result.append(Returns(when, far, np.where(moves[at], ranges[at], scale)))
+    return result
 
 
 def _cubic(
@@ -204,8 +255,8 @@ def find_cycles(
     if not len(rows):
         return result, moved
     mine = map_.rows(rows)
-    time = _least_period(mine, x[rows], time[rows], scale[rows])
-    first = _first(mine, x[rows], time)
+    time = least_period(mine, x[rows], time[rows], scale[rows])
+    first = first_point(mine, x[rows], time)
     points = mine.with_period(time).run(first, 1, Schedule.even(1, LONGEST)).samples
     moves = (np.ptp(points, axis=1) / scale[rows]).max(axis=1) > NO_CYCLE
     multipliers = _multipliers(mine.with_period(time), first)
@@ -295,7 +346,7 @@ def _newton(
     return z[:, :size], z[:, size] * time, found
 
 
-def _least_period(
+def least_period(
     map_: Stroboscope, x: np.ndarray, period: np.ndarray, scale: np.ndarray
 ) -> np.ndarray:
     """The smallest part of each period after which the motion is back already."""
@@ -306,7 +357,7 @@ def _least_period(
     return period / np.where(back.any(axis=1), parts[np.argmax(back, axis=1)], 1)
 
 
-def _first(map_: Stroboscope, x: np.ndarray, period: np.ndarray) -> np.ndarray:
+def first_point(map_: Stroboscope, x: np.ndarray, period: np.ndarray) -> np.ndarray:
     """The state of each cycle at which the first state that moves is least: where its points begin,
     whoever found it.
     """
@@ -342,6 +393,5 @@ def _multipliers(map_: Stroboscope, x: np.ndarray) -> np.ndarray:
     for i, (matrix, rate) in enumerate(zip(matrices, rates, strict=True)):
         if not (np.isfinite(matrix).all() and np.isfinite(rate).all() and rate.any()):
             continue
-        frame = np.linalg.qr(np.concatenate([rate[:, None], np.eye(size)], axis=1))[0][:, :size]
-        result[i] = np.append(1.0, leading_first((frame[:, 1:].T @ matrix @ frame[:, 1:])[None])[0])
+        result[i] = np.append(1.0, leading_first(across(matrix, rate)[None])[0])
     return result

@@ -10,11 +10,16 @@ Morrison, so that no matrix changes.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from saltus.analysis.orbits.newton import Equations
 from saltus.analysis.orbits.tolerances import AMPLIFIED, CONVERGED, SAME, SINGULAR
 
+#: Known zeros, float64[m, d]; or of zeros that aren't isolated, such as a limit cycle from each of
+#: its points on, what gives the nearest of each kind to float64[k, d]: float64[k, m, d].
+Known = np.ndarray | Callable[[np.ndarray], np.ndarray]
 #: Steps at most, shortened ones included.
 MAX_STEPS = 60
 #: Longest step, in units of the scale.
@@ -27,7 +32,7 @@ def damped_newton(
     equations: Equations,
     start: np.ndarray,
     scale: np.ndarray,
-    known: np.ndarray | None = None,
+    known: Known | None = None,
     max_steps: int = MAX_STEPS,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Zeros of k systems of d equations, float64[k, d], and where the iteration converged, bool[k].
@@ -38,7 +43,7 @@ def damped_newton(
         See :data:`saltus.analysis.orbits.newton.Equations`.
     start, scale : float64[k, d]
         First guesses, and the unit of each unknown.
-    known : float64[m, d], optional
+    known : Known, optional
         Zeros that must not be found again.
     max_steps : int
         Rows are given up after more steps.
@@ -77,7 +82,7 @@ def damped_newton(
         )
         stay = alive | (~better & ~stalled & (share >= SHORTEST))
         rows, step, inverse, level, share = _kept(stay, rows, step, inverse, level, share)
-    if known is not None and len(known):  # a start may have been one of them
+    if known is not None:  # a start may have been one of them
         found[found] = (_apart(x[found], scale[found], known)[1] > SAME**2).all(axis=1)
     return x, found
 
@@ -107,27 +112,26 @@ def _newton_steps(
 
 
 # -- known zeros -----------------------------------------------------------------------------------
-def _apart(x: np.ndarray, scale: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _apart(x: np.ndarray, scale: np.ndarray, known: Known) -> tuple[np.ndarray, np.ndarray]:
     """Differences float64[k, m, d] to the known zeros, and their mean squares float64[k, m], in
     units of the scale.
     """
-    apart = (x[:, None] - known[None]) / scale[:, None]
+    zeros = known(x) if callable(known) else known[None]
+    apart = (x[:, None] - zeros) / scale[:, None]
     return apart, np.maximum(np.einsum("kmd,kmd->km", apart, apart) / x.shape[1], 1e-300)
 
 
-def _weight(x: np.ndarray, scale: np.ndarray, known: np.ndarray | None) -> np.ndarray:
+def _weight(x: np.ndarray, scale: np.ndarray, known: Known | None) -> np.ndarray:
     """m(x), float64[k]."""
-    if known is None or not len(known):
+    if known is None:
         return np.ones(len(x))
     _, square = _apart(x, scale, known)
     return np.asarray(np.exp(np.minimum(np.log1p(1.0 / square).sum(axis=1), 600.0)))
 
 
-def _stretch(
-    x: np.ndarray, step: np.ndarray, scale: np.ndarray, known: np.ndarray | None
-) -> np.ndarray:
+def _stretch(x: np.ndarray, step: np.ndarray, scale: np.ndarray, known: Known | None) -> np.ndarray:
     """What the step of the deflated residual is of the plain one, float64[k]."""
-    if known is None or not len(known):
+    if known is None:
         return np.ones(len(x))
     apart, square = _apart(x, scale, known)
     along = np.einsum("kmd,kd->km", apart, step) / x.shape[1]

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from saltus.analysis.orbits.all_cycles import Cycle
 from saltus.analysis.orbits.attractor_set import AttractorSet
 from saltus.analysis.orbits.capture import Neighbourhoods
+from saltus.analysis.orbits.orbit_measures import measure
 from saltus.analysis.orbits.orbits import Orbit
-from saltus.analysis.orbits.portrait import portraits
+from saltus.analysis.orbits.portrait import ASIDE, portraits
 from saltus.analysis.orbits.tolerances import MARGINAL
-from saltus.flow.maps import Map
+from saltus.flow.maps import Map, Stroboscope
+from saltus.results import AttractorTable
+from saltus.results.dataset.kinds import Kind
 from saltus.results.dataset.orbits import OrbitTable
 
 
@@ -24,6 +28,43 @@ def table_of(map_: Map, orbits: list[Orbit], found: list[int]) -> OrbitTable:
         np.array([outside(one) for one in multipliers], np.int64),
         np.array(found, np.int64),
         np.array([orbit.mismatch for orbit in orbits]),
+    )
+
+
+def table_of_cycles(map_: Stroboscope, cycles: list[Cycle], found: list[int]) -> OrbitTable:
+    """The table of limit cycles of a flow with one row of values, and how many starts led to
+    each.
+    """
+    size, count = len(map_.states), len(cycles)
+    time = np.array([one.time for one in cycles])
+    leading = np.array([abs(one.multipliers[0]) for one in cycles])
+    multipliers = np.array([one.multipliers for one in cycles]).reshape(count, -1 if count else 0)
+    start = np.array([one.points[ASIDE] for one in cycles]).reshape(-1, size)
+    rows = map_.rows(np.zeros(count, np.int64)).with_period(time)
+    numbers = measure(rows, start, np.ones(count, np.int64))
+    with np.errstate(divide="ignore"):
+        exponent = np.maximum(np.log(leading) / time, 0.0)
+    whole = AttractorTable(
+        kind=[Kind.LIMIT_CYCLE.word] * count,
+        period=np.zeros(count, np.int64),
+        contacts=numbers.contacts,
+        itinerary=numbers.itinerary,
+        peak=numbers.peak[:, 0],
+        rms=numbers.rms[:, 0],
+        margin=numbers.margin,
+        multipliers=multipliers,
+        exponent=exponent,
+        exponent_error=np.zeros(count),
+        points=[one.points for one in cycles],
+        cycle=time,
+        eigenvalues=np.full((count, size), np.nan + 0j),
+    )
+    return OrbitTable(
+        whole,
+        [stability_of(one) for one in multipliers],
+        np.array([outside(one) for one in multipliers], np.int64),
+        np.array(found, np.int64),
+        np.array([one.mismatch for one in cycles]),
     )
 
 

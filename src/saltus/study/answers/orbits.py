@@ -1,4 +1,4 @@
-"""[periodic_orbits]: the periodic orbits of a forced system, stable or not, from many starts."""
+"""[periodic_orbits]: the periodic orbits of a system, stable or not, from many starts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from saltus.study.table import ROWS, number, quantity, table, words
 if TYPE_CHECKING:
     import xarray as xr
 
-    from saltus.study.table import TextTable
+    from saltus.study.table import Column, TextTable
 
 
 class Orbits(OneVerb):
@@ -26,7 +26,7 @@ class Orbits(OneVerb):
         """A row for each orbit; what the search says of those that it missed."""
         real, imag = (ds[f"orbit_multiplier_{part}"].values for part in ("real", "imag"))
         columns = [
-            words("period", [period_text(int(n)) for n in ds["orbit_period"].values]),
+            _periods(ds),
             words("stability", ds["orbit_stability"].values),
             number("largest |multiplier|", _largest(np.hypot(real, imag)), ".6g"),
             quantity(
@@ -47,6 +47,13 @@ class Orbits(OneVerb):
         return {"": first_figure(axes)}
 
 
+def _periods(ds: xr.Dataset) -> Column:
+    """The periods: in forcing periods, of limit cycles in seconds."""
+    if "orbit_cycle" in ds:
+        return quantity("period", ds["orbit_cycle"].values, "s")
+    return words("period", [period_text(int(n)) for n in ds["orbit_period"].values])
+
+
 def _largest(sizes: np.ndarray) -> np.ndarray:
     """The largest of each row; NaN in one without numbers."""
     return np.where(np.isnan(sizes).all(axis=1), np.nan, np.fmax.reduce(sizes, axis=1, initial=0))
@@ -55,9 +62,9 @@ def _largest(sizes: np.ndarray) -> np.ndarray:
 def _search(ds: xr.Dataset) -> str:
     """What each search found, in a sentence."""
     unseen = [
-        f"{period_text(int(n))} {100 * share:.2g} %"
+        f"{period_text(int(n), 'limit cycles')} {100 * share:.2g} %"
         if np.isfinite(share)
-        else f"{period_text(int(n))} not known"
+        else f"{period_text(int(n), 'limit cycles')} not known"
         for n, share in zip(ds["search_period"].values, ds["search_unseen"].values, strict=True)
     ]
     return f"Estimated share of the starts whose orbit was not found: {', '.join(unseen)}."

@@ -101,11 +101,19 @@ def _vary(value: Any, at: _At) -> dict[str, Any]:
     }
 
 
+def _period(value: Any, at: _At) -> float | tuple[float, ...]:
+    """A time, or the two ends of a range of them [s]."""
+    ends = value if isinstance(value, list) else [value]
+    found = tuple(quantities.number(one, "s", at.place, at.key) for one in ends)
+    return found if isinstance(value, list) else found[0]
+
+
 _READINGS: dict[str, Callable[[Any, _At], Any]] = {
     "start": lambda value, at: quantities.starts(at.system, value, at.place),
     "box": lambda value, at: quantities.box(at.system, value, at.place),
     "time": lambda value, at: quantities.number(value, "s", at.place, at.key),
     "transient": _transient,
+    "period": _period,
     "values": _values,
     "frequency": lambda value, at: quantities.grid(
         at.system, str(at.system.forced_at), value, f"{at.place}.{at.key}"

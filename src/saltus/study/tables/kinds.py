@@ -38,6 +38,11 @@ Surface = Annotated[
     Discriminator(lambda given: "dict[str]" if isinstance(given, dict) else "str"),
     AfterValidator(_one_level),
 ]
+#: A time, or a range of them.
+Period = Annotated[
+    Annotated[Interval, Tag("list")] | Annotated[Quantity, Tag("quantity")],
+    Discriminator(lambda given: "list" if isinstance(given, list) else "quantity"),
+]
 _POWER = "Power that {} [W], a formula; of a published model it is known."
 _STARTS = (
     'Every state at the start, the same at every value, lists making a batch; or "sweep_up", '
@@ -126,6 +131,7 @@ OF_ORBITS = OF_RESPONSES | {
         'Where to begin: every state, lists making a batch; or "random 1000" with box.',
         convert="start"),
     "periods": whole(3, most=MOST_PERIODS),
+    "period": Kind(Period, (["1 s", "5 s"], "0.1 s"), convert="period"),
 }  # fmt: skip
 #: Curves begin at an event of the study's branches, named by its kind.
 OF_CURVES = OF_RESPONSES | {
