@@ -160,6 +160,19 @@ def test_a_force_of_nothing_is_none(method):
     assert float(found.end_v) == 3.0
 
 
+@pytest.mark.parametrize("holds", [0.0, 0.3])
+def test_without_friction_in_motion_an_oscillator_goes_on(holds):
+    """x = cos(t), though it holds up to ``holds`` at rest: it never stays at rest."""
+
+    @sl.system(states="x v")
+    def oscillator(t, x, v, *, slip=0.1, stick=0.4):
+        return v, -x - sl.friction(v, slip=slip, stick=stick)
+
+    found = run(oscillator.with_values(slip=0.0, stick=holds), (1.0, 0.0), 4.0)
+    assert str(found.status.values) == "ok"
+    assert float(found.end_x) == pytest.approx(math.cos(4.0), abs=1e-13)
+
+
 @every
 def test_a_force_that_touches_zero_goes_on(method):
     """v' = -(1 + cos(t)) up to 4: zero at pi."""

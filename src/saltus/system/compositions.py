@@ -15,6 +15,10 @@ from saltus.system.expression import Condition, Expr, Friction, Operand, as_expr
 from saltus.system.functions import atan, exp, max, min, of_numbers, pi, piecewise, sqrt, tanh
 
 
+#: Added to both of two forces, it changes no ratio but that of 0 to 0, which it makes 1.
+NOTHING = 1e-300
+
+
 def _traced(*values: object) -> bool:
     return any(isinstance(value, Expr) for value in values)
 
@@ -68,7 +72,7 @@ def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) 
     if level.op == "const" and level.payload < 0:
         raise TraceError(drives(level.payload))
     if stick is not None:
-        limit, least = as_expr(stick) / level, as_expr(stick) - level
+        limit, least = (as_expr(stick) + NOTHING) / (level + NOTHING), as_expr(stick) - level
         if least.op == "const" and least.payload < 0:
             raise TraceError(sticks_less(as_expr(stick).payload / level.payload))
     return slip * select(Friction(as_expr(velocity), limit, (level,)), 1.0, -1.0)
