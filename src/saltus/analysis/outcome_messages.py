@@ -33,6 +33,7 @@ _ADVICE = {
     "first, or give the stops a stiffness, which shares the blow.",
     st.NONUNIQUE: "Begin on the side that is meant: a little beyond the boundary.",
     st.INVALID_RESTITUTION: "Bound it where it is written, as sl.max(0.0, sl.min(1.0, e)) does.",
+    st.INVALID_FRICTION: "Bound it where it is written, as sl.max(0.0, slip) does.",
     st.PAINLEVE: "Lower the friction, or let the contact give way: a stiff spring and a damper in "
     "place of the rigid stop follow what happens.",
     st.INVALID: "Check the starts and values of these trajectories.",

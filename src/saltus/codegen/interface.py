@@ -63,6 +63,7 @@ BATCH = (
 _CLOCKS = {"numbers_of_clocks": (ARRAY, ARRAY)}
 _JUMP = {"jump": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE)}
 _RESET = {"reset": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE, WHOLE, ARRAY)}
+_LEVELS = {"levels": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, ARRAY)}
 _SETTLE = {"settle": (REAL, ARRAY, ARRAY, ARRAY, WHOLE, WHOLE)}
 
 #: What the layouts' ``workspace()`` return.
@@ -79,7 +80,7 @@ TAYLOR = Interface(
         "CALM_ROW", "ROWS", "NMOVED", "NSINGULAR",
         "NEWTON_DEGREE_1", "NEWTON_DEGREE_2", "NSTEPPED", "NSERIES", "NCLOCKS",
     ),
-    flags=("PROBED", "TANGENT", "LAWS"),
+    flags=("PROBED", "TANGENT", "LAWS", "LEVELS"),
     tables=MappingProxyType(
         dict.fromkeys(
             (
@@ -101,6 +102,7 @@ TAYLOR = Interface(
             **_CLOCKS,
             **_JUMP,
             **_RESET,
+            **_LEVELS,
             **_SETTLE,
         }
     ),
@@ -117,6 +119,7 @@ _OF_RATES = MappingProxyType(
         **_CLOCKS,
         **_JUMP,
         **_RESET,
+        **_LEVELS,
     }
 )
 _TABLEAU = ("STAGE_TIME", "WEIGHT", "ERROR_WEIGHT", "DENSE_WEIGHT")
@@ -151,7 +154,7 @@ def _one_by_one(
             "MULTISTEP",
             *sizes,
         ),
-        flags=("TANGENT", "GAPS_IN_TIME", "LAWS"),
+        flags=("TANGENT", "GAPS_IN_TIME", "LAWS", "LEVELS"),
         tables=MappingProxyType(
             {"CLOCK_KIND": WHOLE, "CLOCK_TABLE": WHOLE, "LAW": WHOLE, "LAW_SIDE": REAL}
             | dict.fromkeys(tables, REAL)

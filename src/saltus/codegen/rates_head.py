@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from saltus.codegen.clocks import Clocks
 from saltus.codegen.head import Constant, Head
-from saltus.codegen.saltation import jump_function, reset_function
+from saltus.codegen.saltation import jump_function, levels_function, levels_of, reset_function
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.taylor_head import (
     bits_of,
@@ -181,6 +181,7 @@ def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool =
         TANGENT=system.tangent_of is not None,
         GAPS_IN_TIME=any(ex.depends_on(gap, ("time",)) for gap in gaps),
         LAWS=any(guard.law and guard.law.reset for guard in system.guards),
+        LEVELS=bool(levels_of(system)),
         **tables(LAW=laws["LAW"], LAW_SIDE=laws["LAW_SIDE"]),
         **stages.clocks.constants(), **numbers,
     )  # fmt: skip
@@ -192,6 +193,7 @@ def rates_head(system: System, numbers: Mapping[str, Constant], jacobian: bool =
         f"@kernel\ndef gaps(t, y, c, q, h, out):\n{gap_values}\n",
         jump_function(system, stages.clocks),
         reset_function(system, stages.clocks),
+        levels_function(system, stages.clocks),
         f"@kernel\ndef gap_rates(t, y, dy, c, q, h, out):\n{gap_rates}\n",
     ]
     if jacobian:

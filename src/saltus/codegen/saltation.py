@@ -16,9 +16,14 @@ from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.system import expression as ex
 from saltus.system.derivatives import differentiate
 from saltus.system.expression import Expr
+from saltus.system.signs import never_negative_if
 from saltus.system.singular import SetAside, set_aside
 from saltus.system.system import System
 from saltus.system.tangent import first_column
+
+#: Part of the size of its terms by which rounding, and a contact met a little beside its boundary,
+#: may make a friction negative that fades out.
+_LEVEL_ROUNDING = 1e-9
 
 
 def jump_function(system: System, clocks: Clocks) -> str:
@@ -165,6 +170,69 @@ def _reset_of_tangent(
     body += [f"{column[i]} = carried_{i}" for i in changed]
     body += [f"{entry} += leap_{i} * along" for i, entry in enumerate(column)]
     return f"@kernel\ndef reset_of_column(y, {given}):\n{indented(body)}\n\n", lines
+
+
+def levels_of(system: System) -> list[tuple[int, Expr, tuple[Expr, ...] | None]]:
+    """What may become negative on the way: coefficients of friction, each with the guard that says
+    whether its contact is held, and forces of friction, with -1. Last, expressions of parameters of
+    which one must be negative for that, if it can be told.
+    """
+    guards = (system.tangent_of or system).guards
+    laws = [guard.law for guard in guards if guard.law]
+    found = [(law.partner, law.friction) for law in laws if law.friction is not None]
+    found += [(-1, level) for law in laws for level in law.levels]
+    signs = [
+        (hold, level, never_negative_if(level, guards)) for hold, level in found if ex.varies(level)
+    ]
+    return [one for one in signs if one[2] is None or one[2]]
+
+
+def levels_function(system: System, clocks: Clocks) -> str:
+    """``levels(t, y, p, h, mode, out)``: out[0] is negative where friction is, by more than
+    rounding, in a mode (bits), else zero; in the mode -1, where it may become negative on the way.
+    """
+    levels, leaf = levels_of(system), parameter_leaf(system.tangent_of or system, "y", clocks.value)
+    known, lines = ScalarCode(leaf, prefix="known_"), list[str]()
+    conditions = dict.fromkeys(one for _, _, known_if in levels for one in known_if or ())
+    negative = " or ".join(f"{known.value(one)} < 0.0" for one in conditions)
+    may = f"-1.0 if {negative} else 0.0" if negative else "0.0"
+    if any(known_if is None for _, _, known_if in levels):
+        may = "-1.0"
+    known.lines.append(f"out[0] = {may}")
+    for i, (hold, level, _) in enumerate(levels):
+        code = ScalarCode(leaf, side=_bit_in("mode"), prefix=f"of{i}_", switch=clocks.side)
+        value = code.value(ex.add(level, ex.mul(_LEVEL_ROUNDING, _size_of_terms(level))))
+        code.lines.append(f"least = {value} if {value} < least else least")
+        acts = [f"if ((mode >> {hold}) & 1) == 1:", *("    " + line for line in code.lines)]
+        lines += acts if hold >= 0 else code.lines
+    known.lines += ["if mode < 0 or out[0] >= 0.0:", "    return", "least = 0.0"]
+    head = "@kernel\ndef levels(t, y, p, h, mode, out):\n"
+    return f"{head}{indented([*known.lines, *lines, 'out[0] = least'])}\n"
+
+
+def _size_of_terms(root: Expr) -> Expr:
+    """The size of an expression if none of its terms took anything from the others."""
+    sizes: dict[Expr, Expr] = {}
+    for node in ex.walk(root, conditions=False):
+        args = [sizes[one] for one in node.args]
+        match node.op:
+            case "add" | "sub":
+                sizes[node] = ex.add(*args)
+            case "mul":
+                sizes[node] = ex.mul(*args)
+            case "div":
+                sizes[node] = ex.div(args[0], _absolute(node.args[1]))
+            case "neg":
+                sizes[node] = args[0]
+            case "select":
+                sizes[node] = ex.select(node.payload, *args)
+            case _:
+                sizes[node] = _absolute(node)
+    return sizes[root]
+
+
+def _absolute(node: Expr) -> Expr:
+    return ex.elementary("sqrt", ex.mul(node, node))
 
 
 def settle_function(system: System, clocks: Clocks) -> str:

@@ -7,7 +7,13 @@ from collections.abc import Sequence
 from saltus.codegen.clocks import Clocks
 from saltus.codegen.head import Constant, Head
 from saltus.codegen.jets import MOVING, Constants, JetCode
-from saltus.codegen.saltation import jump_function, reset_function, settle_function
+from saltus.codegen.saltation import (
+    jump_function,
+    levels_function,
+    levels_of,
+    reset_function,
+    settle_function,
+)
 from saltus.codegen.scalar import ScalarCode, indented, parameter_leaf
 from saltus.codegen.series import Linear, SeriesBuilder, is_constant
 from saltus.kernels.status import LAW_KINDS, NO_LAW
@@ -176,6 +182,7 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         NSERIES=len(series),
         PROBED=probed, TANGENT=system.tangent_of is not None,
         LAWS=any(guard.law for guard in system.guards),
+        LEVELS=bool(levels_of(system)),
         **tables(
             STEP_ROW=stepped, SERIES_ROW=series, GUARD_ROW=guards.row,
             GUARD_SERIES=[series.index(row) for row in guards.row],
@@ -191,6 +198,7 @@ def taylor_head(system: System, order: int, lanes: int) -> Head:
         gaps_function(system, clocks),
         jump_function(system, clocks),
         reset_function(system, clocks),
+        levels_function(system, clocks),
         settle_function(system, clocks),
         _turns_function(system, code),
         _jets_functions(code, len(column), handed_row, order + 1),

@@ -40,6 +40,13 @@ def on_allowed_sides(
     """
     start = np.array(start, float, order="C")
     beyond = np.zeros(len(start), bool)
+    stops = {
+        g: guard.law.side
+        for g, guard in enumerate(system.guards)
+        if guard.law is not None and guard.law.kind == "impact"
+    }
+    if not stops:
+        return start, beyond
     values = dict(zip(system.values, parameters.T, strict=True))
 
     def columns(expressions: object) -> np.ndarray:
@@ -49,13 +56,11 @@ def on_allowed_sides(
         found = evaluate(expressions, t=origin, states=states, values=values, bits=bits)  # type: ignore[arg-type]
         return np.stack(np.broadcast_arrays(*found, beyond)[:-1], axis=1).astype(float)
 
-    for g, guard in enumerate(system.guards):
-        if guard.law is None or guard.law.kind != "impact":
-            continue
-        inside = columns([guard.gap])[:, 0] * guard.law.side
+    for g, side in stops.items():
+        inside = columns([system.guards[g].gap])[:, 0] * side
         if not (inside < 0.0).any():
             continue
-        normal = columns(system.guard_gradients[g]) * guard.law.side
+        normal = columns(system.guard_gradients[g]) * side
         way = np.abs(columns(system.field)) * period[:, None]
         size = (np.abs(normal) * (np.abs(start) + way)).sum(axis=1)
         here = (inside < 0.0) & (inside >= -ROUNDINGS * EPS * size)

@@ -22,6 +22,7 @@ AMBIGUOUS_IMPACT = 14
 NONUNIQUE = 15
 INVALID_RESTITUTION = 16
 PAINLEVE = 17
+INVALID_FRICTION = 18
 
 #: Name and meaning of every status code.
 STATUS = {
@@ -73,6 +74,10 @@ STATUS = {
     INVALID_RESTITUTION: (
         "invalid_restitution",
         "the coefficient of restitution is outside [0, 1] at an impact",
+    ),
+    INVALID_FRICTION: (
+        "invalid_friction",
+        "the force of friction, or its coefficient in a contact that rests, is negative",
     ),
     PAINLEVE: (
         "painleve",

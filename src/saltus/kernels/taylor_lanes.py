@@ -15,6 +15,7 @@ from saltus.kernels.status import (
     GRAZE_UNRESOLVED,
     HOLD_LAW,
     IMPACT_LAW,
+    INVALID_FRICTION,
     NO_LAW,
     NONFINITE,
     NONUNIQUE,
@@ -197,6 +198,8 @@ def attend(lanes, lane, batch, slow):
     hits = crossing_guards(lanes, lane)
     if lanes.run[DUE, lane] <= lanes.clock[TAU, lane]:
         write_samples(lanes, lane, batch, start, slow)
+    if LEVELS and lanes.memo[lane, FAULT] != 0:
+        return lanes.memo[lane, FAULT]
     for g in range(NGUARDS):
         if (lanes.memo[lane, RESTS] >> g) & 1:
             lanes.fresh[g, lane] = 1.0
@@ -235,6 +238,10 @@ def start_sides(lanes, lane, batch, slow):
         watch(lanes, lane)
         if not begins_uniquely(lanes, lane, batch, slow):
             lanes.memo[lane, FAULT] = NONUNIQUE
+        for i in range(NSTATES):
+            slow.state[i] = lanes.y[i, lane]
+        if LEVELS and pushes_on(lanes, lane, batch, time_of_law(lanes, lane, batch), slow):
+            lanes.memo[lane, FAULT] = INVALID_FRICTION
         for g in range(NGUARDS):
             if LAW[g] == IMPACT_LAW and slow.gaps[g] == 0.0 and slow.gaps[3 * NGUARDS + g] == 0.0:
                 ask_for_paradox(lanes, lane, g, slow)
@@ -276,6 +283,9 @@ def fill(lanes, lane, who, batch, slow):
         lanes.y[i, lane] = batch.state[who, i]
     for g in range(NGUARDS):
         lanes.prior[PRIOR_ROWS * g + NEW, lane] = batch.carry[who, CARRIED + g]
+    if LEVELS:
+        levels(0.0, slow.state, batch.param[who * batch.stride], slow.held, -1, slow.out)
+        lanes.memo[lane, MAY_PUSH] = 1 if slow.out[0] < 0.0 else 0
     if batch.mode[who] < 0:
         lanes.run[LIMIT, lane], lanes.run[MARK, lane] = (
             batch.options[who, MOST_STEPS],
@@ -400,6 +410,8 @@ def propagate(
     while busy > 0 and budget > 0 and (rec_i.shape[0] == 0 or rec_used[0] <= roomy):
         budget -= 1
         attention = step_all(lanes, batch, slow)
+        if LEVELS:
+            attention |= watch_friction(lanes, batch, slow)
         while attention != 0:
             lane = lowest_bit(attention)
             attention &= attention - 1

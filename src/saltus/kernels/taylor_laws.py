@@ -15,6 +15,7 @@ from saltus.kernels.status import (
     HOLD_LAW,
     IMPACT,
     IMPACT_LAW,
+    INVALID_FRICTION,
     INVALID_RESTITUTION,
     JUMP_LAW,
     NO_LAW,
@@ -35,14 +36,19 @@ def watch(lanes, lane):
 
 
 @inner
-def time_of_law(lanes, lane, batch):
-    """The time as laws read it: of a motion whose forcing repeats to the bit, that of its first
-    period, which is right to rounding after any number of them.
+def base_of_law(lanes, lane, batch):
+    """Start of the period as laws read the time: of a motion whose forcing repeats to the bit, that
+    of its first period, which is right to rounding after any number of them.
     """
-    base = lanes.clock[BASE, lane]
     if NCLOCKS == 0 and lanes.memo[lane, DRIFTS] == 0:
-        base = batch.origin[lanes.memo[lane, WHO]]
-    return lanes.clock[TAU, lane] + base
+        return batch.origin[lanes.memo[lane, WHO]]
+    return lanes.clock[BASE, lane]
+
+
+@inner
+def time_of_law(lanes, lane, batch):
+    """The time as laws read it."""
+    return lanes.clock[TAU, lane] + base_of_law(lanes, lane, batch)
 
 
 # -- contacts by their laws ------------------------------------------------------------------------
@@ -334,6 +340,56 @@ def ask_for_paradox(lanes, lane, g, slow):
             paradox = paradox and not sticks
     if paradox:
         lanes.memo[lane, FAULT] = PAINLEVE
+
+
+@inner
+def pushes_on(lanes, lane, batch, now, slow):
+    """Whether a force of friction, or a coefficient of one that acts, is negative in slow.state."""
+    show_clocks(lanes, lane, slow)
+    p = batch.param[lanes.memo[lane, WHO] * batch.stride]
+    levels(now, slow.state, p, slow.held, mode_of(lanes, lane), slow.out)
+    return slow.out[0] < 0.0
+
+
+@kernel
+def pushes_on_at(lanes, lane, batch, d, slow):
+    """The same of the state a time d into the step."""
+    state_at(lanes, lane, d, slow.state)
+    now = lanes.run[START, lane] + d + base_of_law(lanes, lane, batch)
+    return pushes_on(lanes, lane, batch, now, slow)
+
+
+@kernel
+def watch_friction(lanes, batch, slow):
+    """End the steps in which a friction becomes negative where it does, for good. Returns the bits
+    of their lanes.
+    """
+    found = 0
+    for lane in range(LANES):
+        watched = lanes.run[ACTIVE, lane] > 0.5 and lanes.memo[lane, MAY_PUSH] == 1
+        whole = lanes.clock[TAU, lane] - lanes.run[START, lane]
+        for look in range(LOOKS if watched else 0):
+            d = whole * ((look + 1) / LOOKS)
+            if (found >> lane) & 1 == 0 and pushes_on_at(lanes, lane, batch, d, slow):
+                turn_back(lanes, lane, batch, whole * (look / LOOKS), d, slow)
+                found |= 1 << lane
+    return found
+
+
+@kernel
+def turn_back(lanes, lane, batch, before, beyond, slow):
+    """Bring a lane back to where friction becomes negative, between two times into its step."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (before + beyond)
+        if pushes_on_at(lanes, lane, batch, middle, slow):
+            beyond = middle
+        else:
+            before = middle
+    state_at(lanes, lane, beyond, slow.state)
+    for i in range(NSTATES):
+        lanes.y[i, lane] = slow.state[i]
+    lanes.clock[TAU, lane] = lanes.run[START, lane] + beyond
+    lanes.memo[lane, FAULT] = INVALID_FRICTION
 
 
 @kernel

@@ -79,9 +79,9 @@ DELTA, RATE, WHICH, NEAREST, TURNED, SIGN, DEPTH, ONBOARD, SERIES, UNTIL, P0, P1
 # Columns of `memo`: trajectory, periods, whether the slow path has decided this step, guards that
 # it found to cross (bits), guards on which the state rests (bits), whether a harmonic of time has
 # another phase in every period, whether this step isn't made of numbers, the status with which a
-# law of contact ends the motion (0: none does).
-WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN, FAULT = range(8)
-MEMO = 8
+# law of contact ends the motion (0: none does), whether a friction may become negative.
+WHO, COUNT, DECIDED, HITS, RESTS, DRIFTS, BROKEN, FAULT, MAY_PUSH = range(9)
+MEMO = 9
 # Columns of `options`: log2 of the tolerance; steps after which a trajectory's pace is looked at;
 # contacts that it may make; periods that it must have gained by then, infinite if the steps are all
 # that it may take.
@@ -107,6 +107,9 @@ SLOW_START = 1.0e-9
 CLOSED, MOST_STRIKES = 1.0e-16, 50
 #: Rows of `slow.state` behind the state, where there are laws (see impacts.py).
 TRIED, AT_FIRST, BY_GUARDS, WAY = (NSTATES * row for row in range(1, 5))
+#: Places in each step at which a force of friction is looked at; halvings that find where it
+#: becomes negative.
+LOOKS, HALVINGS = 4, 60
 #: Part that friction leaves of what the force of a contact does, at which a contact is given up
 #: rather than released.
 PARADOX = 1.0e-9

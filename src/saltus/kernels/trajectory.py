@@ -27,6 +27,7 @@ from saltus.kernels.status import (
     CROSSING,
     EVENTS,
     FINISHED,
+    INVALID_FRICTION,
     NONFINITE,
     OK,
     PAUSED,
@@ -354,11 +355,26 @@ def put_back(i, t, t_leg, status, batch, work):
         batch.count[i], batch.phase[i] = batch.end_count[i], batch.end_phase[i]
 
 
+@kernel
+def pushes_on(i, t, batch, work):
+    """Whether a force of friction is negative at NODE."""
+    mode = batch.mode[i]
+    if batch.options[i, LOCATE] == 0.0:
+        drive_at(t, Q, work)
+        gaps_at(t, NODE, Q, TRY, work)
+        mode = sides(TRY, work)
+    p, h = batch.param[i * batch.stride], part(work, H, HELD * NCLOCKS)
+    levels(t, part(work, NODE, NSTATES), p, h, mode, part(work, TOLD, 2))
+    return work[TOLD] < 0.0
+
+
 @inner
-def status_at(i, t, t_end, batch):
+def status_at(i, t, t_end, batch, work):
     """Status of a trajectory at a node; a law of contact may have ended it."""
     if LAWS and batch.status[i] != RUNNING:
         return batch.status[i]
+    if LEVELS and pushes_on(i, t, batch, work):
+        return INVALID_FRICTION
     if t >= t_end:
         return OK
     if batch.counters[i, EVENTS] > batch.options[i, MAX_EVENTS]:
@@ -382,7 +398,7 @@ def advance(i, budget, batch, work):
     locate = batch.options[i, LOCATE] != 0.0
     t_end = end_time(i, batch)
     t, t_leg, t_break = take_up(i, t_end, batch, work)
-    status = status_at(i, t, t_end, batch)
+    status = status_at(i, t, t_end, batch, work)
     while status == RUNNING and budget > 0 and has_room(batch):
         t_new, h, fine, rejections = step(i, t, min(t_end, t_break), t_leg, t_end, batch, work)
         budget -= 1 + rejections
@@ -419,7 +435,7 @@ def advance(i, budget, batch, work):
             t_break = follow_clocks(i, t, True, batch, work)
             start_leg(i, t, t_end, locate, batch, work)
             t_leg = t
-        status = status_at(i, t, t_end, batch)
+        status = status_at(i, t, t_end, batch, work)
     put_back(i, t, t_leg, status, batch, work)
     return budget
 

@@ -11,7 +11,7 @@ from saltus.system import expression as ex
 from saltus.system.contacts import find_contacts, renamed
 from saltus.system.expression import And, Bit, Condition, Expr, Friction, Not, Or, Relation
 from saltus.system.functions import atan, piecewise, sqrt, tanh
-from saltus.system.guards import Guard, number_of
+from saltus.system.guards import Guard, Law, number_of
 from saltus.system.singular import assuming
 from saltus.system.system import System
 
@@ -59,6 +59,9 @@ def blended(
     blend = _Blend(step, parameters)
     for guard in system.guards:
         blend.add(guard)
+    for number, guard in enumerate(system.guards):
+        if guard.law is not None:
+            blend.keep_friction(number, guard.law)
     try:
         rates = [blend.rewrite(entry) for entry in system.field]
         field, guards = find_contacts(rates, (), system.states)
@@ -93,10 +96,17 @@ class _Blend:
         name = self._parameters.get(number)
         if name is not None:
             self.sides.append(ex.as_expr(self._step(gap, ex.parameter(name))))
-        elif guard.law is None or guard.law.limit is None:
+        else:
             self.sides.append(Relation(gap))
-        else:  # both sides have one limit on the boundary itself
-            self.sides.append(Friction(gap, self.rewrite(assuming(guard.law.limit, number, True))))
+
+    def keep_friction(self, number: int, law: Law) -> None:
+        """Let the comparison that a guard stays decide friction, as its law does."""
+        side = self.sides[number]
+        if isinstance(side, Relation) and law.limit is not None:
+            # both sides have one limit on the boundary itself
+            limit = self.rewrite(assuming(law.limit, number, True))
+            levels = tuple(self.rewrite(level) for level in law.levels)
+            self.sides[number] = Friction(side.gap, limit, levels)
 
     def rewrite(self, root: Expr) -> Expr:
         """The expression with blends in place of pieces."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from saltus.errors import ParameterError, TraceError
-from saltus.system.compositions import sticks_less
+from saltus.system.compositions import drives, sticks_less
 from saltus.system.declared import outside, pushes_on
 from saltus.system.evaluate import evaluate
 from saltus.system.expression import varies
@@ -36,8 +36,8 @@ def check_guards(system: str, count: int) -> None:
 
 def check_values(system: System, values: Mapping[str, Any]) -> None:
     """Raise a ParameterError if pieces overlap with some values of the parameters, a restitution is
-    outside [0, 1], a coefficient of friction is negative, or friction holds less at rest than in
-    motion.
+    outside [0, 1], a coefficient of friction or a force of friction is negative, or friction holds
+    less at rest than in motion.
 
     Parameters
     ----------
@@ -52,6 +52,7 @@ def check_values(system: System, values: Mapping[str, Any]) -> None:
         for part, low, high, why in (
             (law.restitution, 0.0, 1.0, outside),
             (law.friction, 0.0, np.inf, pushes_on),
+            *((level, 0.0, np.inf, drives) for level in law.levels),
             (law.limit, 1.0, np.inf, sticks_less),
         ):
             if part is None or part.op == "const" or varies(part):

@@ -47,8 +47,8 @@ def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) 
     velocity : Expr or float
         Sliding velocity [m/s, or any], zero where it sticks.
     slip : Expr or float
-        Force in motion [N, or any], > 0; it may depend on the velocity (Stribeck). Whether it stays
-        positive isn't watched: bound one that may not, as ``sl.max(slip, 0.0)`` does.
+        Force in motion [N, or any], at least 0; it may depend on the velocity (Stribeck). A motion
+        on which it becomes negative ends with status ``invalid_friction``.
     stick : Expr or float, optional
         Largest force at rest [as slip], at least ``slip`` at rest; default: the same.
 
@@ -60,17 +60,26 @@ def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) 
     Raises
     ------
     TraceError
-        If ``stick`` is smaller than ``slip``.
+        If ``slip`` is negative, or ``stick`` is smaller than it.
     """
     if not _traced(velocity):
         return slip * sign(velocity)
-    if stick is None:
-        return slip * sign(velocity)
-    limit, least = as_expr(stick) / as_expr(slip), as_expr(stick) - as_expr(slip)
-    if least.op == "const" and least.payload < 0:
-        raise TraceError(sticks_less(as_expr(stick).payload / as_expr(slip).payload))
-    gap = as_expr(velocity)
-    return slip * select(Friction(gap, limit), 1.0, -1.0)
+    level, limit = as_expr(slip), None
+    if level.op == "const" and level.payload < 0:
+        raise TraceError(drives(level.payload))
+    if stick is not None:
+        limit, least = as_expr(stick) / level, as_expr(stick) - level
+        if least.op == "const" and least.payload < 0:
+            raise TraceError(sticks_less(as_expr(stick).payload / level.payload))
+    return slip * select(Friction(as_expr(velocity), limit, (level,)), 1.0, -1.0)
+
+
+def drives(force: float) -> str:
+    """What to say of a negative friction force."""
+    return (
+        f"the friction force slip = {force:g} is negative: friction never pushes on. Give its "
+        f"size, and subtract sl.friction(...) in the equation of motion."
+    )
 
 
 def sticks_less(limit: float) -> str:

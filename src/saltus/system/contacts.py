@@ -101,15 +101,23 @@ def find_contacts(
     for law in declared:
         roots += law.roots()
     for friction in frictions:
-        roots += [ex.select(friction, 1.0, 0.0), friction.limit]
+        limit = _ONE if friction.limit is None else friction.limit
+        roots += [ex.select(friction, 1.0, 0.0), limit, *friction.levels]
     found, guards = find_guards(roots)
     rest = iter(found[len(rates) :])
     met = [_met(law, next(rest), [next(rest) for _ in law.parts]) for law in declared]
-    limits = _limits([(next(rest), next(rest)) for _ in frictions], guards)
+    limits, levels = dict[int, Expr](), dict[int, Field]()
+    for friction in frictions:
+        comparison, limit = next(rest), next(rest)
+        forces = tuple(next(rest) for _ in friction.levels)
+        for number in bits_in([comparison]):
+            levels[number] = (*levels.get(number, ()), *forces)
+            if friction.limit is not None:
+                _add_limit(limits, number, limit, guards)
     field = lifted(found[: len(rates)], guards)
     check_finite(field, guards, states)
     check_gaps(guards)
-    return with_laws(field, guards, states, met, limits)
+    return with_laws(field, guards, states, met, limits, levels)
 
 
 def _met(law: Declared, comparison: Expr, parts: Sequence[Expr]) -> _Met:
@@ -130,18 +138,13 @@ def _met(law: Declared, comparison: Expr, parts: Sequence[Expr]) -> _Met:
     return _Met(law, bit.guard, bit is found, dict(zip(law.parts, parts, strict=True)))
 
 
-def _limits(found: Sequence[tuple[Expr, Expr]], guards: Sequence[Guard]) -> dict[int, Expr]:
-    """Static over kinetic force by the number of the guard."""
-    limits: dict[int, Expr] = {}
-    for comparison, limit in found:
-        for number in bits_in([comparison]):
-            if number in limits and limits[number] is not limit:
-                raise TraceError(
-                    f"two friction laws with different limits act where "
-                    f"{equation_of(number, guards)}. Write one, with the sum of their forces."
-                )
-            limits[number] = limit
-    return limits
+def _add_limit(limits: dict[int, Expr], number: int, limit: Expr, guards: Sequence[Guard]) -> None:
+    """Static over kinetic force, by the number of the guard."""
+    if limits.setdefault(number, limit) is not limit:
+        raise TraceError(
+            f"two friction laws with different limits act where "
+            f"{equation_of(number, guards)}. Write one, with the sum of their forces."
+        )
 
 
 def with_laws(
@@ -149,7 +152,8 @@ def with_laws(
     guards: tuple[Guard, ...],
     states: Sequence[str],
     met: Sequence[_Met] = (),
-    limits: dict[int, Expr] | None = None,
+    limits: Mapping[int, Expr] | None = None,
+    levels: Mapping[int, Field] | None = None,
 ) -> tuple[Field, tuple[Guard, ...]]:
     """The field, reduced where contacts are held, and the guards with their laws; hold guards stand
     behind them. Where no guard has a law both are as they were.
@@ -159,7 +163,7 @@ def with_laws(
     TraceError
         If a law doesn't fit its contact.
     """
-    limits = limits or {}
+    limits, levels = limits or {}, levels or {}
     laws: dict[int, Law] = {}
     for declared in met:
         if declared.number in laws:
@@ -173,7 +177,7 @@ def with_laws(
     rubbing = [one for one in (_rubbing(each, states) for each in met) if one]
     _check_rubbing(rubbing, laws, field, guards)
     laws |= {
-        number: Law("surface", constraint=guards[number].gap)
+        number: Law("surface", constraint=guards[number].gap, levels=levels.get(number, ()))
         for number in range(len(guards))
         if number in {one.guard for one in rubbing}
         or (number not in laws and is_surface(number, field, guards, states))

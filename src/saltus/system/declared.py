@@ -133,7 +133,8 @@ def impact(
         momentum is kept.
     friction : Expr or float, optional
         Coefficient of friction [1], at least 0: the friction is at most this times the force with
-        which the contact is pressed, and that much while it slides. It needs ``restitution=0``.
+        which the contact is pressed, and that much while it slides. It needs ``restitution=0``. A
+        motion on which it becomes negative ends with status ``invalid_friction``.
     slip_velocity : Expr, optional
         Velocity at which the contact slides [as ``velocity``], linear in velocities. It comes with
         ``friction``.

@@ -281,11 +281,12 @@ class Relation(Condition):
 
 @dataclass(frozen=True, eq=False)
 class Friction(Relation):
-    """A comparison that decides the direction of a friction force; at rest that force may be
-    ``limit`` times as large as in motion.
+    """A comparison that decides the direction of friction forces. These are ``levels`` in motion;
+    at rest they may be ``limit`` times as large, where that is given.
     """
 
-    limit: Expr
+    limit: Expr | None
+    levels: tuple[Expr, ...]
 
 
 @dataclass(frozen=True)

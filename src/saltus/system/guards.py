@@ -51,6 +51,8 @@ class Law:
         Of a surface: static over kinetic force.
     restitution, friction : Expr or None
         Of an impact; its coefficient of friction while it rests, if it has any.
+    levels : tuple of Expr
+        Of a surface: the forces of friction in motion that are declared as such.
     remaining : Expr or None
         Of an impact with friction: its pivot over that without.
     mass : Expr or None
@@ -76,6 +78,7 @@ class Law:
     limit: Expr | None = None
     restitution: Expr | None = None
     friction: Expr | None = None
+    levels: tuple[Expr, ...] = ()
     remaining: Expr | None = None
     mass: Expr | None = None
     zeros: int = 1
@@ -87,7 +90,7 @@ class Law:
             self.constraint, self.drive, self.pivot, self.limit, self.restitution, self.friction,
             self.remaining, self.mass,
         )  # fmt: skip
-        several = (*self.reset, *self.settled, *self.normal, *self.direction)
+        several = (*self.reset, *self.settled, *self.normal, *self.direction, *self.levels)
         return (*several, *(one for one in single if one is not None))
 
     def extended(self, states: Sequence[Expr]) -> Law:

@@ -130,6 +130,7 @@ class _Rewriting:
             limit=None if law.limit is None else each(law.limit),
             restitution=None if law.restitution is None else each(law.restitution),
             friction=None if law.friction is None else each(law.friction),
+            levels=tuple(each(level) for level in law.levels if ex.varies(level)),
             remaining=None if law.remaining is None else self.rate(law.remaining),
         )
 

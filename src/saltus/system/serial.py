@@ -110,6 +110,8 @@ def _law_data(law: Law, index: Mapping[Expr, int]) -> dict[str, Any]:
     data = {name: getattr(law, name) for name in _PLAIN}
     if law.support >= 0:
         data["support"] = law.support
+    if law.levels:
+        data["levels"] = [index[one] for one in law.levels]
     data |= {name: [index[one] for one in getattr(law, name)] for name in _TUPLES}
     single = {name: getattr(law, name) for name in _SINGLE}
     return data | {name: index[one] for name, one in single.items() if one is not None}
@@ -279,7 +281,8 @@ def _law(
     """The law of a guard from its data, checked."""
     if data is None:
         return None
-    expressions = [i for name in _TUPLES for i in data[name]]
+    levels = data.get("levels", [])
+    expressions = [*levels, *(i for name in _TUPLES for i in data[name])]
     expressions += [data[name] for name in _SINGLE if name in data]
     _require(all(0 <= i < len(nodes) for i in expressions), "a law stands in no node")
     kind, side, partner, zeros = (data[name] for name in _PLAIN)
@@ -303,6 +306,7 @@ def _law(
         all(name in single for name in needed) and all(several[name] for name in rows),
         "a law isn't whole",
     )
+    several["levels"] = tuple(nodes[i] for i in levels)
     return Law(kind, side, partner, zeros=zeros, support=support, **several, **single)
 
 

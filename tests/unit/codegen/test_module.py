@@ -291,15 +291,17 @@ def test_new_values_never_recompile(monkeypatch):
 @pytest.mark.parametrize("shape", [(0, 3), (5,), (3, 2)])
 @pytest.mark.parametrize("writeable", [True, False])
 def test_a_call_reads_arrays_where_they_lie(shape, writeable):
-    """Empty and read-only ones too, whose strides nobody asks for; that of a part begins in the
-    middle of its whole.
+    """Read-only ones too; that of a part begins in the middle of its whole. Nobody asks where an
+    empty one lies.
     """
     array = np.zeros(shape)
     array.flags.writeable = writeable
     block = Call(("float64[::1]" if len(shape) < 2 else "float64[:,::1]",))
     numbers = block.block((array,)).tolist()
-    assert numbers[: 5 + len(shape)] == [0, 0, array.size, 8, array.ctypes.data, *shape]
-    assert len(numbers) == 5 + 2 * len(shape)
-    assert not array.size or tuple(numbers[5 + len(shape) :]) == array.strides
+    assert numbers[:4] == [0, 0, array.size, 8]
+    assert numbers[5 : -len(shape)] == list(shape)
+    if array.size:
+        assert numbers[4] == array.ctypes.data
+        assert tuple(numbers[-len(shape) :]) == array.strides
     if shape == (5,):
         assert block.block((array[2:],))[4] == array.ctypes.data + 16

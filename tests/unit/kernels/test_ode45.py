@@ -85,7 +85,15 @@ def gap_rates(t, y, dy, c, q, h, out):
     out[0], out[1] = dy[0], dy[0] - c[4]
 """
 # Neither has a clock, by which something is decided by time alone, nor a jump of the state.
-PLAIN = dict(NCLOCKS=0, CLOCK_KIND=(0,), CLOCK_TABLE=(0,), LAWS=False, LAW=(0,), LAW_SIDE=(0.0,))
+PLAIN = dict(
+    NCLOCKS=0,
+    CLOCK_KIND=(0,),
+    CLOCK_TABLE=(0,),
+    LAWS=False,
+    LEVELS=False,
+    LAW=(0,),
+    LAW_SIDE=(0.0,),
+)
 OF_PLAIN = """
 @kernel
 def numbers_of_clocks(p, n):
@@ -93,6 +101,10 @@ def numbers_of_clocks(p, n):
 
 @kernel
 def reset(t, y, p, h, before, after, g, out):
+    pass
+
+@kernel
+def levels(t, y, p, h, mode, out):
     pass
 """
 B4 = {

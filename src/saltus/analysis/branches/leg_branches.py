@@ -9,19 +9,18 @@ They go on from one another in the parameter, *persistence*, or both lie on one 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from saltus.analysis.branches.arclength import FIRST, tangents
+from saltus.analysis.branches.arclength import tangents
 from saltus.analysis.branches.contact_sequences import sequences
 from saltus.analysis.branches.grazing_orbits import sqrt_coefficient
 from saltus.analysis.branches.leg_pieces import Piece, follow_legs
 from saltus.analysis.branches.legs import Legs
 from saltus.analysis.branches.shooting import PeriodicOrbits
 from saltus.analysis.branches.special_points import SpecialPoint
-from saltus.analysis.branches.tracing import ASIDE, Branch, Plan, Starts, both_ways
+from saltus.analysis.branches.tracing import Branch, Plan, Start, both_ways
 
 
 @dataclass
@@ -106,34 +105,24 @@ class LegBranch(Branch):
             self.events[i] = replace(event, derivative=matrix[0], tangent=way[0])
 
 
-def leg_branches(plan: Plan, starts: Starts, which: Sequence[int]) -> list[Branch | None]:
-    """The branches of some seeds, see :class:`Plan`: contact by contact where orbits have impacts,
-    as others where contacts are held.
+def leg_branch(plan: Plan, start: Start) -> Branch | None:
+    """The branch of a start, see :class:`Plan`: contact by contact if its orbit has impacts, as
+    others if contacts are held.
     """
-    orbits = plan.make(starts.n, starts.scale)
-    known = dict(zip(which, sequences(orbits, starts.z[which]), strict=True)) if which else {}
-    result = []
-    for i in which:
-        sequence = known[i]
-        if sequence is not None and sequence.flies:
-            result.append(_branch(plan, orbits, i, starts))
-        elif starts.n <= plan.longest:
-            result += both_ways(plan, starts, [i])
-        else:  # a chatter of many periods
-            result.append(None)
-    return result
+    orbits = plan.make(start.n, start.scale[None])
+    sequence = sequences(orbits, start.z[None])[0]
+    if sequence is not None and sequence.flies:
+        return _branch(plan, orbits, start)
+    return both_ways(plan, start) if start.n <= plan.longest else None  # a chatter of many periods
 
 
-def _branch(plan: Plan, orbits: PeriodicOrbits, row: int, starts: Starts) -> Branch | None:
-    """The branch of one seed in both directions, or in the one in which it leaves another."""
-    seed, z, scale = starts.seeds[row], starts.z[row], starts.scale[row]
-    up = np.zeros(len(z))
-    up[-1] = 1.0
-    sides, first = ((up, -up), FIRST) if seed.along is None else ((seed.along,), ASIDE)
+def _branch(plan: Plan, orbits: PeriodicOrbits, start: Start) -> Branch | None:
+    """The branch of a start in both directions, or in the one in which it leaves another."""
+    z, scale = start.z, start.scale
     ways: list[tuple[list[Piece], str]] = []
-    for along in sides:
+    for along in start.sides:
         if not ways or ways[0][1] != "closed":
-            ways.append(follow_legs(orbits, z, scale, along, plan.limits, plan.points, first))
+            ways.append(follow_legs(orbits, z, scale, along, plan.limits, plan.points, start.first))
     ends = (ways[-1][1], ways[0][1]) if len(ways) == 2 else ("branch", ways[0][1])
     if ways[0][1] == "closed":
         ends = ("closed", "closed")
@@ -143,7 +132,7 @@ def _branch(plan: Plan, orbits: PeriodicOrbits, row: int, starts: Starts) -> Bra
         return None
     none = np.zeros(0)
     result = LegBranch(
-        orbits, row, none, none, none, none, none, ends, parent=seed.parent,
+        orbits, 0, none, none, none, none, none, ends, parent=start.seed.parent,
         pieces=[*back[::-1], *forwards], backwards=len(back),
     )  # fmt: skip
     result.join()

@@ -21,8 +21,6 @@ from saltus.analysis.branches.special_points import SpecialPoint, locate, outsid
 ASIDE = 0.001
 #: Farthest that a seed lies from its orbit, in units of the scale.
 ASTRAY = 0.5
-#: Branches that are followed side by side.
-ABREAST = 2
 #: A fold so near to a branch point is none, in units of the scale: it is located less well there.
 VERTEX = 1e-4
 #: Orbits nearer than this, in units of the scale, are one.
@@ -164,7 +162,7 @@ class Plan:
     switch : set of str
         Kinds of events at which the branches that leave are followed.
     follow : callable
-        The branches of some starts, such as :func:`both_ways`; None where there is none.
+        The branch of a start, such as :func:`both_ways`; None where there is none.
     """
 
     make: Callable[[int, np.ndarray], PeriodicOrbits]
@@ -172,7 +170,7 @@ class Plan:
     points: int
     longest: int
     switch: frozenset[str]
-    follow: Callable[[Plan, Starts, Sequence[int]], list[Branch | None]]
+    follow: Callable[[Plan, Start], Branch | None]
 
 
 def trace(
@@ -187,55 +185,63 @@ def trace(
     """
     waiting, begun = list(seeds), 0
     while waiting:
-        n = len(waiting[0].points)
-        wave = [seed for seed in waiting if len(seed.points) == n][:ABREAST]
-        waiting = [seed for seed in waiting if all(seed is not other for other in wave)]
-        begun += len(wave)
-        starts = Starts.of(plan, wave)
-        fresh = [i for i in starts.found if not _known(starts.z[i], starts.n, branches)]
-        fresh = [i for i in fresh if not _ends_there(wave[i], branches)]
-        for i, branch in zip(fresh, plan.follow(plan, starts, fresh), strict=True):
-            if branch is None or _known(starts.z[i], starts.n, branches):
-                continue
-            if _ends_there(wave[i], branches) or branch.is_known(branches):
-                continue
-            branches.append(branch)
-            branch.find_events()
-            waiting += branch.children(plan, len(branches) - 1)
+        seed, begun = waiting.pop(0), begun + 1
+        start = Start.of(plan, seed)
+        known = start is None or _known(start.z, start.n, branches)
+        if start is not None and not known and not _ends_there(seed, branches):
+            branch = plan.follow(plan, start)
+            if branch is not None and not branch.is_known(branches):
+                branches.append(branch)
+                branch.find_events()
+                waiting += branch.children(plan, len(branches) - 1)
         if progress is not None:
             progress(begun / (begun + len(waiting)))
 
 
 # -- following -------------------------------------------------------------------------------------
 @dataclass(frozen=True)
-class Starts:
-    """Seeds of n periods, closed by Newton's method: float64[k, z], their units, and which were."""
+class Start:
+    """The orbit of a seed, closed by Newton's method: float64[z], and the units of its unknowns."""
 
-    seeds: Sequence[Seed]
-    n: int
+    seed: Seed
     z: np.ndarray
     scale: np.ndarray
-    found: list[int]
+
+    @property
+    def n(self) -> int:
+        """Periods of the orbit."""
+        return len(self.seed.points)
+
+    @property
+    def sides(self) -> np.ndarray:
+        """In which directions the branch is followed, in units of the scale, float64[1 or 2, z]."""
+        if self.seed.along is not None:
+            return self.seed.along[None]
+        up = np.zeros(len(self.z))
+        up[-1] = 1.0
+        return np.stack([up, -up])
+
+    @property
+    def first(self) -> float:
+        """The first step, in units of the scale."""
+        return FIRST if self.seed.along is None else ASIDE
 
     @classmethod
-    def of(cls, plan: Plan, seeds: Sequence[Seed]) -> Starts:
-        """At the parameter of each seed; beside it where a branch leaves another."""
-        n = len(seeds[0].points)
-        z = np.array([seed.z for seed in seeds])
-        scale = np.array([
-            np.concatenate([np.tile(seed.scale, n), np.abs(seed.own)]) for seed in seeds
-        ])  # fmt: skip
-        scale[:, -1] = plan.limits[1] - plan.limits[0]
-        normal = np.zeros_like(z)
-        normal[:, -1] = 1.0
-        for i, seed in enumerate(seeds):
-            if seed.along is not None:
-                z[i] += ASIDE * seed.along * scale[i]
-                normal[i] = seed.along
-        rows, orbits = np.arange(len(z)), plan.make(n, scale)
-        orbits.accepted(z, rows)
-        point = correct(orbits, z, normal, rows, ASTRAY)
-        return cls(seeds, n, point.z, scale, [int(i) for i in np.flatnonzero(point.found)])
+    def of(cls, plan: Plan, seed: Seed) -> Start | None:
+        """At the parameter of the seed, beside it where a branch leaves another; None if there is
+        no orbit.
+        """
+        n, z = len(seed.points), seed.z
+        scale = np.concatenate([np.tile(seed.scale, n), np.abs(seed.own)])
+        scale[-1] = plan.limits[1] - plan.limits[0]
+        normal = np.zeros(len(z))
+        normal[-1] = 1.0
+        if seed.along is not None:
+            z, normal = z + ASIDE * seed.along * scale, seed.along
+        row, orbits = np.zeros(1, np.int64), plan.make(n, scale[None])
+        orbits.accepted(z[None], row)
+        point = correct(orbits, z[None], normal[None], row, ASTRAY)
+        return cls(seed, point.z[0], scale) if point.found[0] else None
 
 
 def _halved(orbits: PeriodicOrbits, curve: Curve) -> str:
@@ -255,56 +261,38 @@ def _halved(orbits: PeriodicOrbits, curve: Curve) -> str:
 
 def both_ways(
     plan: Plan,
-    starts: Starts,
-    which: Sequence[int],
+    start: Start,
     ends: Callable[[Any, Curve], str] = _halved,
     kind: type[Branch] = Branch,
-) -> list[Branch | None]:
-    """The branches of some seeds of one period; None where there is none."""
-    if not which:
-        return []
-    owner, sides = [], []
-    for i in which:
-        along = starts.seeds[i].along
-        up = np.zeros(starts.z.shape[1])
-        up[-1] = 1.0
-        for side in (up, -up) if along is None else (along,):
-            owner.append(i)
-            sides.append(side)
-    whose, orbits = np.array(owner), plan.make(starts.n, starts.scale[owner])
-    orbits.accepted(starts.z[owner], np.arange(len(owner)))
-    first = np.array([FIRST if starts.seeds[i].along is None else ASIDE for i in owner])
+) -> Branch | None:
+    """The branch of an orbit over one period; None if there is none."""
+    sides = start.sides
+    rows = np.arange(len(sides))
+    z = np.tile(start.z, (len(sides), 1))
+    orbits = plan.make(start.n, np.tile(start.scale, (len(sides), 1)))
+    orbits.accepted(z, rows)
     curves = follow(
-        orbits, starts.z[owner], np.array(sides), {orbits.width - 1: plan.limits}, plan.points,
-        first, ends=functools.partial(ends, orbits), group=whose,
+        orbits, z, sides, {orbits.width - 1: plan.limits}, plan.points, start.first,
+        ends=functools.partial(ends, orbits), group=0 * rows,
     )  # fmt: skip
     for curve in curves:
         shrunk = curve.end == "lost" and orbits.free and len(curve.z) > 1
         if shrunk and orbits.radius(curve.z[-1]) < ENDING:
             curve.end = "hopf"
-    result = []
-    for i in which:
-        mine = np.flatnonzero(whose == i)
-        result.append(_joined(orbits, mine, [curves[j] for j in mine], starts.seeds[i], kind))
-    return result
+    return _joined(orbits, [curve for curve in curves if curve.z], start.seed, kind)
 
 
 def _joined(
-    orbits: PeriodicOrbits,
-    rows: np.ndarray,
-    curves: list[Curve],
-    seed: Seed,
-    kind: type[Branch],
+    orbits: PeriodicOrbits, curves: list[Curve], seed: Seed, kind: type[Branch]
 ) -> Branch | None:
     """One branch from the curves to both sides."""
-    curves = [curve for curve in curves if curve.z]
     if not curves:
         return None
-    for row, curve in zip(rows, curves, strict=False):
+    for curve in curves:
         if curve.end == "closed":
-            return _of(orbits, int(row), curve, ("closed", "closed"), seed, kind)
+            return _of(orbits, curve, ("closed", "closed"), seed, kind)
     if len(curves) == 1:
-        return _of(orbits, int(rows[0]), curves[0], ("branch", curves[0].end), seed, kind)
+        return _of(orbits, curves[0], ("branch", curves[0].end), seed, kind)
     up, down = curves
     whole = Curve(
         down.z[:0:-1] + up.z,
@@ -312,12 +300,11 @@ def _joined(
         down.derivative[:0:-1] + up.derivative,
         [-length for length in down.length[:0:-1]] + up.length,
     )
-    return _of(orbits, int(rows[0]), whole, (down.end, up.end), seed, kind)
+    return _of(orbits, whole, (down.end, up.end), seed, kind)
 
 
 def _of(
     orbits: PeriodicOrbits,
-    row: int,
     curve: Curve,
     ends: tuple[str, str],
     seed: Seed,
@@ -325,8 +312,8 @@ def _of(
 ) -> Branch:
     z, tangent, derivative = (np.array(one) for one in (curve.z, curve.tangent, curve.derivative))
     length = np.array(curve.length) - curve.length[0]
-    own = orbits.multipliers(z, derivative, np.full(len(z), row))
-    return kind(orbits, row, z, tangent, derivative, length, own, ends, parent=seed.parent)
+    own = orbits.multipliers(z, derivative, np.zeros(len(z), np.int64))
+    return kind(orbits, 0, z, tangent, derivative, length, own, ends, parent=seed.parent)
 
 
 # -- events ----------------------------------------------------------------------------------------
