@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.orbits.all_orbits import BESIDE, HELD, Search, chained
+from saltus.analysis.orbits.all_orbits import BESIDE, HELD, Search, chained, used_up
 from saltus.analysis.orbits.cycles import (
     LOCATED,
     NO_CYCLE,
@@ -234,7 +234,8 @@ def all_cycles(
     guesses, led = list[Guess](), list[np.ndarray]()
     for first in range(0, len(start), TOGETHER):
         part = slice(first, first + TOGETHER)
-        state = _aged(map_, start[part], np.resize(AGES, len(start))[part])
+        state, followed = _aged(map_, start[part], np.resize(AGES, len(start))[part])
+        search.given_up += int((~followed).sum())
         for guess in _guesses(map_, state, limits, time, n):
             guesses.append(guess)
             closed = close(map_, guess, limits[1])
@@ -308,12 +309,16 @@ def _rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray:
 
 
 # -- first guesses ---------------------------------------------------------------------------------
-def _aged(map_: Stroboscope, start: np.ndarray, age: np.ndarray) -> np.ndarray:
-    """States of motions from float64[k, D] so many turns later, int64[k]."""
+def _aged(map_: Stroboscope, start: np.ndarray, age: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """States of motions from float64[k, D] so many turns later, int64[k]; and which of the motions
+    are followed, bool[k]: the budgets of the others are used up.
+    """
     last = AGES[-1]
     rows = map_.rows(np.zeros(len(start), np.int64))
-    points = np.concatenate([start[:, None], rows.launch(start, last).advance(last)], axis=1)
-    return np.asarray(points[np.arange(len(start)), age])
+    flight = rows.launch(start, last)
+    points = np.concatenate([start[:, None], flight.advance(last)], axis=1)
+    state, followed = points[np.arange(len(start)), age], ~used_up(flight)
+    return np.where(followed[:, None], state, np.nan), followed
 
 
 def _guesses(
