@@ -111,3 +111,12 @@ def test_the_beam_is_that_of_the_textbook(tmp_path):
     saltus("run", tmp_path / "study.toml", "--system", f"{BEAM / 'beam.py'}:beam",
            "--out", tmp_path / "out")  # fmt: skip
     assert sl.load(tmp_path / "out" / "run.nc").sizes["contact"] == 6 * 12  # of those that are kept
+
+
+def test_a_buckled_beam_rests_on_either_side(tmp_path):
+    """At +-sqrt(8/2) m it is stable, straight it isn't."""
+    study = Path(__file__).parents[1] / "examples" / "buckled" / "study.toml"
+    assert "Equilibria" in saltus("run", study, "--out", tmp_path / "out")
+    ds = sl.load(tmp_path / "out" / "equilibria.nc")
+    assert ds["equilibrium_x"].values == pytest.approx([-2, 0, 2], abs=1e-12)
+    assert ds["equilibrium_stable"].values.tolist() == [1, 0, 1]

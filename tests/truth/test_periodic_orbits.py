@@ -12,6 +12,9 @@ from scipy.integrate import solve_ivp
 
 import impact_orbits
 import saltus as sl
+from saltus.analysis.basins.periodic_orbits import STEPS
+from saltus.flow.maps import Stroboscope
+from saltus.kernels import status as st
 
 RIG_BOX = {"x": ("-5 mm", "5 mm"), "v": ("-1 m/s", "1 m/s")}
 RECIPES = {
@@ -138,3 +141,60 @@ def test_refusals():
         sl.edge_orbit(sl.models.double_scroll(), (0.1, 0.0, 0.0), (0.2, 0.0, 0.0))
     with pytest.raises(sl.SaltusError, match="errors of ODE45"):
         sl.periodic_orbits(duffing, (0.0, 0.0), method=sl.ODE45())
+
+
+@sl.system(states="x v", forced_at="w", units={"w": "rad/s"})
+def hardening(t, x, v, *, w=1.6, force=0.3):
+    """A spring whose force grows with the cube: far out it swings as fast as it is far out."""
+    return v, -0.1 * v - x - x**3 + force * sl.cos(w * t)
+
+
+@pytest.fixture(scope="module")
+def from_far_away_too():
+    starts = {"x": [0.0, 1e6, 1.5, -1e7], "v": [0.0, 0.0, 0.3, 1e8]}
+    return sl.periodic_orbits(hardening, starts, periods=1, method=sl.Taylor(max_steps=3000))
+
+
+def test_starts_whose_motion_is_too_fast_to_be_followed_are_given_up(from_far_away_too):
+    """Undamped, x'' = -x^3 swings from 1e6 with 0.847e6 rad/s: 530 thousand times a period."""
+    assert from_far_away_too.search_given_up.values.tolist() == [2]
+    assert "given up 2 starts" in sl.describe(from_far_away_too)
+
+
+def test_starts_that_are_given_up_change_nothing(from_far_away_too):
+    starts = {"x": [0.0, 1.5], "v": [0.0, 0.3]}
+    alone = sl.periodic_orbits(hardening, starts, periods=1)
+    assert alone.search_given_up.values.tolist() == [0]
+    assert from_far_away_too.orbit_x.values == pytest.approx(alone.orbit_x.values, abs=1e-12)
+    assert from_far_away_too.sizes["orbit"] == alone.sizes["orbit"] == 3
+
+
+def test_a_search_has_a_budget_of_its_own(monkeypatch):
+    """From 1e4 a period is 5300 swings, some hundred thousand steps; thirteen are followed."""
+    steps, launched = [], Stroboscope.launch
+
+    def watched(map_, start, longest):
+        flight = launched(map_, start, longest)
+        steps.append(flight._arrays["counters"])
+        return flight
+
+    monkeypatch.setattr(Stroboscope, "launch", watched)
+    found = sl.periodic_orbits(hardening, {"x": 1e4, "v": 0.0}, periods=1)
+    assert found.search_given_up.values.tolist() == [1]
+    assert max(one[:, st.STEPS].max() for one in steps) <= 13 * STEPS + 1
+
+
+def test_limit_cycles_are_looked_for_from_motions_that_can_be_followed():
+    """The unit circle, of period 2 pi; with two steps no motion is followed for twelve turns."""
+
+    @sl.system(states="x v")
+    def relaxed(t, x, v):
+        return v, (1 - x**2 - v**2) * v - x
+
+    near = {"x": [0.5, 1e-3], "v": [0.0, 0.1]}
+    found = sl.periodic_orbits(relaxed, near, period=("4 s", "8 s"), method=sl.Taylor(max_steps=2))
+    assert found.search_given_up.values.tolist() == [2]
+    assert found.sizes["orbit"] == 0
+    found = sl.periodic_orbits(relaxed, near, period=("4 s", "8 s"))
+    assert found.search_given_up.values.tolist() == [0]
+    assert found.orbit_cycle.values == pytest.approx([2 * np.pi], rel=1e-12)

@@ -554,6 +554,43 @@ class JetCode:
             total = self._assign(f"{total} + magnitude({product})")
         return total
 
+    def rounding(self, form: Linear) -> str:
+        """What rounding errors of a linear form are measured by where those of its arguments count:
+        the cosine of an angle next to pi/2 is as wrong as the angle.
+        """
+        total = self._assign(
+            f"magnitude({self._as_lane(self.coefficient(form.offset), form.offset)})"
+        )
+        for series, coefficient in form.terms.items():
+            part = self._rounding(series)
+            if not is_constant(coefficient, 1.0) and not is_constant(coefficient, -1.0):
+                part = f"magnitude({self.coefficient(coefficient)} * {part})"
+            total = self._assign(f"{total} + {part}")
+        return total
+
+    def _rounding(self, series: Series) -> str:
+        """The same of one series, to first order in the errors of its operands."""
+        key = (series, 0, "rounding")
+        if key not in self._memo:
+            self._memo[key] = self._assign(self._rounding_code(series))
+        return str(self._memo[key])
+
+    def _rounding_code(self, series: Series) -> str:
+        own = f"magnitude({self._zero(self.value(series, 0))})"
+        match series.kind:
+            case "linear":
+                assert isinstance(series.payload, Linear)
+                return self.rounding(series.payload)
+            case "product":
+                a, b = series.operands
+                x, y = (f"magnitude({self._zero(self.value(s, 0))})" for s in (a, b))
+                return f"{x} * {self._rounding(b)} + {y} * {self._rounding(a)}"
+            case "sin" | "cos" if self._time_frequency(series.operands[0]) is None:
+                angle = series.operands[0]
+                other = self._harmonic(angle, 0, "cosine" if series.kind == "sin" else "sine")
+                return f"{own} + {self._rounding(angle)} * magnitude({other})"
+        return own
+
     def write(self, row: int, value: str | None, of_column: bool = False) -> None:
         """Store a coefficient to a row of ``work``."""
         self.lines.do(f"store(work, {row}, {self._zero(value)})", of_column)

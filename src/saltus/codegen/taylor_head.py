@@ -241,7 +241,7 @@ def _rates(
     code.harmonics = harmonics
     for i, form in enumerate(forms):
         code.write(i, code.linear(form, 0))
-        code.write(2 * len(forms) + i, code.size(form))
+        code.write(2 * len(forms) + i, code.rounding(form))
     return list(code.lines.shared())
 
 

@@ -234,6 +234,12 @@ def _orbits(ds: xr.Dataset) -> list[str]:
             f"{int(one['search_converged'])} of {ds.attrs.get('starts', '?')} starts led to an "
             f"orbit{unseen}; deflation found {int(one['search_deflated'])} more"
         )
+    if "search_given_up" in ds and (dropped := int(ds["search_given_up"].max())):
+        lines.append(
+            f"given up {counted(dropped, 'start')}: the motion took more steps or contacts than "
+            f"allowed. Start nearer to where the system moves, or allow more: "
+            f"method=sl.Taylor(max_steps=...)"
+        )
     return lines
 
 

@@ -128,7 +128,7 @@ def test_schema_tells_editors_the_keys():
     assert set(schema["properties"]) == {
         "study", "system", "method", "simulate", "compare", "poincare", "spectrum", "impacts",
         "energy", "lyapunov",
-        "frequency_response", "bifurcation_diagram", "periodic_orbits", "branches",
+        "frequency_response", "bifurcation_diagram", "equilibria", "periodic_orbits", "branches",
         "bifurcation_curve", "backbone", "basins",
     }  # fmt: skip
     assert schema["$defs"]["Simulate"]["additionalProperties"] is False

@@ -14,6 +14,7 @@ from saltus.analysis.basins.halton import halton
 from saltus.analysis.basins.labels import complete, settle_all
 from saltus.analysis.basins.pipeline import SCOUTS, memory
 from saltus.analysis.dataset_parts import provenance, subject
+from saltus.analysis.orbits.all_orbits import used_up
 from saltus.analysis.orbits.find_attractors import find_attractors
 from saltus.analysis.orbits.noisy import stray_attrs
 from saltus.analysis.orbits.portrait import portraits
@@ -289,9 +290,12 @@ def draw(ranges: Mapping[str, tuple[float, float]], unit: np.ndarray) -> dict[st
 
 def spread(map_: Stroboscope, start: np.ndarray) -> np.ndarray:
     """Range of each state over the starts, their first iterates and the time between two of them; 1
-    for a state that never moves.
+    for a state that never moves. Starts whose budget is used up aren't looked at.
     """
-    iterates = map_.launch(start, SPREAD).advance(SPREAD)
+    flight = map_.launch(start, SPREAD)
+    iterates = flight.advance(SPREAD)
+    if (followed := ~used_up(flight)).any():
+        start, iterates = start[followed], iterates[followed]
     last = iterates[:WATCHED, -1][np.isfinite(iterates[:WATCHED, -1]).all(axis=1)]
     between = map_.run(last, 1, Schedule.even(1, SPREAD)).samples
     points = np.concatenate(

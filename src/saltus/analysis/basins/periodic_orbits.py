@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,7 @@ import xarray as xr
 from saltus.analysis.basins.attractors import spread
 from saltus.analysis.dataset_parts import provenance, subject
 from saltus.analysis.orbits.all_cycles import all_cycles
-from saltus.analysis.orbits.all_orbits import Search, all_orbits
+from saltus.analysis.orbits.all_orbits import AGES, Search, all_orbits
 from saltus.analysis.orbits.equilibria import autonomous
 from saltus.analysis.orbits.orbit_table import table_of, table_of_cycles
 from saltus.analysis.orbits.tolerances import LONGEST
@@ -25,11 +27,16 @@ from saltus.flow.maps import Stroboscope
 from saltus.flow.methods import Method, check_method
 from saltus.flow.progress import reporting
 from saltus.flow.room import check_room
+from saltus.flow.taylor import Taylor
 from saltus.results import build
 from saltus.results.dataset import schema
 from saltus.results.dataset.orbits import OrbitTable
 from saltus.system.system import System
 from saltus.units import to_si
+
+#: Steps for each iterate of a trial's motion, unless the method says how many. The rig takes 14 a
+#: period from where it moves, 5 million from a kilometre away.
+STEPS = 10_000
 
 
 @verb
@@ -76,7 +83,9 @@ def periodic_orbits(
         ``("1 s", "5 s")``, or a first guess, which stands for half to twice of it.
     method : Method
         Default :class:`saltus.Taylor`; another one has errors that keep unstable orbits from
-        closing.
+        closing. Its budgets, ``max_steps`` and ``max_events``, are those of each motion that is
+        followed; default: 10 000 steps for each forcing period or turn, 12 of which a start may
+        be followed before the search begins. Starts that need more are given up.
     seed : int
         Of random starts.
     threads : int, optional
@@ -100,7 +109,8 @@ def periodic_orbits(
         ``search_converged`` of the starts led to an orbit, ``search_found_once`` orbits were found
         by one start only, ``search_unseen`` is their ratio: the share of converging starts whose
         orbit isn't known yet, as Good and Turing estimate it; ``search_deflated`` orbits were found
-        by deflation only, and ``search_exhausted`` says whether that ended by finding nothing more.
+        by deflation only, ``search_exhausted`` says whether that ended by finding nothing more,
+        and ``search_given_up`` starts were dropped, since their motion used up its budget.
 
     Raises
     ------
@@ -139,6 +149,7 @@ def periodic_orbits(
     if system.forced_at is None:
         turn = _turn(system, states)
         limits, guess = _range(period, (0.0, (periods + 0.5) * turn))
+        method = _with_budget(method, max(AGES[-1], limits[1] / turn))
         looks = Stroboscope(system, method, every=turn, threads=threads)
         with reporting(progress) as show:
             cycles = all_cycles(looks, states, limits, guess or turn, show)
@@ -150,6 +161,7 @@ def periodic_orbits(
             f"{system.name} is forced: its orbits last whole forcing periods. Give periods=, the "
             f"longest of them, in place of period=."
         )
+    method = _with_budget(method, AGES[-1] + periods)
     map_ = Stroboscope(system, method, threads=threads)
     scale = spread(map_, states)
     with reporting(progress) as show:
@@ -197,6 +209,13 @@ def exact_method(method: Method | None) -> Method:
     return method
 
 
+def _with_budget(method: Method, iterates: float) -> Method:
+    """The method with a budget of steps for motions that last so many iterates."""
+    if isinstance(method, Taylor) and method.max_steps is None:
+        return replace(method, max_steps=STEPS * math.ceil(iterates))
+    return method
+
+
 def _given(system: System, start: Any, box: Any) -> np.ndarray:
     """The starts that were given, float64[k, D]."""
     if box is not None:
@@ -210,7 +229,7 @@ def searches(each: Sequence[Search]) -> dict[str, Any]:
         "search_period": [one.period for one in each],
         **{
             f"search_{name}": [getattr(one, name) for one in each]
-            for name in ("converged", "found_once", "unseen", "deflated", "exhausted")
+            for name in ("converged", "found_once", "unseen", "deflated", "exhausted", "given_up")
         },
     }
 

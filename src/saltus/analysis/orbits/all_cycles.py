@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from saltus.analysis.orbits.all_orbits import BESIDE, HELD, Search, chained
+from saltus.analysis.orbits.all_orbits import BESIDE, HELD, Search, chained, used_up
 from saltus.analysis.orbits.cycles import (
     LOCATED,
     NO_CYCLE,
@@ -28,7 +28,7 @@ from saltus.analysis.orbits.damped import Known, damped_newton
 from saltus.analysis.orbits.equilibria import field_of
 from saltus.analysis.orbits.floquet import nontrivial
 from saltus.analysis.orbits.newton import Equations
-from saltus.analysis.orbits.tolerances import AMPLIFIED, LONGEST, SAME
+from saltus.analysis.orbits.tolerances import AMPLIFIED, CONVERGED, LONGEST, SAME
 from saltus.flow.engine import Schedule
 from saltus.flow.maps import Stroboscope
 
@@ -41,6 +41,10 @@ WINDOWS = 3
 TOGETHER = 64
 #: Points of a cycle that are unknowns: at least, at most; one for each turn between.
 FEWEST, MOST = 4, 16
+#: Looks at a cycle for each of them to see whether it repeats, and the largest difference.
+FINER, FAR = 8, 1e-2
+#: Farthest that points go from the guess, in units of its range.
+FARTHEST = 3.0
 #: Samples of a cycle by which others are told to be it.
 SAMPLES = 1024
 #: One in so many of these is looked at first.
@@ -230,10 +234,11 @@ def all_cycles(
     guesses, led = list[Guess](), list[np.ndarray]()
     for first in range(0, len(start), TOGETHER):
         part = slice(first, first + TOGETHER)
-        state = _aged(map_, start[part], np.resize(AGES, len(start))[part])
+        state, followed = _aged(map_, start[part], np.resize(AGES, len(start))[part])
+        search.given_up += int((~followed).sum())
         for guess in _guesses(map_, state, limits, time, n):
             guesses.append(guess)
-            closed = close(map_, guess)
+            closed = close(map_, guess, limits[1])
             number = result.take(map_, closed)
             led.append(np.stack([first + closed.row, number])[:, number >= 0])
         if progress:
@@ -241,14 +246,20 @@ def all_cycles(
     pairs = np.unique(np.concatenate(led, axis=1), axis=1)
     result.found = np.bincount(pairs[1], minlength=len(result.cycles)).tolist()
     search.converged, search.found_once = len(np.unique(pairs[0])), result.found.count(1)
-    _deflate(map_, Guess.joined(guesses), result)
+    _deflate(map_, Guess.joined(guesses), limits[1], result)
     return result.within(limits)
 
 
 def close(
-    map_: Stroboscope, guess: Guess, known: Known | None = None, max_steps: int | None = None
+    map_: Stroboscope,
+    guess: Guess,
+    longest: float,
+    known: Known | None = None,
+    max_steps: int | None = None,
 ) -> Guess:
-    """The cycles that Newton's method finds; ``known`` ones are deflated."""
+    """The cycles that Newton's method finds, with periods up to the longest [s]; ``known`` ones are
+    deflated.
+    """
     _, n, size = guess.points.shape
     options = {} if max_steps is None else {"max_steps": max_steps}
     step, parts = max(1, HELD // (n * size + 1) ** 2), [guess.rows(np.zeros(0, np.int64))]
@@ -256,22 +267,25 @@ def close(
         part = guess.rows(np.arange(first, min(first + step, len(guess))))
         z = np.concatenate([part.points.reshape(len(part), -1), part.time[:, None]], axis=1)
         unit = np.concatenate([np.tile(part.scale, n), part.time[:, None]], axis=1)
-        z, found = damped_newton(_equations(map_, part), z, unit, known, **options)
-        found &= z[:, -1] > 0
+        z, found = damped_newton(_equations(map_, part, longest), z, unit, known, **options)
+        found &= (z[:, -1] > 0) & (z[:, -1] <= longest * (1.0 + SAME))
         points = z[found, :-1].reshape(-1, n, size)
         parts.append(Guess(points, z[found, -1], part.scale[found], part.row[found]))
     return Guess.joined(parts)
 
 
-def _equations(map_: Stroboscope, guess: Guess) -> Equations:
+def _equations(map_: Stroboscope, guess: Guess, longest: float) -> Equations:
     """The equations of the cycles near guesses, in units of these; the last one keeps each step
-    across the flow at the first point.
+    across the flow at the first point. They end at twice the longest period,
+    and far from the guess, where a motion may run away.
     """
     _, n, size = guess.points.shape
 
     def equations(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         k, points, scale = len(z), z[:, :-1].reshape(-1, n, size), guess.scale[rows]
-        ahead = z[:, -1] > 0
+        away = np.abs(points - guess.points[rows]) / scale[:, None]
+        ahead = (z[:, -1] > 0) & (z[:, -1] < 2.0 * longest) & (away.max(axis=(1, 2)) < FARTHEST)
+        points = np.where(ahead[:, None, None], points, guess.points[rows])
         part = np.where(ahead, z[:, -1], guess.time[rows]) / n
         mine = map_.rows(np.zeros(k * n, np.int64)).with_period(np.repeat(part, n))
         gaps, matrix, ends = chained(mine, points, scale)
@@ -295,12 +309,16 @@ def _rates(map_: Stroboscope, states: np.ndarray) -> np.ndarray:
 
 
 # -- first guesses ---------------------------------------------------------------------------------
-def _aged(map_: Stroboscope, start: np.ndarray, age: np.ndarray) -> np.ndarray:
-    """States of motions from float64[k, D] so many turns later, int64[k]."""
+def _aged(map_: Stroboscope, start: np.ndarray, age: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """States of motions from float64[k, D] so many turns later, int64[k]; and which of the motions
+    are followed, bool[k]: the budgets of the others are used up.
+    """
     last = AGES[-1]
     rows = map_.rows(np.zeros(len(start), np.int64))
-    points = np.concatenate([start[:, None], rows.launch(start, last).advance(last)], axis=1)
-    return np.asarray(points[np.arange(len(start)), age])
+    flight = rows.launch(start, last)
+    points = np.concatenate([start[:, None], flight.advance(last)], axis=1)
+    state, followed = points[np.arange(len(start)), age], ~used_up(flight)
+    return np.where(followed[:, None], state, np.nan), followed
 
 
 def _guesses(
@@ -331,7 +349,7 @@ def _parts(map_: Stroboscope, state: np.ndarray, time: np.ndarray, n: int) -> np
 
 
 # -- other cycles than those that are known --------------------------------------------------------
-def _deflate(map_: Stroboscope, guesses: Guess, result: CycleSet) -> None:
+def _deflate(map_: Stroboscope, guesses: Guess, longest: float, result: CycleSet) -> None:
     """Search on with the known cycles deflated, from some guesses and from beside the known ones,
     until nothing more is found.
     """
@@ -343,7 +361,7 @@ def _deflate(map_: Stroboscope, guesses: Guess, result: CycleSet) -> None:
         starts = Guess.joined([some, *(_beside(one, n, random) for one in result.cycles)])
         cycles = tuple(result.cycles)
         known = _nearest(cycles, n)
-        result.take(map_, close(map_, starts, known, DEFLATED_STEPS))
+        result.take(map_, close(map_, starts, longest, known, DEFLATED_STEPS))
         search.deflated += len(result.cycles) - before
         if len(result.cycles) == before:
             search.exhausted = True
@@ -372,7 +390,7 @@ def _nearest(cycles: tuple[Cycle, ...], n: int) -> Known:
     """
 
     def zeros(z: np.ndarray) -> np.ndarray:
-        points = z[:, :-1].reshape(len(z), n, z.shape[1] // n)
+        points = z[:, :-1].reshape(len(z), n, (z.shape[1] - 1) // n)
         result = np.empty((len(z), len(cycles), z.shape[1]))
         for i, cycle in enumerate(cycles):
             turns = np.maximum(np.round(z[:, -1] / cycle.time), 1.0)
@@ -396,7 +414,7 @@ def _is(map_: Stroboscope, cycle: Cycle, found: Guess) -> np.ndarray:
         points = found.points[rows]
         apart = _apart(map_, cycle, points.reshape(-1, points.shape[2]))
         # one point may lie at a jump
-        same[rows] = np.sort(apart.reshape(points.shape[:2]), axis=1)[:, -2] < SAME
+        same[rows] = np.sort(apart.reshape(points.shape[:2]), axis=1)[:, -2:][:, 0] < SAME
     return same
 
 
@@ -416,13 +434,13 @@ def _apart(map_: Stroboscope, cycle: Cycle, states: np.ndarray) -> np.ndarray:
 def _cycle(map_: Stroboscope, found: Guess) -> Cycle | None:
     """The cycle that Newton's method found; None if it doesn't close, or rests."""
     row, n = map_.rows(np.zeros(1, np.int64)), found.points.shape[1]
-    if not (np.ptp(found.points[0], axis=0) > NO_CYCLE * found.scale[0]).any():
+    travelled = np.abs(_rates(map_, found.points[0])) * found.time
+    if not (travelled > NO_CYCLE * found.scale).any():
         return None
     time = least_period(row, found.points[:, 0], found.time, found.scale)
     if time[0] < 0.75 * found.time[0]:
-        found = close(
-            map_, Guess(_parts(map_, found.points[:, 0], time, n), time, found.scale, found.row)
-        )
+        points = _parts(map_, found.points[:, 0], time, n)
+        found = close(map_, Guess(points, time, found.scale, found.row), 2.0 * time[0])
         if not len(found):
             return None
     parts = map_.rows(np.zeros(n, np.int64)).with_period(np.repeat(found.time / n, n))
@@ -434,8 +452,24 @@ def _cycle(map_: Stroboscope, found: Guess) -> Cycle | None:
     mismatch = float(np.abs((ends - np.roll(found.points[0], -1, axis=0)) / scale).max())
     if not (mismatch < AMPLIFIED and np.isfinite(matrices).all() and np.isfinite(samples).all()):
         return None
+    multipliers = nontrivial(matrices, _rates(map_, found.points[0]))
+    if not _repeats(whole, found.points[0], scale, float(np.abs(multipliers).max())):
+        return None
     return Cycle(
         float(found.time[0]), samples[:: SAMPLES // LONGEST][:LONGEST],
-        nontrivial(matrices, _rates(map_, found.points[0])), mismatch, scale, samples,
+        multipliers, mismatch, scale, samples,
         _rates(map_, samples),
     )  # fmt: skip
+
+
+def _repeats(whole: Stroboscope, points: np.ndarray, scale: np.ndarray, growth: float) -> bool:
+    """Whether the motion from the first of points float64[n, D] passes the others, and repeats in
+    a second period. At a point at which a held contact was let go it doesn't.
+    """
+    parts = FINER * len(points)
+    seen = whole.run(points[:1], 2, Schedule.even(2, parts, beyond=1)).samples[0] / scale
+    enough = min(SAME + CONVERGED * max(growth, 1.0) ** 2, FAR)
+    again = np.abs(seen[parts:] - seen[: parts + 1]).max(axis=1)
+    passed = np.abs(seen[:parts:FINER] - points / scale).max(axis=1)
+    # either side of a jump may be seen, at the first point twice
+    return bool((again > enough).sum() <= 2 and (passed > enough).sum() <= 1)

@@ -18,7 +18,9 @@ from saltus.analysis.orbits.damped import damped_newton
 from saltus.analysis.orbits.newton import leading_first
 from saltus.analysis.orbits.orbits import Orbit, phase_distances
 from saltus.analysis.orbits.tolerances import AMPLIFIED, SAME
-from saltus.flow.maps import Map
+from saltus.flow.maps import Map, Travel
+from saltus.flow.progress import stage
+from saltus.kernels import status as st
 
 #: Numbers in the matrices that are solved at a time: 64 MB of them.
 HELD = 2**23
@@ -49,6 +51,8 @@ class Search:
         Orbits that no start led to before the others were deflated.
     exhausted : bool
         Whether the last search with all known orbits deflated found nothing.
+    given_up : int
+        Starts that were dropped: their motion took more steps or contacts than the method allows.
     """
 
     period: int
@@ -57,6 +61,7 @@ class Search:
     found_once: int = 0
     deflated: int = 0
     exhausted: bool = False
+    given_up: int = 0
 
     @property
     def unseen(self) -> float:
@@ -178,24 +183,36 @@ def all_orbits(
     result = OrbitSet(scale)
     iterates = _guesses(map_, start, longest)
     for n in range(1, longest + 1):
-        search = Search(n, len(start))
+        search = Search(n, len(start), given_up=len(start) - len(iterates))
+        show = stage(progress, *(m * (m + 1) / (longest * (longest + 1)) for m in (n - 1, n)))
         result.searches.append(search)
         number = result.take(map_, close(map_, iterates[:, :n], scale))
         count = np.bincount(number[number >= 0], minlength=len(result.orbits))
         result.found = (np.array(result.found, np.int64) + count).tolist()
         search.converged, search.found_once = int(count.sum()), int((count == 1).sum())
+        if show:
+            show(0.5)
         _deflate(map_, iterates[:, :n], result, search)
-        if progress:
-            progress(n * (n + 1) / (longest * (longest + 1)))
+        if show:
+            show(1.0)
     return result.ordered()
 
 
 def _guesses(map_: Map, start: np.ndarray, longest: int) -> np.ndarray:
-    """Successive iterates float64[k, longest, D] from each start on, at its age."""
+    """Successive iterates float64[k, longest, D] from each start on, at its age; without the
+    starts whose budget is used up.
+    """
     last = AGES[-1] + longest
-    points = np.concatenate([start[:, None], map_.launch(start, last).advance(last - 1)], axis=1)
+    flight = map_.launch(start, last)
+    points = np.concatenate([start[:, None], flight.advance(last - 1)], axis=1)
     age = np.resize(AGES, len(start))
-    return np.asarray(points[np.arange(len(start))[:, None], age[:, None] + np.arange(longest)])
+    iterates = points[np.arange(len(start))[:, None], age[:, None] + np.arange(longest)]
+    return np.asarray(iterates[~used_up(flight)])
+
+
+def used_up(flight: Travel) -> np.ndarray:
+    """Trajectories that needed more steps or contacts than they were allowed, bool[k]."""
+    return np.isin(flight.status, (st.BUDGET_STEPS, st.BUDGET_EVENTS))
 
 
 def _deflate(map_: Map, guesses: np.ndarray, result: OrbitSet, search: Search) -> None:

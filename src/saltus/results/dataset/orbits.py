@@ -63,6 +63,9 @@ ORBIT_VARIABLES = {
         "i1",
         flags={0: "no", 1: "yes"},
     ),
+    "search_given_up": Variable(
+        _SEARCH, "1", "starts given up, since their motion used up its budget", "i8"
+    ),
 }
 
 

@@ -12,6 +12,7 @@ from saltus.errors import ParameterError, StudyError, TraceError, UnitError, nea
 from saltus.study.answers import basins, simulate
 from saltus.study.answers.branches import Backbone, Branches
 from saltus.study.answers.curves import Curve
+from saltus.study.answers.equilibria import Equilibria
 from saltus.study.answers.lyapunov import Exponents
 from saltus.study.answers.motions import Balance, Lines, Section, Statistics
 from saltus.study.answers.orbits import Orbits
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
 #: Tables that one question answers.
 _KINDS = (
-    Section, Lines, Statistics, Balance, Exponents, Response, Diagram, Orbits, Branches, Curve,
-    Backbone,
+    Section, Lines, Statistics, Balance, Exponents, Response, Diagram, Equilibria, Orbits, Branches,
+    Curve, Backbone,
 )  # fmt: skip
 _ONE: dict[str, type[OneVerb]] = {one.place: one for one in _KINDS}
 #: Tables that may be several questions.

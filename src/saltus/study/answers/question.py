@@ -112,7 +112,7 @@ class OneVerb(Question):
     def __init__(self, table: Any, setting: Setting) -> None:
         self.title, self.stem = self.names(table, setting)
         self.system = system_of_question(table, setting, self.place)
-        self.method = setting.method(getattr(table, self.how), f"{self.place}.{self.how}")
+        self.method = setting.method(getattr(table, self.how, None), f"{self.place}.{self.how}")
         self.check_first(table)
         self.arguments = arguments(table, self.system, setting, self.place)
         try:

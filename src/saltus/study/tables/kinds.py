@@ -133,6 +133,13 @@ OF_ORBITS = OF_RESPONSES | {
     "periods": whole(3, most=MOST_PERIODS),
     "period": Kind(Period, (["1 s", "5 s"], "0.1 s"), convert="period"),
 }  # fmt: skip
+#: Equilibria are looked for in a box, or from starts.
+OF_EQUILIBRIA = KINDS | {
+    "start": Kind(dict[str, Start], KINDS["start"].examples,
+        "Starts of Newton's method, in place of a box: every state; lists make a batch.", None,
+        convert="start"),
+    "starts": whole(256),
+}  # fmt: skip
 #: Curves begin at an event of the study's branches, named by its kind.
 OF_CURVES = OF_RESPONSES | {
     "event": Kind(Literal["fold", "period_doubling", "neimark_sacker", "graze"], ("fold",),

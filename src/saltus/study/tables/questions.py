@@ -14,12 +14,13 @@ from saltus.study.tables.kinds import (
     OF_BACKBONES,
     OF_BRANCHES,
     OF_CURVES,
+    OF_EQUILIBRIA,
     OF_ORBITS,
     OF_RESPONSES,
     whole,
 )
 from saltus.study.tables.methods import Method
-from saltus.study.tables.parts import FileTitle, Quantity, Range, Table
+from saltus.study.tables.parts import FileTitle, Interval, Quantity, Range, Table
 from saltus.study.tables.signature import Asked, Generated, table
 
 #: Stems of the files of [simulate]: of the run, and of that of a second method.
@@ -112,6 +113,20 @@ BifurcationDiagram = table(
     OF_RESPONSES,
     base=Varied,
     called="Bifurcation diagram",
+)
+Equilibria = table(
+    "equilibria",
+    ["equilibria"],
+    OF_EQUILIBRIA,
+    called="Equilibria",
+    box=(
+        dict[str, Interval] | None,
+        Field(
+            None,
+            description="Ranges of the starts of Newton's method.",
+            examples=[{"x": ["-5 mm", "5 mm"]}],
+        ),
+    ),
 )
 PeriodicOrbits = table("periodic_orbits", ["periodic_orbits"], OF_ORBITS, called="Periodic orbits")
 Branches = table("branches", ["branches"], OF_BRANCHES, called="Branches of periodic orbits")

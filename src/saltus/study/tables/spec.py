@@ -18,6 +18,7 @@ from saltus.study.tables.questions import (
     Branches,
     Compare,
     Energy,
+    Equilibria,
     FrequencyResponse,
     Impacts,
     Lyapunov,
@@ -32,7 +33,7 @@ QUESTIONS: dict[str, type[Table]] = {
     "simulate": Simulate, "poincare": Poincare, "spectrum": Spectrum, "impacts": Impacts,
     "energy": Energy, "lyapunov": Lyapunov,
     "frequency_response": FrequencyResponse, "bifurcation_diagram": BifurcationDiagram,
-    "periodic_orbits": PeriodicOrbits, "branches": Branches,
+    "equilibria": Equilibria, "periodic_orbits": PeriodicOrbits, "branches": Branches,
     "bifurcation_curve": BifurcationCurve, "backbone": Backbone,
     "basins": Basins,
 }  # fmt: skip
@@ -55,6 +56,7 @@ class Study(Table):
     lyapunov: one_or_many(Lyapunov) = Field(default_factory=list)  # type: ignore[valid-type]
     frequency_response: one_or_many(FrequencyResponse) = Field(default_factory=list)  # type: ignore[valid-type]
     bifurcation_diagram: one_or_many(BifurcationDiagram) = Field(default_factory=list)  # type: ignore[valid-type]
+    equilibria: one_or_many(Equilibria) = Field(default_factory=list)  # type: ignore[valid-type]
     periodic_orbits: one_or_many(PeriodicOrbits) = Field(default_factory=list)  # type: ignore[valid-type]
     branches: one_or_many(Branches) = Field(default_factory=list)  # type: ignore[valid-type]
     bifurcation_curve: one_or_many(BifurcationCurve) = Field(default_factory=list)  # type: ignore[valid-type]

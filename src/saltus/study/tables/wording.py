@@ -29,7 +29,8 @@ _OF_FORMULAS = {
 }
 _QUESTIONS = (
     "simulate", "poincare", "spectrum", "lyapunov", "frequency_response", "bifurcation_diagram",
-    "periodic_orbits", "branches", "bifurcation_curve", "backbone", "basins", "compare",
+    "equilibria", "periodic_orbits", "branches", "bifurcation_curve", "backbone", "basins",
+    "compare",
 )  # fmt: skip
 _TABLES = {name: f"[{name}]" for name in _QUESTIONS} | {
     "impact_statistics": "[impacts]",

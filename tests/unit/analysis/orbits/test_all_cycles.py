@@ -46,5 +46,5 @@ def test_newtons_method_doesnt_come_back_to_a_deflated_cycle(known):
     map_, cycle = known
     z = around(np.linspace(0, 6, 13), radius=1.05)
     guess = Guess(z[:, :-1].reshape(13, 4, 2), z[:, -1], np.full((13, 2), 2.0), np.arange(13))
-    assert len(close(map_, guess)) == 13
-    assert len(close(map_, guess, _nearest((cycle,), 4))) == 0
+    assert len(close(map_, guess, 2.0)) == 13
+    assert len(close(map_, guess, 2.0, _nearest((cycle,), 4))) == 0
