@@ -14,7 +14,6 @@ from saltus.errors import TraceError
 from saltus.system.expression import Condition, Expr, Friction, Operand, as_expr, select
 from saltus.system.functions import atan, exp, max, min, of_numbers, pi, piecewise, sqrt, tanh
 
-
 #: Added to both of two forces, it changes no ratio but that of 0 to 0, which it makes 1.
 NOTHING = 1e-300
 
