@@ -53,7 +53,7 @@ def check_values(system: System, values: Mapping[str, Any]) -> None:
             (law.restitution, 0.0, 1.0, outside),
             (law.friction, 0.0, np.inf, pushes_on),
             *((level, 0.0, np.inf, drives) for level in law.levels),
-            (law.limit, 1.0, np.inf, sticks_less),
+            (law.limit, 1.0, np.finfo(float).max, sticks_less),
         ):
             if part is None or part.op == "const" or varies(part):
                 continue

@@ -14,9 +14,6 @@ from saltus.errors import TraceError
 from saltus.system.expression import Condition, Expr, Friction, Operand, as_expr, select
 from saltus.system.functions import atan, exp, max, min, of_numbers, pi, piecewise, sqrt, tanh
 
-#: Added to both of two forces, it changes no ratio but that of 0 to 0, which it makes 1.
-NOTHING = 1e-300
-
 
 def _traced(*values: object) -> bool:
     return any(isinstance(value, Expr) for value in values)
@@ -71,7 +68,7 @@ def friction(velocity: Operand, *, slip: Operand, stick: Operand | None = None) 
     if level.op == "const" and level.payload < 0:
         raise TraceError(drives(level.payload))
     if stick is not None:
-        limit, least = (as_expr(stick) + NOTHING) / (level + NOTHING), as_expr(stick) - level
+        limit, least = as_expr(stick) / level, as_expr(stick) - level
         if least.op == "const" and least.payload < 0:
             raise TraceError(sticks_less(as_expr(stick).payload / level.payload))
     return slip * select(Friction(as_expr(velocity), limit, (level,)), 1.0, -1.0)
@@ -86,7 +83,12 @@ def drives(force: float) -> str:
 
 
 def sticks_less(limit: float) -> str:
-    """What to say of a friction force that is smaller at rest than in motion."""
+    """What to say of a friction force that is smaller at rest than in motion, or has no ratio."""
+    if not math.isfinite(limit):
+        return (
+            "slip is 0, and what a contact holds at rest is a multiple of it, stick/slip. Leave "
+            "stick= out where there is no friction, or let slip be greater than 0."
+        )
     return (
         f"stick is {limit:g} times slip: a friction that holds less at rest than in motion has no "
         f"motion at all where it reverses. Let stick be at least slip."
