@@ -153,6 +153,7 @@ def test_friction_that_fades_out_with_a_contact_goes_on(method):
 
 
 @pytest.mark.nojit
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # 0/0, as machine code has it
 @every
 def test_a_force_of_nothing_is_none(method):
     found = run(block.with_values(slip=0.0, fading=0.0), (0.0, 3.0), 0.2, method)
