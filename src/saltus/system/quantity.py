@@ -9,6 +9,7 @@ guard, an integral one more state, and both come with the flow's own precision.
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -358,13 +359,17 @@ def is_remembered(name: str) -> bool:
     return name.endswith(_REMEMBERED)
 
 
+@functools.lru_cache(maxsize=64)
 def remembering(system: System) -> System:
     """The system with more states, the last: its :func:`jumping_states` as they were before the
-    last impact or jump. Where nothing jumps it is the system itself.
+    last impact or jump; the same one each time, and copies of it for copies with other values.
+    Where nothing jumps it is the system itself.
     """
     names, size = jumping_states(system), len(system.states)
     if not names:
         return system
+    if system.origin is not system:
+        return remembering(system.origin).with_values(**system.values)
     new = {f"{name}{_REMEMBERED}": name for name in names}
     extended = with_states(
         system,

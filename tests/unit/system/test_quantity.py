@@ -9,6 +9,7 @@ from saltus.errors import ParameterError, TraceError, UnitError
 from saltus.system.expression import Bit, Not
 from saltus.system.quantity import (
     quantity,
+    remembering,
     turning_surface,
     with_integrals,
     with_level,
@@ -161,6 +162,15 @@ def test_what_is_no_surface_is_refused(make, error, words):
 
 
 # -- integrals -------------------------------------------------------------------------------------
+def test_a_system_that_remembers_is_one_for_all_values():
+    """So that no call of :func:`saltus.simulate` prints and loads its flow again."""
+    ball = sl.models.bouncing_ball()
+    once, other = remembering(ball), remembering(ball.with_values(restitution=0.7))
+    assert remembering(ball) is once
+    assert other.origin is once.origin
+    assert other.values == {**ball.values, "restitution": 0.7}
+
+
 def test_integrals_are_the_last_states():
     system = with_integrals(
         rig, {"work": lambda v, force: force * v, "path": lambda v: abs(v)}, {"work": "J"}
